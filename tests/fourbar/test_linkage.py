@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import Bar, InputError
+from fourbar import Bar, InputError, solve, vary
 from fourbar.files.scene_file import loads
 from fourbar_validation.engines.protocol import scene_to_json
 
@@ -96,15 +96,15 @@ density = "7850 kg/m^3"
 def test_the_mass_follows_length_and_cross_section_in_a_study():
     scene = make_scene()
     varied = {"lengths.coupler": [1.0, 1.1], "bars.input.diameter": ["20 mm", "30 mm"]}
-    study = fourbar.solve(fourbar.vary(scene, varied))
+    study = solve(vary(scene, varied))
     coupler = Bar(1.1, density=STEEL, diameter=0.02)
     input_bar = Bar(0.4, density=STEEL, diameter=0.03)
     linkage = replace(scene.linkage, input=input_bar, coupler=coupler)
-    alone = fourbar.solve(replace(scene, linkage=linkage))
+    alone = solve(replace(scene, linkage=linkage))
     for name in ("torque", "F12", "F43"):
         members = getattr(study, name)
         assert np.array_equal(members[1], getattr(alone, name))
-        assert np.array_equal(members[0], getattr(fourbar.solve(scene), name))
+        assert np.array_equal(members[0], getattr(solve(scene), name))
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key, stated):
     row = list(derived.keys).index(key)
     nominal = derived.numbers[row]
     beside = [nominal * (1.0 - step), nominal * (1.0 + step)]
-    low, high = fourbar.solve(fourbar.vary(scene, {key: beside})).torque
+    low, high = solve(vary(scene, {key: beside})).torque
     quotient = (high - low) / (2.0 * step * nominal)
     assert derived.by["torque"][row] == pytest.approx(quotient, rel=CLOSE)
 

@@ -7,9 +7,10 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import fourbar
-from fourbar import Point
+from fourbar import Point, solve
 from fourbar.errors import InputError
 from fourbar.solution import unwrap
 from tests.support.scenes import crank_rocker
@@ -20,7 +21,7 @@ def pointed():
 
 
 def test_a_quantity_is_found_by_its_name():
-    solution = fourbar.solve(pointed())
+    solution = solve(pointed())
     assert solution["torque"] is solution.torque
     assert solution["F12"] is solution.F12
     assert solution["P"] is solution.points["P"]
@@ -28,7 +29,7 @@ def test_a_quantity_is_found_by_its_name():
     for name in ("tork", 0, "F12_x"):
         with pytest.raises(InputError, match="must be among theta_2, "):
             solution[name]
-    positions = fourbar.solve(crank_rocker(), "position")
+    positions = solve(crank_rocker(), "position")
     with pytest.raises(InputError, match="'torque': was not evaluated"):
         positions["torque"]
     with pytest.raises(TypeError, match="not iterable"):
@@ -38,14 +39,14 @@ def test_a_quantity_is_found_by_its_name():
 def test_a_scene_without_a_title_leaves_no_empty_quotes():
     scene = crank_rocker()
     named, unnamed = (
-        repr(fourbar.solve(replace(scene, title=title))) for title in ("press", "")
+        repr(solve(replace(scene, title=title))) for title in ("press", "")
     )
     assert named.startswith("Solution 'press': ")
     assert unnamed.startswith("Solution: ")
 
 
 def test_a_solution_is_frozen():
-    solution = fourbar.solve(crank_rocker())
+    solution = solve(crank_rocker())
     for name in ("torque", "scene", "title"):
         with pytest.raises(FrozenInstanceError):
             setattr(solution, name, None)
@@ -53,7 +54,7 @@ def test_a_solution_is_frozen():
 
 def test_solutions_are_equal_bit_by_bit():
     scene = pointed()
-    solution, again = fourbar.solve(scene), fourbar.solve(scene)
+    solution, again = solve(scene), solve(scene)
     assert solution == again
     assert solution != "a solution"
     again.torque[3] = np.nextafter(again.torque[3], np.inf)
@@ -62,12 +63,12 @@ def test_solutions_are_equal_bit_by_bit():
     assert solution == again
     again.points["P"][0, 0] += 1e-15
     assert solution != again
-    assert fourbar.solve(scene, "velocity") != fourbar.solve(scene)
+    assert solve(scene, "velocity") != solve(scene)
 
 
 def test_a_data_frame_names_the_unit_of_each_column():
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
-    table = fourbar.solve(pointed()).to_pandas()
+    table = solve(pointed()).to_pandas()
     units = table.attrs["units"]
     assert set(units) == set(table.columns) - {"status", "branch", "drive_bar"}
     wanted = {
@@ -76,7 +77,7 @@ def test_a_data_frame_names_the_unit_of_each_column():
         **{"omega_3": "rad/s", "power": "W"},
     }
     assert {name: units[name] for name in wanted} == wanted
-    inches = fourbar.solve(pointed()).to_pandas(fourbar.units("imperial")).attrs
+    inches = solve(pointed()).to_pandas(fourbar.units("imperial")).attrs
     assert inches["units"]["torque [lbf in]"] == "lbf in"
     assert inches["units"]["P_x [in]"] == "in"
 
@@ -87,4 +88,4 @@ def test_angles_of_several_turns_are_continuous_across_gaps(missing):
     sweep[:, missing] = np.nan
     wrapped = np.angle(np.exp(1j * sweep))
     unwrap(wrapped)
-    np.testing.assert_allclose(wrapped, sweep, atol=1e-14)
+    assert_allclose(wrapped, sweep, atol=1e-14)

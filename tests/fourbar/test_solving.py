@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fourbar
+from fourbar import Bar, FourBar, uniform
 from fourbar.cli import status
 from fourbar.effects import (
     Friction,
@@ -114,10 +115,8 @@ def linkages(draw):
             mass * scale * length * scale * length
         ):
             inertia = 0.0
-        bars.append(fourbar.Bar(scale * length, mass, inertia, draw(st.none() | pairs)))
-    return fourbar.FourBar(
-        scale * lengths[0], *bars, draw(st.just(0.0) | st.floats(-7.0, 7.0))
-    )
+        bars.append(Bar(scale * length, mass, inertia, draw(st.none() | pairs)))
+    return FourBar(scale * lengths[0], *bars, draw(st.just(0.0) | st.floats(-7.0, 7.0)))
 
 
 @st.composite
@@ -191,9 +190,9 @@ def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene, stag
     assert infinite == [], "no value is NaN, never infinite"
 
 
-PARALLELOGRAM = fourbar.uniform(1.0, 0.5, 1.0, 0.5)
-KITE = fourbar.uniform(1.0, 0.5, 0.5, 1.0)
-CRANK_ROCKER = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+PARALLELOGRAM = uniform(1.0, 0.5, 1.0, 0.5)
+KITE = uniform(1.0, 0.5, 0.5, 1.0)
+CRANK_ROCKER = uniform(0.3, 0.1, 0.25, 0.22)
 
 
 @pytest.mark.parametrize(
@@ -230,8 +229,8 @@ def test_on_a_change_point_the_pin_forces_alone_have_no_value():
 
 
 def heavy(mass):
-    bars = fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, mass, 1.0), fourbar.Bar(2.2, 1.0)
-    return fourbar.FourBar(3.0, *bars)
+    bars = Bar(1.0, 1.0), Bar(2.5, mass, 1.0), Bar(2.2, 1.0)
+    return FourBar(3.0, *bars)
 
 
 def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on():
@@ -244,7 +243,7 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on():
     assert solved(scene, "acceleration").status == ["ok"] * 5
     at_rest = replace(scene, motion=Motion(angles, 0.0))
     assert solved(at_rest).status == ["ok"] * 5
-    long = fourbar.uniform(30.0, 10.0, 25.0, 22.0)
+    long = uniform(30.0, 10.0, 25.0, 22.0)
     fast = solved(Scene(long, Motion(np.array([0.3]), 1e154)))
     assert fast.status == ["overflow"] and fast.omega_2 == [1e154]
     assert finite(fast, "omega_4") and lost(fast, "alpha_3", "a_A", "torque")
@@ -268,8 +267,8 @@ def test_a_speed_whose_square_is_no_number_is_refused_in_one_line(omega):
 
 def test_lengths_and_sweeps_beyond_the_range_of_doubles_are_refused():
     with pytest.raises(InputError, match="lengths = "):
-        fourbar.FourBar(1e308, *[fourbar.Bar(1e308, inertia=0.0)] * 3)
-    large = fourbar.FourBar(4e307, *[fourbar.Bar(4e307)] * 3)
+        FourBar(1e308, *[Bar(1e308, inertia=0.0)] * 3)
+    large = FourBar(4e307, *[Bar(4e307)] * 3)
     assert solved(Scene(large, Motion(1.0, 1e-200))).status == ["ok"]
     with pytest.raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
         Sweep(-1e308, 1e308, 3)
@@ -287,7 +286,7 @@ def test_an_angle_that_is_no_number_is_not_reported_as_not_closing():
 
 
 def test_what_is_beyond_the_range_of_doubles_is_nan_also_where_the_loop_is_open():
-    rocker = fourbar.uniform(40.0, 25.0, 25.0, 28.0)
+    rocker = uniform(40.0, 25.0, 25.0, 28.0)
     solution = solved(Scene(rocker, Motion(np.array([2.5]), 1.0, 1e308)))
     assert solution.status == ["not_assembled"] and np.isnan(solution.a_A).all()
 
@@ -382,33 +381,31 @@ def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path):
 @pytest.mark.parametrize("theta_2", [0.4, 2.0, 5.1])
 def test_a_payload_is_part_of_its_bar_by_the_sums_of_the_page(theta_2):
     """The same as a load m_p (g - a_P) at its centre with the couple -I_p alpha_4."""
-    motion = fourbar.Motion(theta_2, 10.0, 5.0)
-    scene = crank_rocker(motion=motion, loads=(fourbar.Load(3, moment=-0.2),))
+    motion = Motion(theta_2, 10.0, 5.0)
+    scene = crank_rocker(motion=motion, loads=(Load(3, moment=-0.2),))
     output = scene.linkage.output
     mass, inertia, place = 0.8, 0.003, complex(0.15, 0.06)
     m, centre = output.mass, output.to_centre
     of_both = (m * centre + mass * place) / (m + mass)
     around = m * abs(centre - of_both) ** 2 + mass * abs(place - of_both) ** 2
-    carrying = fourbar.Bar(
+    carrying = Bar(
         output.length,
         m + mass,
         output.moment_of_inertia + inertia + around,
         (abs(of_both), cmath.phase(of_both)),
     )
     point = fourbar.Point("P", 4, (abs(place), cmath.phase(place)))
-    unloaded = fourbar.solve(replace(scene, points=(point,)))
+    unloaded = solve(replace(scene, points=(point,)))
     a_P = complex(*unloaded.acceleration["P"][0])
     force = mass * (complex(0.0, -9.81) - a_P)
-    load = fourbar.Load(
+    load = Load(
         4,
         (abs(force), cmath.phase(force)),
         from_pin=point.from_pin,
         moment=-inertia * float(unloaded.alpha_4[0]),
     )
-    loaded = fourbar.solve(replace(scene, loads=(*scene.loads, load)))
-    whole = fourbar.solve(
-        replace(scene, linkage=replace(scene.linkage, output=carrying))
-    )
+    loaded = solve(replace(scene, loads=(*scene.loads, load)))
+    whole = solve(replace(scene, linkage=replace(scene.linkage, output=carrying)))
     assert whole.torque == pytest.approx(loaded.torque, rel=1e-12)
     for name in ("F12", "F32", "F43", "F14"):
         assert getattr(whole, name) == pytest.approx(getattr(loaded, name), rel=1e-12)
@@ -416,10 +413,10 @@ def test_a_payload_is_part_of_its_bar_by_the_sums_of_the_page(theta_2):
 
 def test_friction_beyond_the_range_of_doubles_is_no_crash():
     """On a change point of bars of 1e-41 m the slope of the friction at A overflows."""
-    bar = fourbar.Bar(1e-41, mass=1.0)
-    linkage = fourbar.FourBar(1e-41, bar, bar, bar)
-    friction = fourbar.PinFriction.at(O2=(1.0, 1.0), A=(1.0, 1e168))
-    motion = fourbar.Motion(0.0, 1.0, 1.0)
-    solution = solve(fourbar.Scene(linkage, motion, effects=(friction,)))
+    bar = Bar(1e-41, mass=1.0)
+    linkage = FourBar(1e-41, bar, bar, bar)
+    friction = PinFriction.at(O2=(1.0, 1.0), A=(1.0, 1e168))
+    motion = Motion(0.0, 1.0, 1.0)
+    solution = solve(Scene(linkage, motion, effects=(friction,)))
     assert solution.status == ["change_point"]
     assert np.isnan(solution.torque).all()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Gravity, Load, solve
 from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -21,11 +22,11 @@ the drive condition: 2.8e-12.
 """
 FORCES = ("F12", "F32", "F43", "F14")
 LOADS = (
-    fourbar.Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
-    fourbar.Load(3, (2.0, -1.4), from_centre=(0.1, 0.3), frame="bar", moment=-0.2),
-    fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
+    Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
+    Load(3, (2.0, -1.4), from_centre=(0.1, 0.3), frame="bar", moment=-0.2),
+    Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
 )
-DAMPED = (fourbar.Gravity(9.81, -1.2), fourbar.Viscous.at(O2=0.1, A=0.2, B=0.3))
+DAMPED = (Gravity(9.81, -1.2), fourbar.Viscous.at(O2=0.1, A=0.2, B=0.3))
 SCENES = {
     **{
         f"drive on bar {bar}": crank_rocker(loads=LOADS, effects=DAMPED, drive_bar=bar)
@@ -72,11 +73,11 @@ def in_units(
         )
     )
     loads = (
-        fourbar.Load(3, (2.0 * force, -1.4), from_pin=(0.1 * length, 0.3), frame="bar"),
-        fourbar.Load(4, (3.0 * force, 0.7), arm=(0.05 * length, 1.0)),
-        fourbar.Load(2, moment=-0.2 * couple),
+        Load(3, (2.0 * force, -1.4), from_pin=(0.1 * length, 0.3), frame="bar"),
+        Load(4, (3.0 * force, 0.7), arm=(0.05 * length, 1.0)),
+        Load(2, moment=-0.2 * couple),
     )
-    weight = fourbar.Gravity(9.81 * length / time**2, -1.2)
+    weight = Gravity(9.81 * length / time**2, -1.2)
     motion = fourbar.Motion(
         np.linspace(0.1, 6.0, 24), speed / time, acceleration / time**2, branch=branch
     )
@@ -105,8 +106,8 @@ SCALED = {
 @pytest.mark.parametrize("name", SCALED)
 def test_forces_scale_with_the_units(name, branch):
     first, second, ratio = SCALED[name]
-    ours = fourbar.solve(in_units(branch=branch, **first))
-    theirs = fourbar.solve(in_units(branch=branch, **second))
+    ours = solve(in_units(branch=branch, **first))
+    theirs = solve(in_units(branch=branch, **second))
     good = ours.drive_condition > LEAST_CONDITION
     assert good.sum() > 10
     lever = ratio * second.get("length", 1.0)

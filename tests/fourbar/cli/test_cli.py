@@ -13,12 +13,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
+from math import acos, degrees, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, solve
 from fourbar.cli import group, status
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.evaluation.case import Case
@@ -81,7 +83,7 @@ def read_csv(ended):
 def test_json_and_csv_have_every_key_and_every_digit(name, run):
     file = MODELS / f"{name}.toml"
     document = strict(run("analyze", file, "--json"))
-    solution = fourbar.solve(load(file))
+    solution = solve(load(file))
     rows = read_csv(run("analyze", file, "--csv", "--units", "SI"))
     assert set(CONTRACT) <= set(document)
     for quantity in solution.evaluated():
@@ -101,7 +103,7 @@ def test_json_and_csv_have_every_key_and_every_digit(name, run):
 
 
 def test_null_where_there_is_no_value(run):
-    sweep = fourbar.Motion(np.radians([10.0, 135.0]), 0.2244)
+    sweep = Motion(np.radians([10.0, 135.0]), 0.2244)
     save(crank_rocker(linkage=thesis().linkage, motion=sweep), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert document["status"] == ["not_assembled", "ok"]
@@ -113,7 +115,7 @@ def test_null_where_there_is_no_value(run):
 
 
 def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
-    save(crank_rocker(motion=fourbar.Motion(1.0)), "scene.toml")
+    save(crank_rocker(motion=Motion(1.0)), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert set(CONTRACT) <= set(document) and np.shape(document["theta_3"]) == (1,)
     assert document["torque"] is document["F12"] is document["omega_2"] is None
@@ -125,7 +127,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
 
 @pytest.mark.slow
 def test_a_free_motion_has_time_and_no_drive(run):
-    released = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
+    released = Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
     save(crank_rocker(motion=released), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
@@ -166,7 +168,7 @@ def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     code, out, err = run(command, *asked)
     assert (code, err) == (0, "") and "1 kg/m" in out
     made = import_module("fourbar.mjcf").make_scene(
-        0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi
+        0.3, 0.1, 0.25, 0.22, omega=2.0 * pi
     )
     write = getattr(import_module("fourbar.mjcf.assembly"), f"write_{command}")
     assert target.read_text(encoding="utf-8") == write(made)
@@ -180,7 +182,7 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(run):
     from fourbar.mjcf import list_defaults, make_scene
     from fourbar.mjcf.document import write_mjcf_for
 
-    made = make_scene(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
+    made = make_scene(0.3, 0.1, 0.25, 0.22, omega=2.0 * pi)
     lengths = ("--lengths", 0.3, "10 cm", "250 mm", 0.22, "--omega", "60 rpm")
     told = "".join(f"{line}\n" for line in list_defaults(made))
     motor = write_mjcf_for(load(THESIS), drive="motor")
@@ -272,11 +274,11 @@ def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing(w
 
 
 def print_positions(scene, width):
-    return tables.print_positions(fourbar.solve(scene), width)
+    return tables.print_positions(solve(scene), width)
 
 
 def test_the_digits_of_the_torque():
-    solution = fourbar.solve(crank_rocker(), "error")
+    solution = solve(crank_rocker(), "error")
     columns = tables.list_columns(solution)
     (cells,) = (columns[name] for name in columns if "digits" in name)
     for cell, torque, error in zip(
@@ -330,7 +332,7 @@ def test_classify_says_what_turns_and_how_far(run):
 
     def angle(opposite, first, second):
         cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
-        return math.degrees(math.acos(cosine))
+        return degrees(acos(cosine))
 
     d, a, b, c = map(float, LENGTHS)
     lines = run("classify", *LENGTHS)[1].splitlines()
@@ -723,7 +725,7 @@ def test_an_output_angle_out_of_range_is_refused_with_the_range(run):
     """The crank is in line with the coupler: sides 5, 4.5 and 2 or 6."""
     Path("scene.toml").write_text(INCHES)
     cosines = ((5**2 + 4.5**2 - side**2) / (2 * 5 * 4.5) for side in (2, 6))
-    high, low = (180.0 - math.degrees(math.acos(cosine)) for cosine in cosines)
+    high, low = (180.0 - degrees(acos(cosine)) for cosine in cosines)
     said = f"theta_4 goes from {low:.4g} deg to {high:.4g} deg"
     refuses(run("analyze", "scene.toml", "--at", "theta_4=200 deg"), said)
 
@@ -731,7 +733,7 @@ def test_an_output_angle_out_of_range_is_refused_with_the_range(run):
 def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
     """The limit is that of the sides 5, 4.5 and 6; 0.1 s at 10 rad/s are 1 rad."""
     Path("scene.toml").write_text(INCHES)
-    limit = 180.0 - math.degrees(math.acos((5**2 + 4.5**2 - 2**2) / (2 * 5 * 4.5)))
+    limit = 180.0 - degrees(acos((5**2 + 4.5**2 - 2**2) / (2 * 5 * 4.5)))
     _, out, _ = run("analyze", "scene.toml", "--at", "theta_4=max")
     assert re.search(rf"bar 4 +{limit:.4f} ", out)
     _, out, _ = run("analyze", CRANK_ROCKER, "--at", "t=0.1 s")
@@ -756,9 +758,9 @@ def test_points_in_the_table_have_the_coordinates_of_the_drawing(run):
 def test_a_linkage_moves_as_the_bar_of_another_does(run):
     """By two commands the torque is that of the motion stated as three arrays."""
     second = MODELS / "drag_link.toml"
-    moved = fourbar.solve(load(CRANK_ROCKER))
-    motion = fourbar.Motion(moved.theta_4 - 0.7, moved.omega_4, moved.alpha_4)
-    expected = fourbar.solve(replace(load(second), motion=motion))
+    moved = solve(load(CRANK_ROCKER))
+    motion = Motion(moved.theta_4 - 0.7, moved.omega_4, moved.alpha_4)
+    expected = solve(replace(load(second), motion=motion))
     positions = f"{CRANK_ROCKER}:theta_4-0.7 rad"
     document = strict(run("analyze", second, "--positions", positions, "--json"))
     assert document["torque"] == expected.torque.tolist()
@@ -768,11 +770,11 @@ def test_a_linkage_moves_as_the_bar_of_another_does(run):
 def test_one_position_has_the_angles_that_the_sweep_has_there(run):
     """Beyond half a turn of the output of a drag-link, and whatever else is asked."""
     scene, rows = MODELS / "drag_link.toml", [120, 10, 300]
-    sweep = fourbar.solve(load(scene))
+    sweep = solve(load(scene))
     at = [f"--at={theta!r} rad" for theta in sweep.theta_2[rows].tolist()]
     table = strict(run("analyze", scene, "--json", *at))
     for name in ("theta_3", "theta_4"):
         assert table[name] == pytest.approx(getattr(sweep, name)[rows]), name
     block = run("analyze", scene, at[2])[1]
     assert f"{math.degrees(sweep.theta_4[300]):.4f}" in block
-    assert abs(sweep.theta_4[300]) > math.pi
+    assert abs(sweep.theta_4[300]) > pi

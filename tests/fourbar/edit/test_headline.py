@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import solve
 from fourbar.show.block import write_block
 from fourbar.show.units import COMMON
 
@@ -32,7 +33,7 @@ LAST_DIGIT = 5e-4
 def load_coarse(name):
     """Load a scene with a tenth of its positions, between which its peaks lie."""
     scene = fourbar.load(MODELS / f"{name}.toml")
-    steps = max(len(fourbar.solve(scene, "position")) // 10, 12)
+    steps = max(len(solve(scene, "position")) // 10, 12)
     coarse = replace(scene.motion.angle, steps=steps)
     return replace(scene, motion=scene.motion.replace(angle=coarse))
 
@@ -43,7 +44,7 @@ def load_coarse(name):
 )
 def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
-    block = " ".join(write_block(scene, fourbar.solve(scene), COMMON))
+    block = " ".join(write_block(scene, solve(scene), COMMON))
     headline = evaluate_scene(scene, COMMON, settled=True)["headline"]
     drive, pins, _ = headline.split("; ")
     peak = re.sub(r"^peak (torque|drive force) ", "", drive)
@@ -55,7 +56,7 @@ def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
 @pytest.mark.parametrize("name", BOUNDED)
 def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(name):
     scene = load_coarse(name)
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     headline = evaluate_scene(scene, COMMON)["headline"]
     drive, pins, angle = headline.split("; ")
     assert re.match(r"peak (torque|drive force) at least \d", drive)

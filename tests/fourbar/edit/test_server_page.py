@@ -9,12 +9,15 @@ import shutil
 import subprocess
 import sys
 import time
+from math import hypot
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
+from fourbar import load, solve
 
 pytest.importorskip(
     "selenium",
@@ -269,7 +272,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(page, path):
     assert page.value("plain") == steps
     assert page.driver.find_element("tag name", "h1").text.startswith("<b>")
     page.save()
-    solution = fourbar.solve(loads(path.read_text(), str(path)), "error")
+    solution = solve(loads(path.read_text(), str(path)), "error")
     for row in (0, 90, 217):
         page.run(f"go({row})")
         shown = [
@@ -278,7 +281,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(page, path):
         expected = [solution.torque[row], solution.F12[row, 0], solution.alpha_4[row]]
         assert [float(text) for text in shown] == pytest.approx(expected, rel=PRINTED)
     held = json.loads(page.value("JSON.stringify(table().torque)"))
-    np.testing.assert_array_equal(held, solution.torque)
+    assert_array_equal(held, solution.torque)
     cells = page.all("#positions tbody tr:nth-child(4) td")
     cells[2].click()
     assert page.value("row") == 30
@@ -360,10 +363,10 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, 
         page.type("pin-xy", place + Keys.ENTER)
     page.wait("!sketch && Math.abs(data.lengths[1] - 0.125) < 1e-6")
     expected = [
-        math.hypot(1.25, 0.25),
+        hypot(1.25, 0.25),
         0.125,
-        math.hypot(1.5, 0.375),
-        math.hypot(0.25, 0.75),
+        hypot(1.5, 0.375),
+        hypot(0.25, 0.75),
     ]
     assert page.value("data.lengths") == pytest.approx(
         expected,
@@ -400,10 +403,10 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(page, path
     page.wait_for_text("summary", "bore     at least")
     summary = page.text("summary")
     page.save()
-    scene = fourbar.load(path)
+    scene = load(path)
     assert scene.drive is not None and scene.effects and scene.motion.stroke is not None
     assert 'from_pin = {x = "300 mm", y = "-250 mm"}' in path.read_text()
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     stroke = page.value("data.over.values[17]")
     assert force == pytest.approx(
         solution.drive_force[np.abs(solution.stroke - stroke).argmin()],
@@ -496,7 +499,7 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(page, path):
     assert page.value("data.lengths") == lengths
     with_control("s")
     page.wait(SAVED)
-    assert fourbar.load(path).linkage.coupler.mass == 2.01
+    assert load(path).linkage.coupler.mass == 2.01
 
 
 @pytest.mark.slow
@@ -774,7 +777,7 @@ def test_a_photo_is_traced_to_a_scene(page, path):
         )
         assert off < PIXELS, pin
     page.save()
-    scene = fourbar.load(path)
+    scene = load(path)
     assert scene.picture.name == "mine.jpg"
 
 
@@ -825,12 +828,12 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(page, path):
 
     before = find_dead_centres()
     pixel = 1.0 / page.value("view.k")
-    np.testing.assert_allclose(sorted(list_marks(".mark")), before, atol=pixel)
+    assert_allclose(sorted(list_marks(".mark")), before, atol=pixel)
     page.type("field:lengths/output", "235 mm")
     page.wait("data.lengths[3] === 0.235 && !inFlight && !waiting.length")
     kept, shown = list_marks(".mark.behind"), list_marks(".mark:not(.behind)")
-    np.testing.assert_allclose(sorted(kept), before, atol=pixel)
-    np.testing.assert_allclose(sorted(shown), find_dead_centres(), atol=pixel)
+    assert_allclose(sorted(kept), before, atol=pixel)
+    assert_allclose(sorted(shown), find_dead_centres(), atol=pixel)
 
 
 @pytest.mark.slow

@@ -15,8 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import fourbar
+from fourbar import InputError, solve
 from fourbar.files import loads
 from fourbar.files.scene_text import write_new_scene
 from fourbar.quantities.units import find_unit
@@ -233,7 +235,7 @@ def solve_at(scene, angle, stage="error"):
     """Solve one position of the commanded bar."""
     command = fourbar.command(scene)
     one = command._replace(angle=np.array([angle]), branch=command.branch[:1])
-    return fourbar.solve(scene, stage, at=one)
+    return solve(scene, stage, at=one)
 
 
 AT_50_DEG = math.radians(50.0)
@@ -370,9 +372,9 @@ BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
 def test_another_command_goes_over_the_same_motion(tmp_path, command):
     session = start(tmp_path, BUCKET)
-    before = fourbar.solve(session.now.scene)
+    before = solve(session.now.scene)
     accepted(ask(session, "command", command=command))
-    after = fourbar.solve(session.now.scene)
+    after = solve(session.now.scene)
     assert after.assembled.all() and np.isfinite(after.drive_force).all()
     values, places = getattr(before, command), getattr(after, command)
     close = 3e-3 * np.ptp(values)
@@ -404,7 +406,7 @@ def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(tmp_path):
     assert re.fullmatch(words, refused), refused
     far = session.now.scene.motion.replace(angle=7.0)
     state = session.now._replace(scene=replace(session.now.scene, motion=far))
-    with pytest.raises(fourbar.InputError, match=r"stroke = 7000 mm: .* mm$"):
+    with pytest.raises(InputError, match=r"stroke = 7000 mm: .* mm$"):
         state.evaluate(session.now.units, settled=True)
 
 
@@ -446,7 +448,7 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(new, side):
     s = solve_at(new.now.scene, np.angle(A), "position")
     stands = [complex(*s.A[0]), complex(*s.B[0]), on_bar(s, 4, 0.0)]
     assert stands == pytest.approx([A, B, O4], abs=1e-6)
-    assert fourbar.solve(new.now.scene).assembled.any()
+    assert solve(new.now.scene).assembled.any()
     before = new.now.plain["pins"]
     to = INCH * (0.5 + 0.25j)
     drag(new, "O2", to, grain=1e-6, theta_2=float(np.angle(A)))
@@ -533,10 +535,10 @@ def settled(session):
 def test_the_answer_is_what_analyze_says(session):
     put(session, "bars/coupler/mass", "2 lb")
     told = unpacked(pack_frame(settled(session)))
-    s = fourbar.solve(loads(session.now.text), "error")
+    s = solve(loads(session.now.text), "error")
     columns = told["data"]["branches"]["1"]
     for name in ("theta_3", "torque", "torque_error", "power", "F12", "F43", "omega_4"):
-        np.testing.assert_array_equal(columns[name], getattr(s, name))
+        assert_array_equal(columns[name], getattr(s, name))
     summary = "\n".join(told["data"]["summary"])
     assert "\n  torque" in summary and "rank-rocker" in summary
     ask(session, "units", units="imperial")
@@ -561,7 +563,7 @@ def test_an_answer_takes_ten_bare_solves_at_most(session):
     for turn in range(5):
         start = time.process_time()
         for _ in range(BARE_A_READING):
-            fourbar.solve(session.now.scene)
+            solve(session.now.scene)
         middle = time.process_time()
         for number in range(ANSWERS_A_READING):
             request = {
@@ -645,7 +647,7 @@ def test_a_damaged_state_file_is_one_line(session, name):
     assert replaced
     session.state_file.write_text(damaged)
     words = r"cannot be read as a state of the workbench .* remove it"
-    with pytest.raises(fourbar.InputError, match=words) as caught:
+    with pytest.raises(InputError, match=words) as caught:
         Session(session.path, session.exports.folder)
     said = str(caught.value)
     assert "\n" not in said and str(session.state_file) in said
@@ -723,7 +725,7 @@ def test_another_command_goes_over_the_position_that_is_shown(session, shown):
     The page shows one of the stretches.
     """
     accepted(ask(session, "command", command="theta_4", theta_2=shown))
-    covered = fourbar.solve(session.now.scene, "position").theta_2
+    covered = solve(session.now.scene, "position").theta_2
     assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from math import pi, tau
 
 import numpy as np
 import pytest
@@ -220,8 +221,8 @@ def test_pin_load_friction_needs_the_pin_forces():
 
 
 def test_a_table_is_linear_between_its_points_and_periodic():
-    table = Table((1.0, 2.0, 1.0 + math.tau), (0.0, 4.0, 0.0))
-    angles = np.array([1.0, 1.25, 2.0, 1.5 - math.tau, 1.25 + 3 * math.tau])
+    table = Table((1.0, 2.0, 1.0 + tau), (0.0, 4.0, 0.0))
+    angles = np.array([1.0, 1.25, 2.0, 1.5 - tau, 1.25 + 3 * tau])
     right = [0.0, 1.0, 4.0, 2.0, 1.0]
     assert table.at(angles) == pytest.approx(right, abs=1e-14)
     looked_up = [look_up(table, angle) for angle in angles.tolist()]
@@ -234,8 +235,8 @@ def test_a_table_is_linear_between_its_points_and_periodic():
 
 def test_a_load_over_theta_2_is_the_load_times_its_factor():
     load = Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2)
-    table = Table((0.0, math.pi, math.tau), (1.0, 3.0, 1.0))
-    base = alone(theta_2=[math.pi / 2])
+    table = Table((0.0, pi, tau), (1.0, 3.0, 1.0))
+    base = alone(theta_2=[pi / 2])
     tabled = replace(base, loads=(replace(load, table=table),))
     twice = replace(base, loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
     assert solve(tabled).torque == pytest.approx(solve(twice).torque, rel=1e-14)
@@ -250,11 +251,11 @@ def test_breaks_change_their_sign_where_forces_jump_or_bend():
     d, a, b, c = lengths
     places["O4"] = [
         turned + math.acos((r * r + d * d - c * c) / (2.0 * r * d))
-        for r, turned in ((b + a, 0.0), (b - a, math.pi))
+        for r, turned in ((b + a, 0.0), (b - a, pi))
     ]
     friction = Friction.at(O4=0.1)
     scene = Scene(fourbar.uniform(*lengths), loads=(load,), effects=(friction,))
-    angles = np.linspace(0.0, 2.0 * math.tau, 1009)
+    angles = np.linspace(0.0, 2.0 * tau, 1009)
     branch = np.ones(len(angles), dtype=np.int8)
     for speed in (3.0, -3.0):
         state = compute_shown_state(scene, Command(angles, branch, speed, 0.0))
@@ -262,7 +263,7 @@ def test_breaks_change_their_sign_where_forces_jump_or_bend():
         assert breaks.keys() == places.keys()
         for name, values in breaks.items():
             crossed = np.flatnonzero(values[1:] * values[:-1] < 0.0)
-            right = np.add.outer(places[name], [0.0, math.tau]).ravel()
+            right = np.add.outer(places[name], [0.0, tau]).ravel()
             assert [*crossed] == sorted(np.searchsorted(angles, right) - 1), name
 
 

@@ -9,8 +9,10 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
+from fourbar import InputError, LinearDrive, Motion, Scene, solve, uniform
 from fourbar.effects import Place
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
@@ -40,9 +42,7 @@ KITE = (0.2, 0.3, 0.24, 0.33)
 
 
 def ends(start_bar, end_bar):
-    return fourbar.LinearDrive(
-        Place(start_bar, (0.17, -1.1)), Place(end_bar, (0.09, 0.7))
-    )
+    return LinearDrive(Place(start_bar, (0.17, -1.1)), Place(end_bar, (0.09, 0.7)))
 
 
 def driven(start_bar, end_bar, **changes):
@@ -64,9 +64,9 @@ def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars
     for branch in (1, -1):
         scene = replace(
             scene,
-            motion=fourbar.Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch),
+            motion=Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch),
         )
-        s = fourbar.solve(scene, "error")
+        s = solve(scene, "error")
         ok = s.status_code == 0
         assert ok.sum() >= 3 and set(s.status) <= {"ok", "not_assembled"}
         exact = compare_with_balls(scene, s, ok)
@@ -101,15 +101,15 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar, end_bar
 ):
     """At rest forces grow without end only for a line to bar 2, without lever there."""
-    link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
-    near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
-    scene = fourbar.Scene(
+    link = uniform(0.2, 0.48, 0.55, 0.2)
+    near = Motion(fourbar.FromLimit(1, 1e-10), 0.0)
+    scene = Scene(
         link,
         near,
         effects=(fourbar.Gravity(),),
         drive=ends(start_bar, end_bar),
     )
-    s = fourbar.solve(scene, "error")
+    s = solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
     compare_with_balls(scene, s, s.status_code == 0)
     if (start_bar, end_bar) != (1, 2):
@@ -122,8 +122,8 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
 
 @pytest.mark.parametrize("bar, pin", [(2, "F12"), (4, "F14")])
 def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(bar, pin):
-    torque = fourbar.solve(crank_rocker(drive_bar=bar))
-    s = fourbar.solve(driven(1, bar))
+    torque = solve(crank_rocker(drive_bar=bar))
+    s = solve(driven(1, bar))
     angle = getattr(s, f"theta_{bar}") + 0.7
     arm = 0.09 * np.column_stack((np.cos(angle), np.sin(angle)))
     lever = arm[:, 0] * s.drive_line[:, 1] - arm[:, 1] * s.drive_line[:, 0]
@@ -135,10 +135,10 @@ def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(bar, pin):
 
 @pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_its_line_has_no_sense(start_bar, end_bar):
-    s = fourbar.solve(driven(start_bar, end_bar))
-    back = fourbar.solve(
+    s = solve(driven(start_bar, end_bar))
+    back = solve(
         crank_rocker(
-            drive=fourbar.LinearDrive(
+            drive=LinearDrive(
                 ends(start_bar, end_bar).end, ends(start_bar, end_bar).start
             )
         )
@@ -151,15 +151,15 @@ def test_its_line_has_no_sense(start_bar, end_bar):
         "F12",
         "F43",
     ):
-        np.testing.assert_allclose(
+        assert_allclose(
             getattr(back, name),
             getattr(s, name),
             rtol=1e-12,
             atol=1e-12,
         )
-    np.testing.assert_array_equal(back.drive_line, -s.drive_line)
+    assert_array_equal(back.drive_line, -s.drive_line)
     assert s.torque is None and s.drive_bar is None
-    torque = fourbar.solve(crank_rocker())
+    torque = solve(crank_rocker())
     assert torque.drive_force is None and torque.stroke is None
 
 
@@ -178,19 +178,17 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
         if max(d, a, b, c) * 2 >= d + a + b + c:
             continue
         polar = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
-        drive = fourbar.LinearDrive(
+        drive = LinearDrive(
             Place(start_bar, (polar[0][0], polar[1][0])),
             Place(end_bar, (polar[0][1], polar[1][1])),
         )
         theta_2 = rng.uniform(0.0, 6.0)
-        motion = fourbar.Motion(
+        motion = Motion(
             theta_2 + STEP * np.array([0.0, 1.0, -1.0]),
             1.0,
             branch=int(rng.choice([1, -1])),
         )
-        s = fourbar.solve(
-            fourbar.Scene(fourbar.uniform(d, a, b, c), motion, drive=drive)
-        )
+        s = solve(Scene(uniform(d, a, b, c), motion, drive=drive))
         if s.status != ["ok"] * 3 or s.condition[0] < 0.1:
             continue
         most = sum(
@@ -209,13 +207,13 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
 
 
 def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
-    link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    motion = fourbar.Motion(np.array([0.0, 0.5, math.pi]), 1.0)
-    s = fourbar.solve(
-        fourbar.Scene(
+    link = uniform(0.3, 0.1, 0.25, 0.22)
+    motion = Motion(np.array([0.0, 0.5, math.pi]), 1.0)
+    s = solve(
+        Scene(
             link,
             motion,
-            drive=fourbar.LinearDrive(Place(1, (0.2, 0.0)), Place(2, (0.1, 0.0))),
+            drive=LinearDrive(Place(1, (0.2, 0.0)), Place(2, (0.1, 0.0))),
         ),
         "error",
     )
@@ -224,24 +222,24 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
     assert np.isnan(s.F12[0]).all()
     assert s.drive_condition[0] < 1e-15
     assert s.stroke[0] == pytest.approx(0.1) and abs(s.stroke_speed[0]) < 1e-15
-    one = fourbar.solve(fourbar.Scene(link, fourbar.Motion(0.0, 1.0), drive=s.drive))
+    one = solve(Scene(link, Motion(0.0, 1.0), drive=s.drive))
     assert one.status == ["no_lever"] and np.isnan(one.power).all()
-    meet = fourbar.LinearDrive(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)))
-    assert fourbar.solve(fourbar.Scene(link, motion, drive=meet)).status == [
+    meet = LinearDrive(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)))
+    assert solve(Scene(link, motion, drive=meet)).status == [
         "ok",
         "no_direction",
         "ok",
     ]
     # the parallelogram's cranks keep their distance while they are parallel, and only
     # then
-    parallel = fourbar.LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
+    parallel = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
     for branch, status in ((1, "no_lever"), (-1, "ok")):
-        scene = fourbar.Scene(
-            fourbar.uniform(0.3, 0.1, 0.3, 0.1),
-            fourbar.Motion(1.0, 1.0, branch=branch),
+        scene = Scene(
+            uniform(0.3, 0.1, 0.3, 0.1),
+            Motion(1.0, 1.0, branch=branch),
             drive=parallel,
         )
-        assert fourbar.solve(scene).status == [status]
+        assert solve(scene).status == [status]
 
 
 @pytest.mark.parametrize(
@@ -258,12 +256,12 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
     ],
 )
 def test_ends_that_keep_their_distance_are_refused_in_one_line(start, end):
-    drive = fourbar.LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
+    drive = LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
     with pytest.raises(
-        fourbar.InputError,
+        InputError,
         match=r"^drive\.to = .*keeps its distance from `from`",
     ):
-        fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
+        Scene(uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
 
 
 TEXT = """[lengths]
@@ -298,7 +296,7 @@ TO = 'to = { bar = 4, from_pin = ["9 cm", "0 deg"] }\n'
     ],
 )
 def test_a_file_with_a_wrong_drive_is_refused_in_one_line(drive, says):
-    with pytest.raises(fourbar.InputError, match=says) as caught:
+    with pytest.raises(InputError, match=says) as caught:
         loads(TEXT + drive, "scene.toml")
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("scene.toml: ")
@@ -311,24 +309,24 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
     assert again.drive.start.bar == 1 and again.drive.end == Place(4, (0.09, 0.0))
     assert again.drive.start.from_pin == pytest.approx((0.21, math.radians(-60)))
     assert again.drive_bar is None
-    assert '"drive_bar": null' in write_json(fourbar.solve(again))
+    assert '"drive_bar": null' in write_json(solve(again))
     with pytest.raises(
-        fourbar.InputError,
+        InputError,
         match="a drive is a couple on a bar or a force",
     ):
         replace(scene, drive_bar=3)
-    with pytest.raises(fourbar.InputError, match="out = 'torque'"):
-        fourbar.solve(scene, out={"torque": np.empty(1)})
+    with pytest.raises(InputError, match="out = 'torque'"):
+        solve(scene, out={"torque": np.empty(1)})
     with pytest.raises(
-        fourbar.InputError,
+        InputError,
         match=r"drive\.from\.bar = .*same for every member",
     ):
         fourbar.vary(scene, {"drive.from.bar": [2]})
 
 
 def test_its_duty_has_a_peak_force_and_no_peak_torque():
-    scene = driven(1, 3, motion=fourbar.Motion(np.linspace(0.4, 2.0, 7), 10.0, 5.0))
-    s = fourbar.solve(scene)
+    scene = driven(1, 3, motion=Motion(np.linspace(0.4, 2.0, 7), 10.0, 5.0))
+    s = solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, {})
     assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
     assert duty.peak_speed == np.abs(s.stroke_speed).max()
@@ -337,13 +335,13 @@ def test_its_duty_has_a_peak_force_and_no_peak_torque():
 
 @pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
-    motion = fourbar.Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
+    motion = Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
     scene = driven(start_bar, end_bar, motion=motion)
-    speeds = fourbar.solve(scene).stroke_speed / 10.0
+    speeds = solve(scene).stroke_speed / 10.0
     held = (*scene.effects, fourbar.Friction.at(O2=0.05))
-    rest = fourbar.solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))
+    rest = solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))
     width = rest.drive_force_high - rest.drive_force_low
-    np.testing.assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)
+    assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)
 
 
 def test_files_of_simulators_refuse_it_by_name():
@@ -358,9 +356,9 @@ def test_a_released_linkage_has_a_stroke_and_no_force():
         1,
         4,
         loads=(),
-        motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.05, 50)),
+        motion=Motion(1.0, 0.0, free=fourbar.Free(0.05, 50)),
     )
-    s = fourbar.solve(scene, "error")
+    s = solve(scene, "error")
     assert not s.drive_force.any()
     assert not s.power.any()
     assert np.isfinite(s.stroke_speed).all()

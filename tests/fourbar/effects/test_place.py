@@ -9,8 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
+from fourbar import Motion, Point, Spring, solve
 from fourbar.effects import Load, Place
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
@@ -25,13 +27,13 @@ ROUND_OFF = 1e-13
 
 def test_a_weight_hung_at_the_tip_of_the_rocker():
     """Right values by virtual work and circles that meet, apart from this program."""
-    torque = fourbar.solve(loads(HUNG)).torque
+    torque = solve(loads(HUNG)).torque
     right = [0.441477, -0.417152, -0.621733, 0.532516]
-    np.testing.assert_allclose(torque, right, atol=PRINTED, rtol=0.0)
+    assert_allclose(torque, right, atol=PRINTED, rtol=0.0)
 
 
 def test_a_pull_at_the_tip_of_massless_bars():
-    torque = fourbar.solve(loads(PULL)).torque
+    torque = solve(loads(PULL)).torque
     assert torque[0] == pytest.approx(1.656231, abs=PRINTED)
 
 
@@ -72,12 +74,12 @@ def test_a_force_does_the_work_of_its_place_and_its_direction(form, bar, frame):
     """
     force = Load(bar, (7.0, 0.9), frame=frame, **PLACES[form])
     theta_2, step = np.linspace(0.3, 6.0, 7), 1e-6
-    point = fourbar.Point("P", bar, from_centre=(0.05, 1.1))
+    point = Point("P", bar, from_centre=(0.05, 1.1))
     base = crank_rocker(effects=(), loads=(force,), points=(point,))
 
     def at(shift):
-        motion = fourbar.Motion(theta_2 + shift, 0.0)
-        return fourbar.solve(replace(base, motion=motion))
+        motion = Motion(theta_2 + shift, 0.0)
+        return solve(replace(base, motion=motion))
 
     here, ahead, behind = at(0.0), at(step), at(-step)
     moved = find_place(base, force, ahead) - find_place(base, force, behind)
@@ -86,7 +88,7 @@ def test_a_force_does_the_work_of_its_place_and_its_direction(form, bar, frame):
         direction = direction + np.asarray({3: here.theta_3, 4: here.theta_4}[bar])
     along = (np.conj(7.0 * np.exp(1j * direction)) * moved).real
     # the difference errs by step^2, and by the rounding of the places over the step
-    np.testing.assert_allclose(here.torque, -along / (2.0 * step), atol=1e-8)
+    assert_allclose(here.torque, -along / (2.0 * step), atol=1e-8)
 
 
 def test_an_arm_in_world_axes_keeps_its_lever_about_G():
@@ -95,9 +97,9 @@ def test_an_arm_in_world_axes_keeps_its_lever_about_G():
     couple = arm * size * math.sin(direction - angle)
     with_arm = crank_rocker(loads=(Load(2, (size, direction), arm=(arm, angle)),))
     at_G = crank_rocker(loads=(Load(2, (size, direction), moment=couple),))
-    one, other = fourbar.solve(with_arm), fourbar.solve(at_G)
-    np.testing.assert_allclose(one.torque, other.torque, rtol=ROUND_OFF)
-    np.testing.assert_allclose(one.F43, other.F43, rtol=1e-10)
+    one, other = solve(with_arm), solve(at_G)
+    assert_allclose(one.torque, other.torque, rtol=ROUND_OFF)
+    assert_allclose(one.F43, other.F43, rtol=1e-10)
 
 
 def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre():
@@ -105,28 +107,28 @@ def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre()
 
     The same scene stated anew does so too.
     """
-    point = fourbar.Point("P", 4, (0.2, 0.1))
+    point = Point("P", 4, (0.2, 0.1))
     acting = (
         Load(4, (5.0, 0.3), point="P"),
         Load(3, (2.0, 1.0), from_centre=(0.05, 0.2)),
     )
     scene = crank_rocker(loads=acting, points=(point,))
     keys = {"points.P.from_pin.0": [0.25], "bars.coupler.centre.0": [0.21]}
-    varied = fourbar.solve(fourbar.vary(scene, keys))
+    varied = solve(fourbar.vary(scene, keys))
     coupler = replace(scene.linkage.coupler, centre=(0.21, 0.3))
     moved = replace(
         scene,
         linkage=replace(scene.linkage, coupler=coupler),
-        points=(fourbar.Point("P", 4, (0.25, 0.1)),),
+        points=(Point("P", 4, (0.25, 0.1)),),
     )
-    expected = fourbar.solve(moved)
-    np.testing.assert_array_equal(varied.torque[0], expected.torque)
-    assert not np.allclose(expected.torque, fourbar.solve(scene).torque)
+    expected = solve(moved)
+    assert_array_equal(varied.torque[0], expected.torque)
+    assert not np.allclose(expected.torque, solve(scene).torque)
 
 
 def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder():
     place = cmath.rect(0.19, -0.4)
-    point = fourbar.Point("P", 3, cmath.polar(place))
+    point = Point("P", 3, cmath.polar(place))
     ground = Place(1, (0.2, 2.0))
     forms = (
         {"from_pin": cmath.polar(place)},
@@ -136,17 +138,17 @@ def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder():
     drives = []
     for form in forms:
         load, end = Load(3, (5.0, 1.2), **form), Place(3, **form)
-        spring = fourbar.Springs((fourbar.Spring(ground, end, 200.0, 0.05),))
+        spring = fourbar.Springs((Spring(ground, end, 200.0, 0.05),))
         loaded = crank_rocker(loads=(load,), points=(point,))
         sprung = crank_rocker(effects=(spring,), points=(point,))
         pushed = crank_rocker(drive=fourbar.LinearDrive(ground, end), points=(point,))
-        pushing = fourbar.solve(pushed).drive_force
-        torques = fourbar.solve(loaded).torque, fourbar.solve(sprung).torque
+        pushing = solve(pushed).drive_force
+        torques = solve(loaded).torque, solve(sprung).torque
         drives.append([*torques, pushing])
         settled = loaded.settled().loads[0].place
         assert settled.vector() == pytest.approx(place)
-    np.testing.assert_allclose(drives[1], drives[0], rtol=1e-9)
-    np.testing.assert_array_equal(drives[2], drives[0])
+    assert_allclose(drives[1], drives[0], rtol=1e-9)
+    assert_array_equal(drives[2], drives[0])
 
 
 EVERY_FORM = """
@@ -227,14 +229,12 @@ def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(old, new, 
         lambda: crank_rocker(loads=(Load(3, (1.0, 0.0), point="P"),)),
         lambda: crank_rocker(
             loads=(Load(3, (1.0, 0.0), point="P"),),
-            points=(fourbar.Point("P", 4, (0.1, 0.0)),),
+            points=(Point("P", 4, (0.1, 0.0)),),
         ),
-        lambda: fourbar.Point("P", 1, from_centre=(0.1, 0.0)),
-        lambda: fourbar.Point("P", 3),
-        lambda: fourbar.Spring(Place(1), Place(4, (0.1, 0.0)), 1.0),
-        lambda: fourbar.Spring(
-            Place(1, from_centre=(0.1, 0.0)), Place(4, (0.1, 0.0)), 1.0
-        ),
+        lambda: Point("P", 1, from_centre=(0.1, 0.0)),
+        lambda: Point("P", 3),
+        lambda: Spring(Place(1), Place(4, (0.1, 0.0)), 1.0),
+        lambda: Spring(Place(1, from_centre=(0.1, 0.0)), Place(4, (0.1, 0.0)), 1.0),
     ],
 )
 def test_python_refuses_what_is_no_place(make):
@@ -253,8 +253,8 @@ def test_the_error_bar_covers_a_place_from_the_centre():
     from fourbar_validation.engines.balls import compute_outputs, make_balls
 
     loads_ = (Load(3, (1e3, 0.3), from_centre=(0.01, 1.0)),)
-    scene = crank_rocker(loads=loads_, effects=(), motion=fourbar.Motion(1.1, 0.0))
-    s = fourbar.solve(scene, "error")
+    scene = crank_rocker(loads=loads_, effects=(), motion=Motion(1.1, 0.0))
+    s = solve(scene, "error")
     exact = compute_outputs(scene, 1, make_balls(scene, 1.1))
     assert exact is not None and s.torque is not None and s.torque_error is not None
     gap = abs(flint.arb(float(s.torque[0])) - exact["torque"])

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import fourbar
+from fourbar import Motion, Point, solve
 from fourbar.effects import Place, PointDrive
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
@@ -37,7 +39,7 @@ frame = "bar"
 
 def test_pliers_multiply_the_force_of_the_hand():
     """Right: omega_4/omega_2 0.1332544 and a force ratio of 4.26/0.1332544 = 31.969."""
-    s = fourbar.solve(loads(HELD))
+    s = solve(loads(HELD))
     assert s.omega_4[0] / s.omega_2[0] == pytest.approx(0.1332544, abs=5e-8)
     grip = 4.4482216152605
     assert grip / s.drive_force[0] == pytest.approx(31.969, abs=5e-4)
@@ -61,20 +63,20 @@ def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(bar, frame):
 
     v_P is the velocity of the point as the solution has it.
     """
-    point = fourbar.Point("P", bar, (0.15, 0.3))
+    point = Point("P", bar, (0.15, 0.3))
     scene = driven(bar, frame, points=(point,))
-    s = fourbar.solve(scene)
-    couple = fourbar.solve(replace(scene, drive=None, drive_bar=2))
+    s = solve(scene)
+    couple = solve(replace(scene, drive=None, drive_bar=2))
     angle = np.full(len(s), DIRECTION)
     if frame == "bar":
         angle = angle + {2: s.theta_2, 3: s.theta_3, 4: s.theta_4}[bar]
     along = (s.velocity["P"] * np.stack([np.cos(angle), np.sin(angle)], axis=1)).sum(1)
     power = couple.torque * s.omega_2
-    np.testing.assert_allclose(s.drive_force * along, power, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(s.stroke_speed, along, atol=1e-12)
-    np.testing.assert_allclose(s.power, power, rtol=1e-9, atol=1e-9)
+    assert_allclose(s.drive_force * along, power, rtol=1e-9, atol=1e-9)
+    assert_allclose(s.stroke_speed, along, atol=1e-12)
+    assert_allclose(s.power, power, rtol=1e-9, atol=1e-9)
     unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    np.testing.assert_allclose(s.drive_line, unit, atol=1e-13)
+    assert_allclose(s.drive_line, unit, atol=1e-13)
     assert s.torque is None and s.stroke is None and s.drive_bar is None
 
 
@@ -82,16 +84,16 @@ def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(bar, frame):
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_free_bodies_find_the_same_forces(bar, frame):
     scene = driven(bar, frame)
-    s = fourbar.solve(scene)
+    s = solve(scene)
     answer = FreeBody().answer(scene, fourbar.command(scene))
     theirs = answer.quantities["drive_force"]
     condition = s.drive_condition
     ratio = condition * theirs / s.drive_force
-    np.testing.assert_allclose(ratio, condition, atol=ROUND_OFF)
+    assert_allclose(ratio, condition, atol=ROUND_OFF)
     for name in PIN_FORCES:
         apart = condition[:, None] * (answer.quantities[name] - getattr(s, name))
         assert np.abs(apart).max() <= ROUND_OFF * np.abs(s.F32).max(), name
-    np.testing.assert_allclose(
+    assert_allclose(
         answer.quantities["drive_condition"],
         condition,
         rtol=1e-9,
@@ -101,7 +103,7 @@ def test_free_bodies_find_the_same_forces(bar, frame):
 def test_where_the_point_moves_across_the_direction_there_is_no_lever():
     """A crank pushed along itself: the point has no speed in that direction."""
     drive = PointDrive(Place(2, (0.1, 0.0)), 0.0, "bar")
-    s = fourbar.solve(crank_rocker(drive=drive, motion=fourbar.Motion(0.7, 10.0)))
+    s = solve(crank_rocker(drive=drive, motion=Motion(0.7, 10.0)))
     assert s.status == ["no_lever"]
     assert np.isnan(s.drive_force[0]) and np.isnan(s.F12[0]).all()
 
@@ -110,16 +112,16 @@ def test_a_study_and_a_file_carry_it():
     scene = loads(HELD)
     assert loads(dump(scene)) == scene
     keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
-    varied = fourbar.solve(fourbar.vary(scene, keys))
+    varied = solve(fourbar.vary(scene, keys))
     assert isinstance(scene.drive, PointDrive)
-    handle = fourbar.Point("handle", 2, (0.1, 0.0))
+    handle = Point("handle", 2, (0.1, 0.0))
     for k, direction in enumerate((math.pi / 2, 1.2)):
         one = replace(
             scene,
             drive=replace(scene.drive, direction=direction),
             points=(handle, scene.points[1]),
         )
-        assert varied.drive_force[k] == fourbar.solve(one).drive_force
+        assert varied.drive_force[k] == solve(one).drive_force
 
 
 @pytest.mark.parametrize(
@@ -142,6 +144,6 @@ def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(old, new, words):
 
 
 def test_a_stroke_is_of_a_cylinder_alone():
-    motion = fourbar.Motion(stroke=0.3, stroke_speed=0.1, side="left")
+    motion = Motion(stroke=0.3, stroke_speed=0.1, side="left")
     with pytest.raises(InputError, match="no cylinder"):
         crank_rocker(drive=PointDrive(Place(2, (0.1, 0.0)), 1.0), motion=motion)

@@ -3,13 +3,13 @@
 The status says so, there are no forces, and every engine says the same.
 """
 
-import math
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 import pytest
 
-import fourbar
+from fourbar import uniform
 from fourbar.effects import PinFriction, Place, Spring, Springs, Torsion
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
@@ -31,7 +31,7 @@ LINKAGES = {
 
 
 def linkage(name):
-    return fourbar.uniform(*LINKAGES[name])
+    return uniform(*LINKAGES[name])
 
 
 @pytest.mark.slow
@@ -115,7 +115,7 @@ def test_every_engine_stops_where_the_spring_is_wound():
     )  # of theta_2 beyond 0.5 + pi
     at_half = Scene(
         scene.linkage,
-        Motion([0.5, 1.0, 0.5 + math.pi, 4.0], 10.0),
+        Motion([0.5, 1.0, 0.5 + pi, 4.0], 10.0),
         effects=(spring,),
     )
     record = judge("scene", at_half)
@@ -166,10 +166,10 @@ COUNTED = LINKAGES | {
 @pytest.mark.parametrize("name", COUNTED)
 def test_turns_are_counted_whichever_bar_is_commanded(name, branch, bar):
     """A spring winds as its pin turns along an assembly, in any order of positions."""
-    link = replace(fourbar.uniform(*COUNTED[name]), ground_angle=0.4)
+    link = replace(uniform(*COUNTED[name]), ground_angle=0.4)
     least, most = choose_range(link, bar)
-    if most - least > 2.0 * math.pi - 1e-6:
-        most = least + 4.0 * math.pi
+    if most - least > 2.0 * pi - 1e-6:
+        most = least + 4.0 * pi
     angles = np.linspace(least + 0.03, most - 0.03, 2001)
     some = np.r_[0, np.random.default_rng(5).permutation(np.arange(10, 2001, 10))]
     rates = {f"omega_{bar}": 5.0, "branch": branch}
@@ -178,13 +178,13 @@ def test_turns_are_counted_whichever_bar_is_commanded(name, branch, bar):
     assert (solve(scene, "velocity").status_code == 0).any()
     for pin in PINS:
         between = continuous(scene, pin)
-        for rest in between[0] + np.array([-3.0, 1.0, 6.0 * math.pi]):
+        for rest in between[0] + np.array([-3.0, 1.0, 6.0 * pi]):
             spring = Torsion.at(**{pin: (2.0, rest, 0.1)})
             solution = solve(replace(shuffled, effects=(spring,)), "force")
-            from_start = 2.0 * math.pi * round((between[0] - rest) / (2.0 * math.pi))
+            from_start = 2.0 * pi * round((between[0] - rest) / (2.0 * pi))
             away = np.abs(between[some] - rest - from_start)
-            sure = np.abs(away - math.pi) > EDGE
+            sure = np.abs(away - pi) > EDGE
             sure &= solution.status_code != CHANGE_POINT
             wound = solution.status_code[sure] == WOUND
-            assert np.array_equal(wound, away[sure] > math.pi), (pin, rest)
+            assert np.array_equal(wound, away[sure] > pi), (pin, rest)
             assert np.isnan(solution.torque[solution.status_code == WOUND]).all()

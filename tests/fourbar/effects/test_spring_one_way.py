@@ -6,12 +6,15 @@ it: nothing of the formulas is used.
 
 import math
 from dataclasses import replace
+from math import radians, sqrt
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
 import fourbar
+from fourbar import Motion, Springs, equilibrium, solve
 from fourbar.effects import Place, Spring
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
@@ -62,7 +65,7 @@ def close(theta):
     to_O4 = 0.06 - A
     d = abs(to_O4)
     along = (0.07**2 - 0.055**2 + d * d) / (2.0 * d)
-    across = math.sqrt(0.07**2 - along**2)
+    across = sqrt(0.07**2 - along**2)
     return A, A + (along + 1j * across) * to_O4 / d
 
 
@@ -73,7 +76,7 @@ def energy_of_door(theta):
     G3 = A + (0.04 + 0.005j) * line
     lifted = 0.02 * A.imag / 2.0 + 0.06 * G3.imag + 0.04 * B.imag / 2.0
     pushed = min(abs(A + 0.05 * line) - 0.06, 0.0)
-    turned = theta - math.radians(20.0)
+    turned = theta - radians(20.0)
     return float(
         9.81 * lifted + 0.2 * B.imag + 0.025 * turned**2 + 0.5 * 500.0 * pushed**2
     )
@@ -96,51 +99,49 @@ def test_the_door_is_held_by_what_its_energy_asks():
     """At 40 deg the spring is longer than its free length, at 120 deg shorter."""
     scene = make_door('theta_2 = ["40 deg", "100 deg", "120 deg"]\nomega_2 = "0 rad/s"')
     assert loads(dump(scene)) == scene
-    s = fourbar.solve(scene)
+    s = solve(scene)
     step = 1e-5
     right = [
         (energy_of_door(t + step) - energy_of_door(t - step)) / (2.0 * step)
         for t in s.theta_2
     ]
-    np.testing.assert_allclose(s.torque, right, rtol=SLOPES)
-    fastened = fourbar.solve(make_door('theta_2 = "40 deg"\nomega_2 = "0 rad/s"', ""))
+    assert_allclose(s.torque, right, rtol=SLOPES)
+    fastened = solve(make_door('theta_2 = "40 deg"\nomega_2 = "0 rad/s"', ""))
     assert s.torque[0] - fastened.torque[0] == pytest.approx(0.0265373, abs=6e-8)
 
 
 def test_a_door_without_other_forces_is_free_beyond_the_springs_length():
     scene = make_door('theta_2 = ["40 deg", "120 deg"]\nomega_2 = "0 rad/s"')
     alone = replace(scene, loads=(), effects=scene.effects[-1:])
-    torque = fourbar.solve(alone).torque
+    torque = solve(alone).torque
     assert torque[0] == 0.0 and torque[1] == pytest.approx(0.0506291, abs=6e-8)
 
 
 @pytest.mark.slow
 def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
-    found = fourbar.equilibrium(make_door(sweep, "")).found
+    found = equilibrium(make_door(sweep, "")).found
     assert [math.degrees(one.place.theta_2) for one in found] == pytest.approx(
         [80.88], abs=5e-3
     )
-    assert fourbar.equilibrium(make_door(sweep)).found == ()
+    assert equilibrium(make_door(sweep)).found == ()
 
 
 @pytest.mark.slow
 def test_a_released_door_arrives_as_its_energy_says():
     """t = integral of d theta/omega, omega^2 = 2 (U(start) - U)/J."""
     motion = 'theta_2 = "150 deg"\nfree = { duration = "0.04 s", steps = 4000 }'
-    s = fourbar.solve(make_door(motion))
-    row = int(np.argmax(s.theta_2 <= math.radians(40.0)))
-    start = math.radians(150.0)
+    s = solve(make_door(motion))
+    row = int(np.argmax(s.theta_2 <= radians(40.0)))
+    start = radians(150.0)
 
     def speed(theta):
         lost = energy_of_door(start) - energy_of_door(theta)
-        return math.sqrt(2.0 * lost / inertia_of_door(theta))
+        return sqrt(2.0 * lost / inertia_of_door(theta))
 
     end = float(s.theta_2[row])
     # with theta = start - x^2 the integrand has a value where the door is let go
-    time, _ = quad(
-        lambda x: 2.0 * x / speed(start - x * x), 1e-6, math.sqrt(start - end)
-    )
+    time, _ = quad(lambda x: 2.0 * x / speed(start - x * x), 1e-6, sqrt(start - end))
     assert s.omega_2[row] == pytest.approx(-speed(end), rel=1e-6)
     assert s.time[row] == pytest.approx(time, rel=1e-4)
     assert (time, speed(end)) == pytest.approx((31.83e-3, 139.4), rel=1e-3)
@@ -153,13 +154,11 @@ ENDS = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
 @pytest.mark.parametrize("acts, status", [("push", NO_DIRECTION), ("pull", 0)])
 def test_where_its_ends_meet_a_spring_that_only_pulls_is_off(acts, status):
     spring = Spring(*ENDS, 200.0, 0.05, acts=acts)
-    scene = crank_rocker(
-        motion=fourbar.Motion([0.7, 0.9], 8.0), effects=(fourbar.Springs((spring,)),)
-    )
-    s = fourbar.solve(scene)
+    scene = crank_rocker(motion=Motion([0.7, 0.9], 8.0), effects=(Springs((spring,)),))
+    s = solve(scene)
     assert s.status_code.tolist() == [status, 0]
     if acts == "pull":
-        bare = fourbar.solve(replace(scene, effects=()))
+        bare = solve(replace(scene, effects=()))
         assert s.torque[0] == bare.torque[0]
 
 
@@ -167,8 +166,8 @@ def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
     """The distance of the ends is 2 r sin(half the angle between them)."""
     off = 0.2 * math.sin(0.5)
     scene = crank_rocker(
-        motion=fourbar.Motion([1.4, 1.7, 2.0], 0.0),
-        effects=(fourbar.Springs((Spring(*ENDS, 200.0, off, acts="pull"),)),),
+        motion=Motion([1.4, 1.7, 2.0], 0.0),
+        effects=(Springs((Spring(*ENDS, 200.0, off, acts="pull"),)),),
     )
     slopes = fourbar.sensitivity(scene)
     assert slopes.status == ["ok", "at_free_length", "ok"]
@@ -194,11 +193,9 @@ def test_a_spring_that_never_comes_off_is_refused(acts, numbers, words):
 
 def test_a_gas_spring_acts_one_way_too_and_a_study_keeps_the_sense():
     gas = Spring.gas(*ENDS, 0.12, 0.05, 0.0, 20.0, acts="push")
-    scene = crank_rocker(
-        motion=fourbar.Motion([1.0, 2.5], 0.0), effects=(fourbar.Springs((gas,)),)
-    )
+    scene = crank_rocker(motion=Motion([1.0, 2.5], 0.0), effects=(Springs((gas,)),))
     assert loads(dump(scene)).effects[0].springs[0].acts == "push"
-    bare, s = fourbar.solve(replace(scene, effects=())), fourbar.solve(scene)
+    bare, s = solve(replace(scene, effects=())), solve(scene)
     assert s.torque[0] != bare.torque[0] and s.torque[1] == bare.torque[1]
     study = fourbar.vary(scene, {"effects.springs.0.length": [0.02, 0.12]})
-    np.testing.assert_array_equal(fourbar.solve(study).torque, [bare.torque, s.torque])
+    assert_array_equal(solve(study).torque, [bare.torque, s.torque])

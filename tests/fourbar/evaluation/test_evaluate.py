@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Point, solve, uniform
 from fourbar.effects import (
     Gravity,
     Load,
@@ -115,7 +116,7 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     commanded = command(scene)
-    ours = fourbar.solve(scene, "error")
+    ours = solve(scene, "error")
     exact = BallArithmetic().answer(scene, commanded)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width, values = getattr(ours, bar), [getattr(ours, q) for q in quantities]
@@ -145,7 +146,7 @@ def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
 
 
 def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch):
-    ends = fourbar.Point("P", 1, (0.2, 0.6)), fourbar.Point("Q", 3, (0.15, -0.4))
+    ends = Point("P", 1, (0.2, 0.6)), Point("Q", 3, (0.15, -0.4))
     spring = Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.2)
     table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
     scene = Scene(
@@ -155,14 +156,14 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
         effects=(Springs((spring,)), Torsion.at(B=(0.5, 0.7, 0.0))),
         points=ends,
     )
-    swept = fourbar.solve(scene)
+    swept = solve(scene)
     away = [
         np.hypot(*(swept.points["Q"] - swept.points["P"]).T) - 0.2,
         swept.theta_4 - swept.theta_3 - 0.7,
         swept.theta_2 - 2.0,
     ]
     seen = []
-    true = fourbar.solve
+    true = solve
     question = Question("", scene, command(scene))
     assert question.solution is not None
     monkeypatch.setattr(
@@ -186,7 +187,7 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side():
         effects=(fourbar.Friction.at(A=0.5, O4=2.0),),
     )
     for side in (-1, 1):
-        torque_error = fourbar.solve(still, "error", side=side).torque_error
+        torque_error = solve(still, "error", side=side).torque_error
         assert torque_error.max() < 1e-13
 
 
@@ -233,7 +234,7 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
         Motion(1.5 * np.pi + np.linspace(-1e-3, 1e-3, 101), 1.0),
         effects=(Gravity(),),
     )
-    solution = fourbar.solve(scene, "error")
+    solution = solve(scene, "error")
     exact = BallArithmetic().answer(scene, command(scene))
     error = np.abs(solution.torque - exact.quantities["torque"])
     assert (error <= printed.ERROR_BARS * solution.torque_error).all()
@@ -247,27 +248,27 @@ def near_a_limit_of_bar_3():
         0.25387035792278817,
         0.11411483234949293,
     )
-    motion = fourbar.Motion(theta_3=-0.9625944120558366, omega_3=3.0)
-    return fourbar.Scene(
-        fourbar.uniform(*lengths),
+    motion = Motion(theta_3=-0.9625944120558366, omega_3=3.0)
+    return Scene(
+        uniform(*lengths),
         motion,
-        effects=(fourbar.Gravity(),),
+        effects=(Gravity(),),
     )
 
 
 def beside_a_free_length():
     """A position 6e-6 rad beside that at which a spring does not pull."""
-    spring = fourbar.Spring(
-        fourbar.Place(1, (0.1, -1.5)),
-        fourbar.Place(4, (0.08, 0.0)),
+    spring = Spring(
+        Place(1, (0.1, -1.5)),
+        Place(4, (0.08, 0.0)),
         200.0,
         0.293784713457564,
     )
-    two, three, four = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
-    return fourbar.Scene(
-        fourbar.FourBar(0.3, two, three, four),
-        fourbar.Motion(2.264630407249073 + 5.682965972475529e-06, 3.0),
-        effects=(fourbar.Springs((spring,)),),
+    two, three, four = (Bar(length) for length in (0.1, 0.25, 0.22))
+    return Scene(
+        FourBar(0.3, two, three, four),
+        Motion(2.264630407249073 + 5.682965972475529e-06, 3.0),
+        effects=(Springs((spring,)),),
     )
 
 
@@ -282,9 +283,9 @@ def test_an_error_bar_holds_what_long_doubles_do_not_resolve(make, monkeypatch):
     Pairs of doubles have 32 digits.
     """
     scene = make()
-    bars = fourbar.solve(scene, "error")
+    bars = solve(scene, "error")
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
-    errors = fourbar.solve(scene, "error")
+    errors = solve(scene, "error")
     for name in ("torque_error", "force_error"):
         bar, error = getattr(bars, name)[0], getattr(errors, name)[0]
         assert error <= bar <= 2.0**11 * error, name  # what doubles do not resolve
@@ -296,22 +297,22 @@ def test_an_error_bar_grows_with_the_angle(power):
 
     Less the ground's angle theta has 64 bits.
     """
-    linkage = fourbar.FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22), 0.2)
+    linkage = FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22), 0.2)
     angle = 2.0**power
-    scene = Scene(linkage, Motion(angle, 1.0), effects=(fourbar.Gravity(),))
-    error = fourbar.solve(scene, "error").torque_error[0]
+    scene = Scene(linkage, Motion(angle, 1.0), effects=(Gravity(),))
+    error = solve(scene, "error").torque_error[0]
     slope = abs(9.80665 * 0.05 * np.sin(angle))
     assert error >= 0.5 * angle * np.finfo(np.longdouble).eps * slope
 
 
 def test_an_error_bar_at_the_end_of_a_table_of_a_load():
     """The slope of the forces would be taken beyond the table."""
-    table = fourbar.Table((0.5, 1.0), (1.0, 2.0))
-    load = fourbar.Load(4, moment=1.0, table=table)
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.25, 0.22),
-        fourbar.Motion(np.array([0.7, 1.0]), 3.0),
+    table = Table((0.5, 1.0), (1.0, 2.0))
+    load = Load(4, moment=1.0, table=table)
+    scene = Scene(
+        uniform(0.3, 0.1, 0.25, 0.22),
+        Motion(np.array([0.7, 1.0]), 3.0),
         loads=(load,),
     )
-    error = fourbar.solve(scene, "error").torque_error
+    error = solve(scene, "error").torque_error
     assert np.all((error > 0.0) & (error < 1e-14))

@@ -6,40 +6,54 @@ test_free_motion_reference.py has the digits.
 import math
 import pickle
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
+from fourbar import (
+    Bar,
+    Flywheel,
+    FourBar,
+    Friction,
+    Gravity,
+    Motion,
+    Place,
+    Scene,
+    Springs,
+    release,
+)
 from fourbar.errors import LimitError
 from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import integrate
 from fourbar.solving import solve
 from tests.support.scenes import bare
 
-HANGING = fourbar.FourBar(
+HANGING = FourBar(
     0.3,
-    fourbar.Bar(0.1, 0.2),
-    fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
-    fourbar.Bar(0.22, 0.4),
+    Bar(0.1, 0.2),
+    Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
+    Bar(0.22, 0.4),
 )
-DOWN = fourbar.Gravity()
+DOWN = Gravity()
 NO_TORQUE = 1e-12 * 9.81 * 1.1
 """N m: of all the weights of HANGING at one metre."""
 
 
 def let_go(theta_2, omega_2, duration, steps, *effects, linkage=HANGING):
-    motion = fourbar.Motion(theta_2, omega_2, free=fourbar.Free(duration, steps))
-    return fourbar.Scene(linkage, motion, effects=effects)
+    motion = Motion(theta_2, omega_2, free=fourbar.Free(duration, steps))
+    return Scene(linkage, motion, effects=effects)
 
 
 @pytest.mark.slow
 def test_one_window_of_iftomm_a02():
     """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
-    bar = fourbar.Bar(1.0, 1.0)
-    linkage = fourbar.FourBar(1.0, bar, bar, bar)
+    bar = Bar(1.0, 1.0)
+    linkage = FourBar(1.0, bar, bar, bar)
     times = np.array([0.0, 10.0])
-    m = integrate(linkage, (DOWN,), math.pi / 2, -1.0, 1, times)
+    m = integrate(linkage, (DOWN,), pi / 2, -1.0, 1, times)
     x, y = math.cos(m.command.theta_2[-1]), math.sin(m.command.theta_2[-1])
     w = m.command.omega_2[-1]
     printed = (0.478385058, 0.878150179, 1.727264076, -0.940952179)
@@ -54,7 +68,7 @@ def test_needs_no_driving_torque():
     terms = (DOWN, fourbar.Viscous.at(O2=0.002, B=0.001))
     m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
     told = m.command._replace(origin=None)
-    s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=told)
+    s = solve(Scene(HANGING, effects=terms), "force", at=told)
     assert np.abs(s.torque).max() < NO_TORQUE
 
 
@@ -62,8 +76,8 @@ def test_needs_no_driving_torque():
 @pytest.mark.parametrize("coupler", [0.12, 0.15])
 def test_runs_on_through_limits_and_names_its_change_points(coupler):
     """The first has a change point, the second a limit position only."""
-    bars = fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
-    linkage = fourbar.FourBar(0.3, *bars)
+    bars = Bar(0.2, 0.2), Bar(coupler, 0.5), Bar(0.22, 0.4)
+    linkage = FourBar(0.3, *bars)
     times = np.linspace(0.0, 1.0, 21)  # there, back and there again
     passed = integrate(linkage, (DOWN,), 1.0, 0.0, 1, times)
     assert len(passed.time) == len(times) and passed.energy_drift < 1e-11
@@ -81,24 +95,24 @@ def test_runs_on_through_limits_and_names_its_change_points(coupler):
 def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar):
     """Bars without mass, of a drag link: alpha = M/J."""
     linkage, times = bare(0.1, 0.25, 0.3, 0.28), np.linspace(0.0, 2.0, 21)
-    terms = fourbar.Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)
+    terms = Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)
     m = integrate(linkage, terms, 0.3, 1.0, 1, times)
-    s = solve(fourbar.Scene(linkage), "position", at=m.command)
-    start = solve(fourbar.Scene(linkage, fourbar.Motion(0.3, 1.0)), "velocity")
+    s = solve(Scene(linkage), "position", at=m.command)
+    start = solve(Scene(linkage, Motion(0.3, 1.0)), "velocity")
     angle, speed = {2: (s.theta_2, 1.0), 4: (s.theta_4, start.omega_4[0])}[bar]
     turned = speed * times + 0.2 * times**2
     assert angle - angle[0] == pytest.approx(turned, abs=1e-11)
 
 
 def test_dry_friction_holds():
-    terms = DOWN, fourbar.Friction.at(O2=0.3)
+    terms = DOWN, Friction.at(O2=0.3)
     m = integrate(HANGING, terms, 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51)).command
     assert m.omega_2[-1] == m.alpha_2[-1] == 0.0
     assert m.theta_2[-1] == m.theta_2[-2]
 
 
 def test_a_motion_that_has_stopped_is_handed_to_another_process():
-    terms = DOWN, fourbar.Friction.at(O2=0.3)
+    terms = DOWN, Friction.at(O2=0.3)
     s = solve(let_go(0.3, 1.0, 5.0, 50, *terms, linkage=HANGING))
     again = pickle.loads(pickle.dumps(s))
     here, there = (one.command_at(np.array([0.0, 4.0])) for one in (s, again))
@@ -112,9 +126,7 @@ def test_a_scene_reports_its_times():
     assert np.abs(s.torque).max() < NO_TORQUE
 
 
-ROCKER = fourbar.FourBar(
-    0.3, fourbar.Bar(0.25, 0.7), fourbar.Bar(0.1, 1.3), fourbar.Bar(0.22, 0.9)
-)
+ROCKER = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
 """A double rocker; released at rest at 50 deg, open, it swings through limit positions
 of its input.
 """
@@ -181,35 +193,35 @@ def forces_by_energy(theta, start):
 
 @pytest.mark.slow
 def test_a_release_is_computed_once_and_solved_as_any_command():
-    released, solution = fourbar.release(SWING), solve(SWING, "force")
+    released, solution = release(SWING), solve(SWING, "force")
     again = solve(SWING, "force", at=released.command)
     for name in solution.evaluated():
-        np.testing.assert_array_equal(
+        assert_array_equal(
             getattr(again, name),
             getattr(solution, name),
             err_msg=name,
         )
-    np.testing.assert_array_equal(released.time, solution.time)
-    np.testing.assert_array_equal(released.theta_2, solution.theta_2)
-    np.testing.assert_allclose(released.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(released.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
+    assert_array_equal(released.time, solution.time)
+    assert_array_equal(released.theta_2, solution.theta_2)
+    assert_allclose(released.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
+    assert_allclose(released.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
     some = np.array(
         [3, 70, 4]
     )  # positions of both independent angles, in an order of their own
     few = solve(SWING, "force", at=released.command.part(some))
-    np.testing.assert_array_equal(few.F43, solution.F43[some])
+    assert_array_equal(few.F43, solution.F43[some])
 
 
 @pytest.mark.parametrize(
     "motion, says",
     [
-        (fourbar.Motion(1.0, 2.0), "motion.free"),
+        (Motion(1.0, 2.0), "motion.free"),
         (SWING.motion.replace(angle=np.array([1.0, 2.0])), "at one angle"),
     ],
 )
 def test_what_is_not_released_is_refused(motion, says):
     with pytest.raises(fourbar.InputError, match=says):
-        fourbar.release(replace(SWING, motion=motion))
+        release(replace(SWING, motion=motion))
 
 
 def integrate_to_line(scene):
@@ -276,9 +288,9 @@ def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin, 
 
     A drive holds a linkage still just as well.
     """
-    s = solve(let_go(0.3, 0.0, 0.2, 4, DOWN, fourbar.Friction.at(**{pin: 9.0})))
-    still = fourbar.Motion(0.3, 0.0)
-    driven = solve(fourbar.Scene(HANGING, still, bar, effects=(DOWN,)))
+    s = solve(let_go(0.3, 0.0, 0.2, 4, DOWN, Friction.at(**{pin: 9.0})))
+    still = Motion(0.3, 0.0)
+    driven = solve(Scene(HANGING, still, bar, effects=(DOWN,)))
     assert not s.alpha_2.any()
     for force in PINS:
         held = np.broadcast_to(getattr(driven, force), (5, 2))
@@ -286,7 +298,7 @@ def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin, 
 
 
 def test_what_begins_to_move_against_friction_does_so_at_once():
-    s = solve(let_go(0.3, 0.0, 1e-4, 2, DOWN, fourbar.Friction.at(O4=0.02)))
+    s = solve(let_go(0.3, 0.0, 1e-4, 2, DOWN, Friction.at(O4=0.02)))
     assert s.alpha_2[0] != 0.0
     assert np.allclose(s.alpha_2, s.alpha_2[1], rtol=1e-5)
     for force in PINS:
@@ -301,14 +313,14 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
 
     The integration would never end.
     """
-    ends = fourbar.Place(3, (0.25, 0.0)), fourbar.Place(4, (0.22, 0.0))
+    ends = Place(3, (0.25, 0.0)), Place(4, (0.22, 0.0))
     on_B = fourbar.Spring(*ends, 200.0, 0.05, preload)
     with pytest.raises(LimitError, match="springs: two points coincide"):
-        fourbar.release(let_go(0.5, 0.0, 1.0, 50, DOWN, fourbar.Springs((on_B,))))
+        release(let_go(0.5, 0.0, 1.0, 50, DOWN, Springs((on_B,))))
     proportional = replace(on_B, length=0.0, preload=0.0)  # pulls with 0 there
     alone = let_go(0.5, 0.0, 1.0, 50, DOWN)
-    with_it = replace(alone, effects=(DOWN, fourbar.Springs((proportional,))))
-    one, other = (fourbar.release(each).theta_2 for each in (with_it, alone))
+    with_it = replace(alone, effects=(DOWN, Springs((proportional,))))
+    one, other = (release(each).theta_2 for each in (with_it, alone))
     assert np.abs(one - other).max() < 1e-9
 
 
@@ -319,10 +331,10 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
     """
     linkage = bare(0.3, 0.1, 0.3, 0.1, 0.2)
     for speed in (10.0, -10.0):
-        scene = let_go(0.5, speed, 1.5, 6, fourbar.Flywheel(0.3), linkage=linkage)
-        released = fourbar.release(scene)
-        turned = 0.5 - 0.2 if speed < 0.0 else math.pi - (0.5 - 0.2)
-        right = [(turned + k * math.pi) / 10.0 for k in range(5)]
+        scene = let_go(0.5, speed, 1.5, 6, Flywheel(0.3), linkage=linkage)
+        released = release(scene)
+        turned = 0.5 - 0.2 if speed < 0.0 else pi - (0.5 - 0.2)
+        right = [(turned + k * pi) / 10.0 for k in range(5)]
         right = [t for t in right if t < 1.5]
         assert released.change_points == pytest.approx(right, abs=1e-9)
         assert np.abs(released.omega_2 - speed).max() < 1e-9
@@ -332,10 +344,10 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     spring = fourbar.Torsion.at(O2=(0.01, 0.5, 0.0))
     still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)
-    assert len(fourbar.release(still).time) == 5
+    assert len(release(still).time) == 5
     wound = r"effects\.torsion: at 0.*more than half a turn"
     with pytest.raises(LimitError, match=wound):
-        fourbar.release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))
+        release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))
 
 
 @pytest.mark.parametrize(
@@ -354,11 +366,11 @@ def test_the_drift_is_a_part_of_the_largest_energy_or_work(
         return [rate, growth, gain * of_work + power]
 
     monkeypatch.setattr(free_motion._Run, "_compute_rates", count_wrongly)
-    terms = (fourbar.Gravity(),) if omega == 0.0 else ()
+    terms = (Gravity(),) if omega == 0.0 else ()
     times = np.linspace(0.0, 0.5, 6)
     released = integrate(HANGING, terms, 0.9, omega, 1, times)
     if drift is None:  # without forces the energy stays that of the start
-        start = solve(fourbar.Scene(HANGING, fourbar.Motion(0.9, omega)))
+        start = solve(Scene(HANGING, Motion(0.9, omega)))
         velocities = (start.v_G2[0], start.v_G3[0], start.v_G4[0])
         speeds = (start.omega_2[0], start.omega_3[0], start.omega_4[0])
         energy = sum(

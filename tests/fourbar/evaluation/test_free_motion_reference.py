@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, Gravity, Load, Viscous
 from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import integrate
 from fourbar.scene import Command, with_signs
@@ -36,7 +37,7 @@ it.
 class Released(NamedTuple):
     """A motion to be examined."""
 
-    linkage: fourbar.FourBar
+    linkage: FourBar
     terms: tuple[Any, ...]
     theta_2: float
     omega_2: float
@@ -121,27 +122,25 @@ def motion(kind, number):
         mass = float(rng.uniform(0.2, 2.0))
         centre = (length * float(rng.uniform(0.2, 0.8)), float(rng.uniform(-1, 1)))
         bars.append(
-            fourbar.Bar(
-                length, mass, mass * length**2 * float(rng.uniform(0.05, 0.3)), centre
-            )
+            Bar(length, mass, mass * length**2 * float(rng.uniform(0.05, 0.3)), centre)
         )
-    linkage = fourbar.FourBar(
+    linkage = FourBar(
         lengths[0],
         *bars,
         ground_angle=float(rng.uniform(-3.0, 3.0)),
     )
     weight = 9.81 * sum(bar.mass * bar.length for bar in bars)
-    terms = [fourbar.Gravity()]
+    terms = [Gravity()]
     if rng.random() < 0.6:
         damping = {
             pin: 0.01 * weight * float(rng.uniform(0, 1))
             for pin in fourbar.linkage.PINS
             if rng.random() < 0.5
         }
-        terms.append(fourbar.Viscous.at(**damping))
+        terms.append(Viscous.at(**damping))
     if rng.random() < 0.6:
         terms.append(
-            fourbar.Load(
+            Load(
                 int(rng.integers(2, 5)),
                 moment=float(rng.uniform(-0.3, 0.3)) * weight,
             )
@@ -156,7 +155,7 @@ def motion(kind, number):
     for bar, force, frame in forces:
         places = PLACES[frame]
         place = {places[int(chosen * len(places))]: (0.1, 1.0)}
-        terms.append(fourbar.Load(bar, force, frame=frame, **place))
+        terms.append(Load(bar, force, frame=frame, **place))
     while True:
         theta_2 = float(rng.uniform(-3.0, 3.0))
         command = Command(
@@ -248,11 +247,11 @@ def test_nine_digits_over_five_seconds(kind, number):
 def test_the_motions_shown_meet_every_force():
     terms = [term for shown in SHOWN for term in motion(*shown).terms]
     assert {type(term) for term in terms} == {
-        fourbar.Gravity,
-        fourbar.Viscous,
-        fourbar.Load,
+        Gravity,
+        Viscous,
+        Load,
     }
-    loads = [term for term in terms if isinstance(term, fourbar.Load)]
+    loads = [term for term in terms if isinstance(term, Load)]
     assert any(load.moment != 0.0 for load in loads)
     assert {
         (load.frame, place)
@@ -268,10 +267,10 @@ def test_the_reference_against_a_printed_answer():
 
     The source is lim.ii.udc.es/mbsbenchmark.
     """
-    bar = fourbar.Bar(1.0, 1.0)
+    bar = Bar(1.0, 1.0)
     theirs = released(
-        fourbar.FourBar(1.0, bar, bar, bar),
-        (fourbar.Gravity(),),
+        FourBar(1.0, bar, bar, bar),
+        (Gravity(),),
         np.pi / 2,
         -1.0,
         1,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 import fourbar
-from fourbar import effects
+from fourbar import Place, effects, solve
 from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import Dragged, drag, list_handles
 from fourbar.errors import InputError
@@ -106,11 +106,11 @@ def scene(kind):
 def test_it_is_read_and_written(scene):
     (magnets,) = scene.effects
     assert (magnets.bar, magnets.turns, magnets.gap) == (4, 12.0, 0.002)
-    assert magnets.coil == fourbar.Place(3, (0.05, 0.5))
+    assert magnets.coil == Place(3, (0.05, 0.5))
     first, second = magnets.rows
     assert (first.pull, first.pole) == (2.0 * 4.4482216152605, "north")
-    assert first.start == fourbar.Place(4, point="P")
-    assert first.end == fourbar.Place(1, (0.0, 0.0))
+    assert first.start == Place(4, point="P")
+    assert first.end == Place(1, (0.0, 0.0))
     assert (second.pull, second.pole) == (3.0, "south")
     assert loads(dump(scene)).effects == scene.effects
     without = replace(scene, effects=(replace(magnets, rows=()),))
@@ -180,8 +180,8 @@ def test_its_numbers_vary_by_their_keys(scene):
         assert find_unit_of_key(f"effects.magnets.{name}") == unit
     key = "effects.magnets.rows.1.pull"
     study = fourbar.vary(scene, {key: [3.0, 4.0, 6.0]})
-    three, four, six = fourbar.solve(study).torque.ravel()
-    assert three == fourbar.solve(scene).torque != four
+    three, four, six = solve(study).torque.ravel()
+    assert three == solve(scene).torque != four
     assert six - four == pytest.approx(2.0 * (four - three), rel=1e-12)
 
 
@@ -214,7 +214,7 @@ def test_a_drag_changes_the_numbers_of_an_entry(scene):
     document = SceneDocument(TEXT)
     theta_2 = math.radians(60.0)
     (end,) = (h for h in list_handles(scene) if h.name == "to of magnets rows 2")
-    shown = fourbar.solve(scene)
+    shown = solve(scene)
     along = cmath.rect(1.0, float(shown.theta_3[0]))
     wanted = 0.03 + 0.01j
     to = complex(*shown.A[0]) + along * (scene.linkage.coupler.to_centre + wanted)

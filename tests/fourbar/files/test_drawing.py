@@ -2,11 +2,13 @@
 
 import math
 import os
+from math import hypot, pi
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Scene, from_pins, solve
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
@@ -56,8 +58,8 @@ def find_gap(pins):
     condition.
     """
     O2, A, B, _ = pins
-    scene = fourbar.from_pins(*((pin.real, pin.imag) for pin in pins))
-    here = fourbar.solve(scene, "position")
+    scene = from_pins(*((pin.real, pin.imag) for pin in pins))
+    here = solve(scene, "position")
     found = [complex(*getattr(here, name)[0]) for name in ("A", "B")]
     gap = max(abs(found[0] - (A - O2)), abs(found[1] - (B - O2)))
     size = max(scene.linkage.lengths)
@@ -92,17 +94,17 @@ def test_thousands_of_drawings_come_back():
 def test_lengths_angles_and_assembly_are_those_of_the_pins():
     scene = loads(DRAWN + '[motion]\ntheta_2 = "drawn"\n')
     d, a, b, c = scene.linkage.lengths
-    assert (d, a) == (math.hypot(0.25, 0.05), 0.1)
-    assert b == pytest.approx(math.hypot(0.175, 0.05), rel=4 * EPS)
+    assert (d, a) == (hypot(0.25, 0.05), 0.1)
+    assert b == pytest.approx(hypot(0.175, 0.05), rel=4 * EPS)
     assert c == pytest.approx(0.075, rel=4 * EPS)
     assert scene.linkage.ground_angle == math.atan2(0.05, 0.25)
-    assert scene.motion.theta_2 == pytest.approx(0.5 * math.pi, abs=4 * EPS)
+    assert scene.motion.theta_2 == pytest.approx(0.5 * pi, abs=4 * EPS)
 
 
 @pytest.mark.parametrize("bar", (2, 3, 4))
 def test_every_command_is_on_the_assembly_that_is_drawn(bar):
     scene = loads(f'{DRAWN}[motion]\n{COMMAND_NAMES[bar][0]} = "drawn"\n')
-    here = fourbar.solve(scene)
+    here = solve(scene)
     assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-15)
     assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-14)
 
@@ -121,7 +123,7 @@ def test_places_of_the_drawing_are_where_they_are_drawn():
     centre = '[bars.coupler]\nmass = "1 kg"\ncentre = { drawn = ["100 mm", "70 mm"] }\n'
     text = f'{pins}{centre}[motion]\ntheta_2 = "drawn"\n[points]\n{rows}\n'
     scene = loads(text)
-    table = fourbar.solve(scene).to_pandas()
+    table = solve(scene).to_pandas()
     for bar, place in places.items():
         shown = [table[f"P{bar}_{axis}"][0] * 1e3 for axis in "xy"]
         assert shown == pytest.approx(place, abs=1e-10)
@@ -155,7 +157,7 @@ PLACE ["120 mm", "80 mm"] CLOSED
         (short.replace("bar = 3, ", ""), "must name the bar it is of"),
         (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "left out"),
     ):
-        with pytest.raises(fourbar.InputError, match=said):
+        with pytest.raises(InputError, match=said):
             loads(DRAWN + text)
 
 
@@ -171,8 +173,8 @@ side = "drawn"
 
 def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
     scene = loads(DRAWN + CYLINDER)
-    here = fourbar.solve(scene)
-    assert scene.motion.stroke == pytest.approx(math.hypot(0.09, 0.11), rel=4 * EPS)
+    here = solve(scene)
+    assert scene.motion.stroke == pytest.approx(hypot(0.09, 0.11), rel=4 * EPS)
     assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-14)
     assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-13)
 
@@ -205,7 +207,7 @@ def test_a_drawn_stroke_without_its_cylinder_is_refused(drive, side):
 
 def test_a_scene_that_was_changed_since_is_written_by_its_lengths():
     scene = loads(DRAWN)
-    crossed = fourbar.Scene(
+    crossed = Scene(
         scene.linkage,
         scene.motion.replace(branch=-scene.motion.branch),
         drawing=scene.drawing,
@@ -220,13 +222,13 @@ def test_the_default_sweep_holds_the_drawn_position():
     """
     linkage = fourbar.uniform(3.0, 2.5, 2.0, 1.0)
     assert len(fourbar.circuits(linkage)) == 2
-    for theta_4 in (0.5 * math.pi, -0.5 * math.pi):
-        here = fourbar.solve(fourbar.Scene(linkage, fourbar.Motion(theta_4=theta_4)))
+    for theta_4 in (0.5 * pi, -0.5 * pi):
+        here = solve(Scene(linkage, Motion(theta_4=theta_4)))
         A, B = (tuple(pin[0].tolist()) for pin in (here.A, here.B))
-        scene = fourbar.from_pins((0.0, 0.0), A, B, (3.0, 0.0))
-        sweep = fourbar.Scene(
+        scene = from_pins((0.0, 0.0), A, B, (3.0, 0.0))
+        sweep = Scene(
             scene.linkage,
-            fourbar.Motion(branch=scene.motion.branch),
+            Motion(branch=scene.motion.branch),
             drawing=scene.drawing,
         )
         angles = fourbar.command(sweep).angle
@@ -256,7 +258,7 @@ def test_a_drawing_that_is_none_is_refused(change, says):
 
 def test_a_drawing_on_a_change_point_is_refused():
     with pytest.raises(InputError, match="lie in one line: at a change point"):
-        fourbar.from_pins((0, 0), (1, 0), (4, 0), (3, 0))
+        from_pins((0, 0), (1, 0), (4, 0), (3, 0))
 
 
 def test_the_word_needs_a_drawing():
@@ -375,5 +377,5 @@ def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar):
         loads(text)
     other = 6 - bar
     scene = loads(text.replace(f"_{bar} =", f"_{other} ="))
-    here = fourbar.solve(scene)
+    here = solve(scene)
     assert getattr(here, f"omega_{bar}")[0] == 0.0

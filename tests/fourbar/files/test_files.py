@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import replace
 from fractions import Fraction
+from math import pi, tau
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fourbar
+from fourbar import (
+    Bar,
+    FourBar,
+    Free,
+    Friction,
+    FromLimit,
+    Gravity,
+    Load,
+    Spring,
+    Springs,
+    Sweep,
+    Tolerance,
+    Viscous,
+)
 from fourbar.effects import Place
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
@@ -94,8 +109,8 @@ def test_units_are_converted_exactly_and_rounded_once(text, unit, value):
 def test_degrees_are_the_nearest_doubles(degrees, turns):
     # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself
     # is correctly rounded
-    assert to_si(f"{degrees} deg", "rad") == turns * math.tau
-    assert to_si(f"{turns!r} rev", "rad") == turns * math.tau
+    assert to_si(f"{degrees} deg", "rad") == turns * tau
+    assert to_si(f"{turns!r} rev", "rad") == turns * tau
 
 
 @pytest.mark.parametrize(
@@ -168,9 +183,7 @@ def test_what_may_have_been_meant_is_one(text, unit, meant):
 
 def test_defaults_are_those_of_the_contract():
     scene = loads(LENGTHS)
-    assert scene.linkage == fourbar.FourBar(
-        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22), 0.0
-    )
+    assert scene.linkage == FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.0)
     motion = scene.motion
     assert (motion.theta_2, motion.omega_2, motion.alpha_2, motion.branch) == (
         None,
@@ -192,14 +205,12 @@ def test_every_form_of_theta_2():
     def motion(text):
         return loads(f'{LENGTHS}[motion]\ntheta_2 = {text}\nbranch = "crossed"').motion
 
-    assert motion('"180 deg"').theta_2 == math.pi and motion('"0 rad"').branch == -1
-    assert motion(
-        '{ from = "0 deg", to = "360 deg", steps = 7 }'
-    ).theta_2 == fourbar.Sweep(0.0, math.tau, 7)
-    assert motion('{ limit = 2, offset = "1e-9 rad" }').theta_2 == fourbar.FromLimit(
-        2, 1e-9
+    assert motion('"180 deg"').theta_2 == pi and motion('"0 rad"').branch == -1
+    assert motion('{ from = "0 deg", to = "360 deg", steps = 7 }').theta_2 == Sweep(
+        0.0, tau, 7
     )
-    assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, math.pi])
+    assert motion('{ limit = 2, offset = "1e-9 rad" }').theta_2 == FromLimit(2, 1e-9)
+    assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, pi])
 
 
 def test_free_motion_and_frames_are_read():
@@ -229,17 +240,15 @@ compressed_force = "520 N"
 """
     )
     scene = loads(text)
-    assert scene.motion.free == fourbar.Free(5.0, 500)
+    assert scene.motion.free == Free(5.0, 500)
     assert scene.loads == (
-        fourbar.Load(3, (2.0, math.pi / 2), from_centre=(0.01, 0.0), frame="bar"),
+        Load(3, (2.0, pi / 2), from_centre=(0.01, 0.0), frame="bar"),
     )
-    gas = fourbar.Spring.gas(
-        Place(1, (0.0, 0.0)), Place(4, (0.2, 0.0)), 0.5, 0.2, 400.0, 520.0
-    )
-    springs = fourbar.Springs((gas,))
+    gas = Spring.gas(Place(1, (0.0, 0.0)), Place(4, (0.2, 0.0)), 0.5, 0.2, 400.0, 520.0)
+    springs = Springs((gas,))
     assert scene.effects == (
-        fourbar.Viscous.at(O2=0.01, B=1.0),
-        fourbar.Friction.at(A=0.05),
+        Viscous.at(O2=0.01, B=1.0),
+        Friction.at(A=0.05),
         springs,
     )
     assert facts(loads(dump(scene))) == facts(scene)
@@ -251,14 +260,14 @@ def numbers(least=-1e300, most=1e300, **more):
 
 LENGTH = numbers(1.0, 1.4)  # any four of these close
 BAR = st.builds(
-    fourbar.Bar,
+    Bar,
     LENGTH,
     numbers(0.0, 1e9),
     numbers(0.0),
     st.tuples(numbers(), numbers()),
 )
 LOAD = st.builds(
-    fourbar.Load,
+    Load,
     st.integers(2, 4),
     st.tuples(numbers(), numbers()),
     from_pin=st.tuples(numbers(), numbers()),
@@ -274,8 +283,8 @@ THETA_2 = (
     st.none()
     | numbers()
     | st.lists(numbers(), min_size=1, max_size=4).map(np.array)
-    | st.builds(fourbar.Sweep, numbers(), numbers(), st.integers(1, 10**8))
-    | st.builds(fourbar.FromLimit, st.integers(1, 4), numbers())
+    | st.builds(Sweep, numbers(), numbers(), st.integers(1, 10**8))
+    | st.builds(FromLimit, st.integers(1, 4), numbers())
 )
 MOTION = st.builds(
     fourbar.Motion,
@@ -283,18 +292,17 @@ MOTION = st.builds(
     st.none() | numbers(-1e150, 1e150),
     numbers(),
     st.sampled_from((1, -1)),
-    st.none()
-    | st.builds(fourbar.Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
+    st.none() | st.builds(Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
 )
 EFFECTS = st.tuples(
-    st.builds(fourbar.Gravity, numbers(), numbers()),
-    PER_PIN.map(lambda values: fourbar.Viscous.at(**values)),
-    PER_PIN.map(lambda values: fourbar.Friction.at(**values)),
+    st.builds(Gravity, numbers(), numbers()),
+    PER_PIN.map(lambda values: Viscous.at(**values)),
+    PER_PIN.map(lambda values: Friction.at(**values)),
 )
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 SCENE = st.builds(
     fourbar.Scene,
-    st.builds(fourbar.FourBar, LENGTH, BAR, BAR, BAR, numbers()),
+    st.builds(FourBar, LENGTH, BAR, BAR, BAR, numbers()),
     MOTION,
     st.integers(2, 4),
     st.lists(LOAD, max_size=3).map(tuple),
@@ -381,7 +389,7 @@ def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
 def test_what_a_file_cannot_hold_is_refused():
     scene = load(MODELS[0])
     with pytest.raises(InputError, match="one effect of each kind"):
-        dump(replace(scene, effects=(fourbar.Gravity(), fourbar.Gravity())))
+        dump(replace(scene, effects=(Gravity(), Gravity())))
     with pytest.raises(InputError, match="Unicode"):
         dump(replace(scene, title="\ud800"))
 
@@ -428,7 +436,7 @@ WIDTHS = {
 @settings(max_examples=10, deadline=None, database=None)
 def test_tolerances_read_back_in_their_order(keys):
     tolerances = tuple(
-        fourbar.Tolerance(key, WIDTHS[key], key.endswith("mass")) for key in keys
+        Tolerance(key, WIDTHS[key], key.endswith("mass")) for key in keys
     )
     scene = crank_rocker(tolerances=tolerances)
     assert loads(dump(scene)) == scene
@@ -445,7 +453,7 @@ def test_tolerances_read_back_in_their_order(keys):
     ],
 )
 def test_no_tolerance_is_written_that_reading_refuses(key, width, why):
-    scene = crank_rocker(tolerances=(fourbar.Tolerance(key, width),))
+    scene = crank_rocker(tolerances=(Tolerance(key, width),))
     with pytest.raises(InputError, match=why) as refused:
         dump(scene)
     assert key in str(refused.value)
@@ -453,7 +461,7 @@ def test_no_tolerance_is_written_that_reading_refuses(key, width, why):
 
 def test_three_sigma_less_than_the_number_are_written_and_more_are_not():
     for width, written in ((0.033, True), (0.034, False)):
-        tolerance = fourbar.Tolerance("lengths.input", width, sigma=True)
+        tolerance = Tolerance("lengths.input", width, sigma=True)
         scene = crank_rocker(tolerances=(tolerance,))
         if written:
             assert loads(dump(scene)) == scene
@@ -464,22 +472,22 @@ def test_three_sigma_less_than_the_number_are_written_and_more_are_not():
 
 def test_the_stroke_of_a_gas_spring_is_saved():
     ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
-    spring = fourbar.Spring.gas(*ends, 0.35, 0.1, 100.0, 151.0)
-    scene = replace(crank_rocker(), effects=(fourbar.Springs((spring,)),))
+    spring = Spring.gas(*ends, 0.35, 0.1, 100.0, 151.0)
+    scene = replace(crank_rocker(), effects=(Springs((spring,)),))
     read = loads(dump(scene)).effects[0]
-    assert isinstance(read, fourbar.Springs)
+    assert isinstance(read, Springs)
     assert (read.springs[0], read.springs[0].stroke) == (spring, 0.1)
 
 
 def test_a_stroke_is_less_than_the_spring_is_long():
     ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
     with pytest.raises(InputError, match=r"stroke = 0\.3 m: must be less than the"):
-        fourbar.Spring(*ends, 10.0, 0.3, stroke=0.3)
+        Spring(*ends, 10.0, 0.3, stroke=0.3)
     with pytest.raises(
         InputError,
         match=r"stroke = -0\.1: must be a finite number > 0",
     ):
-        fourbar.Spring(*ends, 10.0, 0.3, stroke=-0.1)
+        Spring(*ends, 10.0, 0.3, stroke=-0.1)
 
 
 @pytest.mark.parametrize(
@@ -501,7 +509,7 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     scene = loads(comment.sub("", text))
     assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
     weight = scene.effects[0]
-    assert isinstance(weight, fourbar.Gravity)
+    assert isinstance(weight, Gravity)
     assert weight.magnitude == pytest.approx(gravity)
     for entry in ("mass", "centre", "inertia", "force", "moment"):
         stated = re.search(rf'^(?:# )?{entry} = \[?"[-\d.]+ ([^"]*)"', text, re.M)

@@ -2,12 +2,14 @@
 
 import math
 from fractions import Fraction
+from math import pi
 
 import mpmath as mp
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import (
     angle,
     exact_difference,
@@ -72,7 +74,7 @@ class Carrying(float):
         (vector(1.0, Carrying(2.0)), 1.0 + 2.0j, complex),
         (vector(np.float64(1.0), 2.0), 1.0 + 2.0j, np.complex128),
         (vector(1.0, np.float64(2.0)), 1.0 + 2.0j, np.complex128),
-        (angle(1j), 0.5 * math.pi, float),
+        (angle(1j), 0.5 * pi, float),
         (square_root(0.0), 0.0, float),
         (square_root(0.25), 0.5, float),
         (polar(2.0, 0.0), 2.0, complex),
@@ -209,7 +211,7 @@ LINKAGES = [
     (0.08, 0.24, 0.2, 0.26),  # input longer than the ground
     (0.4, 0.35, 0.1, 0.08),  # 4 a d > 4 b c, and few positions close
 ]
-ANGLES = np.array([-2.5, -1e-7, 0.0, 0.3, 1.0, 2.0, math.pi, 4.0, 7.0])
+ANGLES = np.array([-2.5, -1e-7, 0.0, 0.3, 1.0, 2.0, pi, 4.0, 7.0])
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
@@ -219,9 +221,9 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
 ):
     """A position alone is evaluated in Python's own floats, a sweep in an array."""
     rates = {f"omega_{bar}": 2.0, f"alpha_{bar}": -3.0, "branch": branch}
-    motion = fourbar.Motion(**{f"theta_{bar}": theta_1 + ANGLES}, **rates)
+    motion = Motion(**{f"theta_{bar}": theta_1 + ANGLES}, **rates)
     scenes = [
-        fourbar.Scene(
+        Scene(
             FourBar(d, *(Bar(x, 0.5, 0.02, (0.03, 0.1)) for x in moving), theta_1),
             motion,
         )
@@ -229,11 +231,11 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
     ]
     keys = [f"lengths.{name}" for name in ("ground", "input", "coupler", "output")]
     columns = dict(zip(keys, np.transpose(LINKAGES), strict=True))
-    study, regular = fourbar.solve(fourbar.vary(scenes[0], columns)), 0
+    study, regular = solve(fourbar.vary(scenes[0], columns)), 0
     for n, scene in enumerate(scenes):
-        sweep = fourbar.solve(scene)
+        sweep = solve(scene)
         every = [command_at(scene, motion.angle[[k]]) for k in range(len(ANGLES))]
-        alone = [fourbar.solve(scene, at=command) for command in every]
+        alone = [solve(scene, at=command) for command in every]
         theta = sweep.theta_2, sweep.theta_3, sweep.theta_4
         sines = [np.sin(theta[i] - theta[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
         clear = np.abs(sines).min(axis=0) > 0.1
@@ -246,7 +248,7 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(
             for other in (each, getattr(study, name)[n]):
                 apart = other[clear] - together
                 if name.startswith("theta"):  # a sweep counts whole turns
-                    apart = np.remainder(apart + math.pi, math.tau) - math.pi
+                    apart = np.remainder(apart + pi, math.tau) - pi
                 assert np.abs(apart).max(initial=0.0) <= allowed, name
     assert 15 < regular < len(LINKAGES) * len(ANGLES)
 
@@ -286,10 +288,10 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
     Angles are as near to both as doubles come.
     """
     near = 10.0 ** -np.arange(1.0, 17.0)
-    few = np.array([1e-9, 0.7, math.pi + 1e-9])
+    few = np.array([1e-9, 0.7, pi + 1e-9])
     turns = [math.tau * count + few for count in (3.0, 800.0, -800.0)]
-    plain = np.append(np.linspace(-7.0, 7.0, 40), math.pi)
-    psi = np.concatenate([near, -near, math.pi - near, near - math.pi, plain, *turns])
+    plain = np.append(np.linspace(-7.0, 7.0, 40), pi)
+    psi = np.concatenate([near, -near, pi - near, near - pi, plain, *turns])
     with mp.workdps(200):
         for lengths in [*LINKAGES, (0.4, 0.397, 0.003, 0.002)]:
             bars = uniform(*lengths)
@@ -344,7 +346,7 @@ def test_an_offset_from_a_limit_in_many_digits(bars, stretched, size):
         with mp.workdps(200):
             limit = exact_limit(bars, stretched)
             meant = limit + mp.mpf(offset)
-            assert abs(limit - first) < 1e-15 * math.pi
+            assert abs(limit - first) < 1e-15 * pi
             assert abs(mp.mpf(theta_2) + remainder - meant) <= DIGITS_LEFT * size
             expected = five(bars, meant - mp.mpf(bars.ground_angle))
             half = exact_half_angle(bars, theta_2, remainder)
@@ -372,7 +374,7 @@ def test_bars_that_miss_by_the_rounding_of_their_lengths_touch(lengths):
     assert loop(*lengths).E2 == 0.0
     for remainder in (None, mp.mpf(0)):
         assert exact_half_angle(bars, 0.0, remainder).inner == 0.0
-    solution = fourbar.solve(fourbar.Scene(bars, fourbar.Motion(0.0, 1.0)))
+    solution = solve(Scene(bars, Motion(0.0, 1.0)))
     assert solution.status == ["change_point"]
 
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from math import hypot, pi
 
 import numpy as np
 import pytest
@@ -20,10 +21,10 @@ LINKAGES = {
     "change-point drag link": (1.0, 2.0, 4.0, 3.0),
     "equal coupler and output": (3.0, 1.0, 2.0, 2.0),
     "computed": (
-        math.hypot(3.1, 0.7),
-        math.hypot(1.3, 0.2),
-        math.hypot(3.1, 0.7),
-        math.hypot(1.3, 0.2),
+        hypot(3.1, 0.7),
+        hypot(1.3, 0.2),
+        hypot(3.1, 0.7),
+        hypot(1.3, 0.2),
     ),
 }
 STEP = math.radians(1.5)
@@ -84,8 +85,8 @@ def follow(places, start):
 
 def list_angles(linkage, bar):
     """Angles over three turns from the first quarter, between all change points."""
-    first = linkage.ground_angle + (math.pi if bar == 4 else 0.0) + math.radians(45.7)
-    return first + STEP * np.arange(round(TURNS * 2 * math.pi / STEP))
+    first = linkage.ground_angle + (pi if bar == 4 else 0.0) + math.radians(45.7)
+    return first + STEP * np.arange(round(TURNS * 2 * pi / STEP))
 
 
 @pytest.mark.parametrize("bar", [2, 3, 4])
@@ -123,4 +124,4 @@ def test_an_assembly_goes_on_smoothly_through_change_points(lengths, bar):
             speed = getattr(ours, f"omega_{number}")
             assert np.abs(np.diff(speed)).max() <= 0.2 * max(1.0, np.abs(speed).max())
         compared += len(q)
-    assert compared == 4 * round(TURNS * 2 * math.pi / STEP)
+    assert compared == 4 * round(TURNS * 2 * pi / STEP)

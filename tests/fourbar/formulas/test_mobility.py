@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from math import pi, tau
 
 import mpmath as mp
 import numpy as np
@@ -37,7 +38,7 @@ PRINTED_8 = 0.5e-8
 """
 GRID = 2000
 """Positions of a scan over one turn."""
-MISSED = 20.0 * math.pi / GRID
+MISSED = 20.0 * pi / GRID
 """Of half the end of a range, by a scan: a step, the bar up to ten times as fast."""
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 
@@ -70,7 +71,7 @@ def closes(bars, theta_2):
 
 
 def scan(bars):
-    return bars.ground_angle + (np.arange(GRID) + 0.5) * (math.tau / GRID)
+    return bars.ground_angle + (np.arange(GRID) + 0.5) * (tau / GRID)
 
 
 def angle(bars, theta_2, branch, bar):
@@ -78,7 +79,7 @@ def angle(bars, theta_2, branch, bar):
 
 
 def inside(angle, ranges):
-    within = [(angle - start) % math.tau <= stop - start for start, stop in ranges]
+    within = [(angle - start) % tau <= stop - start for start, stop in ranges]
     return np.any(within, axis=0)
 
 
@@ -163,14 +164,14 @@ def test_equality_is_decided_within_the_rounding_of_the_lengths():
 
 
 @pytest.mark.parametrize("lengths", [*itertools.permutations((1.0, 2.0, 3.0, 6.0))])
-@pytest.mark.parametrize("theta_1", [0.3, -math.pi])
+@pytest.mark.parametrize("theta_1", [0.3, -pi])
 def test_a_structure_stands_in_one_position(lengths, theta_1):
     bars = bare(*lengths, theta_1)
     assert classify(bars).code == "structure" and classify(bars).turning == ()
     (limit,) = limit_positions(bars)
     assert choose_range(bars) == (limit.theta_2, limit.theta_2)
     assert closes(bars, limit.theta_2) == pytest.approx(0.0, abs=12.0 * EPS)
-    assert -math.pi < limit.theta_3 <= math.pi and -math.pi < limit.theta_4 <= math.pi
+    assert -pi < limit.theta_3 <= pi and -pi < limit.theta_4 <= pi
 
 
 @pytest.mark.parametrize("bars", random_linkages(1, 60))
@@ -191,7 +192,7 @@ def test_circuits_agree_with_a_scan(bars):
     joined = closed & closed[ahead]
     meets = closed & ~(joined & np.roll(closed, 1))
     if change_points(bars):
-        touches = np.abs(closes(bars, theta_2 - math.pi / GRID)) < 1e-12
+        touches = np.abs(closes(bars, theta_2 - pi / GRID)) < 1e-12
         meets |= closed & touches & np.isin(place, (0, GRID // 2))
     starts = np.concatenate([place[joined], GRID + place[joined], place[meets]])
     ends = np.concatenate([ahead[joined], GRID + ahead[joined], GRID + place[meets]])
@@ -213,7 +214,7 @@ def test_ranges_hold_every_position_and_no_more(bar):
     nearly_a_structure = bare(6.0, 1.0, 2.0, 3.0001, 0.3)
     for bars in [nearly_a_structure, *random_linkages(8, 48)]:
         start, stop = find_intervals(bars)[0]
-        around = 0.5 * (start + stop) + np.linspace(-math.pi, math.pi, GRID)
+        around = 0.5 * (start + stop) + np.linspace(-pi, pi, GRID)
         fine = np.linspace(start, stop, GRID)
         theta_2 = np.concatenate([around, fine, 2.0 * bars.ground_angle - fine])
         theta_2 = theta_2[closes(bars, theta_2) > 16.0 * EPS * sum(bars.lengths)]
@@ -226,12 +227,12 @@ def test_ranges_hold_every_position_and_no_more(bar):
         assert inside(reached[clear], ranges).all()
         # the first range holds the ground's direction (bar 4: its opposite) or begins
         # less than pi after it
-        ahead = bars.ground_angle + (math.pi if bar == 4 else 0.0)
-        assert abs(ranges[0][0] - ahead) <= math.pi * (1.0 + EPS)
+        ahead = bars.ground_angle + (pi if bar == 4 else 0.0)
+        assert abs(ranges[0][0] - ahead) <= pi * (1.0 + EPS)
         low, high = ranges[0]
         assert swing(bars, bar) == high - low
         if turns_fully(bars, bar):
-            assert choose_range(bars, bar) == (0.0, math.tau)
+            assert choose_range(bars, bar) == (0.0, tau)
         else:
             assert from_ends.min(axis=0).max() < MISSED
             left_out = min(math.radians(1.0), 0.25 * (high - low))
@@ -255,11 +256,11 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
         theta_1, limits = bars.ground_angle, limit_positions(bars, bar)
         ahead = [limit.theta_2 - theta_1 for limit in limits]
         assert ahead == sorted(ahead)
-        assert all(-EPS * 8 <= angle < math.tau for angle in ahead)
+        assert all(-EPS * 8 <= angle < tau for angle in ahead)
         for limit in limits:
             checked += 1
             angles = dict(zip(MOVING_BARS, limit, strict=False))
-            value = limit[bar - 2] + (math.pi if bar == 4 else 0.0)
+            value = limit[bar - 2] + (pi if bar == 4 else 0.0)
             with mp.workdps(50):
                 psi = exact_psi(bars, bar, limit.stretched)
                 turned = mp.mpf(value) - theta_1
@@ -269,15 +270,15 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
                 )
             # theta_1 = 0, first of the pair: nothing is added, so the angle is good
             # relative to itself
-            alone = bar == 2 and theta_1 == 0.0 and 0.0 < value < math.pi
-            assert error <= ANGLE * (psi if alone else 4 * math.pi)
+            alone = bar == 2 and theta_1 == 0.0 and 0.0 < value < pi
+            assert error <= ANGLE * (psi if alone else 4 * pi)
             u2, u3, u4 = (np.exp(1j * angles[k]) for k in MOVING_BARS)
             gap = a * u2 + b * u3 - d * np.exp(1j * theta_1) - c * u4
-            assert abs(gap) <= ANGLE * math.tau * sum(bars.lengths)
+            assert abs(gap) <= ANGLE * tau * sum(bars.lengths)
             # bars 2, 3 lie along each other where stretched; the output runs from
             # its far end
             between = angles[first] - angles[second]
-            assert abs(math.sin(between)) <= ANGLE * math.tau
+            assert abs(math.sin(between)) <= ANGLE * tau
             assert (math.cos(between) > 0.0) == (limit.stretched == (bar == 4))
             sine = math.sin(angles[4] - angles[3])
             assert limit.branch == (0 if bar == 2 else math.copysign(1.0, sine))
@@ -287,7 +288,7 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
 def test_time_ratio_is_the_time_of_both_strokes():
     """A central crank-rocker, d^2 + a^2 = b^2 + c^2, has equal strokes."""
     bars, n = uniform(3.0, 1.0, 2.5, 2.2), 200_000
-    theta_2 = (np.arange(n) + 0.5) * (math.tau / n)
+    theta_2 = (np.arange(n) + 0.5) * (tau / n)
     ahead = np.count_nonzero(compute_state(bars, theta_2, 1).k.h4 > 0.0)
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     # both ends are counted to one step
@@ -303,12 +304,12 @@ def test_time_ratio_is_the_time_of_both_strokes():
 @pytest.mark.parametrize(
     "lengths, turns",
     [
-        ((2, 1, 2, 1), (0.0, math.pi)),
+        ((2, 1, 2, 1), (0.0, pi)),
         ((1, 2, 4, 3), (0.0,)),
-        ((3, 1, 2, 2), (math.pi,)),
+        ((3, 1, 2, 2), (pi,)),
         ((3, 1, 2.5, 2.2), ()),
         # of lengths whose sum is 2 those touch that miss by 8 U = 4 EPS
-        ((0.5, 0.5 + 4 * EPS, 0.5, 0.5), (0.0, math.pi)),
+        ((0.5, 0.5 + 4 * EPS, 0.5, 0.5), (0.0, pi)),
         ((0.5, 0.5 + 5 * EPS, 0.5, 0.5), ()),
     ],
 )

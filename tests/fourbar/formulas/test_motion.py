@@ -5,11 +5,13 @@ What is exact or has no value near limits and change points is tested too.
 
 import cmath
 import math
+from math import pi
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
 from tests.support.scenes import bare
@@ -52,8 +54,8 @@ def test_beyond_a_limit_nothing_assembles_however_near(lengths, offset):
     # the first limit ends the range in which the linkage closes, the second begins it
     for number, inside in ((1, -offset), (2, offset)):
         limits = [fourbar.FromLimit(number, x) for x in (inside, 0.0, -inside)]
-        motions = [fourbar.Motion(limit, 1.0) for limit in limits]
-        status = [fourbar.solve(fourbar.Scene(link, m)).status[0] for m in motions]
+        motions = [Motion(limit, 1.0) for limit in limits]
+        status = [solve(Scene(link, m)).status[0] for m in motions]
         assert status == ["ok", "singular", "not_assembled"]
 
 
@@ -95,7 +97,7 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
 
     An antiparallelogram has h4 = -(d - a)/(d + a) and its inverse there.
     """
-    link, theta_2 = bare(0.3, 0.1, 0.3, 0.1), np.array([0.0, 1.0, math.pi])
+    link, theta_2 = bare(0.3, 0.1, 0.3, 0.1), np.array([0.0, 1.0, pi])
     parallel = compute_state(link, theta_2, 1, 2.0, 5.0)
     assert find_singular(parallel.position).tolist() == [True, False, True]
     assert np.array_equal(parallel.omega(4), [2.0, 2.0, 2.0])
@@ -110,12 +112,12 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
 def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths):
     """The speeds have all their digits."""
     link, after = bare(*lengths), 2.0 * EPS * np.arange(5)  # the next doubles after pi
-    moving = compute_state(link, math.pi + after, 1)
+    moving = compute_state(link, pi + after, 1)
     assert (np.abs(moving.position.sin_mu) < 8.0 * EPS).all()
     assert find_singular(moving.position).all()
-    near = compute_state(link, math.pi + np.array([-1e-8, 1e-8]), 1).omega(3).mean()
+    near = compute_state(link, pi + np.array([-1e-8, 1e-8]), 1).omega(3).mean()
     assert moving.omega(3) == pytest.approx(np.full(5, near), abs=1e-14)
-    beside = compute_state(link, math.pi + after + 1e-13, 1)
+    beside = compute_state(link, pi + after + 1e-13, 1)
     assert not find_singular(beside.position).any()
 
 
@@ -133,7 +135,7 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     A folded kite has B on O2.
     """
     link = bare(*lengths, theta_1)
-    theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
+    theta_2 = theta_1 + pi * half_turn + np.array([1e-9, 0.5, 2.0])
     moving = compute_state(link, theta_2, branch, 2.0, 3.0)
     u1, u2 = np.full(3, cmath.exp(1j * theta_1)), moving.position.u2
     parallelogram = lengths[1] == lengths[3]
@@ -196,7 +198,7 @@ def test_short_ground_and_input_leave_no_digit_of_mu():
 
     mu = e/b, and A passes O4 so near that 8 EPS is reached.
     """
-    b, psi = 0.9, np.linspace(0.0, 2.0 * math.pi, 41)
+    b, psi = 0.9, np.linspace(0.0, 2.0 * pi, 41)
     for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
         d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
         link = bare(d, a, b, b)
@@ -206,7 +208,7 @@ def test_short_ground_and_input_leave_no_digit_of_mu():
         assert assembled(moving).all()
         assert np.array_equal(singular, e / b <= 8.0 * EPS)
         assert np.array_equal(np.isnan(moving.omega(3)), singular)
-        status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
+        status = solve(Scene(link, Motion(psi, 2.0))).status
         assert [word == "singular" for word in status] == singular.tolist()
 
 
@@ -221,11 +223,11 @@ def test_angles_alone_are_those_of_the_whole_position(lengths, branch, theta_1):
     To the roundings of an angle.
     """
     angles = np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
-    motion = fourbar.Motion(theta_1 + angles, branch=branch)
-    scene = fourbar.Scene(bare(*lengths, theta_1), motion)
-    positions = fourbar.solve(scene, "position")
+    motion = Motion(theta_1 + angles, branch=branch)
+    scene = Scene(bare(*lengths, theta_1), motion)
+    positions = solve(scene, "position")
     out = {name: np.empty(angles.shape) for name in ("theta_3", "theta_4")}
-    alone = fourbar.solve(scene, out=out)
+    alone = solve(scene, out=out)
     assert alone.status == positions.status
     for name, ours in out.items():
         apart = ours - getattr(positions, name)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene, solve, vary
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import Wrenches, pin_forces, solve_between
@@ -30,8 +31,8 @@ each.
 
 def make_bodies(case, command):
     """Right-hand sides of the thirteen equations from the kinematics, gravity alone."""
-    s = fourbar.solve(case, "acceleration", at=command)
-    vectors = (e.vector for e in case.effects if isinstance(e, fourbar.Gravity))
+    s = solve(case, "acceleration", at=command)
+    vectors = (e.vector for e in case.effects if isinstance(e, Gravity))
     gravity = np.array(next(vectors, (0.0, 0.0)))
     O4 = np.full_like(s.A, (case.linkage.ground, 0.0))
     first = {2: np.zeros_like(s.A), 3: s.A, 4: O4}
@@ -49,22 +50,22 @@ def make_bodies(case, command):
 
 def scene(drive_bar):
     bars = (
-        fourbar.Bar(0.1, 0.2, 1e-3, (0.03, 0.4)),
-        fourbar.Bar(0.25, 0.5, None, (0.1, -0.2)),
-        fourbar.Bar(0.22, 0.4),
+        Bar(0.1, 0.2, 1e-3, (0.03, 0.4)),
+        Bar(0.25, 0.5, None, (0.1, -0.2)),
+        Bar(0.22, 0.4),
     )
     loads = (
-        fourbar.Load(3, (5.0, 1.0), from_centre=(0.05, 0.3), moment=0.2, frame="bar"),
-        fourbar.Load(4, (-3.0, 0.5)),
+        Load(3, (5.0, 1.0), from_centre=(0.05, 0.3), moment=0.2, frame="bar"),
+        Load(4, (-3.0, 0.5)),
     )
     effects = (
-        fourbar.Gravity(),
+        Gravity(),
         fourbar.Viscous.at(O2=0.1, A=0.05, B=0.02),
         fourbar.Friction.at(O4=0.03),
     )
-    link = fourbar.FourBar(0.3, *bars, 0.3)
-    motion = fourbar.Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0)
-    return fourbar.Scene(link, motion, drive_bar, loads, effects)
+    link = FourBar(0.3, *bars, 0.3)
+    motion = Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0)
+    return Scene(link, motion, drive_bar, loads, effects)
 
 
 ANGLES = np.linspace(0.1, 6.0, 13)
@@ -87,12 +88,12 @@ def test_bars_without_mass_or_inertia(bodies, alpha, drive_bar):
     The thirteen equations leave none out.
     """
     lengths = zip((0.1, 0.25, 0.22), bodies, strict=True)
-    bars = (fourbar.Bar(x, *body, (0.4 * x, 0.3)) for x, body in lengths)
-    link, motion = fourbar.FourBar(0.3, *bars), fourbar.Motion(ANGLES, 10.0, alpha)
-    for effects in ((), (fourbar.Gravity(),)):
-        case = fourbar.Scene(link, motion, drive_bar, effects=effects)
+    bars = (Bar(x, *body, (0.4 * x, 0.3)) for x, body in lengths)
+    link, motion = FourBar(0.3, *bars), Motion(ANGLES, 10.0, alpha)
+    for effects in ((), (Gravity(),)):
+        case = Scene(link, motion, drive_bar, effects=effects)
         bodies_then = make_bodies(case, fourbar.command(case))
-        compare_with_thirteen(bodies_then, fourbar.solve(case))
+        compare_with_thirteen(bodies_then, solve(case))
 
 
 def compare_with_thirteen(bodies, s):
@@ -116,10 +117,10 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
 ):
     """With the couples mu r |F| the thirteen equations give these forces again."""
     friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
-    motion, gravity = fourbar.Motion(ANGLES, 10.0), fourbar.Gravity()
+    motion, gravity = Motion(ANGLES, 10.0), Gravity()
     linkage = make_example().linkage
-    case = fourbar.Scene(linkage, motion, drive_bar, effects=(gravity, friction))
-    s, bodies = fourbar.solve(case), make_bodies(case, fourbar.command(case))
+    case = Scene(linkage, motion, drive_bar, effects=(gravity, friction))
+    s, bodies = solve(case), make_bodies(case, fourbar.command(case))
     rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
     for pin in pins:
         i, j = PINS[pin]
@@ -149,11 +150,11 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back():
     In it the speeds are 0/0, and with them no force is.
     """
     link = bare(0.5, 0.4, 0.3, 0.25, 0.2)
-    loads = (fourbar.Load(3, (2.0, 0.3), arm=(0.1, 0.02)),)
+    loads = (Load(3, (2.0, 0.3), arm=(0.1, 0.02)),)
     limits = [fourbar.FromLimit(1, offset) for offset in (0.0, -1e-20, -1e-22)]
-    motions = [fourbar.Motion(limit, 1.0) for limit in limits]
-    scenes = [fourbar.Scene(link, motion, 4, loads) for motion in motions]
-    on, close, near = (fourbar.solve(one, "error") for one in scenes)
+    motions = [Motion(limit, 1.0) for limit in limits]
+    scenes = [Scene(link, motion, 4, loads) for motion in motions]
+    on, close, near = (solve(one, "error") for one in scenes)
     assert on.status == ["singular"] and close.status == near.status == ["ok"]
     forces = ("torque", "F12", "F32", "F43", "F14")
     for name in forces:
@@ -165,26 +166,26 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back():
 
 
 def test_written_into_given_arrays():
-    solution = fourbar.solve(scene(2))
+    solution = solve(scene(2))
     out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
-    part = fourbar.solve(scene(2), out=out)
+    part = solve(scene(2), out=out)
     assert part.torque is out["torque"] and part.F12 is part.theta_3 is None
     for name, array in out.items():
         assert np.array_equal(array, getattr(solution, name))
     for wrong, words in (("torque", r"out\.torque"), ("T2", "T2")):
         with pytest.raises(fourbar.InputError, match=words):
-            fourbar.solve(scene(2), out={wrong: np.empty(30)})
+            solve(scene(2), out={wrong: np.empty(30)})
 
 
 def test_the_forces_of_a_member_are_the_same_alone_and_beside_others():
     """F32 has a form of its own for members whose ground is shorter than their
     input.
     """
-    case = replace(scene(2), motion=fourbar.Motion(1.0, -8.0, 20.0))
+    case = replace(scene(2), motion=Motion(1.0, -8.0, 20.0))
     key, grounds = "lengths.ground", np.array([0.06, 0.3, 0.08])
-    together = fourbar.solve(fourbar.vary(case, {key: grounds}))
+    together = solve(vary(case, {key: grounds}))
     for member, length in enumerate(grounds):
-        alone = fourbar.solve(fourbar.vary(case, {key: np.array([length])}))
+        alone = solve(vary(case, {key: np.array([length])}))
         for name in ("F12", "F32", "F43", "F14", "torque"):
             one = getattr(alone, name)[0]
             assert np.array_equal(getattr(together, name)[member], one), (length, name)
@@ -198,11 +199,11 @@ def test_a_force_beside_B_has_its_moment_there(beside):
     Then b u3 x F32 is the moment about B: force times arm.
     """
     b, direction = 0.25, 0.3
-    coupler = fourbar.Bar(b, centre=(0.0, 0.0))
+    coupler = Bar(b, centre=(0.0, 0.0))
     link = replace(bare(0.3, 0.1, b, 0.22), coupler=coupler)
-    load = fourbar.Load(3, (1.0, direction), from_centre=(b + beside, 0.0), frame="bar")
-    motion = fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0)
-    s = fourbar.solve(fourbar.Scene(link, motion, 4, (load,)))
+    load = Load(3, (1.0, direction), from_centre=(b + beside, 0.0), frame="bar")
+    motion = Motion(np.linspace(0.1, 6.0, 7), 0.0)
+    s = solve(Scene(link, motion, 4, (load,)))
     arm = (b + beside) - b  # exact: as the doubles have it
     exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
     assert np.hypot(*s.F32.T) == pytest.approx(exact, rel=GROWN)
@@ -217,8 +218,8 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     """
     b, c = 1.0, ratio
     theta_4 = math.pi - 0.3 / max(1.0, c)
-    motion = fourbar.Motion(theta_4=[theta_4], omega_4=2.0)
-    case = fourbar.Scene(fourbar.uniform(1.5 + c, 1.2, b, c), motion)
+    motion = Motion(theta_4=[theta_4], omega_4=2.0)
+    case = Scene(fourbar.uniform(1.5 + c, 1.2, b, c), motion)
     state = compute_shown_state(case, fourbar.command(case))
     assert abs(state.position.sin_mu) > 0.1
     position, lengths = state.position, state.lengths

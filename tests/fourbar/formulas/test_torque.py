@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene
 from fourbar.effects import Place, Table
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.evaluation.case import compute_shown_state
@@ -38,7 +39,7 @@ def random_case(seed):
     rng = np.random.default_rng(seed)
     bare_one = draw_linkage(rng)
     bars = [
-        fourbar.Bar(
+        Bar(
             bar.length,
             rng.uniform(0, 2),
             rng.uniform(0, 0.1),
@@ -46,14 +47,14 @@ def random_case(seed):
         )
         for bar in bare_one.moving
     ]
-    linkage = fourbar.FourBar(bare_one.ground, *bars, bare_one.ground_angle)
+    linkage = FourBar(bare_one.ground, *bars, bare_one.ground_angle)
     loads = (
-        fourbar.Load(2, (3.0, 0.7), arm=(0.05, 1.0)),
-        fourbar.Load(3, (2.0, 0.3), from_centre=(0.1, 2.0), moment=0.4, frame="bar"),
-        fourbar.Load(4, (1.0, 0.9), arm=(0.2, -1.0), moment=-0.3),
+        Load(2, (3.0, 0.7), arm=(0.05, 1.0)),
+        Load(3, (2.0, 0.3), from_centre=(0.1, 2.0), moment=0.4, frame="bar"),
+        Load(4, (1.0, 0.9), arm=(0.2, -1.0), moment=-0.3),
     )
     viscous = fourbar.Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1)
-    return linkage, loads, (fourbar.Gravity(), viscous)
+    return linkage, loads, (Gravity(), viscous)
 
 
 @pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
@@ -66,8 +67,8 @@ def test_digits_are_kept_at_a_stated_distance_from_a_limit(seed, offset):
         assembled = []
         for side in (offset, -offset):
             limit = fourbar.FromLimit(number, side)
-            motion = fourbar.Motion(limit, 1.3, 0.7, branch=branch)
-            scene = fourbar.Scene(linkage, motion, drive, loads, effects)
+            motion = Motion(limit, 1.3, 0.7, branch=branch)
+            scene = Scene(linkage, motion, drive, loads, effects)
             s = solve(scene, "force")
             exact = answer_in_balls(scene).get("torque", [np.nan])[0]
             assembled.append(bool(s.assembled[0]))
@@ -84,7 +85,7 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit():
     for linkage in (draw_linkage(rng) for _ in range(8)):
         for limit in limit_positions(linkage):
             angles = limit.theta_2 + np.arange(-4, 5) * np.spacing(limit.theta_2)
-            ours = solve(fourbar.Scene(linkage, fourbar.Motion(angles))).assembled
+            ours = solve(Scene(linkage, Motion(angles))).assembled
             with mp.workdps(50):
                 d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
                 for angle, assembled in zip(angles.tolist(), ours, strict=True):
@@ -98,13 +99,11 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit():
 
 def test_statics_of_motiongenesis():
     """Equilibrium angles under H = 200 N (motiongenesis MGFourBarDynamicsFBD)."""
-    bars = (fourbar.Bar(1.0, 10.0), fourbar.Bar(2.0, 20.0), fourbar.Bar(2.0, 20.0))
-    linkage = fourbar.FourBar(1.0, *bars, ground_angle=np.pi / 2)
-    pull = fourbar.Load(3, (200.0, np.pi / 2), from_pin=(2.0, 0.0))
-    effects = (fourbar.Gravity(9.81, 0.0),)
-    found = fourbar.equilibrium(
-        fourbar.Scene(linkage, loads=(pull,), effects=effects)
-    ).found
+    bars = (Bar(1.0, 10.0), Bar(2.0, 20.0), Bar(2.0, 20.0))
+    linkage = FourBar(1.0, *bars, ground_angle=np.pi / 2)
+    pull = Load(3, (200.0, np.pi / 2), from_pin=(2.0, 0.0))
+    effects = (Gravity(9.81, 0.0),)
+    found = fourbar.equilibrium(Scene(linkage, loads=(pull,), effects=effects)).found
     angles = [np.degrees(rest.place[:3]) for rest in found]
     printed = [19.98690555, 71.66202052, 38.32488502]
     assert any(np.abs(angle - printed).max() <= 0.5e-8 for angle in angles)
@@ -116,7 +115,7 @@ def with_masses(linkage):
         replace(bar, mass=2.0 + bar.length, inertia=0.01, centre=(0.4, phase))
         for bar, phase in zip(linkage.moving, (0.5, -0.7, 2.0), strict=True)
     )
-    return fourbar.FourBar(linkage.ground, *bars, linkage.ground_angle)
+    return FourBar(linkage.ground, *bars, linkage.ground_angle)
 
 
 def inertia_of(linkage, state):
@@ -157,13 +156,13 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive
     linkage = with_masses(bare(0.3, 0.1, 0.25, 0.22, 0.4))
     ends = Place(1, (0.2, 0.3)), Place(4, (0.15, 0.2))
     table = Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
-    loads = (fourbar.Load(3, (2.0, 0.3), arm=(0.1, 2.0), moment=0.4, table=table),)
+    loads = (Load(3, (2.0, 0.3), arm=(0.1, 2.0), moment=0.4, table=table),)
     spring = fourbar.Springs((fourbar.Spring(*ends, 300.0, 0.05),))
     effects = spring, fourbar.Friction.at(O2=0.1, B=0.3)
     omega, signs = np.array([0.0, 3.0, -3.0, 0.0, 1.0]), np.ones(5, np.int8)
     command = Command(np.linspace(0.2, 5.5, 5), signs, omega, np.full(5, 4.0))
     for terms in ((loads, effects), (loads, effects[:1]), ((), ())):
-        scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, *terms)
+        scene = Scene(linkage, Motion(0.0, 1.0), drive, *terms)
         s = solve(scene, "force", at=command)
         thirteen = solve_thirteen_equations(scene, command)["torque"]
         assert thirteen == pytest.approx(s.torque, rel=1e-11)
@@ -181,10 +180,10 @@ def test_a_single_pendulum():
     Of bars without mass none.
     """
     m, r, phi = 0.7, 0.04, 0.5
-    crank = fourbar.Bar(0.1, m, 1e-3, (r, phi))
+    crank = Bar(0.1, m, 1e-3, (r, phi))
     linkage = replace(bare(0.3, 0.1, 0.25, 0.22), input=crank)
     for alpha in (0.0, 5.0):
-        motion = fourbar.Motion(np.linspace(0.0, 6.0, 13), 3.0, alpha)
-        s = solve(fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),)), "force")
+        motion = Motion(np.linspace(0.0, 6.0, 13), 3.0, alpha)
+        s = solve(Scene(linkage, motion, effects=(Gravity(),)), "force")
         expected = (1e-3 + m * r * r) * alpha + m * 9.81 * r * np.cos(s.theta_2 + phi)
         assert s.torque == pytest.approx(expected, rel=0.0, abs=16 * EPS * m * 9.81 * r)

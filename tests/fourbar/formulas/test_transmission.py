@@ -1,6 +1,7 @@
 """Transmission angle against the cosine law in many digits, the rest against a scan."""
 
 import math
+from math import pi, sin
 
 import mpmath as mp
 import numpy as np
@@ -59,7 +60,7 @@ def test_extremes_are_those_of_a_scan():
         bars = draw_linkage(rng)
         (d, a, b, c), theta_1 = bars.lengths, bars.ground_angle
         extremes = transmission_extremes(bars)
-        kinds.add((extremes.least == 0.0, extremes.greatest == math.pi))
+        kinds.add((extremes.least == 0.0, extremes.greatest == pi))
         start, stop = find_intervals(bars)[0]
         psi = np.linspace(start, stop, SCAN)[1:-1] - theta_1
         e2 = d * d + a * a - 2.0 * a * d * np.cos(psi)
@@ -72,16 +73,16 @@ def test_extremes_are_those_of_a_scan():
         ):
             # mu^2/2 = steep sin psi delta at a limit;
             # else mu'' = steep/sin mu, a whole step away at most
-            if end in (0.0, math.pi):
+            if end in (0.0, pi):
                 miss = math.sqrt(2.0 * steep * step)
             else:
-                miss = 0.5 * steep / math.sin(end) * step**2
+                miss = 0.5 * steep / sin(end) * step**2
             assert end == pytest.approx(scanned, abs=HIGHER_ORDER * miss)
-            assert 0.0 <= theta_2 - theta_1 <= math.pi * (1.0 + EPS) + 2.0 * EPS
+            assert 0.0 <= theta_2 - theta_1 <= pi * (1.0 + EPS) + 2.0 * EPS
             e = abs(a * np.exp(1j * theta_2) - d * np.exp(1j * theta_1))
             by_cosines = b * b + c * c - 2 * b * c * math.cos(end)
             assert e**2 == pytest.approx(by_cosines, abs=64 * EPS)
-        assert extremes.worst == min(extremes.least, math.pi - extremes.greatest)
+        assert extremes.worst == min(extremes.least, pi - extremes.greatest)
     assert len(kinds) == 4
 
 
@@ -94,8 +95,8 @@ def test_extremes_keep_their_digits_near_a_change_point(gap):
         least, greatest = (
             mp.acos((b * b + c * c - e * e) / (2 * b * c)) for e in (d - a, d + a)
         )
-        left = math.pi - extremes.greatest
-        assert abs(left - (mp.pi - greatest)) <= 4 * EPS * math.pi
+        left = pi - extremes.greatest
+        assert abs(left - (mp.pi - greatest)) <= 4 * EPS * pi
         assert abs(extremes.least - least) <= 8 * EPS * least
 
 
@@ -103,8 +104,8 @@ def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept():
     for drawn in random_positions(23, 40):
         moving = drawn.moving(3.0)
         theta_3, theta_4 = (np.angle(moving.direction(bar))[0] for bar in (3, 4))
-        lever_in = drawn.bars.input.length * math.sin(drawn.theta_2[0] - theta_3)
-        lever_out = drawn.bars.output.length * math.sin(theta_4 - theta_3)
+        lever_in = drawn.bars.input.length * sin(drawn.theta_2[0] - theta_3)
+        lever_out = drawn.bars.output.length * sin(theta_4 - theta_3)
         rounding = 256 * EPS * (drawn.bars.input.length + drawn.bars.output.length)
         ratio = derive_at("omega_4/omega_2", *drawn)[0]
         assert ratio * lever_out == pytest.approx(

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Friction, Gravity, Motion, Viscous, solve
 from fourbar.effects import Torsion
 from fourbar.errors import LimitError
 from fourbar.mjcf import SIMULATORS, write_mjcf_for
@@ -40,7 +41,7 @@ def errors(scene, read):
     scene = replace(scene, drive_bar=2)
     state = (q[0], 1, v[0], a[0])
     command = Command(*(np.array([x]) for x in state))
-    expected, turn = fourbar.solve(scene, at=command), fourbar.solve(scene)
+    expected, turn = solve(scene, at=command), solve(scene)
     apart = np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()
     of_torque = abs(torque - expected.torque[0]) / np.abs(turn.torque).max()
     return of_torque, float(apart)
@@ -159,9 +160,9 @@ MIDWAY = 200
 """Steps after which the closures have settled from the exact start."""
 
 
-JOINTS = (fourbar.Gravity(), fourbar.Viscous.at(A=0.05), fourbar.Friction.at(O4=0.1))
+JOINTS = (Gravity(), Viscous.at(A=0.05), Friction.at(O4=0.1))
 KEPT = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0),
+    motion=Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0),
     loads=(),
     effects=JOINTS,
 )
@@ -176,8 +177,8 @@ STIFF = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, 0.2, 0.1))))
 
 def test_a_file_for_genesis_names_what_it_leaves_out():
     at_B = (
-        fourbar.Viscous.at(A=0.05, B=0.1),
-        fourbar.Friction.at(B=0.2),
+        Viscous.at(A=0.05, B=0.1),
+        Friction.at(B=0.2),
         Torsion.at(B=(1, 0, 0)),
     )
     for scene, names in (
@@ -207,9 +208,7 @@ def _genesis():
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_genesis")
 def test_genesis_reads_as_the_comment_says(tmp_path):
-    assembled = (
-        float(fourbar.solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
-    )
+    assembled = float(solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
     resting = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, assembled, 0.0))))
     faster = replace(WHOLE, motion=KEPT.motion.replace(acceleration=30.0))
     for scene, moves_as in (
@@ -228,7 +227,7 @@ def test_genesis_reads_as_the_comment_says(tmp_path):
 
 @pytest.mark.nightly
 def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path):
-    for motion in (fourbar.Motion(1.0, 10.0), fourbar.Motion(1.0, 10.0, 30.0)):
+    for motion in (Motion(1.0, 10.0), Motion(1.0, 10.0, 30.0)):
         scene = crank_rocker(motion=motion, drive_bar=4)
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "newton"))
         read = read_newton(file, MIDWAY)
@@ -281,8 +280,8 @@ and less.
 
 def released(**changes):
     """A linkage let go under its weight, with a damper."""
-    motion = fourbar.Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
-    effects = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05))
+    motion = Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
+    effects = (Gravity(), Viscous.at(O2=0.05))
     return crank_rocker(
         **({"motion": motion, "effects": effects, "loads": ()} | changes)
     )
@@ -311,7 +310,7 @@ def test_drake_loads_the_sdf_and_moves_as_released():
     theta_2, theta_3, _, *speeds = (
         float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text)
     )
-    ours, missed, pulls = fourbar.solve(scene), [], []
+    ours, missed, pulls = solve(scene), [], []
     for step in (1e-3, 5e-4):
         plant = plants.MultibodyPlant(step)
         plant.set_discrete_contact_approximation(
@@ -370,7 +369,7 @@ def test_the_pin_at_B_alone_closes_the_loop_from_outside():
 
 
 LOADED = crank_rocker(loads=(fourbar.Load(4, moment=1.0),))
-AT_B = (fourbar.Viscous.at(B=1.0),)
+AT_B = (Viscous.at(B=1.0),)
 
 
 @pytest.mark.parametrize(
@@ -409,7 +408,7 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write):
         command = Command(
             np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0
         )
-        s = fourbar.solve(scene, "velocity", at=command)
+        s = solve(scene, "velocity", at=command)
         assert s.omega_3 is not None
         assert s.omega_4 is not None
         assert omega_2 == scene.motion.omega_2
@@ -436,9 +435,9 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says():
     pytest.importorskip("newton_usd_schemas")
     wheel = fourbar.Flywheel(100.0, 2)
     scene = crank_rocker(
-        effects=(fourbar.Gravity(), wheel),
+        effects=(Gravity(), wheel),
         loads=(),
-        motion=fourbar.Motion(1.0, 3.0),
+        motion=Motion(1.0, 3.0),
     )
     text = write_usd(scene)
     with tempfile.TemporaryDirectory() as folder:
@@ -467,5 +466,5 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says():
     theta = 2.0 * np.arctan2(turned[:, 5], turned[:, 6])
     force = complex(*row) * cmath.exp(1j * (theta[2] + angles[1] - angles[2]))
     command = Command(theta[:1], np.array([1]), np.array([omega_2]), np.zeros(1))
-    expected = complex(*fourbar.solve(scene, "force", at=command).F43[0])
+    expected = complex(*solve(scene, "force", at=command).F43[0])
     assert abs(force - expected) < KAMINO * abs(expected)

@@ -5,6 +5,7 @@ Exact numbers, clear refusals, and a file that runs in plain MuJoCo.
 
 import math
 from dataclasses import replace
+from math import pi, tau
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep
 from fourbar.effects import Torsion
 from fourbar.formulas.mobility import choose_range, turns_fully
 from fourbar.mjcf import RECIPE, Settings, list_defaults, make_scene, write_mjcf
@@ -57,7 +59,7 @@ def random_scene(rng, kind):
         else min(SHORT_OF_LIMIT, 0.25 * (stop - start))
     )
     motion = scene.motion.replace(
-        angle=fourbar.Sweep(start + short, stop - short, 90),
+        angle=Sweep(start + short, stop - short, 90),
         acceleration=0.0,
     )
     return replace(scene, motion=motion, drive=None, drive_bar=2, loads=())
@@ -80,7 +82,7 @@ def run_alone(scene):
 
     Worst gap, worst speed, angle still missing at the end.
     """
-    assert isinstance(scene.motion.theta_2, fourbar.Sweep)
+    assert isinstance(scene.motion.theta_2, Sweep)
     assert scene.motion.omega_2 is not None
     model, data = at_keyframe(scene)
     start = scene.motion.theta_2.start
@@ -132,10 +134,10 @@ def opened(scene):
 @pytest.mark.parametrize(
     "lengths, points",
     [
-        ((0.3, 0.1, 0.3, 0.1), (0.0, math.pi)),
-        ((0.3, 0.1, 0.1, 0.3), (0.0, math.pi)),
+        ((0.3, 0.1, 0.3, 0.1), (0.0, pi)),
+        ((0.3, 0.1, 0.1, 0.3), (0.0, pi)),
         ((0.1, 0.1, 0.3, 0.3), (0.0,)),
-        ((0.4, 0.1, 0.27, 0.23), (math.pi,)),
+        ((0.4, 0.1, 0.27, 0.23), (pi,)),
     ],
     ids=["parallelogram", "kite a = b", "kite a = d", "a + d = b + c"],
 )
@@ -146,10 +148,10 @@ def test_the_file_opens_in_the_assembly_beyond_change_points(lengths, points, br
     """
     linkage = replace(fourbar.uniform(*lengths), ground_angle=0.3)
     for psi in (-2.5, -0.5, 0.5, 2.5, 3.8, 6.0, 6.8):
-        turns = [point + math.tau * k for point in points for k in (-1, 0, 1)]
+        turns = [point + tau * k for point in points for k in (-1, 0, 1)]
         passed = sum((at > 0.5) != (at > psi) for at in turns)
-        motion = fourbar.Motion(0.3 + psi, 5.0, branch=branch)
-        _, data = opened(fourbar.Scene(linkage, motion))
+        motion = Motion(0.3 + psi, 5.0, branch=branch)
+        _, data = opened(Scene(linkage, motion))
         O4, A, B = (data.site(name).xpos[:2] for name in ("O4", "A", "B3"))
         left = np.cross([*(O4 - A), 0.0], [*(B - A), 0.0])[2]
         assert np.sign(left) == branch * (-1) ** passed, psi
@@ -162,7 +164,7 @@ def sprung():
     The joints start where those put them, far from the angles' first turn.
     """
     springs = Torsion.at(O2=(0.1, 9.0, 0.0), A=(0.1, -12.0, 0.0))
-    return crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,))
+    return crank_rocker(motion=Motion(1.0, 10.0), effects=(springs,))
 
 
 def test_the_joints_count_the_turns_of_every_spring():
@@ -170,13 +172,13 @@ def test_the_joints_count_the_turns_of_every_spring():
 
     The joint at A, which none holds, takes the rest.
     """
-    rests = {"O4": 1.0 + 3 * math.tau, "B": 0.5 - 2 * math.tau}
+    rests = {"O4": 1.0 + 3 * tau, "B": 0.5 - 2 * tau}
     springs = Torsion.at(**{pin: (0.1, rest, 0.0) for pin, rest in rests.items()})
-    _, data = opened(crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,)))
+    _, data = opened(crank_rocker(motion=Motion(1.0, 10.0), effects=(springs,)))
     at_O2, at_A, at_O4 = data.qpos
     assert gap(data) < OPEN
-    assert abs(at_O4 - rests["O4"]) < math.pi
-    assert abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
+    assert abs(at_O4 - rests["O4"]) < pi
+    assert abs(at_O4 - at_O2 - at_A - rests["B"]) < pi
 
 
 @pytest.mark.slow
@@ -192,9 +194,7 @@ def test_opens_assembled_and_moves_without_keyframe_or_control():
         # drive settles
         travel, settling = scene.motion.theta_2, 20.0 * SETTLING * model.opt.timestep
         travelled = (
-            0.9 * (travel.stop - travel.start)
-            if isinstance(travel, fourbar.Sweep)
-            else 0.5
+            0.9 * (travel.stop - travel.start) if isinstance(travel, Sweep) else 0.5
         )
         steps = int(
             min(max(1.0, settling), travelled / abs(omega)) / model.opt.timestep
@@ -218,12 +218,12 @@ RELEASE = 1e-4
 @pytest.mark.parametrize("scale", (1.0, 0.01))
 def test_a_released_linkage_falls_by_itself(scale):
     bars = [
-        fourbar.Bar(scale * length, mass)
+        Bar(scale * length, mass)
         for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))
     ]
-    linkage = fourbar.FourBar(scale * 0.3, *bars, ground_angle=0.2)
-    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5 * math.sqrt(scale), 10))
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    linkage = FourBar(scale * 0.3, *bars, ground_angle=0.2)
+    motion = Motion(0.5, 0.0, free=fourbar.Free(0.5 * math.sqrt(scale), 10))
+    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
     model, data = opened(scene)
     assert gap(data) < OPEN and model.nu == 0 and model.dof_armature[0] == 0.0
     expected = fourbar.solve(scene)
@@ -265,25 +265,25 @@ def test_shapes_add_no_mass_and_change_no_bit():
 
 @pytest.mark.parametrize("mass, inertia", [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
 def test_massless_bar_is_refused_in_one_line(mass, inertia):
-    linkage = fourbar.FourBar(
+    linkage = FourBar(
         0.3,
-        fourbar.Bar(0.1, 1.0),
-        fourbar.Bar(0.25, mass, inertia),
-        fourbar.Bar(0.22, 1.0),
+        Bar(0.1, 1.0),
+        Bar(0.25, mass, inertia),
+        Bar(0.22, 1.0),
     )
-    with pytest.raises(fourbar.InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
+    with pytest.raises(InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
         write_mjcf(crank_rocker(linkage=linkage))
 
 
 def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line():
     scene = crank_rocker(loads=(fourbar.Load(3, (1e308, 0.4)),))
-    with pytest.raises(fourbar.InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
+    with pytest.raises(InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
         write_mjcf(scene)
 
 
 @pytest.mark.parametrize("omega", [None, 0.0])
 def test_at_rest_a_file_is_written_that_stays_at_rest(omega):
-    scene = crank_rocker(motion=fourbar.Motion(1.0, omega), loads=(), effects=())
+    scene = crank_rocker(motion=Motion(1.0, omega), loads=(), effects=())
     model, data = at_keyframe(scene)
     mujoco.mj_step(model, data, 100)
     assert (
@@ -302,7 +302,7 @@ def test_from_lengths_alone():
 def test_without_keyframe_no_position_is_written():
     text = write_mjcf(crank_rocker(), Settings(timestep=1e-3), keyframe=False)
     assert mujoco.MjModel.from_xml_string(text).nkey == 0
-    with pytest.raises(fourbar.InputError, match="timestep"):
+    with pytest.raises(InputError, match="timestep"):
         write_mjcf(crank_rocker(), keyframe=False)
 
 
@@ -317,7 +317,7 @@ def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(pin, theta_1
     spring = Torsion.at(**{pin: (0.5, 0.4, 0.1)})
     scene = crank_rocker(
         linkage=turned,
-        motion=fourbar.Motion(1.0 + theta_1, 10.0),
+        motion=Motion(1.0 + theta_1, 10.0),
         loads=(),
         effects=(spring,),
     )

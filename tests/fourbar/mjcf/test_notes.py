@@ -6,14 +6,17 @@ With loads, effects, and a drive on bar 4.
 import csv
 import math
 from dataclasses import replace
+from math import tau
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import fourbar
+from fourbar import Load, Motion, Spring, Springs, Sweep, solve
 from fourbar.effects import Friction
 from fourbar.effects.place import Place
 from fourbar.linkage import BAR_NAMES
@@ -45,22 +48,22 @@ def acted_on(**changes):
 
     A load of each kind on each bar, and the drive is on bar 4.
     """
-    spring = fourbar.Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02)
+    spring = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02)
     effects = (
         fourbar.Gravity(),
         fourbar.Viscous.at(O2=0.02, B=0.03),
         Friction.at(A=0.01),
         fourbar.Torsion.at(O4=(0.5, 0.2, 0.1)),
-        fourbar.Springs((spring,)),
+        Springs((spring,)),
         fourbar.Flywheel(0.02, 4),
     )
     loads = (
-        fourbar.Load(2, (2.0, 0.4), arm=(0.03, 2.0), moment=0.1),
-        fourbar.Load(3, (4.0, -1.0), from_centre=(0.05, 0.7), frame="bar"),
-        fourbar.Load(3, moment=-0.2),
-        fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
+        Load(2, (2.0, 0.4), arm=(0.03, 2.0), moment=0.1),
+        Load(3, (4.0, -1.0), from_centre=(0.05, 0.7), frame="bar"),
+        Load(3, moment=-0.2),
+        Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
     )
-    motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + math.tau, 60), 10.0)
+    motion = Motion(Sweep(0.4, 0.4 + tau, 60), 10.0)
     acting = {"motion": motion, "effects": effects, "loads": loads, "drive_bar": 4}
     return crank_rocker(**acting | changes)
 
@@ -113,7 +116,7 @@ class Opened:
         d = self.data
         state = (d.qpos[0], 1, d.qvel[0], d.qacc[0])
         command = Command(*(np.array([x]) for x in state))
-        return fourbar.solve(scene, "force", at=command)
+        return solve(scene, "force", at=command)
 
     def errors(self, answers, scene=None):
         """Compare with the formulas; errors are over the greatest value in a turn."""
@@ -121,7 +124,7 @@ class Opened:
         motion = scene.motion.replace(free=None)
         # without poles
         round_ = replace(scene, drive=None, drive_bar=2, motion=motion)
-        expected, turn = self.solve_here(scene), fourbar.solve(round_, "force")
+        expected, turn = self.solve_here(scene), solve(round_, "force")
         errors = {}
         for name, answer in answers.items():
             apart = np.abs(np.asarray(answer) - getattr(expected, name)[0]).max()
@@ -167,7 +170,7 @@ def opens_assembled(file):
     mujoco.mj_resetData(m, d)
     file.forward()
     gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
-    s = fourbar.solve(
+    s = solve(
         file.scene,
         "position",
         at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0),
@@ -177,7 +180,7 @@ def opens_assembled(file):
         (d.qpos[0] + d.qpos[1], s.theta_3[0]),
         (d.qpos[2], s.theta_4[0]),
     ):
-        assert math.remainder(angle - theta, math.tau) == pytest.approx(0.0, abs=1e-12)
+        assert math.remainder(angle - theta, tau) == pytest.approx(0.0, abs=1e-12)
 
 
 def is_driven(file):
@@ -206,7 +209,7 @@ def starts_anew(file):
     The same stretch again, from an assembled pose.
     """
     d, last = file.data, 0.0
-    for _ in range(round(math.tau / 0.2244 / file.model.opt.timestep)):
+    for _ in range(round(tau / 0.2244 / file.model.opt.timestep)):
         file.step(1)
         if d.time < last:
             gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
@@ -320,7 +323,7 @@ def yields_more(file):
     Change points and static loads are measured with the check of files.
     """
     file.move_on()
-    motion = fourbar.solve(file.scene, "position")
+    motion = solve(file.scene, "position")
     bound = 1e-4 / float(np.abs(motion.sin_mu).min()) ** 2
     assert file.error("F43", file.at_B) < bound
 
@@ -337,7 +340,7 @@ def has_one_control_with_a_range(file):
     """
     m, d, scene = file.model, file.data, file.scene
     assert m.nu == 1 and m.actuator_ctrlrange.shape == (1, 2)
-    turn = fourbar.solve(scene, "force")
+    turn = solve(scene, "force")
     driving = turn.torque if scene.drive is None else turn.drive_force
     most = 2.0 * float(np.nanmax(np.abs(np.asarray(driving))))
     assert m.actuator_ctrlrange[0] == pytest.approx([-most, most], rel=5e-3)
@@ -360,7 +363,7 @@ def has_passive_motors(file):
     file.forward()
     before = d.actuator_force[others].copy()
     file.step(50)
-    np.testing.assert_allclose(d.actuator_force[others], before, rtol=1e-15)
+    assert_allclose(d.actuator_force[others], before, rtol=1e-15)
 
 
 def was_wrong_before_3_7(file):
@@ -410,23 +413,21 @@ SAID = {
 }
 """By how a sentence begins, what it promises."""
 CYLINDER = fourbar.LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7)))
-PRELOADED = fourbar.Spring(
-    Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02, 30.0
-)
+PRELOADED = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02, 30.0)
 """A spring that pulls even where its ends meet: a tendon's rest length cannot express
 it.
 """
 FILES = {
     "at omega_2": (acted_on(), "flywheel"),
     "at alpha_2": (
-        acted_on(motion=fourbar.Motion(fourbar.Sweep(0.4, 5.0, 60), 10.0, 30.0)),
+        acted_on(motion=Motion(Sweep(0.4, 5.0, 60), 10.0, 30.0)),
         "flywheel",
     ),
     "motor on bar 4": (acted_on(), "motor"),
     "motor on bar 3": (acted_on(drive_bar=3), "motor"),
     "motor on bar 2": (acted_on(drive_bar=2), "motor"),
     "motor and a preloaded spring": (
-        acted_on(effects=(fourbar.Springs((PRELOADED,)),), drive_bar=2),
+        acted_on(effects=(Springs((PRELOADED,)),), drive_bar=2),
         "motor",
     ),
     "no drive": (acted_on(), "none"),
@@ -434,7 +435,7 @@ FILES = {
     "motor along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "motor"),
     "no drive along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "none"),
     "released": (
-        acted_on(motion=fourbar.Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))),
+        acted_on(motion=Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))),
         "flywheel",
     ),
 }
@@ -471,9 +472,7 @@ FOLLOWED = 1e-6
 
 def test_a_controller_of_ones_own_finds_the_torque():
     """PD control about omega_2 t; its torque is the formulas' at what then happens."""
-    file = Opened(
-        crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 6.0, 60), 10.0)), "motor"
-    )
+    file = Opened(crank_rocker(motion=Motion(Sweep(0.4, 6.0, 60), 10.0)), "motor")
     m, d = file.model, file.data
     assert m.dof_armature[0] == 0.0
     worst = 0.0

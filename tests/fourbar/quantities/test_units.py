@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, PinFriction, Spring, uniform
 from fourbar.effects import Place, Table
 from fourbar.errors import InputError
 from fourbar.files import loads
@@ -22,7 +23,7 @@ SAME = [
         ("10 cm", "200 g", "2 kg cm^2", ("5 cm", "180 deg")),
         (0.1, 0.2, 2e-4, (0.05, np.pi)),
     ),
-    (fourbar.uniform, ("6 in", 0.05, "127 mm", "4 in"), (0.1524, 0.05, 0.127, 0.1016)),
+    (uniform, ("6 in", 0.05, "127 mm", "4 in"), (0.1524, 0.05, 0.127, 0.1016)),
     (fourbar.Sweep, ("180 deg", "2 rad", 4), (np.pi, 2.0, 4)),
     (fourbar.FromLimit, (1, "180 deg"), (1, np.pi)),
     (fourbar.Free, ("0.5 min", 4), (30.0, 4)),
@@ -44,14 +45,14 @@ SAME = [
     (fourbar.Flywheel, ("200 kg cm^2",), (0.02,)),
     (fourbar.Viscous, ((("A", "2 N mm s/rad"),),), ((("A", 0.002),),)),
     (fourbar.Friction, ((("A", "5 N cm"),),), ((("A", 0.05),),)),
-    (fourbar.PinFriction, ((("A", 0.1, "8 mm"),),), ((("A", 0.1, 0.008),),)),
+    (PinFriction, ((("A", 0.1, "8 mm"),),), ((("A", 0.1, 0.008),),)),
     (
         fourbar.Torsion,
         ((("A", "2 N m/rad", "180 deg", "1 N cm"),),),
         ((("A", 2.0, np.pi, 0.01),),),
     ),
     (
-        fourbar.Spring,
+        Spring,
         (
             Place(1, ("10 cm", 0)),
             Place(4, ("20 cm", "180 deg")),
@@ -62,7 +63,7 @@ SAME = [
         (*ENDS, 2000.0, 0.05, 3.0),
     ),
     (
-        fourbar.Spring.gas,
+        Spring.gas,
         (*ENDS, "50 cm", "20 cm", "400 N", "0.5 kN"),
         (*ENDS, 0.5, 0.2, 400.0, 500.0),
     ),
@@ -75,7 +76,7 @@ def test_a_text_with_a_unit_is_its_number(make, texts, numbers):
 
 
 def test_a_motion_is_written_as_in_the_file():
-    stated = fourbar.Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")
+    stated = Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")
     read = loads(
         '[lengths]\nground = "6 in"\ninput = "2 in"\n'
         'coupler = "5 in"\noutput = "4 in"\n'
@@ -94,27 +95,27 @@ def test_a_motion_is_written_as_in_the_file():
     "make, words",
     [
         (
-            lambda: fourbar.uniform("6", 1, 1, 1),
+            lambda: uniform("6", 1, 1, 1),
             r"lengths.ground = '6': the unit is missing.*like \"1 m\"",
         ),
         (
-            lambda: fourbar.uniform(1, "6 kg", 1, 1),
+            lambda: uniform(1, "6 kg", 1, 1),
             "lengths.input = '6 kg'.*does not convert to m",
         ),
         (
-            lambda: fourbar.uniform(1, "-6 in", 1, 1),
+            lambda: uniform(1, "-6 in", 1, 1),
             "lengths.input = '-6 in': must be a finite number > 0",
         ),
         (
-            lambda: fourbar.Motion("60", 1.0),
+            lambda: Motion("60", 1.0),
             r"motion.theta_2 = '60': the unit is missing",
         ),
         (
-            lambda: fourbar.Motion(1.0, branch="opne"),
+            lambda: Motion(1.0, branch="opne"),
             r"motion.branch = 'opne': must be \+1 \(open\)",
         ),
         (
-            lambda: fourbar.PinFriction.at(A=("0.1", 1)),
+            lambda: PinFriction.at(A=("0.1", 1)),
             "coefficient = '0.1': must be a finite number",
         ),
     ],

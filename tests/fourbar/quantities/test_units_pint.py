@@ -7,8 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import fourbar
+from fourbar import Bar, Motion
 from fourbar.errors import InputError
 from fourbar.quantities.units import PARSED_UNITS, ask_library
 
@@ -17,7 +19,7 @@ MM, KG, DEG = ureg.millimeter, ureg.kilogram, ureg.degree
 
 
 def test_lengths_and_masses_are_converted_exactly():
-    bar = fourbar.Bar(0.1 * ureg.inch, mass=250.0 * ureg.gram, centre=(3 * MM, 5 * DEG))
+    bar = Bar(0.1 * ureg.inch, mass=250.0 * ureg.gram, centre=(3 * MM, 5 * DEG))
     assert bar.length == 0.00254
     assert bar.mass == 0.25
     assert bar.centre == (0.003, math.radians(5))
@@ -26,8 +28,8 @@ def test_lengths_and_masses_are_converted_exactly():
 
 def test_arrays_of_angles_are_converted():
     angles = np.array([0.0, 90.0, 180.0])
-    motion = fourbar.Motion(angles * DEG, 60.0 * ureg.rpm)
-    np.testing.assert_array_equal(motion.theta_2, np.radians(angles))
+    motion = Motion(angles * DEG, 60.0 * ureg.rpm)
+    assert_array_equal(motion.theta_2, np.radians(angles))
     assert motion.omega_2 == 2.0 * math.pi
 
 
@@ -48,13 +50,13 @@ def test_effects_and_loads_take_them():
 )
 def test_what_is_no_length_is_refused(quantity, sentence):
     with pytest.raises(InputError, match=sentence):
-        fourbar.Bar(quantity)
+        Bar(quantity)
 
 
 def test_hertz_are_no_speed():
     """pint converts 10 Hz to 10 rad/s, a sixth of the speed that is meant."""
     with pytest.raises(InputError, match=r'did you mean "10\.0 rev/s"'):
-        fourbar.Motion(0.0, 10.0 * ureg.hertz)
+        Motion(0.0, 10.0 * ureg.hertz)
 
 
 @pytest.mark.parametrize("unit", PARSED_UNITS)

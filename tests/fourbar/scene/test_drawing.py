@@ -30,7 +30,5 @@ def test_theta_2_is_within_half_a_turn_of_the_ground(turn):
 
 
 def test_a_text_has_a_unit():
-    drawing = fourbar.DrawnPins(
-        ("0 in", 0), ("0 in", "1 in"), ("2 in", "1 in"), ("3 in", 0)
-    )
+    drawing = DrawnPins(("0 in", 0), ("0 in", "1 in"), ("2 in", "1 in"), ("3 in", 0))
     assert drawing.length(2) == 0.0254

@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import fourbar
+from fourbar import Scene, solve, uniform
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS
@@ -61,7 +63,7 @@ def kinetic_energy(time):
 def test_the_torque_of_a_sine_is_the_power_of_its_energy():
     scene = make_swing(SINE)
     assert loads(dump(scene)) == scene
-    s = fourbar.solve(scene)
+    s = solve(scene)
     for row in (0, 100, 250, 360):
         t = s.time[row]
         power = (kinetic_energy(t + 1e-3) - kinetic_energy(t - 1e-3)) / 2e-3
@@ -90,8 +92,8 @@ def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     between = np.linspace(0.0, 1.5, 50)
     for order, computed in enumerate(law.at(between)):
         right = wanted.deriv(order)(between)
-        np.testing.assert_allclose(computed, right, atol=100.0 * EXACT)
-    scene = fourbar.Scene(fourbar.uniform(0.2, 0.3, 0.25, 0.28), Motion(law=law))
+        assert_allclose(computed, right, atol=100.0 * EXACT)
+    scene = Scene(uniform(0.2, 0.3, 0.25, 0.28), Motion(law=law))
     text = dump(scene)
     assert loads(text).motion == scene.motion
     assert (f"omega_{bar} = [" in text) == (rates > 0) != ("ends" in text)
@@ -208,8 +210,8 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     times, angles = (0.0, 0.2, 0.5, 0.7, 1.0), (0.0, 0.5, 1.5, 1.9, 2.0)
     law, changed = (Law(times, angles, ends=name) for name in (ends, other))
     at_ends = np.array([*np.linspace(0.0, 0.2, 2001), *np.linspace(0.7, 1.0, 2001)])
-    bare = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    scene = fourbar.Scene(bare, fourbar.Motion(law=law), effects=(fourbar.Gravity(),))
+    bare = uniform(0.3, 0.1, 0.25, 0.22)
+    scene = Scene(bare, Motion(law=law), effects=(fourbar.Gravity(),))
     printed = write_note(scene)
     assert f'ends = "{ends}"' in printed and f'"{other}" changes' in printed
     rates = (one.at(at_ends) for one in (law, changed))
@@ -222,7 +224,7 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
 def write_note(scene):
     from fourbar.show.block import write_block
 
-    return " ".join(" ".join(write_block(scene, fourbar.solve(scene, "error"))).split())
+    return " ".join(" ".join(write_block(scene, solve(scene, "error"))).split())
 
 
 def test_what_leaves_no_choice_says_nothing_of_its_ends():
@@ -232,7 +234,5 @@ def test_what_leaves_no_choice_says_nothing_of_its_ends():
     rates = Law((0.0, 1.0), (0.0, 1.0), omega=(0.0, 0.0))
     three = Law((0.0, 0.5, 1.0), (0.0, 1.0, 1.5), ends="rest")
     for law in (periodic, rates, three):
-        scene = fourbar.Scene(
-            fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(law=law)
-        )
+        scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law))
         assert "ends" not in write_note(scene)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from fourbar import InputError, Motion, Point, load, solve, vary
 from fourbar.files import dump, loads
@@ -49,7 +50,7 @@ def test_pins_and_mass_centres_are_points():
             (s.velocity, "v_"),
             (s.acceleration, "a_"),
         ):
-            np.testing.assert_allclose(
+            assert_allclose(
                 vectors[point],
                 getattr(s, start + name),
                 rtol=1e-13,
@@ -65,7 +66,7 @@ def test_velocity_and_acceleration_are_derivatives():
     )
     for point in POINTS:
         low, high = before.points[point.name], after.points[point.name]
-        np.testing.assert_allclose(
+        assert_allclose(
             here.velocity[point.name],
             (high - low) / (2 * h) * omega_2,
             atol=OF_A_DIFFERENCE,
@@ -75,19 +76,19 @@ def test_velocity_and_acceleration_are_derivatives():
             / (2 * h)
             * omega_2
         )
-        np.testing.assert_allclose(
+        assert_allclose(
             here.acceleration[point.name],
             slope,
             atol=100.0 * OF_A_DIFFERENCE,
         )
     for name in ("A", "B", "G2", "G3", "G4"):
         slope = (getattr(after, name) - getattr(before, name)) / (2 * h) * omega_2
-        np.testing.assert_allclose(
+        assert_allclose(
             getattr(here, f"v_{name}"),
             slope,
             atol=OF_A_DIFFERENCE,
         )
-    np.testing.assert_allclose(
+    assert_allclose(
         here.points["on_ground"],
         [[0.1 * np.cos(0.7), 0.1 * np.sin(0.7)]] * 7,
         atol=1e-15,
@@ -129,12 +130,12 @@ def test_a_study_varies_them_and_lists_its_members():
         {"points.P.from_pin.0": [0.0, 0.04], "lengths.coupler": [0.25, 0.26]},
     )
     s = solve(study)
-    np.testing.assert_allclose(s.points["P"][0], s.A[0], atol=1e-15)
+    assert_allclose(s.points["P"][0], s.A[0], atol=1e-15)
     longer = replace(crank_rocker().linkage.coupler, length=0.26)
     alone = solve(
         scene(*POINTS, linkage=replace(crank_rocker().linkage, coupler=longer))
     )
-    np.testing.assert_array_equal(s.acceleration["P"][1], alone.acceleration["P"])
+    assert_array_equal(s.acceleration["P"][1], alone.acceleration["P"])
     frame = s.to_pandas()
     assert len(frame) == s.theta_2.size
     assert frame["member"].tolist() == [0] * 61 + [1] * 61

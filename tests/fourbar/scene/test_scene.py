@@ -5,6 +5,7 @@ The same linkage in the same motion, whichever bar is told to make it.
 
 import math
 from dataclasses import replace
+from math import sin
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,9 @@ from fourbar import (
     Motion,
     Scene,
     Sweep,
+    command,
+    dump,
+    sensitivity,
     solve,
     uniform,
     vary,
@@ -140,7 +144,7 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces(limit)
 
     Pin forces with the others are those just before and after.
     """
-    sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
+    sign = 1 if sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
     angles = limit.theta_4 + np.array([-1e-7, 0.0, 1e-7])
     motion = Motion(theta_4=angles, omega_4=2.0, alpha_4=3.0, branch=sign)
     scene = replace(LOADED, linkage=ROCKER, motion=motion)
@@ -174,7 +178,7 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     assert law.bar == bar and law.angle == table
     by_law = replace(LOADED, motion=Motion(law=law))
     moved = solve(by_law)
-    again = solve(replace(LOADED, motion=Motion()), at=fourbar.command(by_law))
+    again = solve(replace(LOADED, motion=Motion()), at=command(by_law))
     assert np.array_equal(moved.torque, again.torque) and moved.time is not None
     assert getattr(moved, theta)[-1] == pytest.approx(table[-1], rel=4 * U)
     assert abs(moved.omega_2[0]) < 1e-12
@@ -200,7 +204,7 @@ def test_a_study_and_sensitivities_take_the_keys_of_the_commanded_bar(
     key, values, step
 ):
     scene = replace(LOADED, motion=AT_TWO)
-    slopes = fourbar.sensitivity(scene)
+    slopes = sensitivity(scene)
     ends = np.squeeze([values - step, values + step])
     solved = solve(vary(scene, {key: ends}))
     assert solved.theta_2.shape == (2, 2) and (np.abs(solved.branch) == 1).all()
@@ -215,7 +219,7 @@ def test_a_study_and_sensitivities_take_the_keys_of_the_commanded_bar(
 def test_the_commanded_angle_follows_its_key_alone_and_may_have_a_tolerance():
     loose = (fourbar.Tolerance("motion.omega_4", 0.01),)
     scene = replace(LOADED, motion=AT_TWO, tolerances=loose)
-    slopes = fourbar.sensitivity(scene)
+    slopes = sensitivity(scene)
     assert np.array_equal(slopes.of("theta_4", "motion.theta_4"), [1.0, 1.0])
     assert not slopes.of("theta_4", "lengths.input").any()
     with pytest.raises(InputError, match=r"motion\.theta_4"):
@@ -247,11 +251,11 @@ def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own():
     rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
     limit = limit_positions(rocker)[0]
     towards = find_limit_angles(rocker, 4)[0] - limit.theta_4
-    ahead = math.copysign(1.0, math.sin(towards))
+    ahead = math.copysign(1.0, sin(towards))
     motion = Motion(
         theta_4=limit.theta_4 - 0.1 * ahead,
         omega_4=ahead,
-        branch=1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1,
+        branch=1 if sin(limit.theta_3 - limit.theta_2) > 0.0 else -1,
         free=Free(20.0, 200),
     )
     solution = solve(Scene(rocker, motion))
@@ -329,7 +333,7 @@ def test_a_motion_reads_by_the_name_of_what_it_commands():
 def make_motion_of_a_law(law):
     """State the positions of a law one by one, each with its speed and growth."""
     angle, speed, acceleration = law.at(law.times())
-    names = fourbar.Motion(**{f"theta_{law.bar}": 0.0}).names
+    names = Motion(**{f"theta_{law.bar}": 0.0}).names
     return Motion(**dict(zip(names, (angle, speed, acceleration), strict=True)))
 
 
@@ -343,7 +347,7 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     expected = solve(of_law)
     assert np.array_equal(solve(of_each).torque, expected.torque)
     assert np.array_equal(solve(of_each).F12, expected.F12)
-    again = fourbar.files.loads(fourbar.dump(of_each))
+    again = fourbar.files.loads(dump(of_each))
     assert again.motion == of_each.motion != of_law.motion
     assert hash(again.motion) == hash(of_each.motion)
     lightened = vary(of_each, {"bars.output.mass": [0.4, 0.2]})
@@ -409,9 +413,9 @@ def test_two_commands_of_motion_are_one_line(lines, said):
 def test_a_file_of_it_reads_back_bit_for_bit(angle):
     motion = Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1)
     scene = replace(LOADED, motion=motion)
-    text = fourbar.dump(scene)
+    text = dump(scene)
     again = fourbar.files.loads(text)
-    assert again == scene and fourbar.dump(again) == text
+    assert again == scene and dump(again) == text
 
 
 def test_what_takes_theta_2_alone_refuses_in_one_line():
@@ -421,7 +425,7 @@ def test_what_takes_theta_2_alone_refuses_in_one_line():
     with pytest.raises(LimitError, match=words):
         write_mjcf(scene)
     with pytest.raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is"):
-        _ = fourbar.command(scene).theta_2
+        _ = command(scene).theta_2
     listed = replace(scene, motion=Motion([1.0, 2.0], [1.0, 2.0]))
     with pytest.raises(LimitError, match=r"takes one speed and acceleration$"):
         write_mjcf(listed)

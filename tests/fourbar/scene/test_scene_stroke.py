@@ -4,12 +4,15 @@ commanded alone, and an impossible stroke is refused.
 
 import math
 from dataclasses import replace
+from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import fourbar
+from fourbar import Motion, solve, vary
 from fourbar.effects import LinearDrive, Place
 from fourbar.errors import FourBarError, InputError
 from fourbar.files.scene_file import loads
@@ -41,7 +44,7 @@ third derivatives of 1e4.
 
 def scene(bar, stroke, side="left", *, turned=False, **motion):
     ends = (ENDS[bar], GROUND) if turned else (GROUND, ENDS[bar])
-    commanded = fourbar.Motion(stroke=stroke, side=side, **motion)
+    commanded = Motion(stroke=stroke, side=side, **motion)
     return crank_rocker(
         motion=commanded,
         drive=LinearDrive(*ends),
@@ -63,7 +66,7 @@ def test_its_bar_moves_as_the_triangle_in_balls_does(bar, strokes, side, turned)
         stroke_speed=0.2,
         stroke_acceleration=0.1,
     )
-    s, exact = fourbar.solve(by_stroke), answer_in_balls(by_stroke)
+    s, exact = solve(by_stroke), answer_in_balls(by_stroke)
     ok = s.status_code == 0
     assert ok.sum() > 4
     for name in ("theta_2", "theta_3", "theta_4"):
@@ -81,7 +84,7 @@ def test_its_bar_moves_as_the_triangle_in_balls_does(bar, strokes, side, turned)
         "F43",
     ):
         largest = np.abs(exact[name][ok]).max()
-        np.testing.assert_allclose(
+        assert_allclose(
             getattr(s, name)[ok],
             exact[name][ok],
             rtol=0.0,
@@ -91,7 +94,7 @@ def test_its_bar_moves_as_the_triangle_in_balls_does(bar, strokes, side, turned)
 
 def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end():
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        s = fourbar.solve(scene(2, 0.3, side))
+        s = solve(scene(2, 0.3, side))
         end = 0.12 * np.exp(1j * (s.theta_2[0] + 0.4))
         ground = 0.3 * np.exp(1j * (2.2 + crank_rocker().linkage.ground_angle))
         assert sign * (np.conj(ground) * end).imag > 0.0
@@ -112,9 +115,7 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
         loads=(),
     )
     angles = by_stroke.linkage.ground_angle + np.linspace(0.0, 3.0, 100)
-    s = fourbar.solve(
-        fourbar.vary(by_stroke, {"lengths.ground_angle": angles}), "error"
-    )
+    s = solve(vary(by_stroke, {"lengths.ground_angle": angles}), "error")
     assert (s.status_code == 0).all()
     assert s.drive_force is not None
     assert s.drive_force_error is not None
@@ -136,7 +137,7 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
 
 
 def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
-    s = fourbar.solve(scene(2, np.array([0.42, 0.3]), stroke_speed=0.1))
+    s = solve(scene(2, np.array([0.42, 0.3]), stroke_speed=0.1))
     assert list(s.status) == ["singular", "ok"]
     assert np.isnan(s.omega_3[0]) and s.condition[0] < 1e-7
 
@@ -165,16 +166,16 @@ def test_it_reads_back_as_it_was_written():
 def test_what_cannot_be_is_refused_in_one_line(motion, says):
     with pytest.raises(InputError, match=says) as caught:
         refused = crank_rocker(
-            motion=fourbar.Motion(**motion),
+            motion=Motion(**motion),
             drive=LinearDrive(GROUND, ENDS[2]),
         )
-        fourbar.solve(refused)
+        solve(refused)
     assert "\n" not in str(caught.value)
 
 
 def test_who_does_not_take_it_says_so():
     with pytest.raises(InputError, match=r"motion\.stroke.*cylinder"):
-        crank_rocker(motion=fourbar.Motion(stroke=0.3, side="left"))
+        crank_rocker(motion=Motion(stroke=0.3, side="left"))
     by_stroke = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
     with pytest.raises(FourBarError, match=r"motion\.stroke"):
         write_mjcf(by_stroke)
@@ -182,10 +183,8 @@ def test_who_does_not_take_it_says_so():
 
 
 def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble():
-    solution = fourbar.solve(
-        fourbar.vary(
-            scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]}
-        )
+    solution = solve(
+        vary(scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]})
     )
     assert solution.status == [["not_assembled", "ok", "not_assembled"]]
     assert np.isnan(solution.theta_2[0, ::2]).all()
@@ -208,10 +207,8 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar, stroke):
             else read_place(by_stroke, slopes.keys[key].place)
         )
         ends = np.array([value + h, value - h])
-        s = fourbar.solve(
-            fourbar.vary(
-                by_stroke, {key: ends[:, None] if key == "motion.stroke" else ends}
-            )
+        s = solve(
+            vary(by_stroke, {key: ends[:, None] if key == "motion.stroke" else ends})
         )
         for name in (
             "theta_2",
@@ -224,7 +221,7 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar, stroke):
             ahead, back = getattr(s, name)
             slope = (ahead - back)[0] / (2.0 * h)
             size = np.abs(getattr(slopes.solution, name)).max() / h
-            np.testing.assert_allclose(
+            assert_allclose(
                 slopes.of(name, key)[0],
                 slope,
                 rtol=DIFFERENCES,
@@ -235,19 +232,19 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar, stroke):
 @pytest.mark.parametrize(
     "keywords, words",
     [
-        ({"theta_2": fourbar.Sweep("10 cm", "20 cm", 4)}, "motion.theta_2"),
+        ({"theta_2": Sweep("10 cm", "20 cm", 4)}, "motion.theta_2"),
         (
-            {"stroke": fourbar.Sweep("10 deg", "20 deg", 4), "side": "left"},
+            {"stroke": Sweep("10 deg", "20 deg", 4), "side": "left"},
             "motion.stroke",
         ),
     ],
 )
 def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(keywords, words):
-    sweep = fourbar.Sweep("10 cm", "0.2 m", 4)
-    motion = fourbar.Motion(stroke=sweep, side="left")
-    assert motion.angle == fourbar.Sweep(0.1, 0.2, 4)
+    sweep = Sweep("10 cm", "0.2 m", 4)
+    motion = Motion(stroke=sweep, side="left")
+    assert motion.angle == Sweep(0.1, 0.2, 4)
     with pytest.raises(InputError, match=words):
-        fourbar.Motion(**keywords)
+        Motion(**keywords)
 
 
 @pytest.mark.parametrize("name", ["stroke_input", "stroke_output"])
@@ -257,13 +254,13 @@ def test_a_bar_that_follows_a_stroke_begins_within_half_a_turn(name, turned):
     scene = fourbar.load(MODELS / "capabilities" / f"{name}.toml")
     linkage = replace(scene.linkage, ground_angle=math.radians(turned))
     scene = replace(scene, linkage=linkage, loads=(), effects=(), tolerances=())
-    solution = fourbar.solve(scene, "position")
+    solution = solve(scene, "position")
     for angles, pin, foot in (
         (solution.theta_2, solution.A, 0.0),
         (solution.theta_4, solution.B, linkage.ground),
     ):
-        assert -math.pi < angles[0] <= math.pi
-        assert np.abs(np.diff(angles)).max() < math.pi
+        assert -pi < angles[0] <= pi
+        assert np.abs(np.diff(angles)).max() < pi
         away = foot * np.exp(1j * linkage.ground_angle)
         direction = pin[:, 0] + 1j * pin[:, 1] - away
         assert np.exp(1j * angles) == pytest.approx(direction / np.abs(direction))

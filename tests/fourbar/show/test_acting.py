@@ -3,12 +3,14 @@
 import json
 import math
 import re
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Place, Scene, Spring, Springs, solve
 from fourbar.cli import status
 from fourbar.files import loads
 from fourbar.show.acting import list_drawn_notes, list_spring_notes
@@ -90,9 +92,9 @@ def test_a_gas_spring_within_its_stroke_is_not_told(tmp_path, capsys):
 
 
 def test_a_spring_at_its_end_is_within_its_stroke(tmp_path, capsys):
-    longest = math.sqrt(0.13 + 0.12 * math.sin(math.radians(80.0)))
+    longest = sqrt(0.13 + 0.12 * math.sin(math.radians(80.0)))
     file = write(tmp_path, f"{1000.0 * longest!r} mm", "150 mm")
-    assert np.isfinite(fourbar.solve(fourbar.load(file), "force").torque).all()
+    assert np.isfinite(solve(fourbar.load(file), "force").torque).all()
     assert status(["analyze", file]) == 0
     assert "gas spring" not in capsys.readouterr().out
 
@@ -150,7 +152,7 @@ def test_between_the_positions_of_a_list_nothing_is_located(tmp_path, capsys):
 def told(text):
     """Return the block of a scene in one line."""
     scene = fourbar.files.loads(text)
-    return " ".join(" ".join(write_block(scene, fourbar.solve(scene))).split())
+    return " ".join(" ".join(write_block(scene, solve(scene))).split())
 
 
 @pytest.mark.slow
@@ -238,13 +240,13 @@ def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told
 @pytest.mark.parametrize("start, stop", [(2.0, 2.0 + math.tau), (8.0, 2.0)])
 def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
-    ends = fourbar.Place(1, (0.3, 0.0)), fourbar.Place(2, (0.1, 0.0))
-    length = math.sqrt(0.1 - 0.06 * math.cos(math.pi - 0.2))
-    springs = fourbar.Springs((fourbar.Spring(*ends, 1.0, length),))
-    motion = fourbar.Motion(fourbar.Sweep(start, stop, 1), 1.0)
+    ends = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
+    length = sqrt(0.1 - 0.06 * math.cos(math.pi - 0.2))
+    springs = Springs((Spring(*ends, 1.0, length),))
+    motion = Motion(fourbar.Sweep(start, stop, 1), 1.0)
     linkage = bare(0.3, 0.1, 0.25, 0.22)
-    scene = fourbar.Scene(linkage, motion, effects=(springs,))
-    (note,) = list_spring_notes(scene, fourbar.solve(scene), DEGREES)
+    scene = Scene(linkage, motion, effects=(springs,))
+    (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     places = [f"theta_2 = {math.degrees(math.pi + x):.4g} deg" for x in (-0.2, 0.2)]
     if stop < start:
         places = places[::-1]
@@ -254,15 +256,15 @@ def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
 def test_a_spring_pulls_in_a_release_from_between_its_instants():
     """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
     linkage = bare(0.3, 0.1, 0.25, 0.22)
-    ends = fourbar.Place(1, (0.3, 0.0)), fourbar.Place(2, (0.1, 0.0))
-    length = math.sqrt(0.1 - 0.06 * math.cos(1.1))  # at 1.1 rad
+    ends = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
+    length = sqrt(0.1 - 0.06 * math.cos(1.1))  # at 1.1 rad
     effects = (
         fourbar.Flywheel(0.01, 2),
         fourbar.Torsion((("O2", 1.0, 1.0, 0.0),)),
-        fourbar.Springs((fourbar.Spring(*ends, 1e-12, length),)),
+        Springs((Spring(*ends, 1e-12, length),)),
     )
-    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.3, 3))
-    scene = fourbar.Scene(linkage, motion, effects=effects)
+    motion = Motion(0.5, 0.0, free=fourbar.Free(0.3, 3))
+    scene = Scene(linkage, motion, effects=effects)
     time = 1e3 * math.acos(-0.2) / 10.0
-    (note,) = list_spring_notes(scene, fourbar.solve(scene), DEGREES)
+    (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     assert f"pulls from t = {time:.4g} ms on" in note

@@ -13,11 +13,14 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from itertools import pairwise
+from math import pi, radians
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal, assert_equal
 
 import fourbar
+from fourbar import Motion, Sweep, solve
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.files import loads
 from fourbar.scene.motion import Law
@@ -63,9 +66,7 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches():
     scene = crank_rocker()
     data = embedded(animate.write_page(scene))
     for sign in (1, -1):
-        solution = fourbar.solve(
-            replace(scene, motion=scene.motion.replace(branch=sign))
-        )
+        solution = solve(replace(scene, motion=scene.motion.replace(branch=sign)))
         columns = data["branches"][str(sign)]
         for name in (
             "theta_3",
@@ -78,50 +79,50 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches():
             "F43",
             "F14",
         ):
-            np.testing.assert_array_equal(
+            assert_array_equal(
                 np.array(columns[name]), getattr(solution, name)
             )  # to the last bit
         assert columns["sign"] == [sign] * 61
-    np.testing.assert_array_equal(data["theta_2"], fourbar.solve(scene).theta_2)
+    assert_array_equal(data["theta_2"], solve(scene).theta_2)
 
 
 def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
-    theta_2 = math.radians(123.456)
+    theta_2 = radians(123.456)
     data = embedded(animate.write_page(thesis(theta_2)))
     assert data["theta_2"][data["start"]] == theta_2
     assert (
         data["branches"]["1"]["torque"][data["start"]]
-        == fourbar.solve(thesis(theta_2)).torque[0]
+        == solve(thesis(theta_2)).torque[0]
     )
     assert len(data["theta_2"]) > 300
 
 
 RELEASED = crank_rocker(
-    motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
+    motion=Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
 )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "angles",
-    [fourbar.Sweep(0.0, 2.0 * math.pi, 12), fourbar.Sweep(3.0, 1.0, 12), 1.0],
+    [Sweep(0.0, 2.0 * pi, 12), Sweep(3.0, 1.0, 12), 1.0],
     ids=["turn", "backwards", "one position"],
 )
 def test_what_is_solved_already_changes_no_number(angles):
-    scene = crank_rocker(motion=fourbar.Motion(angles, 10.0))
+    scene = crank_rocker(motion=Motion(angles, 10.0))
     plain = animate.collect_live_data(scene, signs=(1, -1))
-    solved = fourbar.solve(scene)
+    solved = solve(scene)
     shown = animate.collect_live_data(scene, signs=(1, -1), solved=solved)
-    np.testing.assert_equal(shown, plain)
+    assert_equal(shown, plain)
 
 
 @pytest.mark.slow
 def test_a_free_motion_is_embedded_instant_by_instant():
-    data, solution = embedded(animate.write_page(RELEASED)), fourbar.solve(RELEASED)
+    data, solution = embedded(animate.write_page(RELEASED)), solve(RELEASED)
     (columns,) = data["branches"].values()
-    np.testing.assert_array_equal(data["time"], solution.time)
+    assert_array_equal(data["time"], solution.time)
     for name in ("theta_2", "theta_4", "omega_2", "alpha_3", "F12"):
-        np.testing.assert_array_equal(
+        assert_array_equal(
             np.array(columns[name]), getattr(solution, name)
         )  # to the last bit
     assert columns["energy"][0] == 0.0 and max(columns["energy"]) > 0.1
@@ -135,16 +136,16 @@ def test_a_free_motion_is_embedded_instant_by_instant():
 )
 def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rate):
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
-    data = embedded(animate.write_page(crank_rocker(motion=fourbar.Motion(law=law))))
+    data = embedded(animate.write_page(crank_rocker(motion=Motion(law=law))))
     assert data["rate"] == pytest.approx(rate)
     assert 1.5 <= duration / rate <= 60.0
     assert len(data["branches"]["1"]["torque"]) == 361
 
 
 def test_positions_that_do_not_assemble_are_null():
-    data = embedded(animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
-    solution = fourbar.solve(
-        replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244))
+    data = embedded(animate.write_page(thesis(Sweep(0.0, 2 * pi, 360))))
+    solution = solve(
+        replace(thesis(), motion=Motion(np.array(data["theta_2"]), 0.2244))
     )
     assert [v is None for v in data["branches"]["1"]["torque"]] == np.isnan(
         solution.torque
@@ -153,14 +154,10 @@ def test_positions_that_do_not_assemble_are_null():
 
 
 def test_a_fine_sweep_is_thinned_evenly_and_says_so():
-    scene = crank_rocker(
-        motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0)
-    )
+    scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36_000), 1.0))
     data = embedded(animate.write_page(scene))
     assert len(data["theta_2"]) == animate.MAX_ROWS
-    assert np.diff(data["theta_2"]) == pytest.approx(
-        2 * math.pi / (animate.MAX_ROWS - 1)
-    )
+    assert np.diff(data["theta_2"]) == pytest.approx(2 * pi / (animate.MAX_ROWS - 1))
     assert data["positions"] == 36_001
 
 
@@ -219,7 +216,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path):
         animate.write_animation(crank_rocker(), tmp_path / "a.avi")
     with pytest.raises(NotAssembledError):
         animate.write_animation(
-            thesis(fourbar.Sweep(math.radians(40), math.radians(50), 5)),
+            thesis(Sweep(radians(40), radians(50), 5)),
             tmp_path / "a.html",
         )
     with pytest.raises(InputError, match="seconds"):
@@ -329,7 +326,7 @@ def test_a_frame_is_the_whole_figure_though_what_stands_still_is_drawn_once(
 
 
 def test_instant_centres_are_no_curves_of_the_page():
-    columns = animate._collect_columns(fourbar.solve(crank_rocker()))
+    columns = animate._collect_columns(solve(crank_rocker()))
     assert "torque" in columns and "theta_4" in columns
     assert columns.keys().isdisjoint(animate.CENTRES)
     assert all(values is not None for values in columns.values())

@@ -3,12 +3,25 @@
 import math
 import re
 from dataclasses import replace
+from math import pi, radians, sqrt, tau
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import (
+    Bar,
+    FourBar,
+    Friction,
+    Gravity,
+    Motion,
+    Place,
+    Scene,
+    Sweep,
+    solve,
+    uniform,
+)
 from fourbar.cli import status
 from fourbar.scene import command_at
 from fourbar.scene.motion import Law
@@ -22,11 +35,11 @@ from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 PSI = 0.45359237 * 9.80665 / 0.0254**2
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
-TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))
+TURN = crank_rocker(motion=Motion(Sweep(0.0, tau, 360), 10.0))
 
 
 def block(scene, **options):
-    lines = write_block(scene, fourbar.solve(scene, find_last_stage(scene)), **options)
+    lines = write_block(scene, solve(scene, find_last_stage(scene)), **options)
     assert max(map(len, lines)) <= BLOCK_WIDTH, lines
     return "\n".join(lines)
 
@@ -42,17 +55,15 @@ def opposite(side, first, second):
 
 @pytest.mark.slow
 def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar():
-    text, scene = plain(block(thesis(fourbar.Sweep(0.0, math.tau, 360)))), thesis()
+    text, scene = plain(block(thesis(Sweep(0.0, tau, 360)))), thesis()
     limits = fourbar.limit_positions(scene.linkage, 2)
     ends = sorted({f"{math.degrees(limit.theta_2) % 360.0:.4g}" for limit in limits})
-    facts = summarize(
-        swept := thesis(fourbar.Sweep(0.0, math.tau, 100)), fourbar.solve(swept)
-    )
+    facts = summarize(swept := thesis(Sweep(0.0, tau, 100)), solve(swept))
     bounds = [
         end for stretch in facts.motion.stretches for end in stretch if end is not None
     ]
     assert sorted(bounds) == pytest.approx(
-        sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12
+        sorted(limit.theta_2 % tau for limit in limits), abs=1e-12
     )
     assert (
         f"assembles up to theta_2 = {ends[0]} deg, and from theta_2 = {ends[1]} deg"
@@ -64,14 +75,14 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar():
 
 
 def test_the_block_has_the_numbers_of_the_facts():
-    facts = summarize(TURN, fourbar.solve(TURN, "error"))
+    facts = summarize(TURN, solve(TURN, "error"))
     text = "\n".join(write_facts(facts))
     duty, peak = facts.duty, facts.peak
 
     def write(number, factor=1e3):
         return f"{factor * number:.4g}"
 
-    degrees = 180.0 / math.pi
+    degrees = 180.0 / pi
     torque, rms = write(peak.value), write(duty.rms_torque)
     place = write(peak.place, degrees)
     row = f"  torque   peak {torque} mN m at theta_2 = {place} deg, RMS {rms} mN m\n"
@@ -97,8 +108,8 @@ def test_the_block_has_the_numbers_of_the_facts():
 
 @pytest.mark.slow
 def test_each_kind_of_motion_shows_what_it_has_and_nothing_else():
-    block_of = lambda **motion: block(crank_rocker(motion=fourbar.Motion(**motion)))  # noqa: E731
-    positions = block_of(theta_2=fourbar.Sweep(0.0, math.tau, 36))
+    block_of = lambda **motion: block(crank_rocker(motion=Motion(**motion)))  # noqa: E731
+    positions = block_of(theta_2=Sweep(0.0, tau, 36))
     assert not re.search("drive|pins|rounding", positions)
     assert 'omega_2 = "0 rad/s" gives the static' in positions
     one = block_of(theta_2=1.0, omega_2=10.0)
@@ -110,17 +121,17 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else():
     assert "mean torque" not in listed
     assert "(of these positions)" in listed
     assert "peak and RMS are those of these positions" in listed
-    part = block_of(theta_2=fourbar.Sweep(0.5, 2.0, 50), omega_2=10.0)
+    part = block_of(theta_2=Sweep(0.5, 2.0, 50), omega_2=10.0)
     assert "over the sweep given" in part
     assert "input from 28.65 deg to 114.6 deg" in part
-    faster = block_of(theta_2=fourbar.Sweep(0.5, 2.0, 5), omega_2=10.0, alpha_2=1.0)
+    faster = block_of(theta_2=Sweep(0.5, 2.0, 5), omega_2=10.0, alpha_2=1.0)
     said = "the positions are passed at no one speed: no RMS values, no energies"
     assert said in faster and "RMS " not in faster.replace("no RMS values", "")
-    twice = block_of(theta_2=fourbar.Sweep(0.0, 2.0 * math.tau, 720), omega_2=10.0)
+    twice = block_of(theta_2=Sweep(0.0, 2.0 * tau, 720), omega_2=10.0)
     assert "in 2 turns given" in twice
     law = block(
         crank_rocker(
-            motion=fourbar.Motion(
+            motion=Motion(
                 law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
             )
         )
@@ -136,10 +147,10 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else():
 
 def test_friction_at_rest_gives_the_range_that_it_holds():
     scene = crank_rocker(
-        motion=fourbar.Motion(1.0, 0.0),
-        effects=(fourbar.Gravity(), fourbar.Friction.at(O2=0.5)),
+        motion=Motion(1.0, 0.0),
+        effects=(Gravity(), Friction.at(O2=0.5)),
     )
-    s = fourbar.solve(scene)
+    s = solve(scene)
     row = re.search(
         r"at rest  (\S+) mN m to (\S+) mN m: dry friction holds it between them",
         block(scene),
@@ -152,15 +163,13 @@ def test_friction_at_rest_gives_the_range_that_it_holds():
 
 def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore():
     """A cylinder can have difference and sum of its ends' distances from the pivot."""
-    motion = fourbar.Motion(
-        stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
-    )
+    motion = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
     scene = crank_rocker(motion=motion, drive=CYLINDER)
-    text, s = plain(block(scene, pressure=210e5)), fourbar.solve(scene)
+    text, s = plain(block(scene, pressure=210e5)), solve(scene)
     assert "stroke 170 mm to 330 mm; assembles from 160 mm to 340 mm" in text
     assert re.search(r"force peak \S+ N at stroke = 330 mm, RMS", text)
     assert "peak 26.88 N" in text.replace("O2 ", "")
-    bore = 1e3 * math.sqrt(4.0 * np.nanmax(s.drive_force) / (math.pi * 210e5))
+    bore = 1e3 * sqrt(4.0 * np.nanmax(s.drive_force) / (pi * 210e5))
     assert (
         f"bore at least {bore:.4g} mm to push {np.nanmax(s.drive_force):.4g} N" in text
     )
@@ -168,15 +177,15 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore():
     assert "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text
     assert "motor" not in text
     right = replace(scene, motion=motion.replace(side="right"))
-    assert summarize(right, fourbar.solve(right)).stroke_limits == pytest.approx(
+    assert summarize(right, solve(right)).stroke_limits == pytest.approx(
         (0.16, 0.34), abs=1e-6
     )
 
 
 def test_a_cylinder_that_nothing_loads_has_its_range_too():
-    motion = fourbar.Motion(stroke=fourbar.Sweep(0.17, 0.33, 40), side="left")
-    bars = fourbar.FourBar(0.3, *map(fourbar.Bar, (0.1, 0.25, 0.22)))
-    text = plain(block(fourbar.Scene(bars, motion, drive=CYLINDER)))
+    motion = Motion(stroke=Sweep(0.17, 0.33, 40), side="left")
+    bars = FourBar(0.3, *map(Bar, (0.1, 0.25, 0.22)))
+    text = plain(block(Scene(bars, motion, drive=CYLINDER)))
     assert "stroke 170 mm to 330 mm; assembles from 160 mm to 340 mm" in text
 
 
@@ -185,15 +194,15 @@ def test_a_bore_is_that_of_the_motion_and_not_of_its_positions():
     corners = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))
     table = fourbar.Table(corners, (1.0, 1.0, 50.0, 1.0, 1.0))
     scene = crank_rocker(
-        motion=fourbar.Motion(fourbar.Sweep(1.0, 2.6, 8), 10.0),
+        motion=Motion(Sweep(1.0, 2.6, 8), 10.0),
         loads=(fourbar.Load(2, moment=-1.0, table=table),),
         effects=(),
         drive=CYLINDER,
     )
     corner = command_at(scene, np.radians([101.3]))
-    (force,) = fourbar.solve(scene, at=corner).drive_force
+    (force,) = solve(scene, at=corner).drive_force
     word = "push" if force > 0.0 else "pull"
-    bore = 1e3 * math.sqrt(4.0 * abs(force) / (math.pi * 1e6))
+    bore = 1e3 * sqrt(4.0 * abs(force) / (pi * 1e6))
     text = plain(block(scene, pressure=1e6))
     assert re.search(rf"{bore:.4g} mm\b[^;]* to {word} {abs(force):.4g} N", text)
 
@@ -204,20 +213,20 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     """The ends lie as far from O2, or the ground's end is on the path of the other,
     which passes it at theta_2 = 40 deg.
     """
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    motion = fourbar.Motion(fourbar.Sweep(1.0, 2.0, 10), 0.0)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
+    motion = Motion(Sweep(1.0, 2.0, 10), 0.0)
+    scene = Scene(linkage, motion, effects=(Gravity(),))
     if bar == 2:
-        ground = fourbar.Place(1, (0.1, -1.5))
-        moving = fourbar.Place(2, (0.1, 0.0))
+        ground = Place(1, (0.1, -1.5))
+        moving = Place(2, (0.1, 0.0))
     else:
-        met = fourbar.solve(replace(scene, motion=fourbar.Motion(math.radians(40.0))))
-        x = 0.1 * math.cos(math.radians(40.0)) + 0.1 * math.cos(met.theta_3[0])
-        y = 0.1 * math.sin(math.radians(40.0)) + 0.1 * math.sin(met.theta_3[0])
-        ground = fourbar.Place(1, (math.hypot(x, y), math.atan2(y, x)))
-        moving = fourbar.Place(3, (0.1, 0.0))
+        met = solve(replace(scene, motion=Motion(radians(40.0))))
+        x = 0.1 * math.cos(radians(40.0)) + 0.1 * math.cos(met.theta_3[0])
+        y = 0.1 * math.sin(radians(40.0)) + 0.1 * math.sin(met.theta_3[0])
+        ground = Place(1, (math.hypot(x, y), math.atan2(y, x)))
+        moving = Place(3, (0.1, 0.0))
     pushed = replace(scene, drive_bar=None, drive=fourbar.LinearDrive(ground, moving))
-    limits = summarize(pushed, fourbar.solve(pushed)).stroke_limits
+    limits = summarize(pushed, solve(pushed)).stroke_limits
     assert limits[0] == 0.0
     assert "assembles from 0 mm to" in block(pushed)
     if bar == 2:
@@ -227,8 +236,8 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
 def test_the_command_line_states_the_bore(capsys):
     path = Path(__file__).parents[3] / "models" / "gallery" / "excavator_bucket.toml"
     assert status(["analyze", str(path), "--pressure", "3000 psi"]) == 0
-    force = np.nanmax(fourbar.solve(fourbar.load(path)).drive_force)
-    bore = 1e3 * math.sqrt(4.0 * force / (math.pi * 3000.0 * PSI))
+    force = np.nanmax(solve(fourbar.load(path)).drive_force)
+    bore = 1e3 * sqrt(4.0 * force / (pi * 3000.0 * PSI))
     assert f"  bore     at least {bore:.4g} mm to push" in capsys.readouterr().out
 
 
@@ -271,7 +280,7 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(tmp_path, capsys):
         == 0
     )
     scene = fourbar.load(tmp_path / "a.toml")
-    assert scene.motion.omega_2 == pytest.approx(math.tau)
+    assert scene.motion.omega_2 == pytest.approx(tau)
     assert [effect.key for effect in scene.effects] == ["gravity"]
     capsys.readouterr()
     assert status(["analyze", str(tmp_path / "a.toml")]) == 0
@@ -280,12 +289,12 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(tmp_path, capsys):
 
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held():
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
-    sweep = fourbar.Motion(fourbar.Sweep(0.2, 1.4, 6), 0.0)
-    bare = crank_rocker(motion=sweep, effects=(fourbar.Gravity(),))
-    static = fourbar.solve(bare).torque
+    sweep = Motion(Sweep(0.2, 1.4, 6), 0.0)
+    bare = crank_rocker(motion=sweep, effects=(Gravity(),))
+    static = solve(bare).torque
     assert static is not None and np.ptp(static) > 0.1
-    held = replace(bare, effects=(*bare.effects, fourbar.Friction.at(O2=0.5)))
-    facts = summarize(held, fourbar.solve(held))
+    held = replace(bare, effects=(*bare.effects, Friction.at(O2=0.5)))
+    facts = summarize(held, solve(held))
     outer = static.min() - 0.5, static.max() + 0.5
     ((low, high, ends),) = facts.held
     assert (low, high) == pytest.approx(outer, rel=1e-12) and ends == (0.2, 1.4)
@@ -300,20 +309,20 @@ def test_each_position_at_rest_has_its_own_range():
 
     The torque jumps by each range while B reverses.
     """
-    lengths = 0.3, fourbar.Bar(0.04), fourbar.Bar(0.29), fourbar.Bar(0.065)
+    lengths = 0.3, Bar(0.04), Bar(0.29), Bar(0.065)
     pins = ("O2", "A", "B", "O4")
     friction = fourbar.PinFriction.at(**dict.fromkeys(pins, (0.15, 0.005)))
-    scene = fourbar.Scene(
-        fourbar.FourBar(*lengths),
-        fourbar.Motion(fourbar.Sweep(0.0, math.tau, 72), math.tau),
-        effects=(fourbar.Friction.at(O4=20.0), friction),
+    scene = Scene(
+        FourBar(*lengths),
+        Motion(Sweep(0.0, tau, 72), tau),
+        effects=(Friction.at(O4=20.0), friction),
     )
-    facts = summarize(scene, fourbar.solve(scene))
-    assert [held.ends for held in facts.held] == [(0.0, 0.0), (math.pi, math.pi)]
+    facts = summarize(scene, solve(scene))
+    assert [held.ends for held in facts.held] == [(0.0, 0.0), (pi, pi)]
     for held in facts.held:
         beside = held.ends[0] + np.array([-1e-9, 1e-9])
-        motion = fourbar.Motion(beside, math.tau)
-        torque = fourbar.solve(replace(scene, motion=motion)).torque
+        motion = Motion(beside, tau)
+        torque = solve(replace(scene, motion=motion)).torque
         assert sorted(torque) == pytest.approx([held.low, held.high], rel=1e-6)
     text = plain(block(scene))
     first, second = ([f"{held.low:.4g}", f"{held.high:.4g}"] for held in facts.held)
@@ -331,12 +340,10 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_angle():
     O2 reverses at the far end, at t = 1 s.
     """
     time = np.linspace(0.0, 2.0, 41)
-    angle = 0.3 + 0.85 * (1.0 - np.cos(math.pi * time))
+    angle = 0.3 + 0.85 * (1.0 - np.cos(pi * time))
     law = Law(tuple(time), tuple(angle), steps=30, ends="rest")
-    scene = crank_rocker(
-        motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),)
-    )
-    facts = summarize(scene, fourbar.solve(scene))
+    scene = crank_rocker(motion=Motion(law=law), effects=(Friction.at(O2=0.05),))
+    facts = summarize(scene, solve(scene))
     ((place, pin),) = facts.motion.reversals
     assert pin == "O2" and place == pytest.approx(2.0, abs=1e-6)
     assert "reverses, and the pin forces jump, at theta_2 = 114.6 deg (O2)" in plain(
@@ -349,17 +356,17 @@ def test_digits_left_are_those_that_the_error_bar_leaves():
 
     The whole digits of value over error bar.
     """
-    linkage = fourbar.uniform(D, A, B, C)
+    linkage = uniform(D, A, B, C)
     stretched = opposite(C, D, A + B)  # bars 2 and 3 in one line
     said = {}
     for away in (1e-6, 1e-9, 1e-10, 1e-11):
-        scene = fourbar.Scene(
+        scene = Scene(
             linkage,
-            fourbar.Motion(stretched + away, 3.0),
+            Motion(stretched + away, 3.0),
             4,
-            effects=(fourbar.Gravity(),),
+            effects=(Gravity(),),
         )
-        s = fourbar.solve(scene, "error")
+        s = solve(scene, "error")
         digits = math.floor(math.log10(abs(s.torque[0]) / s.torque_error[0]))
         row = re.search(r"(\d+) digits left of T4 at", plain(block(scene)))
         said[away] = (None if row is None else int(row.group(1)), digits)
@@ -373,14 +380,14 @@ def test_digits_left_are_those_that_the_error_bar_leaves():
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_range_that_is_left_out_is_printed_with_the_limits(lengths, bar):
     """The program chooses one degree less at each end, which is no limit."""
-    motion = fourbar.Motion(**{f"omega_{bar}": 1.0})
-    scene = fourbar.Scene(fourbar.uniform(*lengths), motion)
-    swept = getattr(fourbar.solve(scene, "position"), f"theta_{bar}")
+    motion = Motion(**{f"omega_{bar}": 1.0})
+    scene = Scene(uniform(*lengths), motion)
+    swept = getattr(solve(scene, "position"), f"theta_{bar}")
     limits = swept[[0, -1]] + np.radians([-1.0, 1.0])
-    stated = fourbar.Sweep(float(swept[0]), float(swept[-1]), 72)
+    stated = Sweep(float(swept[0]), float(swept[-1]), 72)
     commanded = {f"theta_{bar}": limits + np.radians([-0.001, 0.001])}
-    beyond = replace(scene, motion=fourbar.Motion(**commanded))
-    assert not fourbar.solve(beyond, "position").assembled.any()
+    beyond = replace(scene, motion=Motion(**commanded))
+    assert not solve(beyond, "position").assembled.any()
     low, high = (f"{math.degrees(limit):.4g} deg" for limit in limits)
     line = f"1 deg inside its limits {low} and {high}; "
     assert line in plain(block(scene))
@@ -391,15 +398,15 @@ def test_a_range_that_is_left_out_is_printed_with_the_limits(lengths, bar):
 def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
     """Massless bars, and both ends in common: what is left at the pins is rounding."""
     spring = fourbar.effects.Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5)
-    at = fourbar.Motion([0.1, 0.4, 0.7], 1.0)
-    scene = fourbar.Scene(
-        fourbar.FourBar(0.3, *(fourbar.Bar(x) for x in (0.1, 0.25, 0.22))),
+    at = Motion([0.1, 0.4, 0.7], 1.0)
+    scene = Scene(
+        FourBar(0.3, *(Bar(x) for x in (0.1, 0.25, 0.22))),
         motion=at,
         drive=CYLINDER,
         effects=(fourbar.effects.Springs((spring,)),),
     )
-    force = fourbar.solve(scene).drive_force
-    stroke = fourbar.solve(scene).stroke
+    force = solve(scene).drive_force
+    stroke = solve(scene).stroke
     assert force == pytest.approx(1e5 * (stroke - 0.5), rel=1e-12)
     text = block(scene)
     assert text.count("0 N ") > 4 and "e-1" not in text.split("rounding")[0]
@@ -408,11 +415,11 @@ def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
 
 def test_rates_stand_in_place_of_zeros_where_nothing_acts():
     lengths = (0.1, 0.25, 0.22)
-    bare = fourbar.FourBar(0.3, *map(fourbar.Bar, lengths))
-    wheel = replace(bare, output=fourbar.Bar(0.22, inertia=0.01))
-    for linkage in (bare, wheel, fourbar.uniform(0.3, *lengths)):
-        scene = fourbar.Scene(linkage, TURN.motion)
-        facts = summarize(scene, fourbar.solve(scene))
+    bare = FourBar(0.3, *map(Bar, lengths))
+    wheel = replace(bare, output=Bar(0.22, inertia=0.01))
+    for linkage in (bare, wheel, uniform(0.3, *lengths)):
+        scene = Scene(linkage, TURN.motion)
+        facts = summarize(scene, solve(scene))
         lines = write_facts(facts)
         starts = [line.split()[0] for line in lines if line]
         assert ("rates" in starts) == (linkage is bare)

@@ -6,27 +6,43 @@ Torque, headings, releases.
 import math
 import re
 from dataclasses import replace
+from math import radians
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import fourbar
+from fourbar import (
+    Bar,
+    FourBar,
+    Free,
+    Gravity,
+    Motion,
+    Place,
+    Scene,
+    Sweep,
+    load,
+    motor_duty,
+    solve,
+    uniform,
+    units,
+)
 from fourbar.cli import group
 from fourbar.formulas.mobility import classify, find_miss, meet_change_points
 from fourbar.show.block import write_block
 from fourbar.show.studies import write_equilibria
 from fourbar.show.units import COMMON
 
-GRAVITY = fourbar.Gravity()
-PRINTED = math.radians(1e-4)
+GRAVITY = Gravity()
+PRINTED = radians(1e-4)
 """Angles of equilibria are printed with four decimals of a degree."""
 
 
 def read(tmp_path, text):
     path = tmp_path / "scene.toml"
     path.write_text(text, encoding="utf-8")
-    return fourbar.load(path)
+    return load(path)
 
 
 def state(lengths, more=""):
@@ -36,7 +52,7 @@ def state(lengths, more=""):
 
 
 def first_line(scene):
-    return write_block(scene, fourbar.solve(scene))[0]
+    return write_block(scene, solve(scene))[0]
 
 
 def test_a_new_parallelogram_is_one_at_every_angle(tmp_path):
@@ -54,8 +70,8 @@ def test_a_new_parallelogram_is_one_at_every_angle(tmp_path):
     assert shown.output.startswith("Parallelogram")
     assert "ntiparallelogram" not in shown.output
     assert max(map(len, shown.output.splitlines())) <= 80
-    scene = fourbar.load(path)
-    solution = fourbar.solve(scene)
+    scene = load(path)
+    solution = solve(scene)
     weight = sum(
         share * bar.mass
         for share, bar in zip((0.5, 1.0, 0.5), scene.linkage.moving, strict=True)
@@ -84,8 +100,8 @@ def test_a_new_parallelogram_is_one_at_every_angle(tmp_path):
     ],
 )
 def test_headings_name_the_assembly(lengths, motion, head):
-    scene = fourbar.Scene(fourbar.uniform(*lengths), fourbar.Motion(**motion))
-    lines = write_block(scene, fourbar.solve(scene))
+    scene = Scene(uniform(*lengths), Motion(**motion))
+    lines = write_block(scene, solve(scene))
     assert lines[0].startswith(head)
     assert any("change point" in line for line in lines)
     said = any("no theta_3 moves the parallelogram" in line for line in lines)
@@ -93,40 +109,36 @@ def test_headings_name_the_assembly(lengths, motion, head):
 
 
 def test_a_single_change_point_takes_two_turns():
-    linkage = fourbar.uniform(4.0, 1.0, 2.0, 3.0)
+    linkage = uniform(4.0, 1.0, 2.0, 3.0)
     one, two = (
-        fourbar.Scene(
-            linkage, fourbar.Motion(fourbar.Sweep(0.0, turns * math.tau, 720), 1.0)
-        )
+        Scene(linkage, Motion(Sweep(0.0, turns * math.tau, 720), 1.0))
         for turns in (1, 2)
     )
-    text = " ".join(" ".join(write_block(one, fourbar.solve(one))).split())
+    text = " ".join(" ".join(write_block(one, solve(one))).split())
     assert "the assembly repeats after two turns" in text
-    duties = [fourbar.motor_duty(fourbar.solve(scene)) for scene in (one, two)]
+    duties = [motor_duty(solve(scene)) for scene in (one, two)]
     assert [duty.closed for duty in duties if duty is not None] == [False, True]
-    crossed = fourbar.Scene(linkage, one.motion.replace(branch=-1))
-    later = fourbar.solve(two).theta_4[360:]
-    apart = fourbar.solve(crossed).theta_4[::2] - later
+    crossed = Scene(linkage, one.motion.replace(branch=-1))
+    later = solve(two).theta_4[360:]
+    apart = solve(crossed).theta_4[::2] - later
     assert np.abs(np.sin(0.5 * apart)).max() < 1e-12
 
 
 @pytest.mark.slow
 def test_a_scene_without_a_range_covers_both_turns_of_a_single_change_point():
     """The drive then gives as much energy as it takes back: only weights act."""
-    linkage = fourbar.uniform(0.4, 0.2, 0.3, 0.3)
-    scene = fourbar.Scene(
-        linkage, fourbar.Motion(omega_2=6.0), effects=(fourbar.Gravity(),)
-    )
-    solution = fourbar.solve(scene)
+    linkage = uniform(0.4, 0.2, 0.3, 0.3)
+    scene = Scene(linkage, Motion(omega_2=6.0), effects=(Gravity(),))
+    solution = solve(scene)
     assert len(solution) == 721
     assert solution.theta_2[[0, -1]].tolist() == [0.0, 2.0 * math.tau]
-    duty = fourbar.motor_duty(solution)
+    duty = motor_duty(solution)
     assert duty is not None and duty.closed
     assert duty.energy_in == pytest.approx(duty.energy_out, rel=1e-6)
     text = " ".join(write_block(scene, solution))
     assert "in 2 turns given" in text
-    with_both = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    assert len(fourbar.solve(fourbar.Scene(with_both))) == 361
+    with_both = uniform(0.3, 0.1, 0.3, 0.1)
+    assert len(solve(Scene(with_both))) == 361
 
 
 @pytest.mark.slow
@@ -147,7 +159,7 @@ def test_lengths_are_equal_within_the_rounding_of_what_is_stated(tmp_path):
     beyond = ("22.3607 mm", "44.9998 mm", "22.3605 mm", "45.0002 mm")
     scene = read(tmp_path, state(beyond, motion))
     assert find_miss(scene.linkage) == (pytest.approx(6e-7, rel=1e-6), "parallelogram")
-    lines = write_block(scene, fourbar.solve(scene))
+    lines = write_block(scene, solve(scene))
     assert any("misses a parallelogram by 600 nm" in line for line in lines)
     # whole numbers and coarse decimals are meant as they stand
     for stated in (
@@ -161,8 +173,8 @@ def test_a_parallelogram_that_is_missed_by_one_equality_keeps_a_change_point(tmp
     """Opposite bars differ by 2e-4 both: a + d = b + c is within the rounding."""
     text = state(("22.3607 mm", "44.9998 mm", "22.3605 mm", "45.0002 mm"))
     scene = read(tmp_path, text)
-    in_mm = {**COMMON, **fourbar.units("mm")}
-    lines = write_block(scene, fourbar.solve(scene), in_mm)
+    in_mm = {**COMMON, **units("mm")}
+    lines = write_block(scene, solve(scene), in_mm)
     miss = "misses a parallelogram by 0.0006 mm: it has one change point, not two"
     found = [line for line in lines if "change point" in line]
     assert found[:2] == [miss, "change point at theta_2 = 180 deg"], lines
@@ -211,15 +223,15 @@ def test_lengths_that_are_read_as_equal_are_said_with_their_difference(
     Where the stated lengths are equal, or differ by more, nothing is said.
     """
     scene = read(tmp_path, text)
-    in_mm = {**COMMON, **fourbar.units("mm")}
-    lines = " ".join(write_block(scene, fourbar.solve(scene), in_mm)[1:])
+    in_mm = {**COMMON, **units("mm")}
+    lines = " ".join(write_block(scene, solve(scene), in_mm)[1:])
     lines = " ".join(lines.split())
     start = "lengths read as equal within the last decimals of what is stated: "
     assert (f"{start}{said}" in lines) == bool(said)
     assert (start in lines) == bool(said)
     longer = replace(scene.linkage.coupler, length=1.0001 * scene.linkage.lengths[2])
     other = replace(scene, linkage=replace(scene.linkage, coupler=longer))
-    assert start not in " ".join(write_block(other, fourbar.solve(other)))
+    assert start not in " ".join(write_block(other, solve(other)))
 
 
 @pytest.mark.parametrize(
@@ -232,10 +244,8 @@ def test_lengths_that_are_read_as_equal_are_said_with_their_difference(
     ],
 )
 def test_a_position_that_misses_a_change_point_by_its_decimals_is_said(angles, said):
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.array(angles), 1.0)
-    )
-    text = " ".join(write_block(scene, fourbar.solve(scene)))
+    scene = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.array(angles), 1.0))
+    text = " ".join(write_block(scene, solve(scene)))
     text = " ".join(text.split())
     assert said in text
     assert (" within " in text) == (" within " in said)
@@ -253,34 +263,32 @@ def test_one_equality_is_met_by_the_least_change():
 def test_equilibria_are_named_as_a_scene_states_their_assembly(name):
     """Each, put into a scene with its branch, needs no torque."""
     branch = {"open": 1, "crossed": -1}[name]
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
-        fourbar.Motion(branch=branch),
-        effects=(fourbar.Gravity(),),
+    scene = Scene(
+        uniform(0.3, 0.1, 0.3, 0.1),
+        Motion(branch=branch),
+        effects=(Gravity(),),
     )
     rows = write_equilibria("", fourbar.equilibrium(scene)).splitlines()
     found = [row.split() for row in rows if {"stable", "unstable"} & {*row.split()}]
     assert len(found) > 1
     for theta_2, _, named, _, _, slope, *_ in found:
         assert named == name
-        at = fourbar.Motion(math.radians(float(theta_2)), 0.0, branch=branch)
-        torque = fourbar.solve(replace(scene, motion=at)).torque
+        at = Motion(radians(float(theta_2)), 0.0, branch=branch)
+        torque = solve(replace(scene, motion=at)).torque
         assert abs(torque[0]) <= PRINTED * abs(float(slope))
 
 
 def test_a_lamp_that_a_spring_balances_shows_zeros_and_not_their_rounding():
     """A spring of no free length: k = m g l/(r h). Bars 3 and 4 share no load."""
-    arms = (fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3))
-    linkage = fourbar.FourBar(0.06, *arms, 0.5 * math.pi)
+    arms = (Bar(0.3), Bar(0.06, 2.0), Bar(0.3))
+    linkage = FourBar(0.06, *arms, 0.5 * math.pi)
     stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
-    ends = fourbar.Place(1, (0.1, 0.0)), fourbar.Place(2, (0.08, 0.0))
+    ends = Place(1, (0.1, 0.0)), Place(2, (0.08, 0.0))
     springs = fourbar.Springs((fourbar.Spring(*ends, stiffness),))
-    swept = fourbar.Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    swept = Sweep(radians(-40.0), radians(60.0), 10)
     for omega in (0.0, 1e-9):
-        scene = fourbar.Scene(
-            linkage, fourbar.Motion(swept, omega), effects=(fourbar.Gravity(), springs)
-        )
-        lines = write_block(scene, fourbar.solve(scene, "error"))
+        scene = Scene(linkage, Motion(swept, omega), effects=(Gravity(), springs))
+        lines = write_block(scene, solve(scene, "error"))
         text = "\n".join(lines)
         torque = next(line for line in lines if line.startswith("  torque"))
         assert torque.startswith("  torque   peak 0 N m at"), torque
@@ -293,31 +301,29 @@ def test_a_lamp_that_a_spring_balances_shows_zeros_and_not_their_rounding():
 @pytest.mark.slow
 def test_rounding_is_written_as_zero():
     """A massless rocker is a two-force bar, and bars without mass need no torque."""
-    linkage = fourbar.FourBar(
-        2.0, fourbar.Bar(1.0), fourbar.Bar(3.0, 1.0), fourbar.Bar(3.0)
-    )
-    motion = fourbar.Motion(omega_2=1.0)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
-    lines = write_block(scene, fourbar.solve(scene, "error"))
+    linkage = FourBar(2.0, Bar(1.0), Bar(3.0, 1.0), Bar(3.0))
+    motion = Motion(omega_2=1.0)
+    scene = Scene(linkage, motion, effects=(Gravity(),))
+    lines = write_block(scene, solve(scene, "error"))
     (moments,) = (line for line in lines if line.startswith("  moment"))
     assert moments.split()[-3:] == ["0", "N", "m"]
     assert not any("growing without bound" in line for line in lines)
-    bare = fourbar.Scene(fourbar.uniform(2.0, 1.0, 3.0, 3.0, per_metre=0.0), motion)
-    text = "\n".join(write_block(bare, fourbar.solve(bare, "error")))
+    bare = Scene(uniform(2.0, 1.0, 3.0, 3.0, per_metre=0.0), motion)
+    text = "\n".join(write_block(bare, solve(bare, "error")))
     assert "-0 " not in text and "digits left" not in text
-    kite = fourbar.Scene(fourbar.uniform(0.1, 0.1, 0.3, 0.3), motion)
-    text = "\n".join(write_block(kite, fourbar.solve(kite, "error")))
+    kite = Scene(uniform(0.1, 0.1, 0.3, 0.3), motion)
+    text = "\n".join(write_block(kite, solve(kite, "error")))
     assert not re.search(r"e-[0-9]+ (?:deg|mm|m|N)\b", text)
 
 
 @pytest.mark.slow
 def test_the_peak_of_a_release_over_change_points_is_said_to_grow():
-    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    motion = fourbar.Motion(0.5, 25.0, free=fourbar.Free(0.4, 50))
-    scene = fourbar.Scene(
+    linkage = uniform(0.3, 0.1, 0.3, 0.1)
+    motion = Motion(0.5, 25.0, free=Free(0.4, 50))
+    scene = Scene(
         linkage, motion, loads=(fourbar.Load(2, moment=0.05),), effects=(GRAVITY,)
     )
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     assert solution.change_points is not None and len(solution.change_points) > 2
     text = " ".join(" ".join(write_block(scene, solution)).split())
     assert "at a change point pin forces grow without bound" in text
@@ -329,21 +335,17 @@ def test_the_peak_of_a_release_over_change_points_is_said_to_grow():
 @pytest.mark.slow
 def test_the_peak_of_a_release_with_limits_is_not_said_to_grow():
     """Of equal halves each arm carries its own: no pin force grows, however near."""
-    motion = fourbar.Motion(0.5, 6.0, free=fourbar.Free(0.5, 100))
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1), motion, effects=(GRAVITY,)
-    )
-    solution = fourbar.solve(scene)
+    motion = Motion(0.5, 6.0, free=Free(0.5, 100))
+    scene = Scene(uniform(0.3, 0.1, 0.3, 0.1), motion, effects=(GRAVITY,))
+    solution = solve(scene)
     assert solution.change_points
     assert "without bound" not in "\n".join(write_block(scene, solution))
 
 
 def test_a_kite_on_its_change_point_shows_zeros_and_not_their_rounding():
-    kite = fourbar.FourBar(
-        0.3, fourbar.Bar(0.3), fourbar.Bar(0.2, 1.0), fourbar.Bar(0.2)
-    )
-    scene = fourbar.Scene(kite, fourbar.Motion(0.0, 1.0))
-    text = "\n".join(write_block(scene, fourbar.solve(scene)))
+    kite = FourBar(0.3, Bar(0.3), Bar(0.2, 1.0), Bar(0.2))
+    scene = Scene(kite, Motion(0.0, 1.0))
+    text = "\n".join(write_block(scene, solve(scene)))
     assert "e-" not in text
     assert "-0.0000" not in text
     assert re.search(r"transmission angle +0 deg", text)

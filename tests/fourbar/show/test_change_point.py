@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, Free, Gravity, Motion, Scene, solve
 from fourbar.effects import Place
 from fourbar.scene import command_at
 from fourbar.show.position import PositionSheet
@@ -15,9 +16,9 @@ from tests.fourbar.show.test_position import SIX_DIGITS, numbers
 
 PARALLELOGRAM = fourbar.FourBar(
     0.3,
-    fourbar.Bar(0.1, mass=0.1),
-    fourbar.Bar(0.3, mass=0.3),
-    fourbar.Bar(0.1, mass=0.1),
+    Bar(0.1, mass=0.1),
+    Bar(0.3, mass=0.3),
+    Bar(0.1, mass=0.1),
 )
 
 
@@ -28,39 +29,39 @@ def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2,
     On the frame the bars then act with their weights less m a, and each side has the
     limit.
     """
-    scene = fourbar.Scene(
+    scene = Scene(
         PARALLELOGRAM,
-        fourbar.Motion(theta_2, 6.0),
-        effects=(fourbar.Gravity(9.81, 0.0),),
+        Motion(theta_2, 6.0),
+        effects=(Gravity(9.81, 0.0),),
     )
-    rows = PositionSheet(scene, fourbar.solve(scene), units("N m")).write_pin_forces()
+    rows = PositionSheet(scene, solve(scene), units("N m")).write_pin_forces()
     assert rows[-1] == "on the change point: the limits from both sides"
     # of G2 and G4 half of the acceleration of the coupler
     mass_times_acceleration = -sense * 0.1 * 36.0 * (0.1 * 0.5 + 0.3 + 0.1 * 0.5)
     along = 0.5 * 9.81 - mass_times_acceleration
     assert numbers(rows[5]) == pytest.approx([along, 0.0, along], rel=SIX_DIGITS)
     assert numbers(rows[6]) == [0.0]
-    beside = fourbar.Motion(theta_2 + np.array([-1e-5, 1e-5]), 6.0)
-    two = fourbar.solve(replace(scene, motion=beside))
+    beside = Motion(theta_2 + np.array([-1e-5, 1e-5]), 6.0)
+    two = solve(replace(scene, motion=beside))
     for row, name in zip(rows[1:5], ("F12", "F32", "F43", "F14"), strict=True):
         mean = getattr(two, name).mean(axis=0)
         assert numbers(row)[:2] == pytest.approx(mean, rel=SIX_DIGITS, abs=1e-8)
 
 
 def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value():
-    scene = fourbar.Scene(
+    scene = Scene(
         PARALLELOGRAM,
-        fourbar.Motion(0.0, 6.0),
-        effects=(fourbar.Gravity(9.81, -0.5 * np.pi),),
+        Motion(0.0, 6.0),
+        effects=(Gravity(9.81, -0.5 * np.pi),),
     )
-    rows = PositionSheet(scene, fourbar.solve(scene), units("N m")).write_pin_forces()
+    rows = PositionSheet(scene, solve(scene), units("N m")).write_pin_forces()
     assert [row.split()[-4:-1] for row in rows[1:6]] == [["-", "-", "-"]] * 5
     assert rows[-1] == "on the change point no pin force has a limit"
 
 
 def ask_forces(scene, name, value):
     """Return the rows of pin forces where a named quantity has a value."""
-    solution = fourbar.solve(scene, at=find_positions(scene, [(name, value)]))
+    solution = solve(scene, at=find_positions(scene, [(name, value)]))
     assert solution.status == ["change_point"]
     return PositionSheet(scene, solution, units("N m")).write_pin_forces()
 
@@ -71,15 +72,15 @@ def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands():
     Weights along the line ask for no force of the cylinder.
     """
     ends = Place(1, (0.2, -0.5 * np.pi)), Place(2, (0.06, 0.0))
-    along = fourbar.Gravity(9.81, 0.0)
+    along = Gravity(9.81, 0.0)
     swept = fourbar.Sweep(0.19, 0.22, 6)
-    motion = fourbar.Motion(stroke=swept, side="right", stroke_speed=0.0)
-    scene = fourbar.Scene(
+    motion = Motion(stroke=swept, side="right", stroke_speed=0.0)
+    scene = Scene(
         PARALLELOGRAM, motion, drive=fourbar.LinearDrive(*ends), effects=(along,)
     )
     rows = ask_forces(scene, "stroke", float(np.hypot(0.2, 0.06)))
     assert rows[-1] == "on the change point: the limits from both sides"
-    by_angle = fourbar.Scene(PARALLELOGRAM, fourbar.Motion(0.0, 0.0), effects=(along,))
+    by_angle = Scene(PARALLELOGRAM, Motion(0.0, 0.0), effects=(along,))
     assert rows == ask_forces(by_angle, "theta_2", 0.0)
 
 
@@ -91,13 +92,13 @@ def test_a_release_has_the_limits_of_its_own_motion(direction):
     On the frame the bars act with their weights less m a. Each arm turns about the
     same angle, so that half of it all is at each pin.
     """
-    scene = fourbar.Scene(
+    scene = Scene(
         PARALLELOGRAM,
-        fourbar.Motion(0.5, 6.0, free=fourbar.Free(2.0, 100)),
-        effects=(fourbar.Gravity(9.81, direction),),
+        Motion(0.5, 6.0, free=Free(2.0, 100)),
+        effects=(Gravity(9.81, direction),),
     )
     at = find_positions(scene, [("theta_2", 0.0)])
-    solution = fourbar.solve(scene, at=at)
+    solution = solve(scene, at=at)
     rows = ask_forces(scene, "theta_2", 0.0)
     assert rows[-1] == "on the change point: the limits from both sides"
     of_the_arms = np.array([0.1, 0.3, 0.1])
@@ -113,10 +114,8 @@ def test_a_release_has_the_limits_of_its_own_motion(direction):
 
 def test_the_reason_is_said_where_a_law_begins():
     law = fourbar.Rise("cycloidal", (1.0, 1.0), theta_2=0.0)
-    scene = fourbar.Scene(
-        PARALLELOGRAM, fourbar.Motion(law=law), effects=(fourbar.Gravity(9.81, 0.0),)
-    )
-    start = fourbar.solve(scene, at=command_at(scene, np.array([0.0])))
+    scene = Scene(PARALLELOGRAM, Motion(law=law), effects=(Gravity(9.81, 0.0),))
+    start = solve(scene, at=command_at(scene, np.array([0.0])))
     assert start.status == ["change_point"]
     rows = PositionSheet(scene, start, units("N m")).write_pin_forces()
     assert rows[-1] == (
@@ -133,10 +132,10 @@ def test_the_reason_is_said_where_a_law_begins():
     ],
 )
 def test_the_reason_is_said_where_a_release_begins(omega, why):
-    scene = fourbar.Scene(
+    scene = Scene(
         PARALLELOGRAM,
-        fourbar.Motion(0.0, omega, free=fourbar.Free(1.0, 10)),
-        effects=(fourbar.Gravity(9.81, 0.0),),
+        Motion(0.0, omega, free=Free(1.0, 10)),
+        effects=(Gravity(9.81, 0.0),),
     )
     rows = ask_forces(scene, "time", 0.0)
     assert rows[-1].endswith(f"pin forces have no value: {why}")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Sweep, solve
 from fourbar.errors import InputError
 from fourbar.show.columns import choose_columns
 from tests.support.scenes import TURN
@@ -16,12 +17,12 @@ MODELS = Path(__file__).parents[3] / "models"
 
 
 def columns(scene, names):
-    read = choose_columns(scene, fourbar.solve(scene), names)
+    read = choose_columns(scene, solve(scene), names)
     return {column.name: column.values for column in read}
 
 
 def test_a_vector_is_its_size_and_a_place_two_coordinates():
-    s = fourbar.solve(TURN)
+    s = solve(TURN)
     read = columns(TURN, "theta_2, torque,F12,F12_x,P,v_P,a_P_y,I13")
     assert list(read) == [
         *("theta_2", "torque", "F12", "F12_x", "P_x", "P_y"),
@@ -44,7 +45,7 @@ def test_a_ratio_of_speeds_does_not_ask_for_a_speed():
 
 
 def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
-    torque, ratio = choose_columns(TURN, fourbar.solve(TURN), "torque/F12,F12/F14")
+    torque, ratio = choose_columns(TURN, solve(TURN), "torque/F12,F12/F14")
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     shown = torque.shown({"N m": ("N mm", 1e3)})
     assert shown == pytest.approx(1e3 * torque.values)
@@ -72,18 +73,16 @@ def test_a_column_that_needs_a_speed_says_so():
             columns(still, name)
     with pytest.raises(InputError, match="no one speed"):
         columns(still, "time")
-    law = fourbar.Motion(law=fourbar.Sine(1.0, 0.5, 2.0, duration=3.0))
+    law = Motion(law=fourbar.Sine(1.0, 0.5, 2.0, duration=3.0))
     for scene in (still, replace(TURN, motion=law)):
         with pytest.raises(InputError, match='unknown; did you mean "torque"'):
             columns(scene, "tork")
 
 
 def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
-    rocker = replace(
-        TURN, motion=fourbar.Motion(theta_4=fourbar.Sweep(2.0, 1.7, 3), omega_4=-2.0)
-    )
+    rocker = replace(TURN, motion=Motion(theta_4=Sweep(2.0, 1.7, 3), omega_4=-2.0))
     assert columns(rocker, "time")["time"] == pytest.approx([0.0, 0.05, 0.1, 0.15])
-    growing = fourbar.Motion(fourbar.Sweep(0.0, 1.0, 3), 1.0, 0.5)
+    growing = Motion(Sweep(0.0, 1.0, 3), 1.0, 0.5)
     with pytest.raises(InputError, match="no one speed"):
         columns(replace(TURN, motion=growing), "time")
     cylinder = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
@@ -91,7 +90,7 @@ def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     with pytest.raises(InputError, match="no one speed"):
         columns(cylinder, "time")
     time = columns(steady, "time")["time"]
-    stroke = fourbar.solve(cylinder).stroke
+    stroke = solve(cylinder).stroke
     passed = np.abs(stroke - stroke[0]) / abs(cylinder.motion.speed)
     assert time == pytest.approx(passed, rel=1e-9, abs=1e-9)
 
@@ -102,9 +101,9 @@ def test_a_difference_of_angles_goes_on_from_its_first_position():
     theta_4 - theta_2 is -1.4 turns of bar 2 at first where that is commanded so.
     """
     start = 2.0 * np.pi + 5.0
-    motion = fourbar.Motion(fourbar.Sweep(start, start + 2.0 * math.tau, 100), 10.0)
+    motion = Motion(Sweep(start, start + 2.0 * math.tau, 100), 10.0)
     scene = replace(TURN, motion=motion)
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     difference = columns(scene, "theta_2 - theta_4")["theta_2 - theta_4"]
     assert -np.pi < difference[0] <= np.pi
     assert difference - difference[0] == pytest.approx(

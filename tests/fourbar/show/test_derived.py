@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import solve
 from fourbar.formulas.path import compute_state
 from fourbar.quantities import DERIVED_QUANTITIES
 from fourbar.show.derived import derive
@@ -22,7 +23,7 @@ def test_ratios_and_centres_are_those_of_the_formulas():
     """From the pins and from the half-angle formulas."""
     for motion in (TURN.motion, TURN.motion.replace(speed=None)):
         scene = replace(TURN, motion=motion)
-        s = fourbar.solve(scene)
+        s = solve(scene)
         state = compute_state(scene.linkage, s.theta_2, s.branch)
         expected = {
             "mechanical_advantage": 1.0 / state.k.h4,
@@ -45,13 +46,13 @@ def test_what_has_no_value_is_a_dash_and_no_number():
     half_turn = fourbar.Scene(
         fourbar.uniform(3.0, 1.0, 3.0, 1.0), fourbar.Motion(np.array([1.0, 2.0]))
     )
-    assert np.isnan(derive(fourbar.solve(half_turn), "I13")).all()
-    assert derive(fourbar.solve(half_turn), "omega_4/omega_2") == pytest.approx(1.0)
-    assert " - " in print_positions(fourbar.solve(half_turn), None, DEGREES)
+    assert np.isnan(derive(solve(half_turn), "I13")).all()
+    assert derive(solve(half_turn), "omega_4/omega_2") == pytest.approx(1.0)
+    assert " - " in print_positions(solve(half_turn), None, DEGREES)
 
 
 def test_shaking_follows_the_frame_of_a_table_and_csv():
-    s = fourbar.solve(TURN)
+    s = solve(TURN)
     text = s.to_csv()
     header, first = (line.split(",") for line in text.splitlines()[:2])
     row = dict(zip(header, first, strict=True))

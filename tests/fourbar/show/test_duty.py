@@ -5,11 +5,13 @@ The loads of the pins are tested too.
 
 import math
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, uniform, vary
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_motor
 from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
@@ -23,7 +25,7 @@ ROUND_OFF = 1e-11
 @pytest.mark.parametrize("drive", [None, CYLINDER], ids=("couple", "cylinder"))
 def test_shaking_is_the_momentum_that_the_bars_lose(drive):
     scene = crank_rocker(loads=(), effects=(), drive=drive)
-    s = fourbar.solve(scene)
+    s = solve(scene)
     force, moment = np.zeros((61, 2)), np.zeros(61)
     for number, G, a, alpha in (
         (2, s.G2, s.a_G2, s.alpha_2),
@@ -41,8 +43,8 @@ def test_shaking_is_the_momentum_that_the_bars_lose(drive):
 
 
 def test_bearing_load():
-    listed = fourbar.Motion(np.linspace(0.1, 0.1 + math.tau, 61), 10.0)
-    s = fourbar.solve(crank_rocker(motion=listed))
+    listed = Motion(np.linspace(0.1, 0.1 + tau, 61), 10.0)
+    s = solve(crank_rocker(motion=listed))
     load = np.hypot(s.F43[:-1, 0], s.F43[:-1, 1])
     bearing = bearing_load(s, "B")
     assert bearing.largest == load.max() and bearing.where == s.theta_2[load.argmax()]
@@ -53,24 +55,24 @@ def test_bearing_load():
 
 def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn():
     pins = {"O2": 0.004, "B": 0.02}
-    damped = (fourbar.Gravity(), fourbar.Viscous.at(**pins))
-    sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0)
-    s = fourbar.solve(crank_rocker(motion=sweep, loads=(), effects=damped))
+    damped = (Gravity(), fourbar.Viscous.at(**pins))
+    sweep = Motion(Sweep(0.0, tau, 360), 10.0)
+    s = solve(crank_rocker(motion=sweep, loads=(), effects=damped))
     duty = motor_duty(s)
     assert duty is not None and duty.closed
     losses = pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2
-    heat = losses[:-1].mean() * math.tau / 10.0
+    heat = losses[:-1].mean() * tau / 10.0
     # the rule is exact on periods
     given = duty.energy_in - duty.energy_out
     assert abs(given - heat) < 1e-9 * duty.energy_in
-    assert duty.mean_torque == pytest.approx(heat / math.tau, rel=1e-9)
+    assert duty.mean_torque == pytest.approx(heat / tau, rel=1e-9)
 
 
 def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
-    still = motor_duty(fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0, 0.0))))
+    still = motor_duty(solve(crank_rocker(motion=Motion(1.0, 0.0))))
     assert still is not None and still.peak_power == 0.0 and not still.closed
     assert still.energy_in is still.mean_torque is still.energy_swing is None
-    assert motor_duty(fourbar.solve(crank_rocker(), "position")) is None
+    assert motor_duty(solve(crank_rocker(), "position")) is None
 
 
 def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand():
@@ -78,25 +80,23 @@ def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand():
 
     The energy about the mean goes from -m g a to m g a, whichever way the crank turns.
     """
-    weight = fourbar.Bar(0.1, 2.0, 0.0, (0.1, 0.0))
-    massless = fourbar.Bar(0.25), fourbar.Bar(0.22)
-    linkage = fourbar.FourBar(0.3, weight, *massless)
+    weight = Bar(0.1, 2.0, 0.0, (0.1, 0.0))
+    massless = Bar(0.25), Bar(0.22)
+    linkage = FourBar(0.3, weight, *massless)
     couple = fourbar.Load(2, moment=-0.7)
     for speed in (10.0, -10.0):
-        turn = fourbar.Motion(fourbar.Sweep(0.3, 0.3 + math.tau, 720), speed)
-        scene = fourbar.Scene(
-            linkage, turn, loads=(couple,), effects=(fourbar.Gravity(),)
-        )
-        duty = motor_duty(fourbar.solve(scene))
+        turn = Motion(Sweep(0.3, 0.3 + tau, 720), speed)
+        scene = Scene(linkage, turn, loads=(couple,), effects=(Gravity(),))
+        duty = motor_duty(solve(scene))
         assert duty.mean_torque == pytest.approx(0.7, rel=1e-9)
         assert duty.energy_swing == pytest.approx(2.0 * 2.0 * 9.81 * 0.1, rel=1e-9)
 
 
 def test_the_json_holds_the_duty():
     scene = crank_rocker(
-        motion=fourbar.Motion(np.linspace(0.0, math.tau, 61), 10.0)
+        motion=Motion(np.linspace(0.0, tau, 61), 10.0)
     )  # between which nothing stands
-    s = fourbar.solve(scene)
+    s = solve(scene)
     duty, entry = motor_duty(s), write_motor(scene, s, units("imperial"))
     inch_pound = 0.0254 * 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp"
@@ -127,7 +127,7 @@ def test_a_study_has_what_each_of_its_members_has():
     }
     turn = np.linspace(0.1, 0.1 + 2.0 * np.pi, 61)
     theta_2 = np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn])
-    s = fourbar.solve(fourbar.vary(scene, {**values, "motion.theta_2": theta_2}))
+    s = solve(vary(scene, {**values, "motion.theta_2": theta_2}))
     force = shaking_force(s)
     moment = shaking_moment(s)
     duty = motor_duty(s)
@@ -136,7 +136,7 @@ def test_a_study_has_what_each_of_its_members_has():
     for member in range(3):
         d, angle = (float(array[member]) for array in values.values())
         linkage = replace(scene.linkage, ground=d, ground_angle=angle)
-        alone = fourbar.solve(
+        alone = solve(
             replace(
                 scene,
                 linkage=linkage,
@@ -164,7 +164,7 @@ def test_a_study_has_what_each_of_its_members_has():
     assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()
     assert duty.closed.tolist()[:3] == [True, True, False]
     speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}
-    rest = motor_duty(fourbar.solve(fourbar.vary(scene, speeds)))
+    rest = motor_duty(solve(vary(scene, speeds)))
     assert rest is not None and np.isfinite(rest.energy_in).tolist() == [False, True]
 
 
@@ -174,12 +174,10 @@ def test_a_study_of_a_motion_law_keeps_its_time():
     Speeds are zero at both ends.
     """
     law = Law((0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 0.0, 2.0, 2.0, 0.0), 20, "rest")
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    scene = fourbar.Scene(
-        linkage, fourbar.Motion(law=law), effects=(fourbar.Gravity(),)
-    )
-    study = fourbar.solve(fourbar.vary(scene, {"bars.input.mass": [0.1, 0.1]}))
-    alone, duty = fourbar.solve(scene), motor_duty(study)
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
+    scene = Scene(linkage, Motion(law=law), effects=(Gravity(),))
+    study = solve(vary(scene, {"bars.input.mass": [0.1, 0.1]}))
+    alone, duty = solve(scene), motor_duty(study)
     assert np.array_equal(study.time, [alone.time, alone.time])
     assert np.round(duty.energy_in, 4).tolist() == [0.4655, 0.4655]
     by_hand = np.trapezoid(np.maximum(alone.power, 0.0), alone.time)
@@ -193,27 +191,25 @@ def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat():
     """The last position counts once only if its angle, speed and acceleration
     repeat.
     """
-    time, angle = (0.0, 0.3, 0.7, 1.0), (0.0, 1.5, 5.0, math.tau)
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    time, angle = (0.0, 0.3, 0.7, 1.0), (0.0, 1.5, 5.0, tau)
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
     closed = {}
     for ends in ("free", "rest", "periodic"):
-        motion = fourbar.Motion(law=Law(time, angle, 24, ends))
-        solution = fourbar.solve(
-            fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
-        )
+        motion = Motion(law=Law(time, angle, 24, ends))
+        solution = solve(Scene(linkage, motion, effects=(Gravity(),)))
         duty = motor_duty(solution)
         closed[ends] = duty.closed
     assert closed == {"free": False, "rest": False, "periodic": True}
 
 
 def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two():
-    linkage = fourbar.uniform(4.0, 1.0, 2.0, 3.0)
+    linkage = uniform(4.0, 1.0, 2.0, 3.0)
     closed = []
     for turns in (1, 2):
-        angles = (0.0, 0.4 * turns * math.tau, turns * math.tau)
+        angles = (0.0, 0.4 * turns * tau, turns * tau)
         law = Law((0.0, 0.5, 1.0), angles, 24, "periodic")
-        scene = fourbar.Scene(linkage, fourbar.Motion(law=law))
-        duty = motor_duty(fourbar.solve(scene))
+        scene = Scene(linkage, Motion(law=law))
+        duty = motor_duty(solve(scene))
         closed.append(duty.closed)
     assert closed == [False, True]
 
@@ -224,13 +220,13 @@ def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(speed):
 
     Without mass but one, (m g z) at the ends.
     """
-    bars = fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22, 0.4)
-    scene = fourbar.Scene(
-        fourbar.FourBar(0.3, *bars),
-        fourbar.Motion(fourbar.Sweep(2.0, 0.3, 2000), speed),
-        effects=(fourbar.Gravity(9.81),),
+    bars = Bar(0.1), Bar(0.25), Bar(0.22, 0.4)
+    scene = Scene(
+        FourBar(0.3, *bars),
+        Motion(Sweep(2.0, 0.3, 2000), speed),
+        effects=(Gravity(9.81),),
     )
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     duty, heights = motor_duty(solution), solution.G4[:, 1]
     speeds = np.hypot(0.5 * 0.22, 0.22 / math.sqrt(12.0)) * solution.omega_4
     energy = 0.4 * (9.81 * heights + 0.5 * speeds**2)
@@ -243,18 +239,18 @@ def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(speed):
 
 def test_a_position_without_forces_is_not_where_a_light_load_is_largest():
     """Loads below 1 N, in a sweep that begins where the linkage does not assemble."""
-    bars = (fourbar.Bar(length, 1e-3) for length in (0.25, 0.1, 0.22))
-    scene = fourbar.Scene(
-        fourbar.FourBar(0.3, *bars),
-        fourbar.Motion(fourbar.Sweep(-math.pi, math.pi, 90), 1.0),
-        effects=(fourbar.Gravity(),),
+    bars = (Bar(length, 1e-3) for length in (0.25, 0.1, 0.22))
+    scene = Scene(
+        FourBar(0.3, *bars),
+        Motion(Sweep(-math.pi, math.pi, 90), 1.0),
+        effects=(Gravity(),),
     )
-    s = fourbar.solve(scene)
+    s = solve(scene)
     assert s.F12 is not None and not s.assembled[0] and s.assembled.any()
     size = np.hypot(*s.F12.T)
     assert np.nanmax(size) < 1.0
-    listed = fourbar.Motion(s.theta_2, 1.0)
-    load = bearing_load(fourbar.solve(replace(s.scene, motion=listed)), "O2")
+    listed = Motion(s.theta_2, 1.0)
+    load = bearing_load(solve(replace(s.scene, motion=listed)), "O2")
     assert load.largest == np.nanmax(size)
     assert load.where == s.theta_2[np.nanargmax(size)]
 
@@ -262,8 +258,8 @@ def test_a_position_without_forces_is_not_where_a_light_load_is_largest():
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
     torsion = fourbar.effects.Torsion((("A", 2.0, math.radians(86.0), 0.0),))
-    turn = fourbar.Sweep(0.0, math.tau, 120)
-    scene = crank_rocker(motion=fourbar.Motion(turn, 1.0), effects=(torsion,))
-    duty = motor_duty(fourbar.solve(scene))
+    turn = Sweep(0.0, tau, 120)
+    scene = crank_rocker(motion=Motion(turn, 1.0), effects=(torsion,))
+    duty = motor_duty(solve(scene))
     assert duty.peak_torque is not None and duty.closed
     assert (duty.energy_in, duty.energy_out, duty.energy_swing) == (None, None, None)

@@ -1,12 +1,14 @@
 """Positions at which a column has a value, against closed forms."""
 
 import math
+from math import acos, pi, radians
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import solve
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
@@ -66,13 +68,13 @@ def parallelogram(motion=SWEEP):
 @pytest.mark.parametrize(
     "name, value, places",
     [
-        ("B_x", "0.855 m", [math.acos(0.11)]),
-        ("B_y", "499.9 mm", [math.asin(0.9998), math.pi - math.asin(0.9998)]),
-        ("B_x-B_y", "80 cm", [math.pi / 4]),
-        ("theta_2-theta_3", "-330 deg", [math.pi / 6]),
-        ("v_B_x", "-0.25 m/s", [math.pi / 6, 5 * math.pi / 6]),
-        ("v_B_x/v_B_y", "-1", [math.pi / 4]),
-        ("torque", "-1 N m", [math.pi / 6, 5 * math.pi / 6]),
+        ("B_x", "0.855 m", [acos(0.11)]),
+        ("B_y", "499.9 mm", [math.asin(0.9998), pi - math.asin(0.9998)]),
+        ("B_x-B_y", "80 cm", [pi / 4]),
+        ("theta_2-theta_3", "-330 deg", [pi / 6]),
+        ("v_B_x", "-0.25 m/s", [pi / 6, 5 * pi / 6]),
+        ("v_B_x/v_B_y", "-1", [pi / 4]),
+        ("torque", "-1 N m", [pi / 6, 5 * pi / 6]),
     ],
 )
 def test_every_position_with_a_value_is_located(name, value, places, motion):
@@ -88,17 +90,17 @@ def test_an_extreme_that_touches_the_value_is_a_position():
     sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
     for name, value in (("B_y", "0.5 m"), ("transmission", "90 deg")):
         found = locate(parallelogram(sweep), name, value).places
-        assert found == pytest.approx([math.pi / 2], abs=TOUCHED)
+        assert found == pytest.approx([pi / 2], abs=TOUCHED)
 
 
 @pytest.mark.parametrize(
     "name, side, place",
     [
-        ("B_y", "max", math.pi / 2),
-        ("v_B_x", "min", math.pi / 2),
-        ("B_x-B_y", "min", 3 * math.pi / 4),
-        ("theta_4", "max", math.radians(178.0)),
-        ("transmission", "max", math.pi / 2),
+        ("B_y", "max", pi / 2),
+        ("v_B_x", "min", pi / 2),
+        ("B_x-B_y", "min", 3 * pi / 4),
+        ("theta_4", "max", radians(178.0)),
+        ("transmission", "max", pi / 2),
     ],
 )
 def test_the_least_and_the_greatest_value_are_located(name, side, place):
@@ -123,7 +125,7 @@ def test_a_scene_of_single_positions_is_searched_over_its_range():
             DWELL.split("law", maxsplit=1)[0] + f'theta_2 = ["{motion}", "20 deg"]\n'
         )
         found = np.degrees(locate(scene, "B_x", "0.4 m").places)
-        first = math.degrees(math.acos(-0.8))
+        first = math.degrees(acos(-0.8))
         assert found == pytest.approx([first, 360.0 - first])
 
 
@@ -148,7 +150,7 @@ def test_a_release_has_a_value_at_times():
         '[bars.coupler]\nmass = "1 kg"\n[effects]\n'
         'gravity = ["9.81 m/s^2", "-90 deg"]\n'
     )
-    speed = math.sqrt(2.0 * 9.81 * (math.sin(math.radians(50.0)) - 0.5) / 0.5)
+    speed = math.sqrt(2.0 * 9.81 * (math.sin(radians(50.0)) - 0.5) / 0.5)
     at = locate(scene, "omega_2", f"{-speed!r} rad/s")
     assert np.degrees(at.angle) == pytest.approx([-50.0, -130.0], abs=1e-6)
 
@@ -200,9 +202,9 @@ def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
         'output = "25 mm"\n[motion]\ntheta_2 = { from = "30 deg", to = "170 deg", '
         "steps = 20 }\n"
     )
-    limit = math.acos((50**2 + 20**2 - 65**2) / (2 * 50 * 20))
-    place = limit - math.radians(0.001)
-    at = fourbar.solve(
+    limit = acos((50**2 + 20**2 - 65**2) / (2 * 50 * 20))
+    place = limit - radians(0.001)
+    at = solve(
         loads(
             '[lengths]\nground = "50 mm"\ninput = "20 mm"\ncoupler = "40 mm"\n'
             f'output = "25 mm"\n[motion]\ntheta_2 = "{place!r} rad"\n'
@@ -220,7 +222,7 @@ def test_springs_have_their_length_and_pull_as_columns():
             'to = { bar = 4, from_pin = ["0.5 m", "0 deg"] }\npreload = "-1 N"',
         )
     )
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     length, force = choose_columns(scene, solution, "spring_0_length,spring_0_force")
     distance = np.sqrt(0.8**2 + 0.5**2 + 0.8 * np.cos(solution.theta_2))
     assert length.unit == "m" and length.values == pytest.approx(distance, rel=1e-13)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Tolerance, sensitivity, solve, tolerances, vary
 from fourbar.cli import status
 from fourbar.errors import DependencyError, InputError
 from fourbar.files import scene_file as files
@@ -47,17 +48,17 @@ def test_without_matplotlib_a_scene_shows_its_table_and_what_to_install(monkeypa
 
 
 def test_a_solution_shows_its_ends_and_says_what_is_between():
-    solution = fourbar.solve(crank_rocker())
+    solution = solve(crank_rocker())
     shown = solution._repr_html_()
     assert shown.count("<tr>") == 1 + 10 + 1 and "51 more" in shown
     assert f"{math.degrees(solution.theta_2[-1]):.4f}" in shown
-    short = fourbar.solve(thesis())._repr_html_()
+    short = solve(thesis())._repr_html_()
     assert short.count("<tr>") == 2 and "more" not in short
 
 
 def test_a_solution_as_pandas_and_csv_says_the_same_bit_for_bit():
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
-    solution = fourbar.solve(crank_rocker())
+    solution = solve(crank_rocker())
     table = solution.to_pandas()
     assert len(table) == len(solution)
     assert np.array_equal(table["torque"].to_numpy(), solution.torque)
@@ -66,12 +67,12 @@ def test_a_solution_as_pandas_and_csv_says_the_same_bit_for_bit():
     rows = list(csv.DictReader(io.StringIO(text)))
     assert [float(row["F14_y"]) for row in rows] == solution.F14[:, 1].tolist()
     assert set(table.columns) <= set(rows[0])
-    positions = fourbar.solve(crank_rocker(), "position").to_pandas()
+    positions = solve(crank_rocker(), "position").to_pandas()
     assert "torque" not in positions and "theta_3" in positions
 
 
 def test_csv_goes_to_a_file(tmp_path):
-    solution = fourbar.solve(thesis())
+    solution = solve(thesis())
     assert solution.to_csv(tmp_path / "a.csv", degrees=True) is None
     assert (tmp_path / "a.csv").read_text() == solution.to_csv(degrees=True)
 
@@ -79,7 +80,7 @@ def test_csv_goes_to_a_file(tmp_path):
 def test_without_pandas_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(DependencyError, match="pip install pandas"):
-        fourbar.solve(thesis()).to_pandas()
+        solve(thesis()).to_pandas()
 
 
 def test_showing_needs_numpy_alone():
@@ -100,7 +101,7 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path):
     scene = files.loads(text)
     assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
     assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
-    assert np.isfinite(fourbar.solve(scene).torque).all()
+    assert np.isfinite(solve(scene).torque).all()
     opened = []
     for (
         line
@@ -144,18 +145,18 @@ def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):
 
 
 def test_results_say_in_ten_lines_what_they_hold():
-    scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
-    solution = fourbar.solve(scene)
-    slopes = fourbar.sensitivity(scene)
-    spread = fourbar.tolerances(scene, 64)
-    study = fourbar.vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
+    scene = crank_rocker(tolerances=(Tolerance("lengths.input", 1e-4),))
+    solution = solve(scene)
+    slopes = sensitivity(scene)
+    spread = tolerances(scene, 64)
+    study = vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
     for shown in (
         solution,
         slopes,
         spread,
         study,
-        fourbar.solve(study),
-        fourbar.solve(scene, "position"),
+        solve(study),
+        solve(scene, "position"),
     ):
         text = repr(shown)
         assert (
@@ -167,11 +168,9 @@ def test_results_say_in_ten_lines_what_they_hold():
         f"torque: {solution.torque.min():.6g} to {solution.torque.max():.6g} N m"
         in repr(solution)
     )
-    assert "status: 122 ok, 61 not_assembled" in repr(fourbar.solve(study))
-    one = fourbar.solve(
-        fourbar.vary(
-            fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1}
-        )
+    assert "status: 122 ok, 61 not_assembled" in repr(solve(study))
+    one = solve(
+        vary(fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1})
     )
     assert "1 linkage, 1 position each" in repr(one)
     assert "1 linkage, 1 position each" in one._repr_html_()
@@ -202,8 +201,8 @@ def test_results_say_in_ten_lines_what_they_hold():
 
 def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
-    scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
-    slopes, spread = fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
+    scene = crank_rocker(tolerances=(Tolerance("lengths.input", 1e-4),))
+    slopes, spread = sensitivity(scene), tolerances(scene, 64)
     table = slopes.to_pandas()
     assert len(table) == len(slopes.keys) * 61
     rows = table[table["key"] == "lengths.input"]
@@ -213,9 +212,7 @@ def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
     assert all(np.isfinite(slopes.value(name)).all() for name in spread.spreads)
     step = 1e-6
     sides = [
-        fourbar.solve(fourbar.vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[
-            0
-        ]
+        solve(vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[0]
         for sign in (1, -1)
     ]
     slope = (np.hypot(*sides[0].T) - np.hypot(*sides[1].T)) / (2.0 * step)

@@ -5,12 +5,15 @@ import math
 import time
 from dataclasses import replace
 from itertools import pairwise
+from math import atan2, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import fourbar
+from fourbar import Motion, Scene, Sweep, Tolerance, solve, uniform, units
 from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.show import animate
@@ -70,9 +73,9 @@ def state_of(driver, expression):
 @pytest.mark.slow
 def test_numbers_are_shown_in_the_units_of_the_page(browse):
     scene = crank_rocker()
-    driver = browse(animate.write_page(scene, units=fourbar.units("mm kN N.mm rpm")))
-    s = fourbar.solve(scene)
-    expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
+    driver = browse(animate.write_page(scene, units=units("mm kN N.mm rpm")))
+    s = solve(scene)
+    expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / pi]
     assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(
         expected, rel=PRINTED
     )
@@ -97,7 +100,7 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse):
 @pytest.fixture
 def turning(browse):
     """The page of the crank-rocker, and its solution."""
-    return browse(animate.write_page(crank_rocker())), fourbar.solve(crank_rocker())
+    return browse(animate.write_page(crank_rocker())), solve(crank_rocker())
 
 
 @pytest.mark.slow
@@ -142,8 +145,8 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
     )
     drawn = pins(driver)
     scale = np.hypot(*drawn["O4"]) / 0.3
-    np.testing.assert_allclose(drawn["A"], scale * s.A[row], atol=PIXEL)
-    np.testing.assert_allclose(drawn["B"], scale * s.B[row], atol=PIXEL)
+    assert_allclose(drawn["A"], scale * s.A[row], atol=PIXEL)
+    assert_allclose(drawn["B"], scale * s.B[row], atol=PIXEL)
 
 
 def clockwork(driver, ticks):
@@ -168,7 +171,7 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(brows
     rows = clockwork(driver, 241)  # 12 s: two sweeps
     assert set(rows) == set(range(61)) or set(rows) == set(range(60))
     assert sum(np.diff(rows) < 0) == 2
-    text = animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360)))
+    text = animate.write_page(thesis(Sweep(0.0, 2 * pi, 360)))
     data = embedded(text)
     driver = browse(text)
     driver.execute_script(
@@ -187,7 +190,7 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(brows
 @pytest.mark.slow
 def test_a_free_motion_plays_once_in_its_own_time(browse):
     driver = browse(animate.write_page(RELEASED))
-    s = fourbar.solve(RELEASED)
+    s = solve(RELEASED)
     assert not driver.find_element("id", "branch").is_displayed()
     assert not driver.find_element("id", "torque").is_displayed()
     # it has one branch: no key promises another, and none takes the linkage away
@@ -195,9 +198,7 @@ def test_a_free_motion_plays_once_in_its_own_time(browse):
     driver.find_element("id", "picture").send_keys("b")
     assert state_of(driver, "branch") == 1
     rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
-    np.testing.assert_allclose(
-        s.time[rows], 0.05 * np.arange(20), atol=0.011
-    )  # half a row
+    assert_allclose(s.time[rows], 0.05 * np.arange(20), atol=0.011)  # half a row
     assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
     driver.execute_script("go(37)")
     assert driver.find_element("id", "theta-text").text == "0.740 s"
@@ -211,15 +212,11 @@ def test_a_free_motion_plays_once_in_its_own_time(browse):
     kinetic = embedded(animate.write_page(RELEASED))["branches"]["1"]["energy"][37]
     assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
     drawn = pins(driver)
-    np.testing.assert_allclose(
-        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL
-    )
+    assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL)
 
 
-STROKES = fourbar.Motion(
-    stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left"
-)
-OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
+STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
+OUTPUT = Motion(theta_4=Sweep(1.75, 2.95, 40), omega_4=4.0)
 """Its ends do not assemble."""
 
 
@@ -247,7 +244,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     browse, motion, name, place, over, pace
 ):
     scene = crank_rocker(motion=motion, drive=CYLINDER)
-    driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
+    driver, s = browse(animate.write_page(scene)), solve(scene)
     driver.execute_script("go(20)")
     assert driver.find_element("id", "theta-text").text == place
     assert driver.find_element("id", "over").text == over
@@ -264,9 +261,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
         [1000.0 * s.stroke[20]], rel=PRINTED
     )
     drawn = pins(driver)
-    np.testing.assert_allclose(
-        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL
-    )
+    assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL)
     assert state_of(driver, "plotted.over") == pytest.approx(s.at.places)
     driver.find_element("id", "chart").click()  # its middle
     assert abs(state_of(driver, "row") - 20) <= 2
@@ -286,10 +281,8 @@ def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
     drive = fourbar.LinearDrive(
         Place(1, (1.45, math.radians(-160.0))), Place(2, (0.29, 0.17))
     )
-    motion = fourbar.Motion(
-        stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left"
-    )
-    scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
+    motion = Motion(stroke=Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left")
+    scene = Scene(uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
     driver = browse(animate.write_page(scene), width)
     wide, room = driver.execute_script(
         "const box = document.querySelector('.slider output'); return [box.scrollWidth,"
@@ -311,18 +304,18 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(brow
 
     Some of its positions do not assemble.
     """
-    scene = thesis(fourbar.Sweep(0.0, 2.0 * math.pi, 72))
+    scene = thesis(Sweep(0.0, 2.0 * pi, 72))
     driver = browse(animate.write_page(scene))
     assert (
         driver.find_element("id", "type").text == fourbar.classify(scene.linkage).name
     )
     for sign in (1, -1):
         driver.execute_script("chooseBranch(arguments[0])", sign)
-        s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=sign)))
+        s = solve(replace(scene, motion=scene.motion.replace(branch=sign)))
         drawn = state_of(driver, "grid.map((_, i) => at(i) && [at(i).A, at(i).B])")
         assert [pair is not None for pair in drawn] == s.assembled.tolist()
         here = np.flatnonzero(s.assembled)
-        np.testing.assert_allclose(
+        assert_allclose(
             [drawn[i] for i in here],
             np.stack([s.A, s.B], axis=1)[here],
             rtol=0.0,
@@ -334,7 +327,7 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(brow
             " 'G3')))",
         )
         for k, vectors in enumerate((s.v_G3, s.a_G3)):
-            np.testing.assert_allclose(
+            assert_allclose(
                 [moved[i][k] for i in here], vectors[here], rtol=1e-9, atol=1e-9
             )
 
@@ -342,7 +335,7 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(brow
 @pytest.mark.slow
 def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path):
     scene = crank_rocker(
-        title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
+        title="a\\nb", motion=Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
     )
     driver = browse(animate.write_page(scene))
     assert (
@@ -379,7 +372,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
     )
     driver = browse(animate.write_page(scene))
     driver.execute_script("go(20)")
-    s = fourbar.solve(scene)
+    s = solve(scene)
     script = """
         const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
           .map(m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k]);
@@ -391,17 +384,15 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
     end = s.B[20] + (0.08 - 0.22) * np.array(
         [math.cos(s.theta_4[20]), math.sin(s.theta_4[20])]
     )
-    np.testing.assert_allclose(zigzag[-1], end, atol=1e-4)
+    assert_allclose(zigzag[-1], end, atol=1e-4)
     angle = s.theta_3[20] + 1.0
-    np.testing.assert_allclose(
+    assert_allclose(
         arrow[0],
         s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]),
         atol=1e-4,
     )
     towards = np.subtract(arrow[1], arrow[0])
-    assert math.atan2(towards[1], towards[0]) == pytest.approx(
-        s.theta_3[20] + 0.5, abs=0.01
-    )
+    assert atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
     names = (
         'return ["1", "3"].map(k => [parts.label[k].textContent,'
@@ -417,7 +408,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
     assert len(arrows) == 2 * 5
     shafts = np.diff(arrows, axis=1)[:, 0]
     for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
-        assert math.atan2(y, x) == pytest.approx(math.atan2(*expected[::-1]), abs=0.001)
+        assert atan2(y, x) == pytest.approx(atan2(*expected[::-1]), abs=0.001)
     driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
     assert [text for text, _ in driver.execute_script(names)] == [
         "1: 300 mm",
@@ -429,14 +420,12 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
 def test_the_branch_switches_the_picture_and_the_numbers(turning):
     driver, scene = turning[0], crank_rocker()
     driver.execute_script("chooseBranch(-1)")
-    s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=-1)))
+    s = solve(replace(scene, motion=scene.motion.replace(branch=-1)))
     assert shown(driver, "torque", "F32_y") == pytest.approx(
         [s.torque[0], s.F32[0, 1]], rel=PRINTED
     )
     drawn = pins(driver)
-    np.testing.assert_allclose(
-        drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL
-    )
+    assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL)
 
 
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
@@ -463,9 +452,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
     )
     for name in ("F12", "F32", "F43", "F14"):
         drawn = np.array(driver.execute_script(script, name))
-        np.testing.assert_allclose(
-            drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL
-        )
+        assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
 
 
 @pytest.mark.slow
@@ -668,7 +655,7 @@ def test_a_picture_lies_along_its_bar(browse, tmp_path):
     turn = driver.find_element("id", "picture-4").get_attribute("transform")
     angle = float(turn[turn.index("rotate(") + 7 : -1])
     assert math.remainder(
-        angle + math.degrees(fourbar.solve(crank_rocker()).theta_4[9]), 360
+        angle + math.degrees(solve(crank_rocker()).theta_4[9]), 360
     ) == pytest.approx(0, abs=1e-6)
 
 
@@ -690,7 +677,7 @@ def test_with_reduced_motion_it_moves_twice_a_second(browse):
 
 
 def test_positions_alone_show_no_dynamics(browse):
-    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36)))
+    scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36)))
     driver = browse(animate.write_page(scene))
     assert not driver.find_element("id", "forces").is_displayed()
     assert driver.find_element("id", "omega_3").text == "–"
@@ -703,12 +690,12 @@ def test_it_says_why_a_position_has_no_forces(browse):
 
     On its input the drive has forces everywhere, and no remark is shown.
     """
-    motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
+    motion = Motion(Sweep(0.3, 2.0, 4), 1.0)
     for drive_bar, remark in (
         (3, "no torque of the drive holds them in balance"),
         (2, ""),
     ):
-        scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
+        scene = Scene(uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
         status = browse(animate.write_page(scene)).find_element("id", "status")
         assert (remark in status.text) and status.is_displayed() == bool(remark)
 
@@ -716,11 +703,11 @@ def test_it_says_why_a_position_has_no_forces(browse):
 @pytest.mark.slow
 def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
     loose = (
-        fourbar.Tolerance("lengths.input", 5e-5),
-        fourbar.Tolerance("bars.coupler.mass", 0.001, True),
+        Tolerance("lengths.input", 5e-5),
+        Tolerance("bars.coupler.mass", 0.001, True),
     )
     scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
-    driver = browse(animate.write_page(scene, units=fourbar.units("N.mm")), 360)
+    driver = browse(animate.write_page(scene, units=units("N.mm")), 360)
     study = fourbar.tolerances(scene, PAGE_SAMPLES)
     driver.execute_script("go(20)")
     rows = {
@@ -740,7 +727,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
         spread = study.spreads[part]
         names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
         expected = np.array([getattr(spread, name)[20] * factor for name in names])
-        np.testing.assert_allclose(
+        assert_allclose(
             rows[label],
             expected,
             rtol=0,
@@ -765,7 +752,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
 def test_a_scene_without_bands_says_why_or_shows_nothing(browse):
     driver = browse(
         animate.write_page(
-            replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))
+            replace(RELEASED, tolerances=(Tolerance("lengths.input", 5e-5),))
         )
     )
     assert "free motion" in driver.find_element("id", "tolerance-note").text
@@ -790,7 +777,7 @@ def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
 ):
     """`mass`, `inertia`: the units of the heads in kg and kg m^2."""
     scene = crank_rocker()
-    driver = browse(animate.write_page(scene, units=fourbar.units(names)))
+    driver = browse(animate.write_page(scene, units=units(names)))
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     table = driver.find_element("id", "bars")
     assert head in table.text

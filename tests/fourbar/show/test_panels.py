@@ -1,6 +1,7 @@
 """Integrals of curves over a motion against their antiderivatives."""
 
 import math
+from math import pi
 
 import numpy as np
 import pytest
@@ -65,10 +66,10 @@ def test_a_curve_is_integrated_from_zero_to_zero():
 
 def test_the_range_of_the_integral_about_a_level():
     """Of 1/2 + sin(pi x) less its mean it is that of -cos(pi x)/pi."""
-    panels = fit(lambda x: 0.5 + np.sin(math.pi * x), np.array([0.0, 0.7, 2.0]))
+    panels = fit(lambda x: 0.5 + np.sin(pi * x), np.array([0.0, 0.7, 2.0]))
     assert panels.integrate("curve") == pytest.approx(1.0, rel=SETTLED)
     about_mean = panels.accumulate("curve", 0.5)
-    assert np.ptp(about_mean) == pytest.approx(2.0 / math.pi, rel=SETTLED)
+    assert np.ptp(about_mean) == pytest.approx(2.0 / pi, rel=SETTLED)
 
 
 def draw_noise(places):
@@ -100,7 +101,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
         (lambda x: 2.0 - np.abs(x - POLE), 2.0, POLE),
         (lambda x: 3.0 + np.sqrt(2.0 - x), 3.0 + math.sqrt(2.0), 0.0),
         (lambda x: 1.0 / (np.square(x - POLE) + 1e-10), 1e10, POLE),
-        (lambda x: np.sin(7.0 * x), 1.0, 0.5 * math.pi / 7.0),
+        (lambda x: np.sin(7.0 * x), 1.0, 0.5 * pi / 7.0),
         (lambda x: 0.0 * x - 4.0, 4.0, 0.0),
     ],
     ids=("gap", "jump", "corner", "root", "spike", "waves", "constant"),
@@ -129,9 +130,7 @@ def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(edge
 def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
     forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
     for panels in (forwards, backwards):
-        assert panels.find_peak("curve", 1).place == pytest.approx(
-            0.5 * math.pi, abs=1e-5
-        )
+        assert panels.find_peak("curve", 1).place == pytest.approx(0.5 * pi, abs=1e-5)
         assert panels.find_peak("curve", -1).value == pytest.approx(0.0, abs=1e-8)
     level = [fit(lambda x: 1.0 + 0.0 * x, edges) for edges in (EDGES, EDGES[::-1])]
     places = [panels.find_peak("curve").place for panels in level]

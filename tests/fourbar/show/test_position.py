@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, solve
 from fourbar.files import loads
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import COMMON, units
@@ -19,7 +20,7 @@ from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6
 ONE = crank_rocker(
-    motion=fourbar.Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
+    motion=Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
 )
 
 
@@ -28,7 +29,7 @@ def numbers(line):
 
 
 def test_bars_points_and_forces_are_those_of_the_solution():
-    s = fourbar.solve(ONE)
+    s = solve(ONE)
     shown = {**COMMON, **units("m N N.m rad/s")}
     sheet = PositionSheet(ONE, s, shown)
     bars = [numbers(line)[1:] for line in sheet.write_bars()[1:]]
@@ -53,31 +54,29 @@ def test_bars_points_and_forces_are_those_of_the_solution():
 
 
 def test_what_a_scene_has_not_is_left_out():
-    still = replace(ONE, motion=fourbar.Motion(1.0), points=())
-    sheet = PositionSheet(still, fourbar.solve(still), COMMON)
+    still = replace(ONE, motion=Motion(1.0), points=())
+    sheet = PositionSheet(still, solve(still), COMMON)
     assert "omega" not in sheet.write_bars()[0]
     assert not any(line.startswith("  v") for line in sheet.write_points())
     assert not any(line.startswith("F_") for line in sheet.write_ratios())
 
 
 def test_a_static_position_shows_no_rates():
-    still = replace(ONE, motion=fourbar.Motion(1.0, 0.0))
-    sheet = PositionSheet(still, fourbar.solve(still), COMMON)
+    still = replace(ONE, motion=Motion(1.0, 0.0))
+    sheet = PositionSheet(still, solve(still), COMMON)
     assert "theta" in sheet.write_bars()[0]
     assert "omega" not in sheet.write_bars()[0]
     assert not any(line.startswith(("  v", "  a")) for line in sheet.write_points())
-    starting = replace(ONE, motion=fourbar.Motion(1.0, 0.0, 3.0))
-    sheet = PositionSheet(starting, fourbar.solve(starting), COMMON)
+    starting = replace(ONE, motion=Motion(1.0, 0.0, 3.0))
+    sheet = PositionSheet(starting, solve(starting), COMMON)
     assert "alpha" in sheet.write_bars()[0]
 
 
 def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
-    lift = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(np.pi / 2.0, 1.0)
-    )
+    lift = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), Motion(np.pi / 2.0, 1.0))
     text = "\n".join(
         line
-        for sheet in [PositionSheet(lift, fourbar.solve(lift), COMMON)]
+        for sheet in [PositionSheet(lift, solve(lift), COMMON)]
         for line in (*sheet.write_points(), *sheet.write_ratios())
     )
     assert "e-1" not in text and "-0 " not in text
@@ -87,8 +86,8 @@ def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
 @pytest.mark.parametrize("turns", [0, 2777777777, 10**16])
 def test_columns_of_an_angle_of_many_turns_stay_apart(turns):
     angle = 1.0 + math.tau * turns
-    scene = replace(ONE, motion=fourbar.Motion(angle, 10.0, 3.0))
-    solution = fourbar.solve(scene)
+    scene = replace(ONE, motion=Motion(angle, 10.0, 3.0))
+    solution = solve(scene)
     rows = PositionSheet(scene, solution, COMMON).write_bars()[1:]
     for bar, row in enumerate(rows, 2):
         of_bar = [getattr(solution, f"{name}_{bar}")[0] for name in ("theta", "omega")]
@@ -114,11 +113,11 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     The work of a pull of 1 lbf against the jaw's path says the same.
     """
     scene = loads(PRESSED, "pliers.toml")
-    rows = PositionSheet(scene, fourbar.solve(scene), COMMON).write_ratios()
+    rows = PositionSheet(scene, solve(scene), COMMON).write_ratios()
     (row,) = [row for row in rows if row.startswith("F_jaw/drive_force")]
     ratio = numbers(row)[0]
     assert ratio == pytest.approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
     assert not any(row.startswith("F_handle/drive_force") for row in rows)
     held = fourbar.Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
-    loaded = fourbar.solve(replace(scene, loads=(held,)))
+    loaded = solve(replace(scene, loads=(held,)))
     assert 1.0 / loaded.drive_force[0] == pytest.approx(ratio, rel=SIX_DIGITS)

@@ -4,6 +4,7 @@ import math
 import time
 from dataclasses import replace
 from itertools import pairwise
+from math import pi, sin, sqrt, tau
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.integrate import quad
 from scipy.special import ellipk
 
 import fourbar
+from fourbar import Bar, FourBar, Load, Motion, Scene, Sweep, Viscous, solve
 from fourbar.files import loads
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command_at
@@ -41,9 +43,7 @@ SWING = 1e-2
 
 
 def fall(duration):
-    return fourbar.Motion(
-        law=Rise("cycloidal", (1.0, 0.5), 0.3, 0.2, duration, 0.1, 12)
-    )
+    return Motion(law=Rise("cycloidal", (1.0, 0.5), 0.3, 0.2, duration, 0.1, 12))
 
 
 def rub(**torques):
@@ -51,17 +51,15 @@ def rub(**torques):
 
 
 WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
-TURN = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 12), 10.0)
-BACK = fourbar.Motion(fourbar.Sweep(2.6, 1.3, 12), -4.0)
-PULLED = fourbar.Motion(
-    stroke=fourbar.Sweep(0.33, 0.17, 37), stroke_speed=-0.2, side="left"
-)
-THERE_AND_ON = (0.1, -1.2, 3.7, 0.1 + math.tau)
+TURN = Motion(Sweep(0.1, 0.1 + tau, 12), 10.0)
+BACK = Motion(Sweep(2.6, 1.3, 12), -4.0)
+PULLED = Motion(stroke=Sweep(0.33, 0.17, 37), stroke_speed=-0.2, side="left")
+THERE_AND_ON = (0.1, -1.2, 3.7, 0.1 + tau)
 CORNERS = tuple(np.radians([0.0, 98.3, 101.3, 104.3, 360.0]))
-SPIKE = fourbar.Load(
+SPIKE = Load(
     2, (-1.0, 0.3), moment=-0.05, table=fourbar.Table(CORNERS, (0.5, 0.5, 50, 0.5, 0.5))
 )
-MASSLESS = fourbar.FourBar(0.3, *map(fourbar.Bar, (0.1, 0.25, 0.22)))
+MASSLESS = FourBar(0.3, *map(Bar, (0.1, 0.25, 0.22)))
 SCENES = {
     "turn": (crank_rocker(motion=TURN), ""),
     "turn backwards": (crank_rocker(motion=TURN.replace(speed=-10.0)), ""),
@@ -73,19 +71,15 @@ SCENES = {
     "fall in 100 ms": (crank_rocker(motion=fall(0.1)), ""),
     "law of a table": (
         crank_rocker(
-            motion=fourbar.Motion(
-                law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), 20, "rest")
-            ),
+            motion=Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), 20, "rest")),
             effects=(rub(O2=0.05),),
         ),
         "O2",
     ),
     "closed law that goes back": (
         crank_rocker(
-            motion=fourbar.Motion(
-                law=Law((0.0, 0.2, 0.5, 1.0), THERE_AND_ON, 16, "periodic")
-            ),
-            effects=(fourbar.Viscous.at(O2=0.01),),
+            motion=Motion(law=Law((0.0, 0.2, 0.5, 1.0), THERE_AND_ON, 16, "periodic")),
+            effects=(Viscous.at(O2=0.01),),
         ),
         "",
     ),
@@ -93,7 +87,7 @@ SCENES = {
         crank_rocker(motion=PULLED, drive=CYLINDER, effects=(rub(O4=0.01),)),
         "O4",
     ),
-    "nothing acts": (fourbar.Scene(MASSLESS, TURN), ""),
+    "nothing acts": (Scene(MASSLESS, TURN), ""),
 }
 """Scenes, and the pin at which dry friction acts."""
 
@@ -133,27 +127,25 @@ def scan(scene, ends, *corners):
 @pytest.mark.parametrize("name", SCENES)
 def test_facts_are_those_of_a_dense_scan(name):
     scene, pin = SCENES[name]
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     facts = summarize(scene, solution)
     panels = facts.motion.panels
     assert not panels.growing
     ends = solution.at.places[[0, -1]]
     law = scene.motion.law
     corners = [] if law is None else [*law.time]
-    corners += [x + k * math.tau for x in CORNERS for k in (0, 1) if "corners" in name]
+    corners += [x + k * tau for x in CORNERS for k in (0, 1) if "corners" in name]
     assert [found for _, found in facts.motion.reversals] == [pin] * (
         len(facts.motion.breaks) if pin else 0
     )
     if pin:
-        slips = find_slip(
-            fourbar.solve(scene, at=command_at(scene, scan(scene, ends)[0])), pin
-        )
+        slips = find_slip(solve(scene, at=command_at(scene, scan(scene, ends)[0])), pin)
         left = find_slip(facts.motion.solve_at(facts.motion.breaks), pin)
         assert len(left) == np.count_nonzero(slips[1:] * slips[:-1] < 0.0) > 0
         assert np.abs(left).max() < SLIPS * np.abs(slips).max()
         corners += facts.motion.breaks.tolist()
     places, weights = scan(scene, ends, *corners)
-    dense = fourbar.solve(scene, at=command_at(scene, places))
+    dense = solve(scene, at=command_at(scene, places))
     sizes = list_sizes(scene, dense)
     with_peaks = facts.motion.solve_with_peaks()
     assert np.isin(solution.at.places, with_peaks.at.places).all()
@@ -177,9 +169,9 @@ def test_facts_are_those_of_a_dense_scan(name):
         assert np.abs(np.sin(0.5 * away)).max() < EXACT
         assert facts.bending[bar].peak == panels.find_peak(f"bending_{bar}")
     sines = np.abs(dense.sin_mu)
-    assert math.sin(facts.transmission.value) <= sines.min() * (1.0 + EXACT)
+    assert sin(facts.transmission.value) <= sines.min() * (1.0 + EXACT)
     (sine,) = facts.motion.solve_at(np.array([facts.transmission.place])).sin_mu
-    assert abs(sine) == pytest.approx(math.sin(facts.transmission.value), rel=EXACT)
+    assert abs(sine) == pytest.approx(sin(facts.transmission.value), rel=EXACT)
     for bar, rates in facts.rates.items():
         if not acts(scene):
             assert rates == tuple(
@@ -201,7 +193,7 @@ def check_entry(scene, facts, dense, weights):
     steady = not np.any(scene.motion.acceleration)
     means = {
         quantity: pytest.approx(
-            math.sqrt(weights @ size**2 / weights.sum()), rel=EXACT, abs=1e-12
+            sqrt(weights @ size**2 / weights.sum()), rel=EXACT, abs=1e-12
         )
         if steady
         else None
@@ -226,12 +218,12 @@ def check_entry(scene, facts, dense, weights):
         right = np.maximum(sign * work, 0.0).sum()
         assert entry[key] == pytest.approx(right, abs=SUMMED * most)
     first, last = facts.solution.at.angle[[0, -1]]
-    closed = math.isclose(abs(last - first), math.tau)
+    closed = math.isclose(abs(last - first), tau)
     assert entry["closed"] == closed
     if not closed:
         assert entry["mean_torque"] is entry["energy_swing"] is None
         return
-    sense = math.copysign(math.tau, np.mean(dense.at.speed))
+    sense = math.copysign(tau, np.mean(dense.at.speed))
     mean = work.sum() / sense
     assert entry["mean_torque"] == pytest.approx(mean, abs=SUMMED * sizes[drive].max())
     surplus = np.cumsum(work - work.sum() * weights / weights.sum())
@@ -240,22 +232,22 @@ def check_entry(scene, facts, dense, weights):
 
 def test_a_list_has_its_own_peaks_and_means():
     angles = np.array([0.3, 2.5, 0.4])
-    scene = crank_rocker(motion=fourbar.Motion(angles, 10.0))
-    solution = fourbar.solve(scene)
+    scene = crank_rocker(motion=Motion(angles, 10.0))
+    solution = solve(scene)
     assert describe_motion(solution).solve_with_peaks() is solution
     entry = write_motor(scene, solution, {})
     assert entry["peak_torque"] == np.abs(solution.torque).max()
-    rms = math.sqrt(np.square(solution.torque).mean())
+    rms = sqrt(np.square(solution.torque).mean())
     assert entry["rms_torque"] == pytest.approx(rms, rel=EXACT)
 
 
 def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones():
     """Nothing acts but one force, so that everything is in proportion to it."""
     small, huge = (
-        summarize(scene, fourbar.solve(scene))
+        summarize(scene, solve(scene))
         for force in (1.0, 1e300)
-        for load in [fourbar.Load(3, (force, 0.4), from_pin=(0.05, 0.0))]
-        for scene in [fourbar.Scene(MASSLESS, TURN, loads=(load,))]
+        for load in [Load(3, (force, 0.4), from_pin=(0.05, 0.0))]
+        for scene in [Scene(MASSLESS, TURN, loads=(load,))]
     )
     names = ("peak_torque", "rms_torque", "peak_power", "rms_power", "energy_in")
     pairs = [(getattr(huge.duty, n), getattr(small.duty, n)) for n in names]
@@ -298,7 +290,7 @@ def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction():
     for text in (BUCKET, BUCKET + FRICTION):
         scene = loads(text)
         before = time.process_time()
-        facts = summarize(scene, fourbar.solve(scene))
+        facts = summarize(scene, solve(scene))
         assert facts.motion.stretches
         seconds.append(time.process_time() - before)
 
@@ -317,25 +309,25 @@ def release_pendulum(omega, duration, *effects):
 
     The seven instants that it states are never extreme.
     """
-    crank = fourbar.Bar(ARM, CRANK)
-    linkage = fourbar.FourBar(0.6, crank, fourbar.Bar(0.6, COUPLER), crank)
+    crank = Bar(ARM, CRANK)
+    linkage = FourBar(0.6, crank, Bar(0.6, COUPLER), crank)
     free = fourbar.Free(duration, 7)
-    motion = fourbar.Motion(1.5 * math.pi - AWAY, omega, free=free)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(9.8), *effects))
-    return summarize(scene, fourbar.solve(scene))
+    motion = Motion(1.5 * pi - AWAY, omega, free=free)
+    scene = Scene(linkage, motion, effects=(fourbar.Gravity(9.8), *effects))
+    return summarize(scene, solve(scene))
 
 
 def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes():
     """The period of a pendulum is an elliptic integral."""
     facts = release_pendulum(0.0, 1.7)
-    slow = math.sqrt(INERTIA / WEIGHT)
-    period = 4.0 * slow * float(ellipk(math.sin(0.5 * AWAY) ** 2))
+    slow = sqrt(INERTIA / WEIGHT)
+    period = 4.0 * slow * float(ellipk(sin(0.5 * AWAY) ** 2))
     assert facts.period == pytest.approx(period, rel=EXTREME)
     low, high = facts.angles[2]
-    assert low == pytest.approx((1.5 * math.pi - AWAY, 0.0), abs=EXTREME)
-    highest = 1.5 * math.pi + AWAY
+    assert low == pytest.approx((1.5 * pi - AWAY, 0.0), abs=EXTREME)
+    highest = 1.5 * pi + AWAY
     assert high == pytest.approx((highest, 0.5 * period), abs=EXTREME)
-    damped = release_pendulum(0.0, 1.7, fourbar.Viscous((("O2", 1e-6),)))
+    damped = release_pendulum(0.0, 1.7, Viscous((("O2", 1e-6),)))
     assert damped.period is None
 
 
@@ -344,9 +336,9 @@ def test_a_released_turn_has_its_period():
     energy = 0.5 * INERTIA * 30.0**2 - WEIGHT * math.cos(AWAY)
 
     def compute_slowness(theta):
-        return math.sqrt(0.5 * INERTIA / (energy + WEIGHT * math.cos(theta)))
+        return sqrt(0.5 * INERTIA / (energy + WEIGHT * math.cos(theta)))
 
-    period, _ = quad(compute_slowness, 0.0, 2.0 * math.pi, epsabs=1e-13)
+    period, _ = quad(compute_slowness, 0.0, 2.0 * pi, epsabs=1e-13)
     facts = release_pendulum(30.0, 0.5)
     assert facts.period == pytest.approx(period, rel=EXTREME)
 
@@ -356,18 +348,18 @@ def test_transmission_angle_is_the_least_of_all_stretches():
     negative in the other.
     """
     inch = 0.0254
-    bars = [fourbar.Bar(length * inch) for length in (0.2906, 1.203, 1.152)]
-    linkage = fourbar.FourBar(1.102 * inch, *bars)
+    bars = [Bar(length * inch) for length in (0.2906, 1.203, 1.152)]
+    linkage = FourBar(1.102 * inch, *bars)
 
     def sweep(steps):
-        angle = fourbar.Sweep(0.0, math.tau, steps)
-        return fourbar.Scene(linkage, fourbar.Motion(theta_3=angle, omega_3=1.0))
+        angle = Sweep(0.0, tau, steps)
+        return Scene(linkage, Motion(theta_3=angle, omega_3=1.0))
 
     scene = sweep(12)
-    least = summarize(scene, fourbar.solve(scene)).transmission
-    dense = fourbar.solve(sweep(20_000))
-    turned = (dense.theta_4 - dense.theta_3) % math.pi
-    scanned = np.nanmin(np.minimum(turned, math.pi - turned))
+    least = summarize(scene, solve(scene)).transmission
+    dense = solve(sweep(20_000))
+    turned = (dense.theta_4 - dense.theta_3) % pi
+    scanned = np.nanmin(np.minimum(turned, pi - turned))
     signs = np.sign(dense.sin_mu[np.isfinite(dense.sin_mu)])
     assert {*signs} == {-1.0, 1.0}
     assert least.value == pytest.approx(scanned, abs=BETWEEN_STEPS)

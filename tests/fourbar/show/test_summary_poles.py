@@ -4,6 +4,7 @@ of the sweep.
 
 import math
 from dataclasses import replace
+from math import pi, tau
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 import fourbar
+from fourbar import Bar, Gravity, Load, Motion, Scene, Sweep, solve, uniform
 from fourbar.effects import PinFriction, Place, PointDrive
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
@@ -30,22 +32,20 @@ some 1e-16.
 """
 PEAK = 1e-9
 """Relative, of a largest value: a panel settles to that."""
-GRAVITY = fourbar.Gravity(9.81)
+GRAVITY = Gravity(9.81)
 CRANK_ROCKER = (0.3, 0.1, 0.25, 0.22)
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 
 
 def sweep(lengths, start, stop, bar=2, **parts):
     """Make a scene of bars of 1 kg/m under gravity, between two angles of a bar."""
-    rates = {f"theta_{bar}": fourbar.Sweep(start, stop, 20), f"omega_{bar}": 10.0}
-    scene = fourbar.Scene(
-        fourbar.uniform(*lengths), fourbar.Motion(**rates), effects=(GRAVITY,)
-    )
+    rates = {f"theta_{bar}": Sweep(start, stop, 20), f"omega_{bar}": 10.0}
+    scene = Scene(uniform(*lengths), Motion(**rates), effects=(GRAVITY,))
     return replace(scene, **parts)
 
 
 def find_facts(scene):
-    return summarize(scene, fourbar.solve(scene))
+    return summarize(scene, solve(scene))
 
 
 def write(facts, **options):
@@ -61,17 +61,17 @@ def find_angle(side, first, second):
 def find_dead(lengths):
     """List the angles of bar 2 at which bars 2 and 3 are in line."""
     d, a, b, c = lengths
-    return [find_angle(c, d, b + a), find_angle(c, d, b - a) + math.pi]
+    return [find_angle(c, d, b + a), find_angle(c, d, b - a) + pi]
 
 
 def clamp(last):
     """Make a toggle clamp whose bars 2 and 3 would be in line at -6e-5 deg."""
     scene = fourbar.from_pins((0.0, 0.0), (0.04, 0.002), (0.08, 0.0), (0.08, -0.06))
-    angle = fourbar.Sweep(math.atan2(2.0, 40.0), math.radians(last), 20)
+    angle = Sweep(math.atan2(2.0, 40.0), math.radians(last), 20)
     return replace(
         scene,
-        motion=fourbar.Motion(angle, 0.0, branch=scene.motion.branch),
-        loads=(fourbar.Load(2, (100.0, -0.5 * math.pi), from_pin=(0.16, 0.4)),),
+        motion=Motion(angle, 0.0, branch=scene.motion.branch),
+        loads=(Load(2, (100.0, -0.5 * pi), from_pin=(0.16, 0.4)),),
         drive=PointDrive(Place(4, (0.1, 0.0)), 0.0),
         drive_bar=None,
     )
@@ -79,7 +79,7 @@ def clamp(last):
 
 def find_stroke_speed(scene, angle):
     at = command_at(scene, np.array([angle]))
-    speed = fourbar.solve(scene, "velocity", at=at).stroke_speed
+    speed = solve(scene, "velocity", at=at).stroke_speed
     return float(speed[0])
 
 
@@ -87,34 +87,32 @@ MODELS = Path(__file__).parents[3] / "models"
 LEVER, ON_GROUND = (place.from_pin for _, place in reversed(CYLINDER.ends))
 IN_LINE = crank_rocker().linkage.ground_angle + ON_GROUND[1] - LEVER[1]
 DEAD, FOLDED = find_dead(CRANK_ROCKER)
-LIMITS = [math.pi - find_angle(reach, 0.3, 0.22) for reach in (0.35, 0.15)]
+LIMITS = [pi - find_angle(reach, 0.3, 0.22) for reach in (0.35, 0.15)]
 STRAIGHT = 2.0 * math.hypot(0.04, 0.002)
 CLAMPED = find_angle(0.06, 0.1, STRAIGHT) - math.atan2(0.06, 0.08)
 DIGGER = fourbar.load(MODELS / "capabilities" / "cylinder_1_4.toml")
 MET = brentq(lambda angle: find_stroke_speed(DIGGER, angle), 0.8, 1.0)
 """Angle of bar 2 where the cylinder of a model has no lever."""
-RUBBING = (PinFriction.at(O4=(0.12, 0.006)), fourbar.Gravity())
+RUBBING = (PinFriction.at(O4=(0.12, 0.006)), Gravity())
 POLES = {
     "cylinder in line with the crank": (
-        crank_rocker(
-            motion=sweep(CRANK_ROCKER, 0.1, 0.1 + math.tau).motion, drive=CYLINDER
-        ),
-        [IN_LINE + math.pi, IN_LINE + math.tau],
+        crank_rocker(motion=sweep(CRANK_ROCKER, 0.1, 0.1 + tau).motion, drive=CYLINDER),
+        [IN_LINE + pi, IN_LINE + tau],
     ),
     "torque on the output": (
-        sweep(CRANK_ROCKER, 0.0, math.tau, drive_bar=4),
+        sweep(CRANK_ROCKER, 0.0, tau, drive_bar=4),
         [DEAD, FOLDED],
     ),
     "change points": (
-        sweep(PARALLELOGRAM, 5.0, 5.0 + math.tau),
-        [math.tau, 3 * math.pi],
+        sweep(PARALLELOGRAM, 5.0, 5.0 + tau),
+        [tau, 3 * pi],
     ),
-    "change points, backwards": (sweep(PARALLELOGRAM, 6.3, 0.5), [math.tau, math.pi]),
+    "change points, backwards": (sweep(PARALLELOGRAM, 6.3, 0.5), [tau, pi]),
     "change point of the output": (
         sweep(
             (0.36419445229114195, 0.3900709389998438) * 2, 0.09, 4.489191916441563, 4
         ),
-        [math.pi],
+        [pi],
     ),
     "friction that grows with its load": (
         sweep((0.06, 0.18, 0.06, 0.18), -0.7, 0.7, 4, drive_bar=4, effects=RUBBING),
@@ -134,7 +132,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
     facts = find_facts(scene)
     panels = facts.motion.panels
     far, near = (
-        list_sizes(scene, fourbar.solve(scene, at=command_at(scene, np.ravel(beside))))
+        list_sizes(scene, solve(scene, at=command_at(scene, np.ravel(beside))))
         for away in (1e-4, 1e-6)
         for beside in [np.add.outer(places, [-away, away])]
     )
@@ -182,8 +180,7 @@ def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
     """Whichever bar is driven, it gives the same power."""
     scene, _ = POLES["torque on the output"]
     duty, right = (
-        fourbar.motor_duty(fourbar.solve(replace(scene, drive_bar=bar)))
-        for bar in (4, 2)
+        fourbar.motor_duty(solve(replace(scene, drive_bar=bar))) for bar in (4, 2)
     )
     for name in ("peak_power", "rms_power", "energy_in", "energy_out"):
         number = pytest.approx(getattr(right, name), rel=LOCATED)
@@ -197,9 +194,9 @@ def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
 @pytest.mark.parametrize("speed", (10.0, np.array([10.0, 5.0])))
 def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed):
     """Ends of the cylinder and O2 are in line; another position has a force."""
-    motion = fourbar.Motion(np.array([1.0, IN_LINE]), speed)
+    motion = Motion(np.array([1.0, IN_LINE]), speed)
     scene = crank_rocker(motion=motion, drive=CYLINDER)
-    assert list(fourbar.solve(scene).status) == ["ok", "no_lever"]
+    assert list(solve(scene).status) == ["ok", "no_lever"]
     facts = find_facts(scene)
     assert facts.peak is None and facts.pins["O2"].peak is None
     assert facts.pins["B"].peak is not None
@@ -229,7 +226,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
         widths.append(high.value - low.value)
     if not facts.solution.assembled.all():
         assert widths == pytest.approx([widths[0]] * 3, abs=LOCATED)
-        assert widths[0] <= fourbar.swing(fourbar.uniform(*lengths)) + LOCATED
+        assert widths[0] <= fourbar.swing(uniform(*lengths)) + LOCATED
 
 
 @pytest.mark.slow
@@ -238,7 +235,7 @@ def test_a_gap_within_a_step_is_no_full_turn():
 
     No position of the sweep lies in the gap.
     """
-    scene = sweep((0.3, 0.1, 0.25, 0.15 - 1e-6), 0.1, 0.1 + math.tau)
+    scene = sweep((0.3, 0.1, 0.25, 0.15 - 1e-6), 0.1, 0.1 + tau)
     facts = find_facts(scene)
     assert facts.solution.assembled.all()
     text = write(facts)
@@ -249,26 +246,26 @@ def test_a_gap_within_a_step_is_no_full_turn():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "start, steps, pins",
-    [(0.0, 36, ("O2", "A", "B", "O4")), (-math.pi, 97, ("B",)), (0.3, 36, ("B",))],
+    [(0.0, 36, ("O2", "A", "B", "O4")), (-pi, 97, ("B",)), (0.3, 36, ("B",))],
 )
 def test_a_jump_where_pin_friction_reverses_is_no_pole(start, steps, pins):
     """Coupler and output turn alike where the diagonal is shortest and longest.
 
     Pin B reverses there, at positions of some sweeps and at the ends of some turns.
     """
-    scene = fourbar.Scene(
-        fourbar.FourBar(0.3, fourbar.Bar(0.04), fourbar.Bar(0.29), fourbar.Bar(0.065)),
-        fourbar.Motion(fourbar.Sweep(start, start + math.tau, steps), math.tau),
-        loads=(fourbar.Load(4, moment=-20.0),),
+    scene = Scene(
+        fourbar.FourBar(0.3, Bar(0.04), Bar(0.29), Bar(0.065)),
+        Motion(Sweep(start, start + tau, steps), tau),
+        loads=(Load(4, moment=-20.0),),
         effects=(PinFriction.at(**dict.fromkeys(pins, (0.15, 0.005))),),
     )
-    motion = describe_motion(fourbar.solve(scene))
+    motion = describe_motion(solve(scene))
     assert not motion.panels.growing
     at_B = [place for place, pin in motion.reversals if pin == "B"]
     assert np.abs(np.sin(at_B)).max() < LOCATED and len(at_B) == 2
-    sides = np.add.outer([0.0, math.pi], [-1e-9, 1e-9]).ravel()
-    fine = np.concatenate([np.linspace(0.0, math.tau, 721) + 0.01, sides])
-    everywhere = fourbar.solve(replace(scene, motion=fourbar.Motion(fine, math.tau)))
+    sides = np.add.outer([0.0, pi], [-1e-9, 1e-9]).ravel()
+    fine = np.concatenate([np.linspace(0.0, tau, 721) + 0.01, sides])
+    everywhere = solve(replace(scene, motion=Motion(fine, tau)))
     for name in ("F12", "F14"):
         most = np.hypot(*getattr(everywhere, name).T).max()
         peak = motion.panels.find_peak(name).value

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.quantities import UNITS
@@ -49,7 +50,7 @@ IN_SI = {
 
 
 def test_every_number_is_in_the_unit_that_is_named(capsys):
-    solution = fourbar.solve(fourbar.load(MODEL), "error")
+    solution = solve(load(MODEL), "error")
     for form in ("--json", "--csv"):
         assert status(["analyze", str(MODEL), form, "--units", "imperial"]) == HOLDS
         out = capsys.readouterr().out
@@ -94,12 +95,12 @@ def test_every_number_is_in_the_unit_that_is_named(capsys):
 
 
 def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
-    scene = fourbar.load(MODEL)
+    scene = load(MODEL)
     assert status(["analyze", str(MODEL), "--csv-comma", "--units", "mm kW"]) == HOLDS
     header, *rows = csv.reader(io.StringIO(capsys.readouterr().out), delimiter=";")
     assert {len(row) for row in rows} == {len(header)}
     assert not any("." in cell for row in rows for cell in row)
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     wanted = {
         "|F14| [N]": np.hypot(*solution.F14.T),
         "power [kW]": solution.torque * scene.motion.omega_2 / 1000.0,
@@ -112,7 +113,7 @@ def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
     growing = fourbar.Scene(
         scene.linkage, fourbar.Motion(np.array([1.0, 2.0]), 1.0, 1.0)
     )
-    assert "time" not in (fourbar.solve(growing).to_csv() or "")
+    assert "time" not in (solve(growing).to_csv() or "")
 
 
 @pytest.mark.slow
@@ -147,9 +148,7 @@ def test_the_table_names_its_units(capsys):
         ]
     ]
     torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
-    assert torque == pytest.approx(
-        list(1000.0 * fourbar.solve(fourbar.load(MODEL)).torque), rel=1e-4
-    )
+    assert torque == pytest.approx(list(1000.0 * solve(load(MODEL)).torque), rel=1e-4)
 
 
 @pytest.mark.parametrize("text", ["furlong", "mm in", "N.mm J", "m^2"])
@@ -180,13 +179,13 @@ def test_plots_and_notebooks_say_theirs():
         axes = draw_figure(scene, name, units=imperial).figure.subfigs[0].axes[0]
         assert axes.get_ylabel() == label
         if name == "torque":
-            torque = fourbar.solve(scene).torque
+            torque = solve(scene).torque
             curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
             assert np.nanmax(curve) == pytest.approx(
                 np.max(torque) / (POUND * INCH), rel=0.01
             )
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
-    table = notebook.in_units(fourbar.solve(scene), "imperial")._repr_html_()
+    table = notebook.in_units(solve(scene), "imperial")._repr_html_()
     assert "lbf in" in table and "deg" in table and "N m" not in table
 
 

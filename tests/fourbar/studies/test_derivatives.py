@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
+from fourbar import InputError, load, solve, uniform
 from fourbar.cli import status
 from fourbar.effects import Friction, Gravity, Load, PinFriction, Table
 from fourbar.scene import Scene
@@ -44,7 +46,7 @@ def test_every_effect_has_the_slopes_of_files_with_a_number_moved(effects, drive
 
 def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
     """Others count by a hundredth of themselves, angles by a degree."""
-    slopes = sensitivity(fourbar.load(MODELS / "capabilities" / "drawn.toml"))
+    slopes = sensitivity(load(MODELS / "capabilities" / "drawn.toml"))
     longest = max(slopes.solution.scene.linkage.lengths)
     numbers = dict(zip(slopes.keys, slopes.numbers, strict=True))
     steps = {"pins.B.0": 0.01 * longest, "points.P.drawn.1": 0.01 * longest}
@@ -64,12 +66,12 @@ def test_where_there_is_no_derivative_a_status_says_why():
     jammed = sensitivity(scene((PinFriction.at(A=(9.0, 2.0)),), 2))
     assert set(jammed.status) <= {"jammed", "several"}
     assert np.isnan(jammed.by["F12"]).all()
-    apart = fourbar.Scene(
-        fourbar.uniform(0.2, 0.48, 0.55, 0.2),
-        fourbar.Motion(np.array([0.0, 1.2, np.pi]), 1.0),
+    apart = Scene(
+        uniform(0.2, 0.48, 0.55, 0.2),
+        Motion(np.array([0.0, 1.2, np.pi]), 1.0),
     )
     slopes = sensitivity(apart)
-    assert slopes.status == fourbar.solve(apart).status
+    assert slopes.status == solve(apart).status
     lost = np.array(slopes.status) != "ok"
     assert lost.any() and not lost.all()
     for name, rows in slopes.by.items():
@@ -79,15 +81,15 @@ def test_where_there_is_no_derivative_a_status_says_why():
 def test_past_a_change_point_derivatives_are_of_the_same_assembly():
     """Those of the first half of the turn, of a parallelogram on the other half too."""
     theta_2 = np.array([1.0, 4.0, 5.5, 8.0])
-    parallelogram = Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), Motion(theta_2, 1.0))
+    parallelogram = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(theta_2, 1.0))
     slopes = sensitivity(parallelogram)
     # with b = d, c = a: dB = da e^{i theta_2}, which turns the output alone
-    np.testing.assert_allclose(
+    assert_allclose(
         slopes.of("theta_4", "lengths.input"),
         -1.0 / (0.1 * np.tan(theta_2)),
         rtol=EXACT,
     )
-    np.testing.assert_allclose(slopes.of("theta_4", "motion.theta_2"), 1.0, rtol=EXACT)
+    assert_allclose(slopes.of("theta_4", "motion.theta_2"), 1.0, rtol=EXACT)
     alone = sensitivity(replace(parallelogram, motion=Motion(theta_2)))
     assert "torque" not in alone.by and "bars.input.mass" not in alone.keys
 
@@ -97,7 +99,7 @@ def differ_by_a_study(nominal, key):
     step = 1e-6
     number = read_place(nominal, list_entries(nominal)[key].place)
     beside = {key: np.array([number - step, number + step])}
-    below, above = fourbar.solve(fourbar.vary(nominal, beside), "position").theta_3
+    below, above = solve(fourbar.vary(nominal, beside), "position").theta_3
     return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
 
 
@@ -115,10 +117,10 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
 ):
     angles = np.array([0.7, 2.4, 4.0, 5.5])
     motion = Motion(**{command: angles}, branch=branch)
-    nominal = Scene(fourbar.uniform(*lengths), motion)
+    nominal = Scene(uniform(*lengths), motion)
     of = sensitivity(nominal).of
     for key in ("lengths.ground", "lengths.input", "lengths.coupler"):
-        np.testing.assert_allclose(
+        assert_allclose(
             of("theta_3", key), differ_by_a_study(nominal, key), rtol=1e-6, atol=1e-6
         )
 
@@ -131,14 +133,14 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
     ],
 )
 def test_what_has_no_sensitivities(motion, word):
-    with pytest.raises(fourbar.InputError, match=word):
-        sensitivity(Scene(LINK, fourbar.Motion(**motion, omega_2=1.0)))
+    with pytest.raises(InputError, match=word):
+        sensitivity(Scene(LINK, Motion(**motion, omega_2=1.0)))
 
 
 def test_an_unknown_name_is_refused():
     slopes = sensitivity(scene())
     for quantity, key in (("torque", "lengths.inptu"), ("torqe", "lengths.input")):
-        with pytest.raises(fourbar.InputError, match="is not known here"):
+        with pytest.raises(InputError, match="is not known here"):
             slopes.of(quantity, key)
 
 
@@ -168,8 +170,8 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys, tmp_path):
     document = json.loads(out.read_text())
     assert document["schema"] == "fourbar-sensitivity/1"
     assert document["keys"]["lengths.input"]["unit"] == "m"
-    slopes = sensitivity(fourbar.load(models / "crank_rocker.toml"))
-    np.testing.assert_array_equal(
+    slopes = sensitivity(load(models / "crank_rocker.toml"))
+    assert_array_equal(
         document["by"]["F12"]["lengths.input"], slopes.of("F12", "lengths.input")
     )
     assert (
@@ -189,26 +191,24 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
     link = replace(LINK, ground_angle=ground_angle)
     slopes = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
     solution = slopes.solution
-    np.testing.assert_allclose(
+    assert_allclose(
         slopes.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13
     )
     turned = (
         slopes.of("omega_3", "motion.theta_2") * 10.0
         + slopes.of("omega_3", "motion.omega_2") * 3.0
     )
-    np.testing.assert_allclose(turned, solution.alpha_3, rtol=1e-12)
+    assert_allclose(turned, solution.alpha_3, rtol=1e-12)
     with_ground = slopes.of("theta_3", "motion.theta_2") + slopes.of(
         "theta_3", "lengths.ground_angle"
     )
-    np.testing.assert_allclose(
-        with_ground, 1.0, rtol=1e-13
-    )  # a linkage turned as a whole
+    assert_allclose(with_ground, 1.0, rtol=1e-13)  # a linkage turned as a whole
 
 
 def test_a_kite_whose_halves_meet_has_derivatives():
     """With a = d and b = c the product in Heron's factor is a constant."""
-    slopes = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
-    np.testing.assert_allclose(
+    slopes = sensitivity(Scene(uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
+    assert_allclose(
         slopes.of("theta_3", "motion.theta_2"),
         slopes.solution.omega_3 / 10.0,
         rtol=1e-13,

@@ -8,10 +8,12 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from math import pi, radians, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import fourbar
 from fourbar import (
@@ -27,6 +29,7 @@ from fourbar import (
     Springs,
     Sweep,
     Torsion,
+    solve,
 )
 from fourbar.cli import status
 from fourbar.effects import Place
@@ -41,7 +44,7 @@ from tests.support.scenes import CYLINDER, bare, crank_rocker
 ROOT = Path(__file__).parents[3]
 MODELS = ROOT / "models"
 COUNTEREXAMPLES = ROOT / "tests" / "counterexamples"
-TURN = 2.0 * math.pi
+TURN = 2.0 * pi
 M, R, INERTIA = 1.5, 0.04, 0.002
 DOWN = Gravity()
 CLOSE = 1e-12
@@ -78,7 +81,7 @@ def crank_as_pendulum(*effects, loads=(), **motion):
 
 
 J = INERTIA + M * R * R
-AT_REST = -math.pi / 2 - 0.3
+AT_REST = -pi / 2 - 0.3
 """theta_2 of the crank as a pendulum that hangs."""
 FALLS = M * 9.81 * R
 GRID = TURN / POSITIONS_OF_A_BRANCH
@@ -98,18 +101,18 @@ def apart(excess):
     return math.acos(1.0 + excess)
 
 
-TOP = math.pi / 2 + 0.1
+TOP = pi / 2 + 0.1
 SPRING = Springs((Spring(Place(1, (0.3, 1.0)), Place(2, (0.1, 0.0)), 100.0),))
 WITHOUT_MASS = replace(
     crank_as_pendulum(SPRING), linkage=bare(0.3, 0.1, 0.25, 0.22, 0.0)
 )
 HANGS = ("stable", AT_REST, -FALLS, J)
-STEEP = 0.5 * math.sqrt(2e-8)
+STEEP = 0.5 * sqrt(2e-8)
 PENDULUMS = {
     # stability, theta_2, dQ/dq and inertia of each equilibrium; rad that they may miss
     "hanging and standing": (
         crank_as_pendulum(DOWN),
-        [HANGS, ("unstable", AT_REST + math.pi, FALLS, J)],
+        [HANGS, ("unstable", AT_REST + pi, FALLS, J)],
         CLOSE,
     ),
     **{
@@ -131,7 +134,7 @@ PENDULUMS = {
     },
     "without mass": (
         WITHOUT_MASS,
-        [("stable", 1.0, -3.0, 0.0), ("unstable", 1.0 + math.pi, 3.0, 0.0)],
+        [("stable", 1.0, -3.0, 0.0), ("unstable", 1.0 + pi, 3.0, 0.0)],
         CLOSE,
     ),
     "touching between two samples": (
@@ -167,7 +170,7 @@ def test_a_crank_with_mass_alone_is_a_pendulum(name):
             slope, rel=max(CLOSE, 1e3 * close), abs=close
         )
         if stability == "stable" and inertia:
-            own = math.sqrt(-rest.slope / inertia) / TURN
+            own = sqrt(-rest.slope / inertia) / TURN
             assert rest.frequency == pytest.approx(own, rel=CLOSE)
         else:
             assert rest.frequency is None
@@ -180,7 +183,7 @@ def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum():
     scene = Scene(linkage, beside, effects=(Gravity(9.81, limit.theta_4),))
     (hanging,) = [rest for rest in equilibrium(scene).found if rest.place.branch == 0]
     assert hanging.angle == "theta_4"
-    pendulum = math.sqrt(M * 9.81 * R / (INERTIA + M * R * R)) / (TURN)
+    pendulum = sqrt(M * 9.81 * R / (INERTIA + M * R * R)) / (TURN)
     assert hanging.frequency == pytest.approx(pendulum, rel=1e-9)
 
 
@@ -223,7 +226,7 @@ def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move():
         signs = np.array([end.branch for end in ends], dtype=np.int8)
         theta = np.array([end.theta_2 for end in ends])
         at_ends = fourbar.scene.Command(theta, signs, 0.0, 0.0)
-        torques = fourbar.solve(scene, at=at_ends)
+        torques = solve(scene, at=at_ends)
         least = np.minimum(abs(torques.torque_low), abs(torques.torque_high))
         assert least.max() <= 1e-9 * size
 
@@ -253,9 +256,9 @@ ONE_CHANGE_POINT = [
     (2.0, 0.5, 1.25, 1.25),
 ]
 """Ground, input, coupler and output: the input turns fully, past one change point."""
-FULL = Sweep(0.0, 4.0 * math.pi, 360)
-HALF = Sweep(math.radians(30.0), math.radians(390.0), 180)
-BACK = Sweep(math.radians(500.0), math.radians(-100.0), 300)
+FULL = Sweep(0.0, 4.0 * pi, 360)
+HALF = Sweep(radians(30.0), radians(390.0), 180)
+BACK = Sweep(radians(500.0), radians(-100.0), 300)
 
 
 @pytest.mark.slow
@@ -274,7 +277,7 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     bars = Bar(a, 10.0), Bar(b, 20.0), Bar(c, 20.0)
     load = Load(4, force=(0.0, 200.0), from_pin=(c, 0.0))
     scene = Scene(
-        FourBar(d, *bars, 0.5 * math.pi),
+        FourBar(d, *bars, 0.5 * pi),
         Motion(theta_2=motion, omega_2=0.0, alpha_2=0.0, branch=branch),
         loads=(load,),
         effects=(Gravity(9.81, 0.1),),
@@ -287,7 +290,7 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
 
     def solve_at(angles):
         at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0, branch=branch)
-        return np.asarray(fourbar.solve(replace(scene, motion=at)).torque)
+        return np.asarray(solve(replace(scene, motion=at)).torque)
 
     torques = solve_at(np.linspace(swept.start, swept.stop, 3000))
     nothing = 1e-9 * np.nanmax(np.abs(torques))
@@ -305,7 +308,7 @@ def test_friction_holds_on_past_the_one_change_point():
     for first, last in held:
         angles = np.linspace(first.theta_2, last.theta_2, 101)[1:-1]
         at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0)
-        at_rest = fourbar.solve(replace(scene, motion=at))
+        at_rest = solve(replace(scene, motion=at))
         solved = np.isfinite(at_rest.torque_low)
         assert solved.sum() >= len(angles) - 1
         assert (at_rest.torque_low[solved] <= 0.0).all()
@@ -315,11 +318,11 @@ def test_friction_holds_on_past_the_one_change_point():
 def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated():
     """A parallelogram lamp and a spring of no free length: k = m g l/(r h)."""
     arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
-    linkage = FourBar(0.06, *arms, 0.5 * math.pi)
+    linkage = FourBar(0.06, *arms, 0.5 * pi)
     post = Place(1, (0.1, 0.0))
     stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
     spring = Springs((Spring(post, Place(2, (0.08, 0.0)), stiffness),))
-    swept = Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    swept = Sweep(radians(-40.0), radians(60.0), 10)
     scene = Scene(linkage, Motion(swept), effects=(DOWN, spring))
     rest = equilibrium(scene)
     # what rounding leaves of the torque is no torque
@@ -382,15 +385,13 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
     along = (5.0**2 - 3.0**2 + d**2) / (2.0 * d)
     coupler = (along + 1j * np.sqrt(5.0**2 - along**2)) * to_O4 / d
     theta_3, theta_4 = (np.unwrap(np.angle(u)) for u in (coupler, coupler - to_O4))
-    from_rest = np.array(
-        [theta_3 - theta - math.pi / 2, theta_4 - theta_3 + math.pi / 2]
-    )
+    from_rest = np.array([theta_3 - theta - pi / 2, theta_4 - theta_3 + pi / 2])
     from_rest -= TURN * np.rint(from_rest[:, :1] / TURN)
-    near = np.argmin(np.abs(theta - math.radians(167.7867)))
+    near = np.argmin(np.abs(theta - radians(167.7867)))
     wound = float(np.degrees(np.abs(from_rest[1, near])))
     assert wound == pytest.approx(254.5 if count == 0 else 105.5, abs=0.05)
     rows = write_equilibria("robot", equilibrium(scene)).splitlines()
-    half_a_turn = theta[np.argmax(np.abs(from_rest[1]) >= math.pi)]
+    half_a_turn = theta[np.argmax(np.abs(from_rest[1]) >= pi)]
     for row in rows:
         if row.endswith(("wound", "falls", "grows", "stays")):
             degrees = float(row.split()[0])
@@ -400,7 +401,7 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
     assert len(found) == count
     if count:
         assert math.degrees(found[0].place.theta_2) == pytest.approx(167.7867, abs=1e-4)
-    within = np.all(np.abs(from_rest) < math.pi, axis=0)
+    within = np.all(np.abs(from_rest) < pi, axis=0)
     energy = sum(5.0 * angle**2 for angle in from_rest)
     assert np.any(np.diff(np.sign(np.diff(energy[within])))) == bool(count)
 
@@ -408,12 +409,12 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
 def springy_table(**motion):
     """A folding table on two legs, pressed up by torsion springs: a double rocker."""
     bars = Bar(0.35, 0.6), Bar(0.45, 8.0), Bar(0.35, 0.6)
-    leg = 12.0, math.radians(120.0), 0.0
+    leg = 12.0, radians(120.0), 0.0
     springs = Torsion.at(O2=leg, O4=leg)
     return Scene(FourBar(0.5, *bars), Motion(**motion), effects=(DOWN, springs))
 
 
-SWEPT = Sweep(math.radians(20.0), math.radians(140.0), 60)
+SWEPT = Sweep(radians(20.0), radians(140.0), 60)
 
 
 @pytest.mark.parametrize("branch", [1, -1])
@@ -428,15 +429,15 @@ def test_what_a_sweep_does_not_reach_is_told_apart(branch):
 
 def points_of(scene, low, high):
     """Return psi and mu where bar 4 turns between two angles, deg."""
-    sweep = Sweep(math.radians(low), math.radians(high), 977)
-    solution = fourbar.solve(replace(scene, motion=Motion(theta_4=sweep)), "position")
+    sweep = Sweep(radians(low), radians(high), 977)
+    solution = solve(replace(scene, motion=Motion(theta_4=sweep)), "position")
     assert solution.assembled.all()
     return np.stack([solution.theta_2, solution.theta_4 - solution.theta_3], axis=1)
 
 
 def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
     """Bar 2 turns back at its limit, theta_4 = 196.4 deg, within the sweep."""
-    sweep = Sweep(math.radians(150.0), math.radians(230.0), 60)
+    sweep = Sweep(radians(150.0), radians(230.0), 60)
     scene = springy_table(theta_4=sweep)
     curve = CircuitCurve(scene)
     within = points_of(scene, 150.0, 230.0)
@@ -475,7 +476,7 @@ def test_released_ones_begin_to_move_as_stated():
     chosen = range(7, len(equilibria.positions), 80)
     for i in chosen:
         motion = Motion(float(equilibria.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
-        released = fourbar.solve(replace(scene, motion=motion), "position")
+        released = solve(replace(scene, motion=motion), "position")
         moved = np.sign(released.theta_2[1] - released.theta_2[0])
         assert moved == equilibria.moves[i]
     assert 0 in equilibria.moves[list(chosen)]
@@ -491,7 +492,7 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     angle = equilibria.positions.theta_2
     at_change_point = np.abs(np.sin(angle)) < CLOSE
     falls = -np.sign(np.cos(angle)) * (np.abs(np.cos(angle)) > CLOSE)
-    np.testing.assert_array_equal(equilibria.moves, np.where(at_change_point, 0, falls))
+    assert_array_equal(equilibria.moves, np.where(at_change_point, 0, falls))
     rows = write_equilibria("", equilibria).splitlines()
     words = {row.split()[0]: row.split()[-1] for row in rows if row.split()}
     assert [words[angle] for angle in ("0", "180", "360")] == ["change_point"] * 3
@@ -516,7 +517,7 @@ def test_the_command_prints_what_python_finds(run):
 
 
 def test_what_assembles_nowhere_is_refused():
-    scene = Scene(fourbar.uniform(1.0, 1.5, 1.0, 0.2), Motion(math.pi))
+    scene = Scene(fourbar.uniform(1.0, 1.5, 1.0, 0.2), Motion(pi))
     with pytest.raises(fourbar.NotAssembledError, match="assembles at none"):
         equilibrium(scene)
 
@@ -553,7 +554,7 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     """
     motion = Motion(**{name: Sweep(*swept, 90)}, **side)
     commanded = crank_rocker(motion=motion, effects=(DOWN,), drive=CYLINDER)
-    theta_2 = fourbar.solve(commanded).theta_2
+    theta_2 = solve(commanded).theta_2
     same = Sweep(float(theta_2.min()), float(theta_2.max()), 90)
 
     def compare(by_name, by_input):
@@ -577,7 +578,7 @@ def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency():
     at_limits = [rest for rest in found if rest.inertia < 1e-6]
     assert [(rest.inertia, rest.frequency) for rest in at_limits] == [(0.0, None)] * 2
     # a pendulum of bar 4 about O4, whatever moves with it
-    pendulum = math.sqrt(9.81 * 0.1 / (0.002 + 0.01)) / TURN
+    pendulum = sqrt(9.81 * 0.1 / (0.002 + 0.01)) / TURN
     others = [
         rest.frequency for rest in found if rest.stability == "stable" and rest.inertia
     ]

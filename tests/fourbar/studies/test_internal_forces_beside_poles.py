@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import solve
 from fourbar.show.summary import summarize
 
 SCENE = fourbar.load(
@@ -34,7 +35,7 @@ def many_digits():
 
 
 def solve_at(places):
-    return fourbar.solve(replace(SCENE, motion=SCENE.motion.replace(angle=places)))
+    return solve(replace(SCENE, motion=SCENE.motion.replace(angle=places)))
 
 
 def move_output(theta_2):
@@ -114,7 +115,7 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
 @pytest.mark.slow
 def test_the_largest_moments_are_those_of_many_digits():
     """That of the input is the same everywhere, that of the output has a maximum."""
-    facts = summarize(SCENE, fourbar.solve(SCENE))
+    facts = summarize(SCENE, solve(SCENE))
     assert "drive_force" in facts.motion.panels.growing
     assert facts.bending[3].peak is None
     assert facts.bending[2].peak.value == pytest.approx(

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
-from fourbar import InputError, Tolerance
+from fourbar import InputError, Tolerance, sensitivity, solve, uniform, vary
 from fourbar.cli import status
 from fourbar.files import dump, loads
 from fourbar.linkage import PINS
@@ -147,7 +148,7 @@ def test_coordinates_move_as_in_files_with_them_moved(name, check):
     rows = [row for row in judge_by(scene, check) if row.setting == DRAWN_SETTING]
     assert {"theta_4", "F12"} <= {row.quantity for row in rows if row.compared}
     assert not failing(rows)
-    coordinates = {key for key in fourbar.sensitivity(scene).keys if is_coordinate(key)}
+    coordinates = {key for key in sensitivity(scene).keys if is_coordinate(key)}
     assert coordinates >= {*PIN_KEYS}
     assert len(coordinates) == COORDINATES[name.split(maxsplit=1)[0]]
 
@@ -155,16 +156,16 @@ def test_coordinates_move_as_in_files_with_them_moved(name, check):
 def test_places_of_a_table_are_those_of_each_members_drawing():
     """O2 moves in the drawing, and O4 does not."""
     scene = loads(DRAWING + ACTS)
-    table = fourbar.solve(
-        fourbar.vary(scene, {"pins.O2.0": [-0.010, -0.005], "pins.O2.1": -0.010})
+    table = solve(
+        vary(scene, {"pins.O2.0": [-0.010, -0.005], "pins.O2.1": -0.010})
     ).to_pandas()
     for member, x in enumerate((-0.010, -0.005)):
         rows = table[table["member"] == member]
         # B lies at its distance from O4, wherever O2 lies
         away = np.hypot(rows["B_x"] - 0.250, rows["B_y"] - 0.050)
-        np.testing.assert_allclose(away, 0.075, rtol=1e-14)
+        assert_allclose(away, 0.075, rtol=1e-14)
         a = math.hypot(x, 0.110)
-        np.testing.assert_allclose(
+        assert_allclose(
             rows["A_x"], x + a * np.cos(rows["theta_2"]), rtol=1e-13, atol=1e-16
         )
 
@@ -177,7 +178,7 @@ def test_a_drawn_place_and_angle_stay_as_they_were_built():
         + '[points]\nP = { bar = 3, drawn = ["100 mm", "120 mm"] }\n'
     )
     scene = loads(text)
-    members = fourbar.solve(fourbar.vary(scene, {"pins.A.0": [0.0, -0.004]}))
+    members = solve(vary(scene, {"pins.A.0": [0.0, -0.004]}))
     built = scene.points[0].from_pin
     for member in (0, 1):
         from_A = members.points["P"][member, 0] - members.A[member, 0]
@@ -214,21 +215,21 @@ def test_a_drawn_parallelogram_stays_one_on_both_halves_of_the_turn():
     study = tolerances(scene, 512)
     torque = study.spreads["torque"]
     weight = 0.3 * 9.81 * scene.linkage.input.length
-    expected = weight * np.cos(fourbar.solve(scene).theta_2)
-    np.testing.assert_allclose(torque.nominal, expected, rtol=1e-12, atol=1e-14)
+    expected = weight * np.cos(solve(scene).theta_2)
+    assert_allclose(torque.nominal, expected, rtol=1e-12, atol=1e-14)
     assert (torque.low < torque.nominal).all() and (torque.nominal < torque.high).all()
     assert (torque.high - torque.low < 0.02 * weight).all()
-    np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=0.1)
+    assert_allclose(torque.deviation, torque.first_order, rtol=0.1)
 
 
 def test_slopes_of_a_drawn_parallelogram_are_differences_of_its_members():
     scene = loads(PARALLELOGRAM)
-    slopes = fourbar.sensitivity(scene)
+    slopes = sensitivity(scene)
     for key in PIN_KEYS:
         number = slopes.numbers[list(slopes.keys).index(key)]
-        ends = fourbar.vary(scene, {key: number + np.array([-STEP, STEP])})
-        below, above = fourbar.solve(ends).torque
-        np.testing.assert_allclose(
+        ends = vary(scene, {key: number + np.array([-STEP, STEP])})
+        below, above = solve(ends).torque
+        assert_allclose(
             slopes.of("torque", key),
             (above - below) / (2.0 * STEP),
             atol=1e-5,
@@ -240,18 +241,18 @@ def test_slopes_of_a_drawn_parallelogram_are_differences_of_its_members():
 def test_the_value_of_a_place_is_what_its_slopes_are_of(name):
     """The drawing's coordinates, whose origin a moved O2 leaves; `solve` has O2's."""
     scene = loads(DRAWING + ACTS)
-    slopes = fourbar.sensitivity(scene)
+    slopes = sensitivity(scene)
     value = slopes.value(name)
     assert value.shape == (5, 2)
-    np.testing.assert_array_equal(value, fourbar.solve(scene)[name] + scene.origin)
+    assert_array_equal(value, solve(scene)[name] + scene.origin)
     for axis in (0, 1):
         key = f"pins.O2.{axis}"
         moved = scene.drawing.place("O2")[axis] + np.array([-STEP, STEP])
-        ends = fourbar.solve(fourbar.vary(scene, {key: moved}))
+        ends = solve(vary(scene, {key: moved}))
         origins = np.stack(np.broadcast_arrays(*ends.origin), axis=-1)
         below, above = ends[name] + origins.reshape(2, 1, 2)
         difference = (above - below) / (2.0 * STEP)
-        np.testing.assert_allclose(slopes.of(name, key), difference, atol=1e-5)
+        assert_allclose(slopes.of(name, key), difference, atol=1e-5)
 
 
 def test_first_order_and_samples_of_pins_agree():
@@ -267,7 +268,7 @@ def test_first_order_and_samples_of_pins_agree():
     study = tolerances(replace(scene, tolerances=stated[:2]), 2048)
     for name in ("torque", "|F12|", "theta_4", "A_x", "P_y", "Q_x"):
         spread = study.spreads[name]
-        np.testing.assert_allclose(spread.deviation, spread.first_order, rtol=0.02)
+        assert_allclose(spread.deviation, spread.first_order, rtol=0.02)
     assert study.spreads["A_x"].deviation.min() > 0.0
     beside = (Tolerance("pins.O4.0", "0.05 mm"), stated[2])
     assert tolerances(replace(scene, tolerances=beside), 8).invalid == 0
@@ -276,7 +277,7 @@ def test_first_order_and_samples_of_pins_agree():
 def test_a_member_with_two_pins_in_one_place_is_invalid():
     scene = loads(DRAWING + ACTS)
     values = {"pins.A.0": [0.0, -0.010], "pins.A.1": [0.100, -0.010]}
-    study = fourbar.solve(fourbar.vary(scene, values))
+    study = solve(vary(scene, values))
     assert study.status == [["ok"] * 5, ["invalid"] * 5]
 
 
@@ -291,7 +292,7 @@ def test_a_member_with_two_pins_in_one_place_is_invalid():
 def test_a_key_that_names_no_coordinate_gets_one_line(key, line):
     text = DRAWING + ACTS
     for make in (
-        lambda: fourbar.vary(loads(text), {key: [0.0]}),
+        lambda: vary(loads(text), {key: [0.0]}),
         lambda: loads(f'{text}[tolerances]\n"{key}" = "0.1 mm"\n'),
     ):
         with pytest.raises(InputError) as caught:
@@ -300,9 +301,9 @@ def test_a_key_that_names_no_coordinate_gets_one_line(key, line):
 
 
 def test_a_scene_stated_by_lengths_has_no_pins():
-    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22))
     with pytest.raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
-        fourbar.vary(scene, {"pins.A.0": [0.0, 0.1]})
+        vary(scene, {"pins.A.0": [0.0, 0.1]})
     text = dump(scene) + '[tolerances]\n"pins.A.0" = "0.1 mm"\n'
     with pytest.raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
         loads(text)
@@ -313,7 +314,7 @@ def test_a_length_beside_a_pin_by_which_it_follows_is_refused():
     for length, pin in (("coupler", "pins.B.1"), ("ground_angle", "pins.O2.0")):
         values = {pin: [0.0, 0.01], f"lengths.{length}": 0.1}
         with pytest.raises(InputError, match=f"follows from {pin}, which varies too"):
-            fourbar.vary(scene, values)
+            vary(scene, values)
     text = DRAWING + ACTS
     table = '[tolerances]\n"pins.A.0" = "1 mm"\n"lengths.input" = "1 mm"\n'
     with pytest.raises(InputError, match=r"follows from pins\.A\.0, which has a tol"):
@@ -324,7 +325,7 @@ def test_tolerances_of_pins_are_written_and_shown(capsys, tmp_path):
     text = DRAWING + ACTS
     scene = loads(f'{text}[tolerances]\npins.O2.0 = "0.05 mm"\n')
     assert loads(dump(scene)) == scene
-    redrawn = replace(scene, linkage=fourbar.uniform(0.3, 0.1, 0.25, 0.22))
+    redrawn = replace(scene, linkage=uniform(0.3, 0.1, 0.25, 0.22))
     with pytest.raises(InputError, match="no number of the scene has this key"):
         dump(redrawn)  # its file states lengths
     path = tmp_path / "drawn.toml"
@@ -358,7 +359,7 @@ def test_a_drawn_place_and_its_pins_move_independently_of_each_other():
         )
     )
     z = right + up - start
-    solution = fourbar.solve(fourbar.vary(scene, together))
+    solution = solve(vary(scene, together))
     A = complex(*solution.A[0, 0])
     along = complex(*solution.B[0, 0]) - A
     P = complex(*solution.points["P"][0, 0])
@@ -393,9 +394,9 @@ def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate():
     spread = tolerances(loads(WISHBONE), 512).spreads["|F43|"]
     upper = complex(-0.250, 0.015)
     arm = abs((upper.conjugate() * complex(0.030, -0.260)).imag) / abs(upper)
-    np.testing.assert_allclose(spread.nominal, 3000.0 * 0.060 / arm, rtol=1e-12)
-    np.testing.assert_allclose(spread.worst, 3000.0 * 0.005 / arm, rtol=1e-12)
-    np.testing.assert_allclose(spread.deviation, spread.first_order, rtol=1e-3)
+    assert_allclose(spread.nominal, 3000.0 * 0.060 / arm, rtol=1e-12)
+    assert_allclose(spread.worst, 3000.0 * 0.005 / arm, rtol=1e-12)
+    assert_allclose(spread.deviation, spread.first_order, rtol=1e-3)
     scene = loads(WISHBONE)
     assert loads(dump(scene)) == scene
 
@@ -430,7 +431,7 @@ coupler = "0.25 m"
 output = "0.22 m"
 """
     with pytest.raises(InputError) as caught:
-        fourbar.vary(loads(lengths + ACTS), {key: [0.0]})
+        vary(loads(lengths + ACTS), {key: [0.0]})
     assert line in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -445,7 +446,7 @@ output = "0.22 m"
 )
 def test_a_hint_of_a_drawing_names_the_coordinate(key, line):
     with pytest.raises(InputError) as caught:
-        fourbar.vary(loads(PLACED), {key: [0.0]})
+        vary(loads(PLACED), {key: [0.0]})
     assert line in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -457,7 +458,7 @@ def test_distance_and_coordinate_of_one_place_do_not_vary_together():
     ):
         values = {number: 0.1, f"{place}.drawn.0": [0.0, 0.01]}
         with pytest.raises(InputError, match=f"follows from {place}.drawn.0, which"):
-            fourbar.vary(scene, values)
+            vary(scene, values)
 
 
 def test_a_mass_centre_on_its_pin_has_no_coordinates():
@@ -466,7 +467,7 @@ def test_a_mass_centre_on_its_pin_has_no_coordinates():
     )
     words = r"no place .*; it has bars\.input\.centre\.0 \(the distance\) and"
     with pytest.raises(InputError, match=words):
-        fourbar.vary(loads(text), {"bars.input.centre.drawn.0": [0.0]})
+        vary(loads(text), {"bars.input.centre.drawn.0": [0.0]})
 
 
 def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(

@@ -6,12 +6,14 @@ Solved back, of every kind of motion.
 import math
 import re
 from dataclasses import replace
+from math import acos, pi, radians
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, Free, Motion, Scene, Sweep, solve
 from fourbar.errors import InputError, NotAssembledError, state_messages_in
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
@@ -28,24 +30,24 @@ eps/condition.
 AT_LIMIT = 10.0 * INSIDE_LIMIT
 """rad: the other bars turn by about as much as the bar from its limit, on average."""
 LAW = crank_rocker(
-    motion=fourbar.Motion(
+    motion=Motion(
         law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")
     )
 )
-SWEPT = fourbar.Sweep(0.2, 1.2, 10)
+SWEPT = Sweep(0.2, 1.2, 10)
 DROPPED = crank_rocker(
-    motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 50)),
+    motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
     effects=(fourbar.Gravity(),),
 )
 
 
 def test_every_position_of_the_assembly_with_that_output_angle_is_found():
     scene = crank_rocker()
-    sweep = fourbar.solve(replace(scene, motion=fourbar.Motion()))
+    sweep = solve(replace(scene, motion=Motion()))
     value = float(sweep.theta_4[100])
     found = find_positions(scene, [("theta_4", value)])
     assert len(found.angle) == 2
-    solved = fourbar.solve(scene, "position", at=found)
+    solved = solve(scene, "position", at=found)
     assert solved.theta_4 == pytest.approx(value, abs=LOCATED)
     assert np.abs(found.angle - sweep.theta_2[100]).min() < LOCATED
 
@@ -58,24 +60,24 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
     d, a, b, c = scene.linkage.lengths
     reach = b + side * a
     theta_1 = scene.linkage.ground_angle
-    at_O2 = math.acos((d**2 + reach**2 - c**2) / (2.0 * d * reach))
-    at_O4 = math.acos((d**2 + c**2 - reach**2) / (2.0 * d * c))
-    theta_4 = theta_1 + math.pi - at_O4 + beside
+    at_O2 = acos((d**2 + reach**2 - c**2) / (2.0 * d * reach))
+    at_O4 = acos((d**2 + c**2 - reach**2) / (2.0 * d * c))
+    theta_4 = theta_1 + pi - at_O4 + beside
     found = find_positions(scene, [("theta_4", theta_4)])
-    theta_2 = theta_1 + (at_O2 if side > 0.0 else at_O2 + math.pi)
+    theta_2 = theta_1 + (at_O2 if side > 0.0 else at_O2 + pi)
     assert found.angle == pytest.approx([theta_2], abs=AT_LIMIT)
     (line,) = [
         line
-        for line in write_block(scene, fourbar.solve(scene, at=found))
+        for line in write_block(scene, solve(scene, at=found))
         if line.startswith("at theta_2")
     ]
     assert line.endswith("deg, where theta_4 is at a limit: bars 2 and 3 are in line")
 
 
 def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
-    scene = fourbar.Scene(bare(0.42, 0.6, 0.56, 0.45))
+    scene = Scene(bare(0.42, 0.6, 0.56, 0.45))
     ((_, limit),) = find_intervals(scene.linkage, 3)
-    there = fourbar.solve(scene, at=find_positions(scene, [("theta_3", limit)]))
+    there = solve(scene, at=find_positions(scene, [("theta_3", limit)]))
     between = there.theta_4 - there.theta_2
     assert np.sin(between) == pytest.approx([0.0], abs=AT_LIMIT)
     told = "theta_3 is at a limit: bars 2 and 4 are parallel"
@@ -83,31 +85,31 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
 
 
 def test_a_parallelogram_whose_coupler_does_not_turn_is_at_no_limit():
-    scene = fourbar.Scene(bare(0.3, 0.1, 0.3, 0.1), fourbar.Motion(0.7))
-    assert "limit" not in " ".join(write_block(scene, fourbar.solve(scene)))
+    scene = Scene(bare(0.3, 0.1, 0.3, 0.1), Motion(0.7))
+    assert "limit" not in " ".join(write_block(scene, solve(scene)))
 
 
 def test_places_lie_in_the_turn_of_the_sweep_in_rising_order():
-    scene = replace(crank_rocker(), motion=fourbar.Motion())
-    value = float(fourbar.solve(scene).theta_4[100])
+    scene = replace(crank_rocker(), motion=Motion())
+    value = float(solve(scene).theta_4[100])
     found = find_positions(scene, [("theta_4", value)]).angle
-    assert 0.0 <= found[0] < found[1] <= 2.0 * math.pi
+    assert 0.0 <= found[0] < found[1] <= 2.0 * pi
 
 
 def test_a_release_has_a_state_at_its_start():
     found = find_positions(DROPPED, [("time", 0.0)])
     assert found.time.tolist() == [0.0]
-    start = fourbar.solve(DROPPED, at=found)
+    start = solve(DROPPED, at=found)
     assert start.theta_2[0] == pytest.approx(1.0, abs=LOCATED)
     assert start.omega_2[0] == 0.0
 
 
 def test_a_place_out_of_range_is_refused_with_the_range():
     with pytest.raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
-        find_positions(thesis(), [("theta_2", math.radians(30.0))])
+        find_positions(thesis(), [("theta_2", radians(30.0))])
     with pytest.raises(NotAssembledError, match="no position of this assembly"):
         find_positions(crank_rocker(), [("theta_4", 0.0)])
-    still = replace(crank_rocker(), motion=fourbar.Motion(SWEPT))
+    still = replace(crank_rocker(), motion=Motion(SWEPT))
     with pytest.raises(InputError, match="needs a motion over time: a sweep at one"):
         find_positions(still, [("time", 1.0)])
     with pytest.raises(NotAssembledError, match="it stays within"):
@@ -121,7 +123,7 @@ def test_a_place_out_of_range_is_refused_with_the_range():
 @pytest.mark.parametrize("omega", [0.5, -0.5])
 def test_a_steady_sweep_has_a_place_at_each_time(omega):
     """A backward sweep begins at its other end, as its column of times has it."""
-    scene = replace(crank_rocker(), motion=fourbar.Motion(SWEPT, omega))
+    scene = replace(crank_rocker(), motion=Motion(SWEPT, omega))
     found = find_positions(scene, [("time", 1.3)])
     begin = SWEPT.start if omega > 0.0 else SWEPT.stop
     assert found.angle == pytest.approx([begin + 1.3 * omega], abs=1e-12)
@@ -142,7 +144,7 @@ def test_a_law_passes_an_angle_up_and_down():
 def test_a_release_is_met_when_it_first_passes():
     """By a much finer release: the angle lies between two of its instants."""
     fine = fourbar.release(
-        replace(DROPPED, motion=DROPPED.motion.replace(free=fourbar.Free(1.0, 20000)))
+        replace(DROPPED, motion=DROPPED.motion.replace(free=Free(1.0, 20000)))
     )
     value = float(fine.theta_2[3001])
     found = find_positions(DROPPED, [("theta_2", value)])
@@ -151,7 +153,7 @@ def test_a_release_is_met_when_it_first_passes():
         (fine.theta_2[:-1] - value) * (fine.theta_2[1:] - value) <= 0.0
     )[0]
     assert abs(found.time[0] - fine.time[first]) <= fine.time[1] * (1.0 + 1e-6)
-    state = fourbar.solve(DROPPED, at=found)
+    state = solve(DROPPED, at=found)
     assert state.omega_2[0] == pytest.approx(fine.omega_2[first], rel=1e-3)
     timed = find_positions(DROPPED, [("time", 0.25), ("theta_2", value)])
     assert timed.time[0] == 0.25
@@ -160,30 +162,28 @@ def test_a_release_is_met_when_it_first_passes():
 
 def test_a_stroke_is_found_where_an_angle_is_commanded():
     scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
-    commanded = replace(scene, motion=fourbar.Motion(), tolerances=())
-    stroke = fourbar.solve(commanded, "position").stroke
+    commanded = replace(scene, motion=Motion(), tolerances=())
+    stroke = solve(commanded, "position").stroke
     value = float(np.nanmean(stroke))
     found = find_positions(commanded, [("stroke", value)])
-    solved = fourbar.solve(commanded, "position", at=found).stroke
+    solved = solve(commanded, "position", at=found).stroke
     assert solved == pytest.approx(value, abs=LOCATED)
-    back = find_positions(scene, [("theta_4", float(fourbar.solve(scene).theta_4[3]))])
+    back = find_positions(scene, [("theta_4", float(solve(scene).theta_4[3]))])
     assert len(back.stated[0]) >= 1
 
 
 def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     """Bar 2 has two ranges; the extent of bar 4 is that of the second, which moves."""
-    linkage = fourbar.FourBar(
-        0.3, fourbar.Bar(0.2), fourbar.Bar(0.25), fourbar.Bar(0.1)
-    )
+    linkage = fourbar.FourBar(0.3, Bar(0.2), Bar(0.25), Bar(0.1))
     ranges = fourbar.limit_positions(linkage)
     assert len(ranges) == 4
-    low, high = sorted(2.0 * math.pi - limit.theta_2 for limit in ranges[:2])
-    inside = fourbar.Sweep(low + 0.1, high - 0.1, 20)
-    scene = fourbar.Scene(linkage, fourbar.Motion(inside))
-    theta_4 = np.degrees(fourbar.solve(scene).theta_4)
-    middle = math.radians(0.5 * (theta_4.min() + theta_4.max()))
+    low, high = sorted(2.0 * pi - limit.theta_2 for limit in ranges[:2])
+    inside = Sweep(low + 0.1, high - 0.1, 20)
+    scene = Scene(linkage, Motion(inside))
+    theta_4 = np.degrees(solve(scene).theta_4)
+    middle = radians(0.5 * (theta_4.min() + theta_4.max()))
     with pytest.raises(NotAssembledError, match="no position") as caught:
-        find_positions(scene, [("theta_4", middle + math.pi)])
+        find_positions(scene, [("theta_4", middle + pi)])
     ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
     least, most = map(float, ends)
     assert least <= theta_4.min() and theta_4.max() <= most
@@ -210,14 +210,14 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     From the line of the cylinder's ground pin bar 2 turns clockwise to the one limit
     and anticlockwise, by the rest of a turn, to the other.
     """
-    limit = math.acos((7.0**2 + 2.0**2 - 8.5**2) / 28.0)
-    from_line = math.radians(60.0)
+    limit = acos((7.0**2 + 2.0**2 - 8.5**2) / 28.0)
+    from_line = radians(60.0)
     first, last = (
         math.sqrt(3.0**2 + 1.0 - 6.0 * math.cos(limit + away))
         for away in (-from_line, from_line)
     )
     scene = loads(ROCKER_WITH_RAM)
-    assert not fourbar.solve(scene).assembled.any()
+    assert not solve(scene).assembled.any()
     said = (
         "motion.stroke: the linkage assembles at none of the positions requested;"
         f" this cylinder can have 2 to {first:.6g} in and {last:.6g} to 4 in"

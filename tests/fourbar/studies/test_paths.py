@@ -1,6 +1,7 @@
 """Extents of paths, against closed forms and a scan of directions."""
 
 import math
+from math import cos, radians, sin
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ def close(steps):
     """Return the convex hull of the piston's path, mm, by the cosine rule in A B O4."""
     d, a, b, c = LENGTHS
     A = a * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, steps + 1))
-    to_O4 = d * np.exp(1j * math.radians(ANGLE)) - A
+    to_O4 = d * np.exp(1j * radians(ANGLE)) - A
     side = np.abs(to_O4)
     at_A = np.arccos((b * b + side * side - c * c) / (2.0 * b * side))
     path = A + PISTON * to_O4 / side * np.exp(1j * at_A)
@@ -70,7 +71,7 @@ def test_straightness_is_the_distance_of_the_nearest_two_lines(turned, steps):
         width, length, direction = scan(path_in_full, beside)
     assert 1e3 * path.straightness == pytest.approx(width, abs=SCANNED)
     assert 1e3 * path.stroke == pytest.approx(length, abs=SCANNED)
-    away = path.direction - math.radians(turned) - direction
+    away = path.direction - radians(turned) - direction
     assert math.remainder(away, math.pi) == pytest.approx(0.0, abs=1e-7)
 
 
@@ -97,13 +98,13 @@ P = { bar = 2, from_pin = ["80 mm", "0 deg"] }
 def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(motion, ends):
     """Over 80 deg: chord 2 r sin 40 deg, sagitta r (1 - cos 40 deg), y to 80 mm."""
     (path,) = measure_paths(solve(loads(CRANK + motion))).values()
-    half = math.radians(40.0)
-    assert path.stroke == pytest.approx(0.16 * math.sin(half), abs=1e-12)
-    assert path.straightness == pytest.approx(0.08 * (1.0 - math.cos(half)), abs=1e-12)
-    assert path.direction == pytest.approx(math.radians(60.0 - 90.0), abs=1e-9)
-    low, high = math.cos(math.radians(100.0)), math.cos(math.radians(20.0))
+    half = radians(40.0)
+    assert path.stroke == pytest.approx(0.16 * sin(half), abs=1e-12)
+    assert path.straightness == pytest.approx(0.08 * (1.0 - cos(half)), abs=1e-12)
+    assert path.direction == pytest.approx(radians(60.0 - 90.0), abs=1e-9)
+    low, high = cos(radians(100.0)), cos(radians(20.0))
     assert path.x == pytest.approx((0.08 * low, 0.08 * high), abs=1e-12)
-    assert path.y == pytest.approx((0.08 * math.sin(math.radians(20.0)), 0.08))
+    assert path.y == pytest.approx((0.08 * sin(radians(20.0)), 0.08))
     if ends is None:
         assert path.ends == pytest.approx((0.0, 1.0), abs=AT_REST)
     else:
@@ -129,7 +130,7 @@ def test_a_wide_curve_is_no_narrower_than_by_a_scan(lengths, distance, angle):
     side = np.abs(ground - A)
     at_A = np.arccos((coupler**2 + side**2 - output**2) / (2.0 * coupler * side))
     unit = (ground - A) / side * np.exp(1j * at_A)
-    curve = A + distance * unit * np.exp(1j * math.radians(angle))
+    curve = A + distance * unit * np.exp(1j * radians(angle))
     width, length, _ = scan(curve, np.linspace(0.0, np.pi, 7201))
     assert path.straightness == pytest.approx(width, rel=1e-6)
     assert path.stroke == pytest.approx(length, rel=1e-3)
@@ -181,4 +182,4 @@ def test_a_release_is_integrated_once_for_its_path(monkeypatch):
     solution = solve(loads(CRANK + motion + free + acts))
     (path,) = measure_paths(solution).values()
     assert len(runs) == 1
-    assert path.stroke == pytest.approx(0.16 * math.sin(0.5), abs=1e-9)
+    assert path.stroke == pytest.approx(0.16 * sin(0.5), abs=1e-9)

@@ -5,29 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fourbar
+from fourbar import coupler_curve, instant_centres, solve
 from fourbar.errors import InputError
 from tests.support.scenes import TURN
 
 
 def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage():
-    of_scene, of_solution = (
-        fourbar.instant_centres(of) for of in (TURN, fourbar.solve(TURN))
-    )
+    of_scene, of_solution = (instant_centres(of) for of in (TURN, solve(TURN)))
     assert np.array_equal(of_scene[1, 3].x, of_solution[1, 3].x)
     with pytest.raises(InputError, match="must be left out"):
-        fourbar.instant_centres(TURN, np.array([1.0]), 1)
+        instant_centres(TURN, np.array([1.0]), 1)
     with pytest.raises(InputError, match="needs theta_2 and branch"):
-        fourbar.instant_centres(TURN.linkage)
+        instant_centres(TURN.linkage)
 
 
 def test_a_coupler_curve_of_a_scene_passes_through_its_point():
-    curve = fourbar.coupler_curve(TURN, "P", steps=4000)
-    path = fourbar.solve(TURN).points["P"]
+    curve = coupler_curve(TURN, "P", steps=4000)
+    path = solve(TURN).points["P"]
     away = np.hypot(curve.x[:, None] - path[:, 0], curve.y[:, None] - path[:, 1])
     assert away.min(axis=0).max() < 1e-4
     crossed = replace(TURN, motion=TURN.motion.replace(branch=-1))
-    other = fourbar.coupler_curve(fourbar.solve(crossed), "P", steps=400)
+    other = coupler_curve(solve(crossed), "P", steps=400)
     assert set(other.branch) == {-1} and set(curve.branch) == {1}
     with pytest.raises(InputError, match="must be a point of the coupler: P"):
-        fourbar.coupler_curve(TURN, "J")
+        coupler_curve(TURN, "J")

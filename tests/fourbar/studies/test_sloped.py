@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import sensitivity
 from fourbar.effects.effect import Effect
 from fourbar.errors import LimitError
 from fourbar.linkage import Declared
@@ -126,17 +127,17 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
         return scene, fourbar.solve(scene).torque
 
     scene, torque = torques("copysign", speed)
-    by_speed = fourbar.sensitivity(scene).of("torque", "motion.omega_2")
+    by_speed = sensitivity(scene).of("torque", "motion.omega_2")
     ahead, behind = (torques("copysign", speed + h)[1] for h in (STEP, -STEP))
     assert by_speed == pytest.approx((ahead - behind) / (2.0 * STEP), rel=1e-7)
     other, same = torques("absolute", speed)
     assert torque == pytest.approx(same, rel=1e-14)
     assert by_speed == pytest.approx(
-        fourbar.sensitivity(other).of("torque", "motion.omega_2"), rel=1e-12
+        sensitivity(other).of("torque", "motion.omega_2"), rel=1e-12
     )
     refused, _ = torques("maximum", speed)
     with pytest.raises(LimitError, match=r"cannot follow numpy\.maximum"):
-        fourbar.sensitivity(refused)
+        sensitivity(refused)
     with pytest.raises(LimitError, match=r"cannot follow numpy\.maximum"):
         fourbar.equilibrium(refused)
 

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import norm
 
 import fourbar.formulas.mobility
@@ -50,15 +51,13 @@ def test_a_number_that_the_torque_is_proportional_to():
     study = spread(omega)
     torque = study.spreads["torque"]
     size = np.abs(torque.nominal)
-    np.testing.assert_allclose(
+    assert_allclose(
         np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4
     )
-    np.testing.assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
-    np.testing.assert_allclose(
-        torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12
-    )
-    np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
-    np.testing.assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
+    assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
+    assert_allclose(torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12)
+    assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
+    assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
 
 
@@ -76,11 +75,9 @@ def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_share
     study, alone = spread(*both), [spread(tolerance) for tolerance in both]
     for name in ("torque", "|F12|", "F43_x", "theta_4"):
         of_both = study.spreads[name]
-        np.testing.assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
+        assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
         for share, one in zip(of_both.shares, alone, strict=True):
-            np.testing.assert_allclose(
-                np.sqrt(share), one.spreads[name].deviation, rtol=QUASI
-            )
+            assert_allclose(np.sqrt(share), one.spreads[name].deviation, rtol=QUASI)
         assert (of_both.least <= of_both.low).all()
         assert (of_both.low < of_both.nominal).all()
         assert (of_both.high <= of_both.greatest).all()
@@ -93,9 +90,7 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch)
     pieces = spread(*loose, samples=100)
     for name, in_one in at_once.spreads.items():
         for expected, piece in zip(in_one, pieces.spreads[name], strict=True):
-            np.testing.assert_allclose(
-                expected, piece, rtol=1e-12, atol=1e-12, err_msg=name
-            )
+            assert_allclose(expected, piece, rtol=1e-12, atol=1e-12, err_msg=name)
 
 
 def test_a_generator_draws_the_samples_of_its_seed():
@@ -103,7 +98,7 @@ def test_a_generator_draws_the_samples_of_its_seed():
     by_seed = spread(loose, samples=64, seed=7)
     by_generator = spread(loose, samples=64, seed=np.random.default_rng(7))
     for name, expected in by_seed.spreads.items():
-        np.testing.assert_array_equal(expected.low, by_generator.spreads[name].low)
+        assert_array_equal(expected.low, by_generator.spreads[name].low)
     assert by_generator.seed is None
     assert "(a generator's)" in repr(by_generator)
 

@@ -8,6 +8,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
 from fourbar import (
@@ -121,13 +122,11 @@ def test_a_member_is_its_linkage_alone(effects, drive, stage):
                 (M, len(ANGLES), 2) if name in VECTORS else (M, len(ANGLES))
             )
             if name.endswith("_error"):
-                np.testing.assert_allclose(
+                assert_allclose(
                     array[member], getattr(single, name), rtol=BARS, err_msg=name
                 )
             else:
-                np.testing.assert_array_equal(
-                    array[member], getattr(single, name), err_msg=name
-                )
+                assert_array_equal(array[member], getattr(single, name), err_msg=name)
 
 
 def test_blocks_over_members_and_positions_change_no_digit(monkeypatch):
@@ -140,7 +139,7 @@ def test_blocks_over_members_and_positions_change_no_digit(monkeypatch):
         )
         piece = solve(study)
         for name in at_once.evaluated():
-            np.testing.assert_array_equal(
+            assert_array_equal(
                 getattr(piece, name), getattr(at_once, name), err_msg=name
             )
 
@@ -155,8 +154,8 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
         values = {"lengths.input": [length] * 2}
         one = alone(study, values, 0)
         single = solve(Scene(one.linkage, Motion(theta_2[member], 3.0, 0.5), 2, LOADS))
-        np.testing.assert_array_equal(out["torque"][member], single.torque)
-        np.testing.assert_array_equal(out["a_G3"][member], single.a_G3)
+        assert_array_equal(out["torque"][member], single.torque)
+        assert_array_equal(out["a_G3"][member], single.a_G3)
 
 
 def test_what_the_scene_leaves_out_follows_the_length():
@@ -192,7 +191,7 @@ def test_a_bad_member_has_a_status_and_disturbs_no_other():
     for name in solution.evaluated():
         if name != "theta_2":
             assert np.isnan(getattr(solution, name)[[1, 2, 3, 5]]).all(), name
-    np.testing.assert_array_equal(
+    assert_array_equal(
         solution.torque[0], solve(vary(plain, {"bars.coupler.mass": 1.0})).torque[0]
     )
 
@@ -202,9 +201,7 @@ def test_a_law_and_a_path_through_change_points():
     values = {"lengths.input": np.array([0.1, 0.11])}
     study = vary(Scene(LINK, Motion(law=law)), values)
     solution = solve(study)
-    np.testing.assert_array_equal(
-        solution.torque[1], solve(alone(study, values, 1)).torque
-    )
+    assert_array_equal(solution.torque[1], solve(alone(study, values, 1)).torque)
     kite = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0))
     for values in (
         {"lengths.input": np.array([0.1, 0.09])},
@@ -215,8 +212,8 @@ def test_a_law_and_a_path_through_change_points():
         assert -1 in solution.branch[0]
         for member in (0, 1):
             single = solve(alone(study, values, member))
-            np.testing.assert_array_equal(solution.branch[member], single.branch)
-            np.testing.assert_array_equal(solution.theta_4[member], single.theta_4)
+            assert_array_equal(solution.branch[member], single.branch)
+            assert_array_equal(solution.theta_4[member], single.theta_4)
 
 
 REFUSED = {
@@ -328,16 +325,16 @@ def test_a_study_is_given_no_other_positions():
 
 def test_springs_of_members_count_their_turns_from_where_each_assembles():
     """The sweep begins where the members do not assemble; each is what it is alone."""
-    linkage = fourbar.uniform(0.2, 0.25, 0.21, 0.22)
+    linkage = uniform(0.2, 0.25, 0.21, 0.22)
     low, high = fourbar.formulas.mobility.choose_range(linkage)
-    sweep = fourbar.Sweep(low - 0.5, high + 0.2, 40)
+    sweep = Sweep(low - 0.5, high + 0.2, 40)
     for effect in (
-        fourbar.Torsion.at(O2=(2.0, low - 2.5, 0.1)),
-        fourbar.Torsion.at(B=(2.0, 3.0, 0.1), O2=(1.0, high + 2.5, 0.0)),
+        Torsion.at(O2=(2.0, low - 2.5, 0.1)),
+        Torsion.at(B=(2.0, 3.0, 0.1), O2=(1.0, high + 2.5, 0.0)),
     ):
-        scene = fourbar.Scene(linkage, fourbar.Motion(sweep, 1.0), effects=(effect,))
-        together = fourbar.solve(fourbar.vary(scene, {"bars.coupler.mass": [0.1, 0.1]}))
-        alone = fourbar.solve(scene)
+        scene = Scene(linkage, Motion(sweep, 1.0), effects=(effect,))
+        together = solve(vary(scene, {"bars.coupler.mass": [0.1, 0.1]}))
+        alone = solve(scene)
         assert not alone.assembled[0] and alone.assembled.any()
         assert {"ok", "wound"} <= set(alone.status)
         assert together.status == [alone.status, alone.status]

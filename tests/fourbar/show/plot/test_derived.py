@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import solve
 from fourbar.show.derived import derive
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.view import make_view
@@ -30,7 +31,7 @@ def list_lines(figure):
 @pytest.mark.slow
 def test_the_shaking_force_is_drawn_with_its_components():
     lines = list_lines("shaking")
-    force = derive(fourbar.solve(SCENE), "shaking_force")
+    force = derive(solve(SCENE), "shaking_force")
     for name, values in {
         "$|F|$": np.hypot(*force.T),
         "$F_x$": force[:, 0],
@@ -43,7 +44,7 @@ def test_the_shaking_force_is_drawn_with_its_components():
 
 def test_ratios_are_those_of_the_speeds_and_no_line_crosses_a_dead_centre():
     lines = list_lines("ratios")
-    s = fourbar.solve(SCENE)
+    s = solve(SCENE)
     drawn = lines["ω₄/ω₂"]
     shown = np.interp(np.linspace(0.0, 360.0, 121), *drawn.T)
     assert shown == pytest.approx(s.omega_4 / 10.0, abs=1e-9)

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, cycle
+from math import radians
 from pathlib import Path
 
 import matplotlib
@@ -17,8 +18,21 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from numpy.testing import assert_allclose
 
 import fourbar
+from fourbar import (
+    Bar,
+    Free,
+    Gravity,
+    LinearDrive,
+    Motion,
+    Point,
+    Sweep,
+    Viscous,
+    load,
+    solve,
+)
 from fourbar.effects import Flywheel, PinFriction, Place, Spring, Springs, Torsion
 from fourbar.effects.effect import list_bodies
 from fourbar.errors import InputError, NotAssembledError
@@ -65,7 +79,7 @@ WHOLE_PIXEL = 1.0
 """A film puts its labels at whole pixels."""
 GALLERY = Path(__file__).parents[4] / "models" / "gallery"
 GALLERY = Path(__file__).parents[4] / "models" / "gallery"
-FULL_TURN = fourbar.Sweep(0.0, 2 * math.pi, 360)
+FULL_TURN = Sweep(0.0, 2 * math.pi, 360)
 
 
 CRANK_ROCKER = crank_rocker()
@@ -80,7 +94,7 @@ def composed(scene, name, branches="one", units="SI", **options):
 
 def compose_both(name):
     """A figure of both branches with all that it takes, drawn once."""
-    options = {"position": math.radians(77.7), "dimensions": True}
+    options = {"position": radians(77.7), "dimensions": True}
     taken = {key: value for key, value in options.items() if name in TAKERS[key]}
     return composed(CRANK_ROCKER, name, "both", "mm", **taken)
 
@@ -155,9 +169,9 @@ def test_every_figure_draws_both_branches_alike_and_no_texts_overlap(name):
         # free bodies move their window with the bar: its width is the scale
         ends = [np.array([axes.get_xlim(), axes.get_ylim()]) for axes in (panel, twin)]
         if name in ("overview", "coupler", "hodograph") and panel.axison:
-            np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
+            assert_allclose(ends[0], ends[1], rtol=1e-9)
         if name in ("overview", "coupler", "hodograph", "freebody"):
-            np.testing.assert_allclose(np.diff(ends[0]), np.diff(ends[1]), rtol=1e-9)
+            assert_allclose(np.diff(ends[0]), np.diff(ends[1]), rtol=1e-9)
             assert panel.get_ylabel() == twin.get_ylabel()
 
 
@@ -169,7 +183,7 @@ def test_no_texts_of_a_position_of_three_rockers_overlap(name):
 
 def compose_gallery(name, dimensions=True):
     """The axes of a linkage of the gallery, and a function that finds its lines."""
-    scene = fourbar.load(GALLERY / f"{name}.toml")
+    scene = load(GALLERY / f"{name}.toml")
     (axes,) = draw_figure(scene, "linkage", dimensions=dimensions).figure.axes
 
     def paths(is_wanted):
@@ -197,9 +211,7 @@ def test_a_leader_crosses_neither_a_text_nor_another_leader(name, dimensions):
 
 @pytest.mark.slow
 def test_no_text_stands_on_a_bar():
-    scene = fourbar.load(
-        Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml"
-    )
+    scene = load(Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml")
     figure = draw_figure(scene, "linkage", dimensions=True).figure
     (axes,) = figure.axes
     bars = [
@@ -235,7 +247,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit():
 def test_positions_at_rest_have_no_panel_of_zeros(figure, at_rest, moving):
     """With a speed there are speeds, accelerations and power besides."""
     for speed, panels in ((0.0, at_rest), (1.0, moving)):
-        motion = fourbar.Motion(fourbar.Sweep(1.0, 2.0, 10), speed)
+        motion = Motion(Sweep(1.0, 2.0, 10), speed)
         axes = composed(replace(CRANK_ROCKER, motion=motion), figure).axes
         labels = " ".join(one.get_ylabel() for one in axes)
         assert len(axes) == panels
@@ -244,7 +256,7 @@ def test_positions_at_rest_have_no_panel_of_zeros(figure, at_rest, moving):
 
 def solved(scene):
     """At the positions of a scene, and those that a figure shows between them."""
-    return describe_motion(fourbar.solve(scene)).solve_with_peaks()
+    return describe_motion(solve(scene)).solve_with_peaks()
 
 
 @pytest.mark.slow
@@ -255,12 +267,12 @@ def test_drawn_curves_are_those_of_the_solution():
     drawn = {
         line.get_label(): line.get_ydata() for panel in axes for line in panel.lines
     }
-    np.testing.assert_allclose(drawn[r"$\theta_4$"], np.degrees(solution.theta_4))
-    np.testing.assert_allclose(drawn[r"$\omega_3$"], solution.omega_3)
-    np.testing.assert_allclose(drawn[r"$\alpha_4$"], solution.alpha_4)
+    assert_allclose(drawn[r"$\theta_4$"], np.degrees(solution.theta_4))
+    assert_allclose(drawn[r"$\omega_3$"], solution.omega_3)
+    assert_allclose(drawn[r"$\alpha_4$"], solution.alpha_4)
     torque = composed(scene, "torque").axes[0]
     assert torque.get_ylabel() == "$T_2$ (mN m)"
-    np.testing.assert_allclose(torque.lines[1].get_ydata(), 1e3 * solution.torque)
+    assert_allclose(torque.lines[1].get_ydata(), 1e3 * solution.torque)
 
 
 def test_bars_are_drawn_to_scale_at_the_requested_position():
@@ -278,9 +290,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
 
 @pytest.mark.slow
 def test_the_coupler_figure_shows_the_points_of_the_scene():
-    scene = crank_rocker(
-        points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0)))
-    )
+    scene = crank_rocker(points=(Point("P", 3, (0.15, 0.7)), Point("Q", 4, (0.1, 0.0))))
     (axes,) = draw_figure(scene, "coupler", units=fourbar.units("m")).figure.axes
     curves = {
         line.get_label(): line.get_xydata()
@@ -300,7 +310,7 @@ def test_the_coupler_figure_shows_the_points_of_the_scene():
 
 @pytest.mark.slow
 def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign():
-    figure = composed(crank_rocker(), "freebody", position=math.radians(135.0))
+    figure = composed(crank_rocker(), "freebody", position=radians(135.0))
     lines = [text for text, _ in texts_shown(figure) if text[0] in "↺↻"]
     assert lines and not any(" = −" in line for line in lines)
     assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith(
@@ -312,7 +322,7 @@ def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign():
 def test_the_sensitivities_have_the_units_asked_for_and_whole_names():
     panels = composed(crank_rocker(), "sensitivity", units="imperial").axes
     assert [axes.get_xlabel() for axes in panels[:2]] == ["lbf in", "lbf"]
-    largest = np.abs(fourbar.solve(crank_rocker()).torque).max() / 0.112984829
+    largest = np.abs(solve(crank_rocker()).torque).max() / 0.112984829
     assert f"{largest:.3g} lbf in" in panels[0].texts[0].get_text()
 
 
@@ -373,8 +383,8 @@ def test_transmission_angle_marks_limits_and_dead_centres(branch):
 
 SPRUNG = ((1, 3), (2, 3), (4, 3))
 EFFECTS = (
-    fourbar.Gravity(),
-    fourbar.Viscous.at(A=0.02, O4=0.01),
+    Gravity(),
+    Viscous.at(A=0.02, O4=0.01),
     fourbar.Friction.at(B=0.03),
     PinFriction.at(A=(0.2, 0.01), O4=(0.1, 0.02)),
     Torsion.at(B=(0.5, 1.0, 0.1)),
@@ -388,10 +398,10 @@ EFFECTS = (
 )
 
 
-CYLINDER = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
+CYLINDER = LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
 
 
-BETWEEN_NEIGHBOURS = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09, 0.7)))
+BETWEEN_NEIGHBOURS = LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09, 0.7)))
 
 
 @pytest.mark.parametrize(
@@ -452,7 +462,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
 
 
 def test_a_scene_without_velocity_draws_positions_only(tmp_path):
-    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 30)))
+    scene = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 30)))
     assert len(composed(scene, "kinematics").axes) == 1
     with pytest.raises(InputError, match="omega_2"):
         plot.draw(scene, tmp_path / "b.svg", "torque")
@@ -537,15 +547,15 @@ def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were():
 
 def test_a_position_that_does_not_assemble_is_refused(tmp_path):
     with pytest.raises(NotAssembledError, match="45 deg"):
-        plot.draw(thesis(), tmp_path / "a.png", "linkage", position=math.radians(45.0))
+        plot.draw(thesis(), tmp_path / "a.png", "linkage", position=radians(45.0))
 
 
 def released(steps=300, duration=0.6, **changes):
     """The crank-rocker let go from rest under gravity, a load and damping."""
-    motion = fourbar.Motion(0.5, 0.0, free=fourbar.Free(duration, steps))
+    motion = Motion(0.5, 0.0, free=Free(duration, steps))
     parts = {
         "motion": motion,
-        "effects": (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001)),
+        "effects": (Gravity(), Viscous.at(O2=0.002, B=0.001)),
         **changes,
     }
     return crank_rocker(**parts)
@@ -553,7 +563,7 @@ def released(steps=300, duration=0.6, **changes):
 
 def by_law():
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), ends="rest")
-    return crank_rocker(motion=fourbar.Motion(law=law), drive_bar=4)
+    return crank_rocker(motion=Motion(law=law), drive_bar=4)
 
 
 @pytest.mark.slow
@@ -571,8 +581,8 @@ def test_a_motion_through_time_is_drawn_over_time(scene):
         (r"$\theta_2$", np.degrees(solution.theta_2)),
         (r"$\omega_4$", solution.omega_4),
     ):
-        np.testing.assert_allclose(drawn[name].get_xdata(), solution.time)
-        np.testing.assert_allclose(drawn[name].get_ydata(), values)
+        assert_allclose(drawn[name].get_xdata(), solution.time)
+        assert_allclose(drawn[name].get_ydata(), values)
     free = scene.motion.free is not None
     for name in ("overview", "energy") if free else ("torque",):
         figure = composed(scene, name)
@@ -585,11 +595,11 @@ def test_a_motion_through_time_is_drawn_over_time(scene):
 
 @pytest.mark.slow
 def test_both_branches_of_a_release_share_their_scales():
-    bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
-    motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(0.3, 30))
+    bars = [Bar(0.22, 0.5), Bar(0.25, 0.8), Bar(0.2, 0.4)]
+    motion = Motion(radians(60.0), 0.0, free=Free(0.3, 30))
     linkage = fourbar.FourBar(0.3, *bars)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
-    solutions = [fourbar.solve(set_branch(scene, sign)) for sign in (1, -1)]
+    scene = fourbar.Scene(linkage, motion, effects=(Gravity(),))
+    solutions = [solve(set_branch(scene, sign)) for sign in (1, -1)]
     fastest = [np.abs(solution.omega_4).max() for solution in solutions]
     assert abs(fastest[0] - fastest[1]) > 0.1 * max(fastest)  # alone each has its own
     for name in ("kinematics", "energy"):
@@ -620,9 +630,9 @@ instants 2 ms apart.
 
 @pytest.mark.slow
 def test_the_work_of_what_acts_is_the_kinetic_energy():
-    damped = fourbar.Viscous.at(O2=0.002, B=0.001)
-    scene = released(effects=(fourbar.Gravity(), damped, Flywheel(0.01, 4)))
-    motion = fourbar.solve(scene)
+    damped = Viscous.at(O2=0.002, B=0.001)
+    scene = released(effects=(Gravity(), damped, Flywheel(0.01, 4)))
+    motion = solve(scene)
     energies = compute_energies(scene, motion)
     assert set(energies.work) == {"loads", "gravity", "viscous"}
     linkage = scene.linkage
@@ -630,12 +640,12 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     bodies = list_bodies(linkage, scene.effects)
     parts = inertia(linkage.input.length, bodies, place.position, place.k)
     expected = 0.5 * sum(parts) * motion.omega_2**2
-    np.testing.assert_allclose(energies.kinetic, expected, rtol=1e-9, atol=1e-15)
+    assert_allclose(energies.kinetic, expected, rtol=1e-9, atol=1e-15)
     largest = energies.kinetic.max()
     assert largest > 0.1
     assert np.all(np.diff(energies.work["viscous"]) <= 0.0)
     done = sum(energies.work.values())
-    np.testing.assert_allclose(done, energies.kinetic, atol=ENERGY * largest)
+    assert_allclose(done, energies.kinetic, atol=ENERGY * largest)
     panel = composed(scene, "energy").axes[0]
     assert panel.get_ylabel() in ("energy (J)", "energy (mJ)")
 
@@ -689,17 +699,11 @@ def test_units_get_the_prefix_that_suits():
     assert choose_unit(0.0, "N") == (1.0, "N")
 
 
-BOTTOM, SIDE = Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17))
+BOTTOM, SIDE = Place(1, (0.25, radians(-160.0))), Place(2, (0.09, 0.17))
 COMMANDS = {
-    r"$\theta_3$ (°)": fourbar.Motion(
-        theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0
-    ),
-    r"$\theta_4$ (°)": fourbar.Motion(
-        theta_4=fourbar.Sweep(1.95, 2.78, 40), omega_4=4.0
-    ),
-    "stroke (mm)": fourbar.Motion(
-        stroke=fourbar.Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"
-    ),
+    r"$\theta_3$ (°)": Motion(theta_3=Sweep(1.25, 0.67, 40), omega_3=-2.0),
+    r"$\theta_4$ (°)": Motion(theta_4=Sweep(1.95, 2.78, 40), omega_4=4.0),
+    "stroke (mm)": Motion(stroke=Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"),
 }
 """Each command and the name of the axis that curves are drawn over."""
 
@@ -717,8 +721,8 @@ GREEK = {"theta_3": "θ₃", "theta_4": "θ₄"}
 def commanding(motion):
     return crank_rocker(
         motion=motion,
-        drive=fourbar.LinearDrive(BOTTOM, SIDE),
-        effects=(fourbar.Gravity(),),
+        drive=LinearDrive(BOTTOM, SIDE),
+        effects=(Gravity(),),
     )
 
 
@@ -730,7 +734,7 @@ def longest_line(axes):
 @pytest.mark.parametrize("label", COMMANDS)
 def test_curves_are_drawn_over_what_is_commanded(label):
     scene = commanding(COMMANDS[label])
-    s, name = fourbar.solve(scene), scene.motion.commanded
+    s, name = solve(scene), scene.motion.commanded
     over = getattr(s, name) * (1000.0 if name == "stroke" else 180.0 / math.pi)
     (drive,) = panels = composed(scene, "torque").axes
     if name == "stroke":
@@ -746,9 +750,7 @@ def test_curves_are_drawn_over_what_is_commanded(label):
     force = s.drive_force[order]
     at_positions = np.interp(over[order], x[drawn], y[drawn])
     usual = np.abs(force) < np.percentile(np.abs(force), 80.0)
-    np.testing.assert_allclose(
-        at_positions[usual], force[usual], rtol=DRAWN, atol=DRAWN
-    )
+    assert_allclose(at_positions[usual], force[usual], rtol=DRAWN, atol=DRAWN)
     (linkage,) = composed(scene, "linkage").axes
     place = getattr(make_view(scene).here, name)[0]
     if name == "stroke":
@@ -798,7 +800,7 @@ def test_one_position_of_another_command_stands_in_its_range():
     places = shown.sweep.at.places
     # the cylinder's shortest and longest stroke
     assert places.min() > 0.16 and places.max() < 0.34 and len(places) == 362
-    shown = make_view(commanding(fourbar.Motion(theta_4=2.0, omega_4=1.0)))
+    shown = make_view(commanding(Motion(theta_4=2.0, omega_4=1.0)))
     ranges = find_intervals(CRANK_ROCKER.linkage, 4)
     (low, high) = next(ends for ends in ranges if ends[0] < 2.0 + math.tau < ends[1])
     assert shown.sweep.theta_4.min() > low and shown.sweep.theta_4.max() < high
@@ -811,8 +813,8 @@ def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis(bar):
     d, a, b, c = CRANK_ROCKER.linkage.lengths
     cosine = ((a + b) ** 2 + d * d - c * c) / (2.0 * (a + b) * d)
     stretched = math.degrees(CRANK_ROCKER.linkage.ground_angle + math.acos(cosine))
-    sweep = {f"theta_{bar}": fourbar.Sweep(0.7, 1.25, 40), f"omega_{bar}": 1.0}
-    figure = composed(commanding(fourbar.Motion(**sweep)), "transmission")
+    sweep = {f"theta_{bar}": Sweep(0.7, 1.25, 40), f"omega_{bar}": 1.0}
+    figure = composed(commanding(Motion(**sweep)), "transmission")
     assert find_marks(figure)["dead centre"] == pytest.approx([stretched])
 
 
@@ -836,9 +838,9 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
 def test_the_stroke_is_a_figure_where_it_is_not_the_axis():
     scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
     (axes,) = composed(scene, "stroke").axes
-    s = fourbar.solve(scene)
+    s = solve(scene)
     drawn = np.interp(np.degrees(s.theta_4), *longest_line(axes).get_data())
-    np.testing.assert_allclose(drawn, 1000.0 * s.stroke, rtol=1e-14)
+    assert_allclose(drawn, 1000.0 * s.stroke, rtol=1e-14)
     for refused in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
         with pytest.raises(InputError, match="needs a linear drive"):
             draw_figure(refused, "stroke")

@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import fourbar
+from fourbar import Point, solve
 from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import Table
 from fourbar.files import loads
@@ -62,7 +63,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything):
 
     A spring joins its two points.
     """
-    solution = fourbar.solve(everything)
+    solution = solve(everything)
     axes = Figure().subplots()
     for index in (5, 30):
         place = symbols.place_of(everything.linkage, solution, index, 1.0)
@@ -111,7 +112,7 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(
         },
     )
     shown = make_view(
-        replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
+        replace(everything, linkage=short, points=(Point("P", 3, (0.15, 0.7)),))
     )
     factor, *_ = choose_drawing_scale(shown)
     axes = Figure().subplots()
@@ -171,8 +172,8 @@ def test_the_page_is_given_the_same_symbols(everything):
 @pytest.mark.slow
 def test_the_points_of_a_scene_are_drawn_where_they_are():
     """Path, speed and mark in the plot, place and columns in the page."""
-    scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    solution = describe_motion(fourbar.solve(scene)).solve_with_peaks()
+    scene = crank_rocker(points=(Point("P", 3, (0.15, 0.7)),))
+    solution = describe_motion(solve(scene)).solve_with_peaks()
     panels = (
         draw_figure(scene, "points", units=fourbar.units("m m/s m/s^2"))
         .figure.subfigs[0]
@@ -220,14 +221,14 @@ def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything)
 
 @pytest.mark.slow
 def test_a_film_names_and_moves_what_the_plot_does(everything):
-    scene = replace(everything, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
+    scene = replace(everything, points=(Point("P", 3, (0.15, 0.7)),))
     with apply_style():
         figure, move = _make_stage(make_view(scene), moving=True)
         move(3)
         move(7)
         figure.draw_without_rendering()
     (axes,) = figure.axes
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     bars = [line for line in axes.lines if line.get_lw() == 4.5 and line.get_visible()]
     at_7 = [getattr(solution, name)[7] for name in ("A", "B")]
     ratios = np.transpose(bars[1].get_data()) / at_7
