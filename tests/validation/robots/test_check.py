@@ -9,7 +9,6 @@ import re
 import signal
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -24,9 +23,7 @@ from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
-from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import FAILS, Row
@@ -37,8 +34,6 @@ from fourbar_validation.engines.mujoco.robots import compiled as robots_compiled
 from fourbar_validation.engines.mujoco.robots import examine as examining
 from fourbar_validation.engines.mujoco.robots import onto_scene
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.compiled import CompiledRobot
-from fourbar_validation.engines.mujoco.robots.examine import Examined
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
@@ -86,11 +81,11 @@ measured.
 
 
 @cache
-def generated(scene: Scene) -> Examined:
+def generated(scene):
     return examine(scene, None, {})
 
 
-def test_a_file_is_held_to_the_assembly_that_is_stated_beyond_a_change_point() -> None:
+def test_a_file_is_held_to_the_assembly_that_is_stated_beyond_a_change_point():
     """Both for single states and through time: the generated file is right."""
     scene = low_parallelogram()
     for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
@@ -101,21 +96,21 @@ def test_a_file_is_held_to_the_assembly_that_is_stated_beyond_a_change_point() -
             assert np.abs(theirs - ours).max() < 1e-8 * np.abs(ours).max(), (how, name)
 
 
-def values(examined: Examined) -> dict[str, Value]:
+def values(examined):
     return {key: entry.value for key, entry in examined.described.items()}
 
 
-def differences(scene: Scene, theirs: Examined) -> dict[str, Difference]:
+def differences(scene, theirs):
     return {
         d.key: d for d in find_differences(generated(scene).described, theirs.described)
     }
 
 
-def keys(scene: Scene, theirs: Examined) -> set[str]:
+def keys(scene, theirs):
     return set(differences(scene, theirs))
 
 
-def rows_of(scene: Scene, answers: Sequence[Answer]) -> list[Row]:
+def rows_of(scene, answers):
     return [
         row
         for answer in answers
@@ -125,7 +120,7 @@ def rows_of(scene: Scene, answers: Sequence[Answer]) -> list[Row]:
     ]
 
 
-def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
+def errors(scene, examined, how):
     return {
         row.quantity: row.error
         for row in rows_of(scene, [answer_of(examined, how)])
@@ -133,7 +128,7 @@ def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
     }
 
 
-def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
+def test_the_generated_file_differs_in_nothing_and_agrees():
     examination = examine(CRANK_ROCKER, GENERATED, {})
     assert keys(CRANK_ROCKER, examination) == set()
     for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
@@ -142,8 +137,8 @@ def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
 
 @pytest.mark.parametrize("axis", [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0)])
 def test_a_tilted_file_differs_in_its_plane_alone(
-    axis: tuple[float, float, float],
-) -> None:
+    axis,
+):
     text = write_mjcf(CRANK_ROCKER, plane=Plane(axis, (1.0, -2.0, 0.5)))
     examination = examine(CRANK_ROCKER, text, {})
     assert keys(CRANK_ROCKER, examination) == {"plane"}
@@ -151,14 +146,14 @@ def test_a_tilted_file_differs_in_its_plane_alone(
         assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
 
 
-def test_a_hinge_that_is_not_parallel_is_named() -> None:
+def test_a_hinge_that_is_not_parallel_is_named():
     hinge = 'name="A" type="hinge" axis="0 0 1"'
     assert hinge in GENERATED
     text = GENERATED.replace(hinge, hinge.replace("0 0 1", "0 1e-6 1"))
     assert "skew" in keys(CRANK_ROCKER, examine(CRANK_ROCKER, text, {}))
 
 
-def test_the_description_is_that_of_the_scene() -> None:
+def test_the_description_is_that_of_the_scene():
     numbers, linkage = values(generated(CRANK_ROCKER)), CRANK_ROCKER.linkage
     for number, name in ((2, "input"), (3, "coupler"), (4, "output")):
         bar = linkage.bar(number)
@@ -171,7 +166,7 @@ def test_the_description_is_that_of_the_scene() -> None:
         assert described == pytest.approx(expected, rel=1e-14)
 
 
-def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
+def test_what_is_welded_to_a_bar_is_part_of_it():
     """Two masses m at distance s of each other.
 
     G in the middle, inertia 2 I + m s^2/2.
@@ -310,7 +305,7 @@ EDITS = [
 ]
 
 
-def planted(what: str) -> str:
+def planted(what):
     """Return the generated file with one of the edits."""
     (old, new) = next(edit[1:3] for edit in EDITS if edit[0] == what)
     assert old in GENERATED
@@ -321,7 +316,7 @@ def planted(what: str) -> str:
 
 
 @pytest.mark.parametrize(("what", "key", "word"), [(e[0], *e[3:]) for e in EDITS])
-def test_a_planted_difference_is_named(what: str, key: str, word: str) -> None:
+def test_a_planted_difference_is_named(what, key, word):
     remarks = {
         d.key: d.remark
         for d in find_differences(
@@ -331,11 +326,11 @@ def test_a_planted_difference_is_named(what: str, key: str, word: str) -> None:
     assert word in remarks[key]
 
 
-def slip_at_A(s: Solution) -> np.ndarray:
+def slip_at_A(s):
     return (s.omega_3 - s.omega_2) ** 2 / s.omega_2
 
 
-def work_of_load(s: Solution) -> np.ndarray:
+def work_of_load(s):
     """Return what the load on the coupler does per turn of the crank, N m."""
     crank, rod = np.exp(1j * s.theta_2), np.exp(1j * s.theta_3)
     place = complex(0.15992199739630214, 0.048391265005082486) * rod
@@ -351,9 +346,7 @@ def work_of_load(s: Solution) -> np.ndarray:
         ("load missing", work_of_load),
     ],
 )
-def test_what_a_planted_difference_does_to_the_torque_is_its_virtual_work(
-    what: str, more: Callable[[Solution], np.ndarray]
-) -> None:
+def test_what_a_planted_difference_does_to_the_torque_is_its_virtual_work(what, more):
     scene = replace(CRANK_ROCKER, motion=FEW.motion)
     answer = answer_of(examine(scene, planted(what), {}), FILE_AT_ONE_STATE)
     ours = solve(scene, "force", at=answer.at)
@@ -368,7 +361,7 @@ DRY = replace(
 )
 
 
-def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
+def test_how_softly_dry_friction_slips_is_named_and_costs():
     """By default its couple rises over 0.02 s of slip."""
     text = re.sub(' sol(ref|imp)friction="[^"]*"', "", write_mjcf(DRY))
     examination = examine(
@@ -390,7 +383,7 @@ def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
     assert errors(DRY, examination, FILE_AT_ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
 
 
-def test_a_cause_is_named_without_what_hangs_on_it() -> None:
+def test_a_cause_is_named_without_what_hangs_on_it():
     """Solver parameters of friction that a file does not have.
 
     What MuJoCo derives from a mass is one too.
@@ -407,7 +400,7 @@ def test_a_cause_is_named_without_what_hangs_on_it() -> None:
         assert {d.key for d in differing} == {"bars.coupler.mass", *further}
 
 
-def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> None:
+def test_loads_under_other_names_and_in_another_order_are_the_same_loads():
     text = GENERATED.replace("load_1", "couple").replace("load_2", "push")
     first, second = re.findall("    <general [^>]*(?:couple|push)[^>]*/>\n", text)
     examination = examine(
@@ -420,7 +413,7 @@ def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> No
     )
 
 
-def described(text: str) -> Mapping[str, ModelEntry]:
+def described(text):
     """Describe a file of the crank-rocker without measuring it."""
     options = MeasureOptions(PoseOptions())
     found = find_loop_of_scene(RobotFile(MINE_XML, text), CRANK_ROCKER, options)
@@ -432,7 +425,7 @@ def described(text: str) -> Mapping[str, ModelEntry]:
 @pytest.mark.parametrize(
     ("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')]
 )
-def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
+def test_what_a_difference_costs_is_seen(old, new):
     examination = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
     assert (
         errors(CRANK_ROCKER, examination, FILE_AT_ONE_STATE)["F12"] > SIMULATED.factor
@@ -443,17 +436,17 @@ def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
 
 
 def other_plane(
-    closure: str = 'site1="r" site2="q"',
-    axis: str = "0 -1 0",
-    option: str = "",
-) -> str:
+    closure='site1="r" site2="q"',
+    axis="0 -1 0",
+    option="",
+):
     """The crank-rocker by another hand.
 
     x-z plane, away from the origin, other names, default closure.
     """
     linkage = FEW.linkage
 
-    def inertial(number: int) -> str:
+    def inertial(number):
         bar = linkage.bar(number)
         r, phi = bar.mass_centre or (0.0, 0.0)
         x, z = r * math.cos(phi), r * math.sin(phi)
@@ -476,8 +469,8 @@ def other_plane(
 
 @pytest.mark.parametrize("closure", ['site1="r" site2="q"', ""])
 def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_lengths(
-    closure: str,
-) -> None:
+    closure,
+):
     """The rocker is as good a crank by its hinges alone.
 
     Without a connect the sites of pin B are looked for too.
@@ -530,7 +523,7 @@ COSTLY = [
 Priced = dict[str, Difference]
 
 
-def price_all(scene: Scene, listed: Mapping[str, Difference]) -> Priced:
+def price_all(scene, listed):
     """Return differences with the costs of each alone in the generated file."""
     unchanged, *changed = (
         rows_of(scene, answers or [])
@@ -541,7 +534,7 @@ def price_all(scene: Scene, listed: Mapping[str, Difference]) -> Priced:
 
 
 @pytest.fixture(scope="module")
-def costly() -> tuple[dict[str, Examined], Priced]:
+def costly():
     """Files with one wrong entry each, and what each entry costs."""
     text = other_plane(f'site1="r" site2="q" {STIFF}')
     spoilt = {}
@@ -558,8 +551,8 @@ def costly() -> tuple[dict[str, Examined], Priced]:
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [key for key, _, _ in COSTLY])
 def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
-    key: str, costly: tuple[dict[str, Examined], Priced]
-) -> None:
+    key, costly
+):
     """Made wrong in one entry, a tree in another plane has as its price the error of
     that file by another model.
     """
@@ -596,7 +589,7 @@ SPOILT = {  # loads of the generated file itself, and what is attached to it
 
 
 @pytest.fixture(scope="module")
-def attached() -> tuple[dict[str, Examined], Priced]:
+def attached():
     """Generated files with one wrong entry each, and what each entry costs."""
     text = write_mjcf(SPRUNG)
     spoilt = {}
@@ -610,9 +603,7 @@ def attached() -> tuple[dict[str, Examined], Priced]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", SPOILT)
-def test_what_is_attached_costs_what_it_does_in_the_file_itself(
-    key: str, attached: tuple[dict[str, Examined], Priced]
-) -> None:
+def test_what_is_attached_costs_what_it_does_in_the_file_itself(key, attached):
     spoilt, priced = attached
     assert priced[key].key == key
     rows = errors(SPRUNG, spoilt[key], FILE_AT_ONE_STATE)
@@ -620,9 +611,7 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(
     assert priced[key].cost == pytest.approx(worst, abs=FLOOR)
 
 
-def test_a_servo_on_a_tendon_pulls_where_it_is_told_nothing_and_a_motor_does_not() -> (
-    None
-):
+def test_a_servo_on_a_tendon_pulls_where_it_is_told_nothing_and_a_motor_does_not():
     text = write_mjcf(SPRUNG)
     servo = text.replace(
         "</actuator>", '<position tendon="spring_1" kp="100"/></actuator>'
@@ -634,7 +623,7 @@ def test_a_servo_on_a_tendon_pulls_where_it_is_told_nothing_and_a_motor_does_not
     )
 
 
-def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
+def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone():
     """The first has its price.
 
     Who turns the other way round, or closes the loop otherwise, is another file.
@@ -659,11 +648,11 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
 
 
 def test_a_file_is_compiled_once_and_each_entry_is_mended_in_a_model_of_its_own(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     compiled: list[RobotFile] = []
 
-    def compile_robot(file: RobotFile) -> CompiledRobot:
+    def compile_robot(file):
         compiled.append(file)
         return robots_compiled.compile_robot(file)
 
@@ -689,20 +678,20 @@ def test_a_file_is_compiled_once_and_each_entry_is_mended_in_a_model_of_its_own(
 
 
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
-def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
+def test_another_plane_and_a_reversed_axis_change_no_number(axis):
     examination = examine(FEW, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
     assert max(errors(FEW, examination, FILE_AT_ONE_STATE).values()) < STIFF_ENOUGH
     assert {"plane"} <= keys(FEW, examination)
     assert ("pins.A.positive" in keys(FEW, examination)) == (axis == "0 1 0")
 
 
-def test_the_default_softness_costs_a_percent_or_so() -> None:
+def test_the_default_softness_costs_a_percent_or_so():
     soft = examine(FEW, other_plane(), MINE)
     assert "closure.softness" in keys(FEW, soft)
     assert 1e-3 < errors(FEW, soft, FILE_AT_ONE_STATE)["torque"] < 1e-1
 
 
-def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
+def test_body_anchors_on_an_open_rest_state_build_another_linkage():
     examination = examine(
         FEW, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE
     )
@@ -713,7 +702,7 @@ def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
     assert values(examination)["lengths.output"] == pytest.approx(0.05)
 
 
-def test_lengths_of_another_linkage_come_before_what_costs_more() -> None:
+def test_lengths_of_another_linkage_come_before_what_costs_more():
     """A length that is off by its rounding is no cause of what a soft closure costs."""
     entries = [
         Difference("contacts", "off", "possible", "", cost=70.0),
@@ -730,8 +719,8 @@ def test_lengths_of_another_linkage_come_before_what_costs_more() -> None:
 
 @pytest.mark.slow
 def test_the_cause_is_printed_first_and_entries_keep_their_indent(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """The anchor of an open rest pose makes another linkage, which is soft as well."""
     path = tmp_path / "mine.xml"
     path.write_text(other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'))
@@ -751,7 +740,7 @@ def test_the_cause_is_printed_first_and_entries_keep_their_indent(
     assert max(map(len, printed)) <= 80
 
 
-def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
+def test_cut_at_another_pin_it_is_the_same_linkage():
     """The rocker hangs on the coupler, and the loop closes at O4."""
     text = other_plane().replace(
         '<site name="r" pos="0.25 0 0"/></body></body>', "<ROCKER/></body></body>"
@@ -778,7 +767,7 @@ def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
     assert max(errors(FEW, examination, FILE_AT_ONE_STATE).values()) < STIFF_ENOUGH
 
 
-def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
+def test_a_servo_and_another_equality_are_taken_off_and_reported():
     text = GENERATED.replace(
         "</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>'
     )
@@ -793,7 +782,7 @@ def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
 
 
 @pytest.mark.slow
-def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
+def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for():
     drive = fourbar.LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
     scene = replace(CRANK_ROCKER, drive_bar=None, drive=drive)
     text, driven = write_mjcf(scene), '<general name="cylinder" tendon="cylinder" />'
@@ -827,7 +816,7 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
     assert errors(scene, without, FILE_AT_ONE_STATE)["drive_force"] < 1e-9
 
 
-def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
+def test_a_loop_that_nothing_closes_is_seen_in_the_numbers():
     text = (
         other_plane("")
         .replace('site name="r"', 'site name="B3"')
@@ -839,7 +828,7 @@ def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
     assert errors(FEW, examination, FILE_AT_ONE_STATE)["torque"] > 0.01
 
 
-def test_colliding_bars_are_seen() -> None:
+def test_colliding_bars_are_seen():
     text = GENERATED.replace('contype="0" conaffinity="0"', "").replace(
         'contact="disable"', ""
     )
@@ -848,7 +837,7 @@ def test_colliding_bars_are_seen() -> None:
 
 
 @pytest.mark.parametrize("timestep", ["1e-12", "1e9"])
-def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> None:
+def test_an_absurd_timestep_is_reported_and_not_run_through(timestep):
     """One so long that no step is made once agreed in every position.
 
     The state at the start, again and again.
@@ -901,7 +890,7 @@ OVERDONE = [
 
 
 @pytest.mark.slow
-def test_a_file_that_overdoes_it_is_one_line_with_its_name() -> None:
+def test_a_file_that_overdoes_it_is_one_line_with_its_name():
     with guard.examine_guarded(NO_FILE) as examined:
         for what, old, new, words in OVERDONE:
             text = re.sub(old, new, GENERATED)
@@ -913,7 +902,7 @@ def test_a_file_that_overdoes_it_is_one_line_with_its_name() -> None:
             assert words in message and "\n" not in message, what
 
 
-def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
+def test_a_ratio_beyond_the_range_of_doubles_has_its_remark():
     light, heavy = (
         {"lengths.input": ModelEntry(1.0), "bars.output.mass": ModelEntry(mass)}
         for mass in (0.4, 4e307)
@@ -922,7 +911,7 @@ def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
     assert difference.remark.startswith("10^308 times")
 
 
-def rows_with(torque: float, force: float) -> list[Row]:
+def rows_with(torque, force):
     errors = {"torque": torque, "F12": force}
     return [
         Row("", "how", "-", name, error, 1e-5, FAILS, "", 0.0, 1.0)
@@ -933,9 +922,7 @@ def rows_with(torque: float, force: float) -> list[Row]:
 @pytest.mark.parametrize(
     ("key", "cost"), [("closure.solref", 0.0), ("bars.coupler.mass", 0.048)]
 )
-def test_a_setting_that_leaves_the_worst_error_costs_nothing(
-    key: str, cost: float
-) -> None:
+def test_a_setting_that_leaves_the_worst_error_costs_nothing(key, cost):
     """The output's mass is wrong, and both time constants leave F12 0.3 off."""
     difference = Difference(key, 0.02, 0.03, "")
     priced = price(difference, rows_with(0.05, 0.3), rows_with(0.002, 0.3))
@@ -946,7 +933,7 @@ def test_a_setting_that_leaves_the_worst_error_costs_nothing(
     ("key", "finer"),
     [("option.timestep", 0.5), ("option.tolerance", 0.5), ("option.iterations", 2.0)],
 )
-def test_a_setting_that_is_finer_is_no_difference(key: str, finer: float) -> None:
+def test_a_setting_that_is_finer_is_no_difference(key, finer):
     ours = {"lengths.input": ModelEntry(1.0), key: ModelEntry(1.0)}
     for value, count in ((finer, 0), (1.0 / finer, 1)):
         theirs = ours | {key: ModelEntry(value)}
@@ -1000,32 +987,32 @@ REFUSED = [
     ids=[case[0] for case in REFUSED],
 )
 def test_a_file_that_is_no_four_bar_is_one_line(
-    what: str,
-    text: str,
-    names: dict[str, str],
-    word: str,
-) -> None:
+    what,
+    text,
+    names,
+    word,
+):
     with pytest.raises(InputError) as caught:
         examine(FEW, text, names)
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def crash(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+def crash(scene, text, names):
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
-def hang(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+def hang(scene, text, names):
     time.sleep(3600.0)
 
 
-def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+def devour(scene, text, names):
     bytearray(2 * WORKER_MEMORY)
 
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_ctrl_c_does_not_wait_for_the_file() -> None:
+def test_ctrl_c_does_not_wait_for_the_file():
     # a test run in the background inherits SIGINT ignored
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     began = time.monotonic()
@@ -1051,10 +1038,10 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     ],
 )
 def test_a_file_that_breaks_the_engine_is_one_line(
-    what: object,
-    word: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    what,
+    word,
+    monkeypatch,
+):
     monkeypatch.setattr(
         guard, "ROBOT_SECONDS", 4.0 if what is hang else 60.0
     )  # a busy machine starts a process slowly
@@ -1066,7 +1053,7 @@ def test_a_file_that_breaks_the_engine_is_one_line(
 
 
 @pytest.mark.slow
-def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
+def test_the_command_writes_and_prints_what_it_found(tmp_path):
     path = tmp_path / "mine\x1b[31m.xml"
     path.write_text(other_plane().replace('name="rod"', 'name="rod&#60;b&#62;|"'))
     scene = tmp_path / "scene.toml"
@@ -1091,12 +1078,12 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     )
 
 
-def test_a_role_that_no_body_has_is_refused(tmp_path: Path) -> None:
+def test_a_role_that_no_body_has_is_refused(tmp_path):
     with pytest.raises(InputError, match="ROLE=NAME"):
         run(tmp_path, GENERATED, "--name", "wheel=a")
 
 
-def test_a_name_without_a_scene_is_refused(tmp_path: Path) -> None:
+def test_a_name_without_a_scene_is_refused(tmp_path):
     path = tmp_path / "theirs.xml"
     path.write_text(GENERATED)
     process = CliRunner().invoke(
@@ -1107,7 +1094,7 @@ def test_a_name_without_a_scene_is_refused(tmp_path: Path) -> None:
     assert "--name needs a SCENE" in str(process.exception)
 
 
-def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path: Path) -> None:
+def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path):
     path = tmp_path / "robot.xml"
     hinge = '<body><joint/><geom size="0.1"/></body>'
     path.write_text(f"<mujoco><worldbody>{hinge}</worldbody></mujoco>")
@@ -1119,7 +1106,7 @@ def test_a_file_without_a_scene_is_read_as_a_robot(tmp_path: Path) -> None:
     assert "no equality that closes a loop" in str(process.exception)
 
 
-def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:
+def run(tmp_path, text, *options):
     """Return the exit status of the command on a file of the crank-rocker.
 
     What its comparisons are allowed is returned too.
@@ -1146,7 +1133,7 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
 
 
 @pytest.mark.slow
-def test_a_required_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
+def test_a_required_error_is_what_their_file_is_held_to(tmp_path):
     text = write_mjcf(FEW).replace("0.0016133333333333336", "0.0017")
     assert run(tmp_path, text) == (1, [0.0, SIMULATED.factor])
     assert run(tmp_path, text, "--error", "0.5") == (0, [0.0, 0.5])

@@ -5,7 +5,6 @@ Where one is wrong its cause stands first.
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -26,7 +25,6 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import (
-    Examined,
     examine_file,
     predict_softness,
 )
@@ -38,7 +36,6 @@ from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
-    LoopJudgement,
     judge_file,
 )
 from fourbar_validation.robots.measure import find_left_out
@@ -70,7 +67,7 @@ BISECTED = 1e-9
 """Relative; both solve for the same couple, and the solver's noise is 1e-11."""
 
 
-def default_friction() -> str:
+def default_friction():
     """The file of the dry arm whose friction yields as MuJoCo's does.
 
     Nothing is said of it in the file.
@@ -79,14 +76,14 @@ def default_friction() -> str:
     return re.sub(' sol(ref|imp)friction="[^"]*"', "", text)
 
 
-def rotor_as_armature() -> str:
+def rotor_as_armature():
     """The file of the arm with the rotor as armature of its driven hinge."""
     text = write_mjcf(replace(ROTOR, effects=()), drive="none")
     assert 'armature="0"' in text
     return text.replace('armature="0"', 'armature="0.02"')
 
 
-def error_of(scene: Scene, examined: Examined, how: str, name: str) -> float:
+def error_of(scene, examined, how, name):
     """Largest difference from the formulas, over the largest value."""
     answer = answer_of(examined, how)
     ours = np.asarray(getattr(solve(scene, "force", at=answer.at), name))
@@ -96,7 +93,7 @@ def error_of(scene: Scene, examined: Examined, how: str, name: str) -> float:
     return float(np.abs(difference).max() / size.max())
 
 
-def bisect_on_the_couple(text: str, theta_2: float, alpha_2: float) -> float:
+def bisect_on_the_couple(text, theta_2, alpha_2):
     """Return MuJoCo's couple on the input, N m, at keyframe 0 moved to an angle by
     Newton steps.
     """
@@ -130,12 +127,12 @@ def bisect_on_the_couple(text: str, theta_2: float, alpha_2: float) -> float:
 
 
 @cache
-def examined_dry() -> Examined:
+def examined_dry():
     return examine(DRY, default_friction(), {})
 
 
 @pytest.mark.slow
-def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None:
+def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop():
     """Two trials and a line gave a couple that accelerates the crank by -56 rad/s^2 in
     place of 0.
     """
@@ -145,7 +142,7 @@ def test_a_file_with_dry_friction_is_right_to_the_softness_of_its_loop() -> None
             assert error_of(DRY, examined_dry(), how, pin) < SOFT_LOOP
 
 
-def written(text: str, folder: Path) -> Path:
+def written(text, folder):
     path = folder / "theirs.xml"
     path.write_text(text)
     return path
@@ -153,8 +150,8 @@ def written(text: str, folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """Its pin forces are 4.6e-5 off, which is what MuJoCo's stiffest constraint leaves.
 
     More of it is an error.
@@ -177,9 +174,7 @@ def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(
 
 
 @pytest.mark.slow
-def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it() -> (
-    None
-):
+def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it():
     file = RobotFile(Path("theirs.xml"), default_friction())
     left = predict_softness(DRY, file, MeasureOptions(PoseOptions()))
     ours = solve(DRY, "force")
@@ -190,7 +185,7 @@ def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it(
 
 
 @pytest.mark.slow
-def test_the_couple_is_the_one_that_bisection_finds() -> None:
+def test_the_couple_is_the_one_that_bisection_finds():
     answer = answer_of(examined_dry(), FILE_AT_ONE_STATE)
     assert answer.at.theta_2[0] == pytest.approx(math.radians(30.0))
     bisected = bisect_on_the_couple(default_friction(), math.radians(30.0), 0.0)
@@ -201,8 +196,8 @@ def test_the_couple_is_the_one_that_bisection_finds() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("pin", ["O2", "A"])
 def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
-    pin: str,
-) -> None:
+    pin,
+):
     """By virtual work 0.5 N m more at O2 is 0.5 N m of torque.
 
     At A it is 0.5 |omega_3 - omega_2| / omega_2.
@@ -223,7 +218,7 @@ def test_friction_that_is_too_large_is_seen_at_one_state_and_through_time(
         np.testing.assert_allclose(more, 0.5 * slip * np.ones(len(more)), rtol=1e-4)
 
 
-def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene() -> None:
+def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene():
     examined = examine(ROTOR, rotor_as_armature(), {})
     torque = answer_of(examined, FILE_AT_ONE_STATE).quantities["torque"]
     assert torque[0] == pytest.approx(0.3624249, abs=2e-7)
@@ -234,7 +229,7 @@ def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene() -> None:
     assert not {key for key in keys if key.startswith(("bars.", "pins."))}
 
 
-def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input() -> None:
+def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input():
     """By virtual work it adds its own moment alone: 0.02 kg m^2 times 20 rad/s^2."""
     scene = replace(ROTOR, effects=())
     answer = answer_of(examine(scene, rotor_as_armature(), {}), FILE_AT_ONE_STATE)
@@ -242,7 +237,7 @@ def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input() -> None
     np.testing.assert_allclose(answer.quantities["torque"] - ours, 0.4, rtol=1e-5)
 
 
-def limited(pin: str, low: float, high: float) -> str:
+def limited(pin, low, high):
     """Return the file of the arm without friction, with a joint range in rad from its
     own zero.
     """
@@ -252,12 +247,12 @@ def limited(pin: str, low: float, high: float) -> str:
     return text.replace(hinge, f'{hinge} range="{low!r} {high!r}"')
 
 
-def counted_from_elsewhere(text: str, pin: str) -> str:
+def counted_from_elsewhere(text, pin):
     """Return the same file with another zero of a joint: `ref` and range are moved
     alike.
     """
 
-    def moved(match: re.Match[str]) -> str:
+    def moved(match):
         return f'{match[1]}"{float(match[2]) + TURNED!r}"'
 
     line = next(line for line in text.splitlines() if f'name="{pin}" type' in line)
@@ -267,7 +262,7 @@ def counted_from_elsewhere(text: str, pin: str) -> str:
     return re.sub("<keyframe>.*</keyframe>", "", text.replace(line, other), flags=re.S)
 
 
-def test_a_stop_that_the_motion_does_not_meet_is_no_difference() -> None:
+def test_a_stop_that_the_motion_does_not_meet_is_no_difference():
     """Bar 4 turns between 1.7 and 2.1 rad; the file's zero makes that -2.3 to -1.9."""
     theta_4 = solve(BARE, "position").theta_4
     low, high = float(theta_4.min()) - 0.1, float(theta_4.max()) + 0.1
@@ -282,7 +277,7 @@ def test_a_stop_that_the_motion_does_not_meet_is_no_difference() -> None:
         assert error_of(BARE, examined, FILE_AT_ONE_STATE, "torque") < 1e-4
 
 
-def test_a_stop_inside_the_motion_is_where_the_bars_meet_it() -> None:
+def test_a_stop_inside_the_motion_is_where_the_bars_meet_it():
     theta_4 = solve(BARE, "position").theta_4
     middle = float(theta_4.mean())
     for text in (
@@ -300,12 +295,47 @@ def test_a_stop_inside_the_motion_is_where_the_bars_meet_it() -> None:
         assert off[~before].max() < 1e-6
 
 
+def measure_rocker(scene, drawn, theta_4, branch):
+    """Measure the file of a drawn linkage at angles of its output."""
+    motion = Motion(theta_4=theta_4, omega_4=1.0, branch=branch)
+    loop = examine(replace(scene, motion=motion), write_mjcf(drawn, drive="none"), {})
+    assert find_left_out(loop.measured) < ROUND_OFF
+    assert not loop.measured.states.open
+    return " ".join(loop.measured.remarks)
+
+
+@pytest.mark.parametrize(("branch", "behind"), [("open", False), ("crossed", True)])
+def test_angles_to_which_no_motion_leads_are_named(branch, behind):
+    theta_4 = solve(BARE, "position").theta_4
+    here = np.linspace(theta_4.min() + 0.05, theta_4.max() - 0.05, 3)
+    said = measure_rocker(BARE, BARE, np.concatenate([here, -here]), branch)
+    assert "at 3 of 6 positions, O4 = -106.8 to -99.78 deg, the loop is in its" in said
+    assert ("its plane is seen from behind" in said) == behind
+
+
+@pytest.mark.parametrize("branch", BRANCH_NAMES.values())
+@pytest.mark.parametrize("effects", [(), (fourbar.Gravity(),)])
+def test_a_pose_at_a_limit_of_the_output_tells_no_assembly_of_its_command(
+    branch, effects
+):
+    """Bars 2 and 3 are in line there, and not those of pin B."""
+    ground, crank, coupler, rocker = BARE.linkage.lengths
+    reach = crank + coupler
+    cosine = (ground**2 + reach**2 - rocker**2) / (2.0 * ground * reach)
+    scene = replace(BARE, effects=effects)
+    limit = replace(scene, motion=Motion(math.acos(cosine), 1.0))
+    theta_4 = solve(limit, "position").theta_4[0] + np.linspace(0.1, 0.5, 5)
+    said = measure_rocker(scene, limit, theta_4, branch)
+    assert f"is closed onto the {branch} one" in said
+    assert said.startswith("input and coupler are in line")
+
+
 HEAVY = replace(BARE, effects=(fourbar.Gravity(),))
 WITHOUT_FLYWHEEL = 1e-4
 """What MuJoCo's stiffest constraint leaves in these files: 5.1e-5 of a pin force."""
 
 
-def turned(scene: Scene, angle: float) -> Scene:
+def turned(scene, angle):
     """The scene turned in its plane, gravity and all."""
     return replace(
         scene,
@@ -328,7 +358,7 @@ def turned(scene: Scene, angle: float) -> Scene:
     ],
     ids=["with gravity", "level", "from behind", "turned from behind"],
 )
-def test_a_file_may_stand_in_its_plane_as_it_likes(scene: Scene, other: Scene) -> None:
+def test_a_file_may_stand_in_its_plane_as_it_likes(scene, other):
     """As `loops` writes a scene.
 
     Gravity down, or the ground along x where the plane is level.
@@ -341,7 +371,7 @@ def test_a_file_may_stand_in_its_plane_as_it_likes(scene: Scene, other: Scene) -
         assert error_of(scene, examined, FILE_AT_ONE_STATE, name) < WITHOUT_FLYWHEEL
 
 
-def test_a_file_that_is_turned_against_gravity_is_not_the_same() -> None:
+def test_a_file_that_is_turned_against_gravity_is_not_the_same():
     other = replace(turned(HEAVY, 0.7), effects=HEAVY.effects)
     examined = examine(HEAVY, write_mjcf(other, drive="none"), {})
     generated = examine(HEAVY, None, {})
@@ -350,18 +380,18 @@ def test_a_file_that_is_turned_against_gravity_is_not_the_same() -> None:
     assert error_of(HEAVY, examined, FILE_AT_ONE_STATE, "torque") > 0.1
 
 
-def colliding(text: str) -> str:
+def colliding(text):
     touching = re.sub('contype="0" conaffinity="0"', "", text)
     return touching.replace('contact="disable" ', "")
 
 
-def stopped(text: str) -> str:
+def stopped(text):
     hinge = 'name="O4" type="hinge"'
     return text.replace(hinge, f'{hinge} range="0 1.8"').replace('limit="disable" ', "")
 
 
 @cache
-def report_of(spoil: Callable[[str], str], folder: Path) -> LoopJudgement:
+def report_of(spoil, folder):
     """The report on the arm's file with two faults.
 
     A mass that is 1 % off, and one that explains the error.
@@ -378,10 +408,10 @@ def report_of(spoil: Callable[[str], str], folder: Path) -> LoopJudgement:
     [(colliding, "contacts"), (stopped, "pins.O4.range")],
 )
 def test_the_cause_that_explains_the_error_stands_first(
-    spoil: Callable[[str], str],
-    key: str,
-    tmp_path: Path,
-) -> None:
+    spoil,
+    key,
+    tmp_path,
+):
     report = report_of(spoil, tmp_path)
     assert report.differences[0].key == key
     cost = report.differences[0].cost
@@ -391,7 +421,7 @@ def test_the_cause_that_explains_the_error_stands_first(
     assert cost is not None and cost > 0.1 * worst
 
 
-def force_errors(report: LoopJudgement) -> dict[tuple[str, str], float]:
+def force_errors(report):
     return {
         (cost.row.engine, cost.row.quantity): cost.row.error
         for cost in report.errors
@@ -399,7 +429,7 @@ def force_errors(report: LoopJudgement) -> dict[tuple[str, str], float]:
     }
 
 
-def set_attribute(text: str, name: str, value: str) -> str:
+def set_attribute(text, name, value):
     changed, times = re.subn(f' {name}="[^"]*"', f' {name}="{value}"', text)
     assert times == 1
     return changed
@@ -411,10 +441,10 @@ def set_attribute(text: str, name: str, value: str) -> str:
     [("closure.solimp", "0.9 0.95 0.001 0.5 2"), ("option.timestep", "0.003")],
 )
 def test_a_setting_costs_what_typing_it_into_the_file_gains(
-    key: str,
-    was: str,
-    tmp_path: Path,
-) -> None:
+    key,
+    was,
+    tmp_path,
+):
     """In the stiff file that is generated, a timestep would matter less.
 
     The loop's impedance would not matter at all.
@@ -442,7 +472,7 @@ def test_a_setting_costs_what_typing_it_into_the_file_gains(
     assert difference.cost == pytest.approx(gained, rel=0.02)
 
 
-def test_where_no_force_gives_the_acceleration_is_said() -> None:
+def test_where_no_force_gives_the_acceleration_is_said():
     """The tendon of a cylinder carries only a part of what the motion asks for."""
     end, start = fourbar.Place(4, (0.09, 0.7)), fourbar.Place(1, (0.1, -1.0))
     scene = replace(
@@ -465,10 +495,10 @@ def test_where_no_force_gives_the_acceleration_is_said() -> None:
 
 
 def test_warnings_of_the_engine_are_notes_and_nothing_is_printed(
-    capfd: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    capfd,
+    tmp_path,
+    monkeypatch,
+):
     monkeypatch.chdir(tmp_path)
     text = re.sub('timestep="[^"]*"', 'timestep="0.2"', write_mjcf(BARE, drive="none"))
     text = re.sub('solref="[^"]*"', 'solref="-1e12 -1"', text)
@@ -483,7 +513,7 @@ def test_warnings_of_the_engine_are_notes_and_nothing_is_printed(
 MODELS = Path(__file__).parents[3] / "models"
 
 
-def default_constraint(scene: Scene) -> str:
+def default_constraint(scene):
     """The file of a scene without a drive, its loop closed by default.
 
     MuJoCo closes it so where nothing is said.
@@ -502,9 +532,9 @@ def default_constraint(scene: Scene) -> str:
     [("crank_rocker", 0.037), ("drag_link", 0.10), ("gallery/landing_gear", 0.88)],
 )
 def test_how_wrong_the_default_constraint_is_as_the_pages_say(
-    name: str,
-    off: float,
-) -> None:
+    name,
+    off,
+):
     scene = fourbar.load(MODELS / f"{name}.toml")
     examined = examine(scene, default_constraint(scene), {})
     assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == pytest.approx(
@@ -531,7 +561,7 @@ PARALLELOGRAM = Scene(
     ],
     ids=lambda value: value.title if isinstance(value, Scene) else "",
 )
-def test_what_each_drive_reaches_as_the_guide_says(scene: Scene, motor: float) -> None:
+def test_what_each_drive_reaches_as_the_guide_says(scene, motor):
     for drive, reached in (("flywheel", 1e-6), ("motor", motor), ("none", motor)):
         examined = examine(scene, write_mjcf(scene, drive=drive), {})  # type: ignore[arg-type]
         worst = max(
@@ -543,7 +573,7 @@ def test_what_each_drive_reaches_as_the_guide_says(scene: Scene, motor: float) -
             assert worst > 0.9 * reached
 
 
-def test_loads_of_passive_motors_are_the_loads_of_the_scene() -> None:
+def test_loads_of_passive_motors_are_the_loads_of_the_scene():
     scene = fourbar.load(MODELS / "crank_rocker.toml")
     assert len(scene.loads) == 2
     examined = examine(scene, write_mjcf(scene, drive="motor"), {})
@@ -574,8 +604,8 @@ FINGER = """<mujoco><compiler angle="degree" autolimits="true"/>
 
 @pytest.mark.slow
 def test_a_range_that_ends_where_the_motion_does_is_not_the_cause(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """Both limits are touched, to round-off, at the ends of the sweep.
 
     The soft loop is the error, and the file is judged as it is without the range.
@@ -597,7 +627,7 @@ def test_a_range_that_ends_where_the_motion_does_is_not_the_cause(
 STIFF = 'solimp="0.9999 0.9999 0.001 0.5 2"'
 
 
-def read_cut(cut: str) -> tuple[Scene, RobotFile]:
+def read_cut(cut):
     """Return a file that closes its loop at a pin, as stiff as it may be, and its scene
     at a few positions.
     """
@@ -610,7 +640,7 @@ def read_cut(cut: str) -> tuple[Scene, RobotFile]:
 
 
 @pytest.mark.slow
-def test_a_softness_that_nothing_typed_mends_stays_a_difference() -> None:
+def test_a_softness_that_nothing_typed_mends_stays_a_difference():
     scene, file = read_cut("A")
     options = MeasureOptions(PoseOptions(), error=1e-9)
     judgement = judge_file("cut", scene, file, options)
@@ -620,7 +650,7 @@ def test_a_softness_that_nothing_typed_mends_stays_a_difference() -> None:
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3])
-def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar: int) -> None:
+def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     """Seen from its other end the loop is cut at O2: no hinge bears the input."""
     scene, file = read_cut("O4")
     options = MeasureOptions(PoseOptions())
@@ -649,7 +679,7 @@ YIELD = 1e-3
 """Error that the stiffest constraint leaves of the largest: 2e-4 as measured."""
 
 
-def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too() -> None:
+def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too():
     """A file that has it is off from the formulas by what is predicted without them."""
     scene, file = read_cut("A")
     angles = np.linspace(*command(scene).theta_2[[0, -1]], 19)

@@ -1,7 +1,6 @@
 """The command `loops` as it is called."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,13 +16,13 @@ from tests.whole.test_imports import ROOT
 MODELS = ROOT / "models" / "robots"
 
 
-def unfold(printed: str) -> list[str]:
+def unfold(printed):
     """Return the lines of a text whose folds are indented by four blanks."""
     return printed.replace("\n    ", " ").splitlines()
 
 
 @pytest.mark.slow
-def test_a_line_for_each_closure() -> None:
+def test_a_line_for_each_closure():
     arguments = [str(MODELS / "gripper.xml")]
     result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
     assert result.exception is None
@@ -39,7 +38,7 @@ def test_a_line_for_each_closure() -> None:
 
 
 @pytest.mark.slow
-def test_the_gap_is_that_of_the_stated_pose() -> None:
+def test_the_gap_is_that_of_the_stated_pose():
     arguments = [str(MODELS / "biped_foot.xml"), "--pose", "crank=20deg,knee=30deg"]
     result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
     line, note = unfold(result.output)
@@ -49,7 +48,7 @@ def test_the_gap_is_that_of_the_stated_pose() -> None:
     assert note.startswith("note: the loops are closed again by least squares")
 
 
-def test_a_pose_is_read_from_pairs() -> None:
+def test_a_pose_is_read_from_pairs():
     options = read_pose(("knee=20deg, hip=1rad", "slide=3mm"), "home", ("a,b",), "c")
     assert options.joints == {"knee": "20deg", "hip": "1rad", "slide": "3mm"}
     assert options.held == ("a", "b")
@@ -59,7 +58,7 @@ def test_a_pose_is_read_from_pairs() -> None:
 
 
 @pytest.mark.slow
-def test_a_scene_is_written_that_the_formulas_solve(tmp_path: Path) -> None:
+def test_a_scene_is_written_that_the_formulas_solve(tmp_path):
     out = tmp_path / "finger.toml"
     loop = "right_finger-right_follower"
     arguments = [str(MODELS / "gripper.xml"), "--loop", loop, "-o", str(out)]
@@ -76,7 +75,7 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path: Path) -> None:
     assert np.isfinite(fourbar.solve(scene).torque).all()
 
 
-def test_a_scene_is_read_again_however_many_meshes_are_missing(tmp_path: Path) -> None:
+def test_a_scene_is_read_again_however_many_meshes_are_missing(tmp_path):
     """The reader takes no line of more than a hundred dots."""
     geoms = "".join(f'<geom type="mesh" mesh="m{i}"/>' for i in range(150))
     meshes = "".join(f'<mesh name="m{i}" file="m{i}.stl"/>' for i in range(150))
@@ -92,7 +91,7 @@ def test_a_scene_is_read_again_however_many_meshes_are_missing(tmp_path: Path) -
     assert fourbar.load(out).linkage.ground > 0.0
 
 
-def test_a_speed_without_a_scene_is_refused() -> None:
+def test_a_speed_without_a_scene_is_refused():
     arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
     with pytest.raises(UsageError, match="--speed goes with -o"):
         CliRunner().invoke(

@@ -1,7 +1,6 @@
 """A robot's file with its includes and meshes: what is read, left out and refused."""
 
 import re
-from pathlib import Path
 
 import mujoco
 import pytest
@@ -38,12 +37,12 @@ INERTIAL = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
 
 
 def make(
-    folder: Path,
+    folder,
     *,
-    meshdir: str = "assets",
-    include: str = "options.xml",
-    inertial: str = "",
-) -> Path:
+    meshdir="assets",
+    include="options.xml",
+    inertial="",
+):
     """Write the robot with an include into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "robot.xml"
@@ -53,7 +52,7 @@ def make(
     return path
 
 
-def test_includes_and_meshes_of_its_folder_are_read(tmp_path: Path) -> None:
+def test_includes_and_meshes_of_its_folder_are_read(tmp_path):
     path = make(tmp_path)
     (tmp_path / "assets").mkdir()
     (tmp_path / "assets" / "part.obj").write_text(TETRAHEDRON)
@@ -64,9 +63,9 @@ def test_includes_and_meshes_of_its_folder_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("where", ["beside", "assets"])
 def test_meshes_beside_it_and_of_the_option_are_read(
-    tmp_path: Path,
-    where: str,
-) -> None:
+    tmp_path,
+    where,
+):
     path = make(tmp_path / "robot", meshdir="../meshes" if where == "beside" else "")
     elsewhere = tmp_path / ("meshes" if where == "beside" else "far/away")
     elsewhere.mkdir(parents=True)
@@ -77,15 +76,15 @@ def test_meshes_beside_it_and_of_the_option_are_read(
 
 
 def test_a_missing_mesh_is_left_out_where_the_inertial_is_stated(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     robot = compile_robot(read_robot(make(tmp_path, inertial=INERTIAL)))
     assert robot.model.body("arm").mass[0] == 2.0
     assert not robot.unknown_masses
     assert robot.notes == ("meshes that are missing are left out: part.obj",)
 
 
-def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path: Path) -> None:
+def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path):
     robot = compile_robot(read_robot(make(tmp_path)))
     body = robot.model.body("arm").id
     assert robot.unknown_masses == (body,)
@@ -95,7 +94,7 @@ def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path: Path) -> None:
     assert list_unknown_parts(robot, set()) == []
 
 
-def test_a_part_without_a_mass_is_named(tmp_path: Path) -> None:
+def test_a_part_without_a_mass_is_named(tmp_path):
     part = '<geom size="0.1"/><body name="part"><geom type="mesh" mesh="part"/></body>'
     robot = compile_robot(read_robot(make(tmp_path, inertial=INERTIAL + part)))
     body = robot.model.body("part").id
@@ -103,7 +102,7 @@ def test_a_part_without_a_mass_is_named(tmp_path: Path) -> None:
     assert robot.model.body("part").mass[0] == 0.0
 
 
-def test_no_file_outside_is_opened(tmp_path: Path) -> None:
+def test_no_file_outside_is_opened(tmp_path):
     home = tmp_path / "a" / "b"
     (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
     (tmp_path / "part.obj").write_text(TETRAHEDRON)
@@ -143,10 +142,10 @@ def test_no_file_outside_is_opened(tmp_path: Path) -> None:
     ],
 )
 def test_what_a_file_may_not_hold_is_one_line(
-    tmp_path: Path,
-    text: str | bytes,
-    words: str,
-) -> None:
+    tmp_path,
+    text,
+    words,
+):
     path = tmp_path / "robot.xml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     assert_refused(path, words)
@@ -164,8 +163,8 @@ def test_what_a_file_may_not_hold_is_one_line(
     ],
 )
 def test_a_message_begins_with_the_format_of_the_file(
-    name: str, text: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    name, text, kind, tmp_path, capsys
+):
     path = tmp_path / name
     path.write_text(text)
     scene = str(ROOT / "models" / "crank_rocker.toml")
@@ -177,13 +176,13 @@ def test_a_message_begins_with_the_format_of_the_file(
     assert not any(other in message.partition(f"{kind} = ")[2] for other in others)
 
 
-def test_a_usd_is_refused_by_its_name(tmp_path: Path) -> None:
+def test_a_usd_is_refused_by_its_name(tmp_path):
     path = tmp_path / "robot.usd"
     path.write_bytes(b"PXR-USDC")
     assert_refused(path, "is a USD: give the robot's MJCF, SDF or URDF")
 
 
-def assert_refused(path: Path, words: str) -> None:
+def assert_refused(path, words):
     """Reading a file ends in one line with these words."""
     with pytest.raises(InputError, match=words) as caught:
         read_robot(path)
@@ -192,17 +191,17 @@ def assert_refused(path: Path, words: str) -> None:
 
 @pytest.mark.parametrize("tag", ["attach", "model"])
 def test_what_reaches_beyond_the_file_is_refused_wherever_it_stands(
-    tmp_path: Path,
-    tag: str,
-) -> None:
+    tmp_path,
+    tag,
+):
     path = make(tmp_path, inertial=INERTIAL + f"<body><{tag} name='x'/></body>")
     assert_refused(path, f"'<{tag}>': is not read here")
 
 
 def test_a_text_has_a_limit_alone_and_with_its_includes(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path,
+    monkeypatch,
+):
     path = make(tmp_path, inertial=INERTIAL)
     sizes = [len(p.read_bytes()) for p in (path, tmp_path / "options.xml")]
     monkeypatch.setattr(files, "LARGEST_TEXT", sum(sizes))
@@ -214,9 +213,9 @@ def test_a_text_has_a_limit_alone_and_with_its_includes(
 
 
 def test_meshes_have_a_limit_together(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path,
+    monkeypatch,
+):
     path = make(tmp_path, meshdir="", inertial=INERTIAL)
     for name in ("part.obj", "other.obj"):
         (tmp_path / name).write_text(TETRAHEDRON)
@@ -230,9 +229,9 @@ def test_meshes_have_a_limit_together(
 
 
 def test_includes_have_a_limit_in_number(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    tmp_path,
+    monkeypatch,
+):
     path = make(tmp_path, inertial=INERTIAL)
     include = '<include file="options.xml"/>'
     path.write_text(path.read_text().replace(include, 3 * include))
@@ -244,10 +243,10 @@ def test_includes_have_a_limit_in_number(
 
 @pytest.mark.slow
 def test_a_million_copies_end_in_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path,
+    monkeypatch,
+    capsys,
+):
     """A robot may have <replicate>; what it becomes is bounded where it is compiled."""
     monkeypatch.setattr(guard, "ROBOT_SECONDS", 5.0)
     scene = ROOT / "models" / "crank_rocker.toml"
@@ -266,7 +265,7 @@ def test_a_million_copies_end_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_complaint_of_the_compiler_is_one_line(tmp_path: Path) -> None:
+def test_a_complaint_of_the_compiler_is_one_line(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>")
     with pytest.raises(InputError, match="does not compile it") as caught:
@@ -275,7 +274,7 @@ def test_a_complaint_of_the_compiler_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rows", ["file='hills.png'", "nrow='60000' ncol='60000'"])
-def test_height_fields_are_left_out_and_said(tmp_path: Path, rows: str) -> None:
+def test_height_fields_are_left_out_and_said(tmp_path, rows):
     """However large they are."""
     path = tmp_path / "robot.xml"
     path.write_text(
@@ -298,7 +297,7 @@ PLUGIN = """
 
 
 @pytest.mark.parametrize("inertial", [INERTIAL, ""])
-def test_a_plugin_is_left_out_and_said(tmp_path: Path, inertial: str) -> None:
+def test_a_plugin_is_left_out_and_said(tmp_path, inertial):
     path = tmp_path / "robot.xml"
     path.write_text(PLUGIN.format(inertial=inertial))
     robot = compile_robot(read_robot(path))
@@ -324,7 +323,7 @@ def test_a_plugin_is_left_out_and_said(tmp_path: Path, inertial: str) -> None:
         ("a robot ", '<geom size=".1"/>'),
     ],
 )
-def test_what_mujoco_reads_is_read(tmp_path: Path, before: str, text: str) -> None:
+def test_what_mujoco_reads_is_read(tmp_path, before, text):
     inside = f"<worldbody><body><joint/>{text}</body></worldbody>"
     written = f"{before}<mujoco>{inside}</mujoco>"
     of_mujoco = mujoco.MjModel.from_xml_string(written)
@@ -337,7 +336,7 @@ def test_what_mujoco_reads_is_read(tmp_path: Path, before: str, text: str) -> No
     assert note.startswith("robot.xml is no XML")
 
 
-def test_no_document_type_hides_in_what_is_dropped(tmp_path: Path) -> None:
+def test_no_document_type_hides_in_what_is_dropped(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(
         '<!DOC<!-- -->TYPE m [<!ENT<!-- -->ITY a "b">]><mujoco name="&a;"/>'

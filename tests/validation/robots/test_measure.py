@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 
 import fourbar
 from fourbar.mjcf import write_mjcf
@@ -28,19 +28,19 @@ from tests.support.scenes import crank_rocker
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
 
 
-def call(command: object, *arguments: str) -> Result:
+def call(command, *arguments):
     return CliRunner().invoke(command, arguments, standalone_mode=False)  # type: ignore[arg-type]
 
 
-def join_lines(result: Result) -> str:
+def join_lines(result):
     """Return what was printed without the breaks of its lines."""
     return " ".join(result.output.split())
 
 
 @pytest.mark.slow
 def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     asked = ("--loop", "rod", "--speed", "2", "--torque", "5", "-o", str(tmp_path))
     checked = call(check_mjcf, FOOT, *asked)
     assert checked.return_value == 0, checked.output
@@ -54,7 +54,7 @@ def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(
 
 
 @pytest.mark.slow
-def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path: Path) -> None:
+def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path):
     scene = str(tmp_path / "foot.toml")
     made = call(loops, FOOT, "-o", scene)
     assert made.exception is None, made.output
@@ -66,8 +66,8 @@ def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     asked = ("--loop", "rod", "--speed", "0.0001", "-o", str(tmp_path))
     checked = call(check_mjcf, FOOT, *asked)
     held = join_lines(checked)
@@ -76,13 +76,13 @@ def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(
     assert "nan" not in checked.output
 
 
-def test_forces_in_a_plane_that_is_turned_are_those_of_the_scene() -> None:
+def test_forces_in_a_plane_that_is_turned_are_those_of_the_scene():
     """The scene's own answer, turned by 40 deg as complex numbers."""
     turned = math.radians(40.0)
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 5.0, 6), 10.0, 5.0))
     solution = fourbar.solve(scene)
 
-    def turn(vector: np.ndarray) -> np.ndarray:
+    def turn(vector):
         turned_vector = complex(*vector) * cmath.exp(1j * turned)
         return np.array([turned_vector.real, turned_vector.imag])
 
@@ -108,7 +108,7 @@ def test_forces_in_a_plane_that_is_turned_are_those_of_the_scene() -> None:
     assert max(values.max() for values in differences.values()) < 1e-10
 
 
-def test_options_that_do_not_go_together_are_refused() -> None:
+def test_options_that_do_not_go_together_are_refused():
     for command, arguments in (
         (check_mjcf, ("a.toml", FOOT, "b.xml")),
         (check_mjcf, (FOOT, "--mimic", "crank")),
@@ -121,8 +121,8 @@ def test_options_that_do_not_go_together_are_refused() -> None:
 
 @pytest.mark.slow
 def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     file = tmp_path / "parallelogram.xml"
     file.write_text(make_parallelogram(0.5, 0.4, "0 0 0").text, encoding="utf-8")
     checked = call(check_mjcf, str(file), "-o", str(tmp_path))
@@ -150,8 +150,8 @@ def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
 
 @pytest.mark.slow
 def test_errors_beside_a_limit_are_told_from_those_of_the_motion(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     """O2 O4 = 4, O2 A = 1, A B = 1.5, O4 B = 2 m: no bar turns fully.
 
     Bars 3 and 4 are in line where cos theta_2 = (16 + 1 - 3.5^2)/8.
@@ -175,7 +175,7 @@ def test_errors_beside_a_limit_are_told_from_those_of_the_motion(
     assert "deg is 2 deg from a limit position, where forces grow" in said
 
 
-def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path: Path) -> None:
+def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path):
     file = tmp_path / "foot.xml"
     file.write_text(FOOT_PARALLELOGRAM, encoding="utf-8")
     checked = call(check_mjcf, str(file), "-o", str(tmp_path))

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -59,11 +58,11 @@ PAD = """<body pos="0 0.04 0"><joint name="pad"/><geom size="0.004"/></body>"""
 
 
 def write_upright(
-    folder: Path,
-    polycoef: str = "0 1 0 0 0",
-    sense: int = 1,
-    pad: str = PAD,
-) -> Path:
+    folder,
+    polycoef="0 1 0 0 0",
+    sense=1,
+    pad=PAD,
+):
     path = folder / "upright.xml"
     path.write_text(UPRIGHT.format(polycoef=polycoef, sense=sense, pad=pad))
     return path
@@ -72,11 +71,11 @@ def write_upright(
 @pytest.mark.slow
 @pytest.mark.parametrize(("sense", "pad"), [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
 def test_theta_2_is_counted_from_where_the_file_has_the_bar(
-    sense: int,
-    pad: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    sense,
+    pad,
+    tmp_path,
+    capsys,
+):
     report = measure_mimic(
         write_upright(tmp_path, sense=sense, pad=pad), "rocker_j", GRIPPER
     )
@@ -97,8 +96,8 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
 
 @pytest.mark.slow
 def test_a_parallelogram_loses_nothing_and_its_crossed_form_much(
-    tmp_path: Path,
-) -> None:
+    tmp_path,
+):
     path = write_upright(tmp_path)
     report = measure_mimic(path, "rocker_j", PARALLELOGRAM)
     assert report.file.angle <= ROUND_OFF
@@ -113,7 +112,7 @@ def test_a_parallelogram_loses_nothing_and_its_crossed_form_much(
 
 
 @pytest.mark.slow
-def test_a_motion_through_a_change_point_is_refused(tmp_path: Path) -> None:
+def test_a_motion_through_a_change_point_is_refused(tmp_path):
     angles = np.radians(np.linspace(-30.0, 30.0, 61))
     motion = PARALLELOGRAM.motion.replace(angle=angles)
     through = replace(PARALLELOGRAM, motion=motion)
@@ -121,13 +120,13 @@ def test_a_motion_through_a_change_point_is_refused(tmp_path: Path) -> None:
         measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
 
-def write(folder: Path, polycoef: str = "0 0.8842 0 0 0", axis: int = 1) -> Path:
+def write(folder, polycoef="0 0.8842 0 0 0", axis=1):
     path = folder / "mimic.xml"
     path.write_text(FILE.format(polycoef=polycoef, axis=axis))
     return path
 
 
-def ask_mujoco(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def ask_mujoco(path):
     """Find the follower's position at each of the leader's.
 
     MuJoCo's own equality is satisfied at it.
@@ -144,7 +143,7 @@ def ask_mujoco(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-def test_what_the_file_loses_through_its_own_zero(tmp_path: Path) -> None:
+def test_what_the_file_loses_through_its_own_zero(tmp_path):
     report = measure_mimic(write(tmp_path), "s", KNEE)
     assert math.degrees(report.file.angle) == pytest.approx(1.7507, abs=5e-5)
     assert report.file.ratio == pytest.approx(0.1267, abs=5e-5)
@@ -167,9 +166,9 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_each_error_stands_with_its_name(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path,
+    capsys,
+):
     show_mimic(measure_mimic(write(tmp_path), "s", KNEE))
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
@@ -189,7 +188,7 @@ def test_each_error_stands_with_its_name(
 
 
 @pytest.mark.slow
-def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path: Path) -> None:
+def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path):
     best = measure_mimic(write(tmp_path), "s", KNEE).fitted[2]
     polycoef = " ".join(f"{number!r}" for number in (*best.coefficients, 0.0))
     again = measure_mimic(write(tmp_path, polycoef), "s", KNEE)
@@ -204,10 +203,10 @@ def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path: Path) -> 
     [(np.square, 1, 0.5), (np.abs, 2, 0.125), (lambda x: x**3, 2, 0.25)],
 )
 def test_the_smallest_largest_error_is_that_of_the_textbooks(
-    function: object,
-    degree: int,
-    smallest: float,
-) -> None:
+    function,
+    degree,
+    smallest,
+):
     """Chebyshev's theorem.
 
     x^n is missed by 2^(1-n) by polynomials of degree n - 1, |x| by 1/8 by parabolas.
@@ -218,7 +217,7 @@ def test_the_smallest_largest_error_is_that_of_the_textbooks(
     assert np.abs(left).max() == pytest.approx(smallest, rel=1e-5)
 
 
-def test_least_squares_are_the_normal_equations() -> None:
+def test_least_squares_are_the_normal_equations():
     x = np.linspace(-0.7, 0.7, 41)
     y = np.exp(x)
     powers = np.vander(x, 4, increasing=True)
@@ -227,7 +226,7 @@ def test_least_squares_are_the_normal_equations() -> None:
 
 
 @pytest.mark.slow
-def test_an_include_may_lie_in_the_folder_of_assets(tmp_path: Path) -> None:
+def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):
     home, elsewhere = tmp_path / "a" / "b", tmp_path / "assets"
     for folder in (home, elsewhere):
         folder.mkdir(parents=True)
@@ -243,14 +242,14 @@ def test_an_include_may_lie_in_the_folder_of_assets(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path: Path) -> None:
+def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path):
     few = replace(KNEE, motion=KNEE.motion.replace(angle=np.linspace(-0.5, 0.5, 5)))
     with pytest.raises(InputError, match="range of at least 6 positions"):
         measure_mimic(write(tmp_path), "s", few)
 
 
 @pytest.mark.slow
-def test_a_joint_that_follows_none_is_refused(tmp_path: Path) -> None:
+def test_a_joint_that_follows_none_is_refused(tmp_path):
     with pytest.raises(InputError, match="follows no other"):
         measure_mimic(write(tmp_path), "c", KNEE)
     with pytest.raises(InputError, match="no such joint"):
@@ -269,7 +268,7 @@ COUPLER = """<mujoco><worldbody><body name="crank"><joint name="j2" axis="0 0 1"
 </mujoco>"""
 
 
-def test_a_follower_on_the_crank_turns_the_coupler(tmp_path: Path) -> None:
+def test_a_follower_on_the_crank_turns_the_coupler(tmp_path):
     """Its angle is theta_3 - theta_2, here from the two circles of the loop."""
     path = tmp_path / "coupler.xml"
     path.write_text(COUPLER)
@@ -308,10 +307,10 @@ def test_a_follower_on_the_crank_turns_the_coupler(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("ground", [0.03, 0.04])
 def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    ground: float,
-) -> None:
+    tmp_path,
+    capsys,
+    ground,
+):
     """A coupler that stays parallel turns by -theta_2 on the crank.
 
     In a rhombus its hinge is as far from the crank's as the rocker's is.
@@ -339,10 +338,10 @@ def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
     ],
 )
 def test_the_tree_tells_which_bars_a_follower_joins(
-    tmp_path: Path,
-    tree: str,
-    bars: tuple[int, int],
-) -> None:
+    tmp_path,
+    tree,
+    bars,
+):
     body = '<body pos=".1 0 0"><joint name="{}" axis="0 0 1"/><geom size=".01"/>'
     bodies = tree.replace("(", "<").replace(")", "</body>")
     for name in "LCF":

@@ -12,7 +12,6 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
-    RobotMeasurement,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
@@ -31,14 +30,14 @@ from tests.support.robots import FINGER
 
 
 @cache
-def measured() -> RobotMeasurement:
+def measured():
     file = RobotFile(Path("finger.xml"), FINGER)
     options = MeasureOptions(PoseOptions(), "pip_link-middle", torque=0.05)
     return measure_loops(file, options, None)
 
 
 @pytest.mark.slow
-def test_what_was_switched_off_and_left_out_is_said() -> None:
+def test_what_was_switched_off_and_left_out_is_said():
     said = [
         block for block in describe_measurement(measured()) if isinstance(block, str)
     ]
@@ -54,7 +53,7 @@ def test_what_was_switched_off_and_left_out_is_said() -> None:
 
 
 @pytest.mark.slow
-def test_the_states_are_those_that_were_asked_at() -> None:
+def test_the_states_are_those_that_were_asked_at():
     rows = list(csv.DictReader(io.StringIO(write_states(measured().loops))))
     (loop,) = measured().loops
     assert loop.through_time is not None
@@ -79,11 +78,11 @@ def test_the_states_are_those_that_were_asked_at() -> None:
         (math.inf, "inf %"),
     ],
 )
-def test_percentages_have_one_notation(part: float, written: str) -> None:
+def test_percentages_have_one_notation(part, written):
     assert write_percent(part) == written
 
 
-def test_a_page_holds_sentences_tables_and_elements() -> None:
+def test_a_page_holds_sentences_tables_and_elements():
     blocks = [
         "one *sentence*",
         TextTable(("a", "b"), [("1|2", "3")]),
@@ -98,9 +97,9 @@ def test_a_page_holds_sentences_tables_and_elements() -> None:
 
 @pytest.mark.slow
 def test_the_report_is_printed_and_written(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path,
+    capsys,
+):
     blocks = list(describe_measurement(measured()))
     rows = list_measured_rows(measured())
     out = tmp_path / "new"

@@ -2,7 +2,6 @@
 
 import math
 import re
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -17,7 +16,7 @@ from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
 from tests.validation.robots.test_files import TETRAHEDRON
@@ -31,7 +30,7 @@ DENSITY = 2700.0
 WIDTH, DEPTH = 0.02, 0.01
 
 
-def find_pin(near: complex, far: complex, r_near: float, r_far: float) -> complex:
+def find_pin(near, far, r_near, r_far):
     """Return the upper point at two distances from two points."""
     apart = abs(far - near)
     along = (r_near**2 - r_far**2 + apart**2) / (2.0 * apart)
@@ -46,7 +45,7 @@ ROD = math.atan2((PIN_B - PIN_A).imag, (PIN_B - PIN_A).real)
 ROCKER = math.atan2(PIN_B.imag, PIN_B.real - D)
 
 
-def make_bar(length: float) -> Bar:
+def make_bar(length):
     """Return a bar that is a box of WIDTH in the plane."""
     mass = DENSITY * length * WIDTH * DEPTH
     return Bar(length, mass, inertia=mass * (length**2 + WIDTH**2) / 12.0)
@@ -59,7 +58,7 @@ SCENE = Scene(
 )
 
 
-def write_inertial(length: float) -> str:
+def write_inertial(length):
     bar = make_bar(length)
     around = f"<ixx>1</ixx><iyy>1</iyy><izz>{bar.inertia}</izz>"
     return (
@@ -68,7 +67,7 @@ def write_inertial(length: float) -> str:
     )
 
 
-def write_link(name: str, length: float, pose: str) -> str:
+def write_link(name, length, pose):
     return f'<link name="{name}">{pose}{write_inertial(length)}</link>'
 
 
@@ -95,7 +94,7 @@ PLAIN = f"""<sdf version="1.9"><world name="w"><gravity>0 -9.81 0</gravity>{MODE
 </world></sdf>"""
 
 
-def write_box(length: float) -> str:
+def write_box(length):
     return (
         f'<inertial auto="true"/><collision name="c"><density>{DENSITY}</density>'
         f"<pose>{length / 2} 0 0 0 0 0</pose><geometry><box><size>{length} {WIDTH} "
@@ -104,7 +103,7 @@ def write_box(length: float) -> str:
     )
 
 
-def put(*changes: tuple[str, str]) -> str:
+def put(*changes):
     """Return the plain file with texts replaced that stand in it once."""
     text = PLAIN
     for old, new in changes:
@@ -219,7 +218,7 @@ STATED = {
 }
 
 
-def write_drake() -> str:
+def write_drake():
     """Return thin rods drawn anywhere, whose joints have a frame on each link.
 
     The prefix is bound nowhere, as in Drake's own files.
@@ -261,7 +260,7 @@ def write_drake() -> str:
     return put((MODEL, f'<model name="linkage">{text}</model>'))
 
 
-def write_halves() -> str:
+def write_halves():
     """Return the rod as two halves on each other, which a constraint welds."""
     rod = make_bar(B)
     half = COUPLER.replace(f"<mass>{rod.mass}", f"<mass>{rod.mass / 2.0}")
@@ -283,14 +282,14 @@ ROD_MODEL = f"""<sdf version="1.9"><model name="rod"><pose>9 9 9 0 0 0</pose>
 <frame name="start" attached_to="rod"/></model></sdf>"""
 
 
-def read(folder: Path, text: str) -> RobotFile:
+def read(folder, text):
     path = folder / "linkage.sdf"
     path.write_text(text)
     return read_robot(path)
 
 
 @pytest.mark.parametrize("way", STATED)
-def test_torque_and_pin_forces_are_those_of_the_bars(way: str, tmp_path: Path) -> None:
+def test_torque_and_pin_forces_are_those_of_the_bars(way, tmp_path):
     (tmp_path / "rod").mkdir()
     (tmp_path / "rod" / "model.sdf").write_text(ROD_MODEL)
     made = read_loop_scene(read(tmp_path, STATED[way]), PoseOptions(), None, 10.0)
@@ -308,15 +307,13 @@ def test_torque_and_pin_forces_are_those_of_the_bars(way: str, tmp_path: Path) -
         )
 
 
-def compile_text(folder: Path, text: str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+def compile_text(folder, text):
     robot = compile_robot(read(folder, text))
     return robot.model, robot.notes
 
 
 @pytest.mark.parametrize("way", ["plain", "joints from the other side"])
-def test_angles_of_a_joint_turn_the_child_against_the_parent(
-    way: str, tmp_path: Path
-) -> None:
+def test_angles_of_a_joint_turn_the_child_against_the_parent(way, tmp_path):
     text = STATED[way].replace(CLOSING, "").replace('"A" type="revolute"', UNIVERSAL)
     text = text.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
     model, _ = compile_text(tmp_path, text)
@@ -333,11 +330,11 @@ def test_angles_of_a_joint_turn_the_child_against_the_parent(
     np.testing.assert_allclose(relative[1], expected, atol=AGREES)
 
 
-def closes(folder: Path, text: str) -> str:
+def closes(folder, text):
     return compile_text(folder, text)[0].eq(0).name
 
 
-def test_the_joint_farthest_from_the_world_closes_the_loop(tmp_path: Path) -> None:
+def test_the_joint_farthest_from_the_world_closes_the_loop(tmp_path):
     last = put((PIN_OF_CRANK, ""), (CRANK, PIN_OF_CRANK + CRANK))
     assert closes(tmp_path, last) == "B"
     both = last.replace(CLOSING, "").replace(CRANK, CLOSING + CRANK)
@@ -362,9 +359,7 @@ LIMITED = "<limit><lower>-3</lower></limit></axis>"
         ({pin: DAMPED for pin in ("O2", "A", "B", "O4")}, "halves"),
     ],
 )
-def test_the_joint_that_loses_least_closes_the_loop(
-    kinds: dict[str, str], closing: str, tmp_path: Path
-) -> None:
+def test_the_joint_that_loses_least_closes_the_loop(kinds, closing, tmp_path):
     """The rod is in two halves on each other that a fixed joint holds together."""
     shadow = COUPLER.replace('"rod"', '"shadow"')
     halves = (
@@ -386,7 +381,7 @@ def test_the_joint_that_loses_least_closes_the_loop(
     assert lost == ([] if closing == "halves" else ["range" * (closing in kinds)])
 
 
-def test_a_tensor_is_turned_with_its_frame(tmp_path: Path) -> None:
+def test_a_tensor_is_turned_with_its_frame(tmp_path):
     stated = (
         "<inertial><pose>0 0 0 0.3 0.4 0.5</pose><mass>1</mass><inertia><ixx>2</ixx>"
         "<iyy>3</iyy><izz>4</izz><ixy>0.1</ixy><ixz>0.2</ixz><iyz>0.3</iyz></inertia>"
@@ -426,8 +421,8 @@ def test_a_tensor_is_turned_with_its_frame(tmp_path: Path) -> None:
     [(1000.0, ""), (500.0, "<density>500</density>")],
 )
 def test_auto_inertials_are_volumes_by_densities(
-    shape: str, volume: float, density: float, stated: str, tmp_path: Path
-) -> None:
+    shape, volume, density, stated, tmp_path
+):
     (tmp_path / "rod").mkdir()
     (tmp_path / "rod" / "part.obj").write_text(TETRAHEDRON)
     collision = f"<collision name='c'>{stated}<geometry>{shape}</geometry>"
@@ -436,7 +431,7 @@ def test_auto_inertials_are_volumes_by_densities(
     assert model.body("crank").mass[0] == pytest.approx(density * volume, rel=1e-7)
 
 
-def test_numbers_of_a_joint_are_those_of_its_file(tmp_path: Path) -> None:
+def test_numbers_of_a_joint_are_those_of_its_file(tmp_path):
     axis = (
         "<axis><xyz>0 0 1</xyz><dynamics><damping>0.1</damping><friction>0.2</friction>"
         "<spring_stiffness>0.3</spring_stiffness><spring_reference>0.4"
@@ -483,9 +478,7 @@ def test_numbers_of_a_joint_are_those_of_its_file(tmp_path: Path) -> None:
         ("screw", [], 6),
     ],
 )
-def test_joints_of_each_type_leave_its_freedoms(
-    kind: str, names: list[str], freedoms: int, tmp_path: Path
-) -> None:
+def test_joints_of_each_type_leave_its_freedoms(kind, names, freedoms, tmp_path):
     joint = PIN_OF_CRANK.replace("revolute", kind)
     joint = joint.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
     model, notes = compile_text(tmp_path, put((PIN_OF_CRANK, joint), (CLOSING, "")))
@@ -495,16 +488,14 @@ def test_joints_of_each_type_leave_its_freedoms(
     assert notes == (("left out of the SDF: the screw joint A",) * (kind == "screw"))
 
 
-def start_at(axis: str, angle: float) -> str:
+def start_at(axis, angle):
     """Return an axis of SDF with the position at which its joint begins."""
     start = f"<initial_position>{angle}</initial_position></axis>"
     return axis.replace("</axis>", start)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_loop_begins_at_the_initial_positions_of_its_joints(
-    sign: float, tmp_path: Path
-) -> None:
+def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
     """All links are drawn along the ground; the positions alone tell the assembly."""
     turned = [sign * angle for angle in (START, ROD - START, ROCKER)]
     text = STATED["ball constraint"]
@@ -539,7 +530,7 @@ def test_a_loop_begins_at_the_initial_positions_of_its_joints(
     )
 
 
-def test_a_slide_begins_at_its_initial_position(tmp_path: Path) -> None:
+def test_a_slide_begins_at_its_initial_position(tmp_path):
     joint = PIN_OF_CRANK.replace("revolute", "prismatic")
     text = put((PIN_OF_CRANK, start_at(joint, 0.07)), (CLOSING, ""))
     model, _ = compile_text(tmp_path, text)
@@ -550,9 +541,7 @@ def test_a_slide_begins_at_its_initial_position(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("starts", [(0.0, 0.0), (0.2, 0.5)])
-def test_a_joint_follows_by_its_multiplier_offset_and_reference(
-    starts: tuple[float, float], tmp_path: Path
-) -> None:
+def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path):
     """MuJoCo's own residual of the line is zero where SDF's line goes through."""
     mimic = (
         '<mimic joint="O2"><multiplier>-2</multiplier><offset>0.3</offset>'
@@ -573,7 +562,7 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(
     assert data.efc_pos[:1] == pytest.approx([0.0], abs=AGREES)
 
 
-def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path: Path) -> None:
+def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path):
     text = put(
         ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
         (CLOSING, "<drake:linear_bushing_rpy/>"),
@@ -583,7 +572,7 @@ def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path: Path) 
     assert any("put <drake:ball_constraint> in its place" in note for note in notes)
 
 
-def test_what_stands_and_what_floats(tmp_path: Path) -> None:
+def test_what_stands_and_what_floats(tmp_path):
     alone = "<model name='{}'>{}<link name='part'/></model>"
     shelf = alone.format("shelf", f"<static>1</static>{alone.format('board', '')}")
     models = shelf + alone.format("ball", "")
@@ -627,9 +616,7 @@ def test_what_stands_and_what_floats(tmp_path: Path) -> None:
         (f"<mass>{make_bar(A).mass}</mass>", "<mass>-1</mass>", "above 0"),
     ],
 )
-def test_what_contradicts_itself_is_refused_in_one_line(
-    old: str, new: str, message: str | None, tmp_path: Path
-) -> None:
+def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, tmp_path):
     text = put((old, new))
     if message is None:
         assert compile_text(tmp_path, text)[0].nbody == 1
@@ -666,8 +653,8 @@ ixz="0" iyz="0"/></inertial></link><gazebo/>
     ],
 )
 def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
-    gazebo: str, way: str, tmp_path: Path
-) -> None:
+    gazebo, way, tmp_path
+):
     text = URDF.replace("<gazebo/>", gazebo)
     report = list_closures(read(tmp_path, text), PoseOptions())
     (closure,) = report.closures

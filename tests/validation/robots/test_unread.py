@@ -18,7 +18,7 @@ UNREAD = [
 ]
 
 
-def test_what_the_check_does_not_know_is_named_as_not_looked_at() -> None:
+def test_what_the_check_does_not_know_is_named_as_not_looked_at():
     assert list_unread(GENERATED) == []
     text = GENERATED
     for old, new, _ in UNREAD:

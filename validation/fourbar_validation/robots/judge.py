@@ -13,7 +13,7 @@ import numpy as np
 
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, FORCE_NAMES, OK, PIN_FORCES, UNKNOWNS, Array
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Scene, command
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -29,7 +29,6 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
-    FORCE_QUANTITIES,
     BarMotion,
     InsideAnswer,
     LoopMeasurement,
@@ -47,7 +46,6 @@ from fourbar_validation.robots.differences import (
     price,
 )
 from fourbar_validation.robots.guard import examine_guarded
-from fourbar_validation.robots.measure import turn_vectors
 from fourbar_validation.robots.unread import list_unread
 
 FILE_AT_ONE_STATE = "mjcf-one-state"
@@ -338,25 +336,9 @@ def _make_answer(
     measured: LoopMeasurement, inside: InsideAnswer, engine: str, setting: str
 ) -> Answer:
     rows = inside.rows
-    count = len(rows)
-    opened = [angle - measured.turned for angle in inside.open]
-    angles = [row.angle - measured.turned for row in rows]
-    speeds = [row.speed for row in rows]
-    rates = [row.acceleration for row in rows]
-    at = Command(
-        np.array([*angles, *opened]),
-        np.full(count + len(opened), measured.scene.motion.branch, dtype=np.int8),
-        np.array([*speeds, *(speeds[:1] * len(opened))]),
-        np.array([*rates, *(rates[:1] * len(opened))]),
-        bar=command(measured.scene).bar,
-    )
-    quantities = {}
-    for name in FORCE_QUANTITIES:
-        values = np.array([row.soft.values()[name] for row in rows], dtype=float)
-        if values.ndim == 2:
-            values = turn_vectors(values, -measured.turned)
-        quantity = name_driving(measured.scene) if name == COUPLE.value else name
-        quantities[quantity] = values
+    at = measured.command(inside)
+    count = len(at.angle)
+    quantities = measured.collect(inside, "soft")
     for name in BarMotion._fields:
         if name.endswith(f"_{at.bar}"):
             continue
@@ -364,14 +346,7 @@ def _make_answer(
         if name.startswith("theta"):
             values = values - measured.turned
         quantities[name] = values
-    blank = len(opened)
     for name, values in quantities.items():
-        missing = np.full((blank, *values.shape[1:]), np.nan)
+        missing = np.full((len(inside.open), *values.shape[1:]), np.nan)
         quantities[name] = np.concatenate([values, missing])
-    return Answer(
-        engine,
-        setting,
-        at,
-        np.arange(count + blank) < count,
-        quantities,
-    )
+    return Answer(engine, setting, at, np.arange(count) < len(rows), quantities)

@@ -4,8 +4,8 @@
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import COUPLE, OK, UNITS, Array
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
@@ -22,7 +22,6 @@ from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
     FORCE_QUANTITIES,
     InsideAnswer,
-    InsideRow,
     LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
@@ -150,18 +149,11 @@ def _compare(
     nothing is judged.
     """
     rows = answer.rows
-    motion = loop.scene.motion
-    commanded = Command(
-        np.array([row.angle for row in rows]) - loop.turned,
-        np.full(len(rows), motion.branch, dtype=np.int8),
-        np.array([row.speed for row in rows]),
-        np.array([row.acceleration for row in rows]),
-        bar=command(loop.scene).bar,
-    )
+    commanded = loop.command(replace(answer, open=[]))
     formulas = solve(loop.scene, "force", at=commanded)
     reversing = mark_reversing(loop.scene, formulas, _SLIP)
     if method == RIGID:
-        errors = _subtract_formulas(rows, formulas, loop)
+        errors = _subtract_formulas(answer, formulas, loop)
     else:
         errors = answer.errors()
     largest = loop.states.sizes()
@@ -189,7 +181,7 @@ def _compare(
 
 
 def _subtract_formulas(
-    rows: Sequence[InsideRow],
+    answer: InsideAnswer,
     formulas: Solution,
     loop: LoopMeasurement,
 ) -> dict[str, Array]:
@@ -199,22 +191,15 @@ def _subtract_formulas(
     value.
     """
     judged = formulas.status_code == OK
-    differences = {}
-    for name in FORCE_QUANTITIES:
-        rigid = np.array([row.rigid.values()[name] for row in rows])
-        if rigid.ndim == 2:
-            rigid = turn_vectors(rigid, -loop.turned)
-        quantity = name_driving(loop.scene) if name == COUPLE.value else name
-        sizes = measure_sizes(rigid - np.asarray(getattr(formulas, quantity)))
-        differences[name] = np.where(judged, sizes, math.inf)
-    return differences
-
-
-def turn_vectors(vectors: Array, angle: float) -> Array:
-    """Turn vectors (n, 2) counter-clockwise."""
-    cos = math.cos(angle)
-    sin = math.sin(angle)
-    return np.asarray(vectors @ np.array([[cos, sin], [-sin, cos]]))
+    rigid = loop.collect(answer, "rigid").items()
+    return {
+        name: np.where(
+            judged,
+            measure_sizes(force - np.asarray(getattr(formulas, quantity))),
+            math.inf,
+        )
+        for name, (quantity, force) in zip(FORCE_QUANTITIES, rigid, strict=True)
+    }
 
 
 def find_worst_of_loop(loop: LoopMeasurement) -> float:

@@ -16,6 +16,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.quantities import PIN_FORCES, UNITS
+from fourbar.scene import command
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import (
     UNDECIDED,
@@ -30,6 +31,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     SettingsAdvice,
     TriedSettings,
 )
+from fourbar_validation.engines.mujoco.robots.loop import name_following
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell
 from fourbar_validation.robots.judge import LoopJudgement
@@ -195,9 +197,9 @@ def _describe_loop(
         places = ", ".join(map(write_degrees, loop.states.in_line))
         count = len(loop.states.in_line)
         yield (
-            f"left out: {count} of {count + len(loop.states.rows)} states, with coupler"
-            f" and output in line{within_digits} ({loop.joint} = {places} deg), where"
-            " the loop may go on in two ways"
+            f"left out: {count} of {count + len(loop.states.rows)} states, with"
+            f" {name_following(command(loop.scene).bar)} in line{within_digits}"
+            f" ({loop.joint} = {places} deg), where the loop may go on in two ways"
         )
     errors = list_errors_by_method(loop)
     if left_out <= LEAST_LEFT_OUT:

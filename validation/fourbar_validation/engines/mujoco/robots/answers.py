@@ -7,12 +7,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.quantities import PIN_FORCES, Array
-from fourbar.scene import Scene
+from fourbar.quantities import COUPLE, PIN_FORCES, Array
+from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 
 FORCE_QUANTITIES = ("torque", *PIN_FORCES)
+OTHER_ASSEMBLY = (
+    "MuJoCo goes over to the other assembly before the loop has settled; the motion of"
+    " a SCENE may start elsewhere"
+)
+"""Why a motion has no state that counts."""
 ROUND_OFF_OF_A_FILE = 1e-5
 """Part of its terms below which a torque or a pin force is the rounding of a file.
 MuJoCo saves six significant digits: half of the last is up to 5e-6 of a length, and the
@@ -171,23 +177,28 @@ class InsideAnswer:
     seconds_per_step: float = math.nan
     """Processor time of a step of the whole robot, s."""
 
+    def collect(self, which: str) -> dict[str, Array]:
+        """Return torque (n,) and pin forces (n, 2), N m and N: "soft" or "rigid"."""
+        states = [getattr(row, which).values() for row in self.rows]
+        return {
+            name: np.array([state[name] for state in states], dtype=float)
+            for name in FORCE_QUANTITIES
+        }
+
+    def differences(self) -> dict[str, Array]:
+        """Return soft less rigid torque (n,) and pin forces (n, 2), N m and N."""
+        rigid = self.collect("rigid")
+        return {name: soft - rigid[name] for name, soft in self.collect("soft").items()}
+
     def errors(self) -> dict[str, Array]:
         """Return the size of the error of torque and pin forces, (n,), N m and N."""
-        sizes = {}
-        for name in FORCE_QUANTITIES:
-            soft, rigid = (
-                np.array([getattr(row, which).values()[name] for row in self.rows])
-                for which in ("soft", "rigid")
-            )
-            sizes[name] = measure_sizes(soft - rigid)
-        return sizes
+        errors = self.differences().items()
+        return {name: measure_sizes(error) for name, error in errors}
 
     def sizes(self) -> dict[str, Array]:
         """Return the sizes of torque and pin forces of rigid pins, (n,), N m and N."""
-        return {
-            name: measure_sizes([row.rigid.values()[name] for row in self.rows])
-            for name in FORCE_QUANTITIES
-        }
+        forces = self.collect("rigid").items()
+        return {name: measure_sizes(force) for name, force in forces}
 
     def scales(self, lever: float) -> dict[str, float]:
         """Return what errors are divided by, from rigid pins, as `find_scales` does."""
@@ -379,8 +390,41 @@ class LoopMeasurement:
     """Armature of the driven hinge that drives, kg m^2."""
     unmet_stops: tuple[int, ...]
     """Hinges of the loop whose stops ended no state."""
-    left_assembly: bool
-    """True if the simulation went over to the other assembly."""
+
+    @property
+    def left_assembly(self) -> bool:
+        """Tell whether the simulation went over to the other assembly."""
+        through = self.through_time
+        left = through is not None and through.other_assembly is not None
+        return left or self.refusal == OTHER_ASSEMBLY
+
+    def command(self, answer: InsideAnswer) -> Command:
+        """Return the command of an answer in the axes of the scene.
+
+        The states that are answered come first, then the angles that are open.
+        """
+        rows = [*answer.rows, *answer.rows[:1] * len(answer.open)]
+        angles = [*(row.angle for row in answer.rows), *answer.open]
+        return Command(
+            np.array(angles) - self.turned,
+            np.full(len(rows), self.scene.motion.branch, dtype=np.int8),
+            np.array([row.speed for row in rows]),
+            np.array([row.acceleration for row in rows]),
+            bar=command(self.scene).bar,
+        )
+
+    def collect(self, answer: InsideAnswer, which: str) -> dict[str, Array]:
+        """Return what the drive exerts (n,), and the pin forces (n, 2), of an answer.
+
+        The names and axes are those of the scene, N m and N. `which`: "soft" or
+        "rigid".
+        """
+        forces = answer.collect(which)
+        drive = forces.pop(COUPLE.value)
+        turned = np.exp(-1j * self.turned)
+        axes = np.array([[turned.real, turned.imag], [-turned.imag, turned.real]])
+        values = {name: force @ axes for name, force in forces.items()}
+        return {name_driving(self.scene): drive, **values}
 
     def find_vanishing(self, quantity: str) -> float | None:
         """Return the scale of the terms of a quantity that is their rounding."""

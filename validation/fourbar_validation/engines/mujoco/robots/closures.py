@@ -5,6 +5,7 @@ the fourth pin; or four hinges and a weld, which joins two halves of a bar. Bodi
 no joint parts, or a held one, are one bar.
 """
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,6 +32,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.loop import (
     PoseOptions,
     RobotClosure,
@@ -41,6 +43,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
     PARALLEL,
+    find_mean_axis,
     find_normals,
     find_offset,
 )
@@ -267,12 +270,6 @@ class _Finder:
         self.before = mujoco.MjData(self.model)
         self.before.qpos[:] = posed.stated
         mujoco.mj_kinematics(self.model, self.before)
-        self.stated = PosedRobot(
-            self.model,
-            self.before,
-            posed.stated,
-            (),
-        )
 
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""
@@ -663,46 +660,113 @@ class _Finder:
         by_pin = dict(zip(PINS, pins, strict=True))
         hinges = {pin: joint for pin, joint in by_pin.items() if joint is not None}
         bodies = dict(zip((1, 2, 3, 4), groups, strict=True))
-        layout = _Layout(self, self.posed, bodies, hinges, number)
         cut = next((pin for pin, joint in by_pin.items() if joint is None), None)
-        reason = layout.measure(cut)
+        moving = set(hinges.values())
+        sides = {
+            pin: 1.0 if self._find_root(joint) in bodies[PINS[pin][1]] else -1.0
+            for pin, joint in hinges.items()
+        }
+        # about it the driven joint turns bar 2 counter-clockwise
+        normal = sides["O2"] * find_mean_axis(self.data, hinges.values())
+        places = self._locate_pins(number, bodies, hinges, cut)
+        along = self._choose_along(normal, places[1, "O4"] - places[1, "O2"])
+
+        def to_body(bar: int, vector: Array) -> Array:
+            """Return a vector of the world in the frame of a bar's first body."""
+            rotation = self.data.xmat[bodies[bar][0]].reshape(3, 3)
+            return np.asarray(rotation.T @ vector)
+
+        loop = RobotLoop(
+            name=name,
+            equality=number,
+            closures=(number,),
+            cut=cut,
+            bodies=bodies,
+            ground=chain.ground_name,
+            hinges=hinges,
+            senses={
+                pin: math.copysign(1.0, side * self.data.xaxis[hinges[pin]] @ normal)
+                for pin, side in sides.items()
+            },
+            points={
+                (bar, pin): to_body(bar, place - self.data.xpos[bodies[bar][0]])
+                for (bar, pin), place in places.items()
+            },
+            axis=to_body(1, normal),
+            along=to_body(1, along),
+            misaligned=self._measure_axes(chain)[0] or 0.0,
+            lengths=(),
+            angles=(),
+            stated_angles=(),
+            qpos=self.data.qpos.copy(),
+            held=tuple(j for j in range(self.model.njnt) if j not in moving),
+            motors=tuple(dict.fromkeys(actuator for _, actuator in motors)),
+            other_equalities=(),
+        )
+        frame = LoopFrame(loop, self.data)
+        lines = [complex(*frame.line(bar)) for bar in ENDS]
+        loop = replace(
+            loop,
+            lengths=tuple(map(abs, lines)),
+            angles=tuple(map(cmath.phase, lines)),
+            stated_angles=tuple(map(LoopFrame(loop, self.before).angle, ENDS)),
+        )
+        for length, (one, other) in zip(loop.lengths, ENDS.values(), strict=True):
+            if length <= COINCIDENT_PINS * max(loop.lengths):
+                reason = f"pins {one} and {other} are in one place: a bar has no length"
+                return None, reason
+        closures, others, reason = self._sort_equalities(loop)
         if reason:
             return None, reason
-        before = _Layout(self, self.stated, bodies, hinges, number)
-        before.measure(cut)
-        closures, tied = self._sort_equalities(number, bodies, layout, cut)
-        rigid = [other for other in tied if isinstance(other, str)]
-        if rigid:
-            return None, rigid[0]
-        remarks += _describe_offset(self.posed, tuple(closures), layout)
-        moving = set(hinges.values())
-        return (
-            RobotLoop(
-                name=name,
-                equality=number,
-                closures=tuple(closures),
-                cut=cut,
-                bodies=bodies,
-                ground=chain.ground_name,
-                hinges=hinges,
-                senses=layout.senses,
-                points=layout.points,
-                axis=layout.axis,
-                along=layout.along,
-                misaligned=self._measure_axes(chain)[0] or 0.0,
-                lengths=layout.lengths,
-                angles=layout.angles,
-                stated_angles=before.angles,
-                qpos=self.data.qpos.copy(),
-                held=tuple(j for j in range(self.model.njnt) if j not in moving),
-                motors=tuple(dict.fromkeys(actuator for _, actuator in motors)),
-                other_equalities=tuple(
-                    other for other in tied if isinstance(other, int)
-                ),
-                remarks=tuple(remarks),
-            ),
-            "",
+        remarks += _describe_offset(self.posed, closures, loop, normal)
+        loop = replace(
+            loop,
+            closures=closures,
+            other_equalities=others,
+            remarks=tuple(remarks),
         )
+        return loop, ""
+
+    def _find_root(self, joint: int) -> int:
+        """Return the bar that a joint turns."""
+        return self.root[int(self.model.jnt_bodyid[joint])]
+
+    def _locate_pins(
+        self,
+        number: int,
+        bodies: dict[int, tuple[int, ...]],
+        hinges: dict[str, int],
+        cut: str | None,
+    ) -> dict[tuple[int, str], Array]:
+        """Locate each pin on each of its bars, by bar and pin, (3,), m."""
+        places = {
+            (bar, pin): self.data.xanchor[joint].copy()
+            for pin, joint in hinges.items()
+            for bar in PINS[pin]
+        }
+        if cut is not None:
+            for end in find_ends(self.model, self.data, number):
+                root = self.root[end.body]
+                bar = next(bar for bar in PINS[cut] if root in bodies[bar])
+                places[bar, cut] = end.place
+        return places
+
+    def _choose_along(self, normal: Array, line: Array) -> Array:
+        """Return the unit vector x of a plane in world axes, (3,).
+
+        The direction is across gravity unless the plane is level, else along the line
+        of the ground.
+        """
+        gravity = self.model.opt.gravity
+        in_plane = gravity - (gravity @ normal) * normal
+        size = float(np.linalg.norm(in_plane))
+        if size > LEVEL_PLANE * float(np.linalg.norm(gravity)) and size > 0.0:
+            return np.asarray(np.cross(-in_plane / size, normal))
+        line = line - (line @ normal) * normal
+        length = float(np.linalg.norm(line))
+        if length > 0.0:
+            return np.asarray(line / length)
+        return np.asarray(np.linalg.svd(normal[None])[2][1])
 
     def _choose_driven(
         self,
@@ -763,27 +827,22 @@ class _Finder:
         return joint, name
 
     def _sort_equalities(
-        self,
-        number: int,
-        bodies: dict[int, tuple[int, ...]],
-        layout: "_Layout",
-        cut: str | None,
-    ) -> tuple[list[int], list[int | str]]:
-        """Return the equalities that hold the closing pin, and others.
+        self, loop: RobotLoop
+    ) -> tuple[tuple[int, ...], tuple[int, ...], str]:
+        """Return the equalities that hold the closing pin, and others on moving bars.
 
-        The others act on the moving bars. A text among the others says that one leaves
-        the loop no freedom.
+        A text says that one leaves the loop no freedom.
         """
-        model = self.model
-        bars = {root: bar for bar, roots in bodies.items() for root in roots}
+        bars = {root: bar for bar, roots in loop.bodies.items() for root in roots}
         moving = {root for root, bar in bars.items() if bar != 1}
-        closures: list[int] = [number]
-        others: list[int | str] = []
-        pins = set(layout.hinges.values())
-        for other in self._list_others(number, "joint"):
-            if EQUALITY_KINDS[int(model.eq_type[other])] == "joint":
-                tied = {int(model.eq_obj1id[other]), int(model.eq_obj2id[other])}
-                if tied & pins:
+        frame = LoopFrame(loop, self.data)
+        closures = [loop.equality]
+        others: list[int] = []
+        pins = set(loop.hinges.values())
+        for other in self._list_others(loop.equality, "joint"):
+            equality = self.model.equality(other)
+            if EQUALITY_KINDS[int(equality.type[0])] == "joint":
+                if pins & {int(equality.obj1id[0]), int(equality.obj2id[0])}:
                     others.append(other)
                 continue
             ends = find_ends(self.model, self.data, other)
@@ -791,158 +850,44 @@ class _Finder:
             numbers = [1 if root is None else bars[root] for root in carried]
             if numbers[0] == numbers[1]:
                 continue
-            direct = all(self.root[end.body] in bars for end in ends)
-            if not direct:
+            if not all(self.root[end.body] in bars for end in ends):
                 others.append(other)
                 continue
             pin = _PIN_BETWEEN.get(frozenset(numbers))
-            if pin is not None and self._is_pin(other) and layout.is_at(pin, ends):
-                if pin == cut:
-                    closures.append(other)
-                else:  # a hinge and a connect hold the same pin
-                    others.append(other)
-                continue
-            others.append(
-                f"{self._name(other)} holds two of its bars as well: no freedom is left"
-            )
-        return closures, others
+            if pin is None or not self._is_pin(other) or not _is_at(frame, pin, ends):
+                reason = f"{self._name(other)} holds two of its bars as well"
+                return (), (), f"{reason}: no freedom is left"
+            # beside a hinge a connect holds the same pin
+            (closures if pin == loop.cut else others).append(other)
+        return tuple(closures), tuple(others), ""
+
+
+def _is_at(frame: LoopFrame, pin: str, ends: tuple[ClosureEnd, ClosureEnd]) -> bool:
+    """Tell whether both ends of another equality lie on the axis of a pin."""
+    near = max(COINCIDENT_PINS * max(frame.loop.lengths), LARGEST_RESIDUAL)
+    place = frame.locate(PINS[pin][0], pin)
+    return all(
+        float(np.linalg.norm(frame.in_plane(end.place - place))) <= near for end in ends
+    )
 
 
 def _describe_offset(
     posed: PosedRobot,
     closures: tuple[int, ...],
-    layout: "_Layout",
+    loop: RobotLoop,
+    normal: Array,
 ) -> list[str]:
     """Say how far the ends of a closure are apart along the axes, and what that costs.
 
     The list is empty where they lie in one plane.
     """
     offset, across, in_plane = find_offset(
-        posed.model, posed.data.qpos, closures, layout.normal
+        posed.model, posed.data.qpos, closures, normal
     )
-    if offset <= COINCIDENT_PINS * max(layout.lengths):
+    if offset <= COINCIDENT_PINS * max(loop.lengths):
         return []
     return [
         f"its ends are {write_length(offset)} mm apart along the axes, which no motion"
         f" closes: MuJoCo's constraint carries {across:.4g} N across the plane and"
         f" {in_plane:.4g} N in it, let go at rest in this pose"
     ]
-
-
-class _Layout:
-    """Geometry of a four-bar in its plane, measured in the pose."""
-
-    def __init__(
-        self,
-        finder: _Finder,
-        posed: PosedRobot,
-        bodies: dict[int, tuple[int, ...]],
-        hinges: dict[str, int],
-        equality: int,
-    ) -> None:
-        self.finder = finder
-        self.bodies = bodies
-        self.hinges = hinges
-        self.model = posed.model
-        self.data = posed.data
-        self.ends = find_ends(posed.model, posed.data, equality)
-        self.senses: dict[str, float] = {}
-        self.points: dict[tuple[int, str], Array] = {}
-        self.places: dict[tuple[int, str], Array] = {}
-        """Pins in world axes by bar and pin, (3,), m."""
-        self.normal = self._find_normal()
-        self.axis = self._to_ground(self.normal)
-
-    def _find_normal(self) -> Array:
-        """Return the mean axis of the hinges in world axes.
-
-        About it the driven joint turns bar 2 counter-clockwise.
-        """
-        joint = self.hinges["O2"]
-        reference = self.data.xaxis[joint] * self._side("O2", joint)
-        total = np.zeros(3)
-        for hinge in self.hinges.values():
-            axis = self.data.xaxis[hinge]
-            total += math.copysign(1.0, float(axis @ reference)) * axis
-        return np.asarray(total / np.linalg.norm(total))
-
-    def _side(self, pin: str, joint: int) -> float:
-        """Return +1 if the second bar of a pin hangs on its joint, -1 if the first."""
-        root = self.finder.root[int(self.model.jnt_bodyid[joint])]
-        first, second = PINS[pin]
-        if root in self.bodies[second]:
-            return 1.0
-        assert root in self.bodies[first]
-        return -1.0
-
-    def _to_ground(self, vector: Array) -> Array:
-        ground = self.bodies[1][0]
-        rotation = self.data.xmat[ground].reshape(3, 3)
-        return np.asarray(rotation.T @ vector)
-
-    def measure(self, cut: str | None) -> str:
-        """Measure pins, lengths and angles.
-
-        Return a reason if they make no four-bar.
-        """
-        for pin, joint in self.hinges.items():
-            turned = self.data.xaxis[joint] @ self.normal * self._side(pin, joint)
-            self.senses[pin] = math.copysign(1.0, float(turned))
-            for bar in PINS[pin]:
-                self.places[bar, pin] = self.data.xanchor[joint].copy()
-        if cut is not None:
-            for end in self.ends:
-                bar = self._find_bar_of(end.body, cut)
-                self.places[bar, cut] = end.place
-        for (bar, pin), place in self.places.items():
-            body = self.bodies[bar][0]
-            turn = self.data.xmat[body].reshape(3, 3)
-            self.points[bar, pin] = turn.T @ (place - self.data.xpos[body])
-        self.along = self._to_ground(self._choose_along())
-        self.across = np.cross(self.normal, self._choose_along())
-        lines = [self._line(bar) for bar in ENDS]
-        self.lengths = tuple(math.hypot(x, y) for x, y in lines)
-        self.angles = tuple(math.atan2(y, x) for x, y in lines)
-        for length, (one, other) in zip(self.lengths, ENDS.values(), strict=True):
-            if length <= COINCIDENT_PINS * max(self.lengths):
-                return f"pins {one} and {other} are in one place: a bar has no length"
-        return ""
-
-    def _find_bar_of(self, body: int, cut: str) -> int:
-        root = self.finder.root[body]
-        return next(bar for bar in PINS[cut] if root in self.bodies[bar])
-
-    def _choose_along(self) -> Array:
-        """Return the unit vector x of the plane in world axes, (3,).
-
-        The direction is across gravity unless the plane is level, else from O2 to O4.
-        """
-        gravity = self.model.opt.gravity
-        in_plane = gravity - (gravity @ self.normal) * self.normal
-        size = float(np.linalg.norm(in_plane))
-        if size > LEVEL_PLANE * float(np.linalg.norm(gravity)) and size > 0.0:
-            return np.asarray(np.cross(-in_plane / size, self.normal))
-        line = self.places[1, "O4"] - self.places[1, "O2"]
-        line = line - (line @ self.normal) * self.normal
-        length = float(np.linalg.norm(line))
-        if length > 0.0:
-            return np.asarray(line / length)
-        return np.asarray(np.linalg.svd(self.normal[None])[2][1])
-
-    def _line(self, bar: int) -> tuple[float, float]:
-        first, second = ENDS[bar]
-        vector = self.places[bar, second] - self.places[bar, first]
-        ground = self.bodies[1][0]
-        along = self.data.xmat[ground].reshape(3, 3) @ self.along
-        return float(vector @ along), float(vector @ self.across)
-
-    def is_at(self, pin: str, ends: tuple[ClosureEnd, ClosureEnd]) -> bool:
-        """Tell whether both ends of another equality lie on the axis of a pin."""
-        bar = PINS[pin][0]
-        near = max(COINCIDENT_PINS * max(self.lengths), LARGEST_RESIDUAL)
-        for end in ends:
-            apart = end.place - self.places[bar, pin]
-            in_plane = apart - (apart @ self.normal) * self.normal
-            if float(np.linalg.norm(in_plane)) > near:
-                return False
-        return True

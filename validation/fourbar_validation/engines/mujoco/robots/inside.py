@@ -47,6 +47,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
+    OTHER_ASSEMBLY,
     BarMotion,
     InsideAnswer,
     InsideRow,
@@ -60,7 +61,11 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     read_equality_force,
 )
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
-from fourbar_validation.engines.mujoco.robots.loop import DRIVEN_PINS, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop import (
+    DRIVEN_PINS,
+    FOLLOWING,
+    RobotLoop,
+)
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
     project_closures,
@@ -70,11 +75,6 @@ from fourbar_validation.engines.mujoco.runner import Stepper
 
 RESIDUAL_OF_A_CLOSED_STATE = 1e-12
 """m or rad; residual of the closure at which a state is closed."""
-OTHER_ASSEMBLY = (
-    "MuJoCo goes over to the other assembly before the loop has settled; --pose states"
-    " another start"
-)
-"""Why a motion has no state that counts."""
 _CLOSING_STEPS = 50
 RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
@@ -350,41 +350,17 @@ class LoopInside:
     def _jump(self, wanted: float) -> Array | None:
         """Return the pose at an angle of the commanded bar to which no motion leads.
 
-        The assembly is that of the loop's pose; None if the loop is open. The bars are
-        vectors of a closed polygon, of which two make up for the rest, a triangle.
+        The assembly is that of the loop's pose; None if the loop is open.
         """
-        loop = self.loop
-        angles = dict(zip(ENDS, loop.angles, strict=True))
-        vectors = {
-            bar: _DIRECTIONS[bar] * cmath.rect(loop.lengths[bar - 1], angle)
-            for bar, angle in angles.items()
-        }
-        first, second = self._follow
-        side = math.copysign(1.0, (vectors[first].conjugate() * vectors[second]).imag)
-        angles[self.bar] = wanted
-        moved = cmath.rect(loop.lengths[self.bar - 1], wanted)
-        line = -vectors[1] - _DIRECTIONS[self.bar] * moved
-        size = abs(line)
-        near, far = (abs(vectors[bar]) for bar in self._follow)
-        if not abs(near - far) < size < near + far:
+        qpos = assemble(self.model, self.loop, self.bar, wanted)
+        if qpos is None:
             return None
-        apart = math.acos((size**2 + near**2 - far**2) / (2.0 * size * near))
-        vector = cmath.rect(near, cmath.phase(line) - side * apart)
-        angles[first] = cmath.phase(_DIRECTIONS[first] * vector)
-        angles[second] = cmath.phase(_DIRECTIONS[second] * (line - vector))
-        qpos = turn_hinges(self.model, loop, angles[2], angles[3], angles[4])
         self._turn_to(qpos, wanted)
         if not self.close_gap(qpos):
             return None
         self._last = qpos.copy()
         self._rates = self._find_rates(qpos)
         return qpos
-
-    @property
-    def _follow(self) -> tuple[int, int]:
-        """Moving bars that are not commanded."""
-        first, second = (bar for bar in MOVING_BARS if bar != self.bar)
-        return first, second
 
     def _find_rates(self, qpos: Array) -> Array:
         """Return the turn of the hinges that follow by that of the commanded bar, (k,).
@@ -432,7 +408,7 @@ class LoopInside:
         """Return the sine of the angle between the bars that follow in a pose."""
         self._evaluate_closure(qpos)
         frame = LoopFrame(self.loop, self.closing)
-        (x, y), (u, v) = (frame.line(bar) for bar in self._follow)
+        (x, y), (u, v) = map(frame.line, FOLLOWING[self.bar])
         return float(x * v - y * u) / (math.hypot(x, y) * math.hypot(u, v))
 
     def _is_in_line(self, qpos: Array) -> bool:
@@ -963,19 +939,54 @@ def turn_hinges(
     return qpos
 
 
+def assemble(
+    model: mujoco.MjModel,
+    loop: RobotLoop,
+    bar: int,
+    angle: float,
+    *,
+    other: bool = False,
+) -> Array | None:
+    """Return the pose at an angle of a bar in a loop's assembly, (nq,).
+
+    The bars are vectors of a closed polygon, of which the two that follow make up for
+    the rest, a triangle. None if the loop is open.
+
+    Parameters
+    ----------
+    angle : of the bar in the plane of the loop, rad.
+    other : the assembly is the one that the loop's pose is not of.
+    """
+    angles = dict(zip(ENDS, loop.angles, strict=True))
+    vectors = {
+        bar: _DIRECTIONS[bar] * cmath.rect(length, angles[bar])
+        for bar, length in zip(ENDS, loop.lengths, strict=True)
+    }
+    first, second = FOLLOWING[bar]
+    side = math.copysign(1.0, (vectors[first].conjugate() * vectors[second]).imag)
+    if other:
+        side = -side
+    angles[bar] = angle
+    line = -vectors[1] - _DIRECTIONS[bar] * cmath.rect(loop.lengths[bar - 1], angle)
+    size = abs(line)
+    near, far = abs(vectors[first]), abs(vectors[second])
+    if not abs(near - far) < size < near + far:
+        return None
+    apart = math.acos((size**2 + near**2 - far**2) / (2.0 * size * near))
+    vector = cmath.rect(near, cmath.phase(line) - side * apart)
+    angles[first] = cmath.phase(_DIRECTIONS[first] * vector)
+    angles[second] = cmath.phase(_DIRECTIONS[second] * (line - vector))
+    return turn_hinges(model, loop, angles[2], angles[3], angles[4])
+
+
 def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | None:
     """Return the pose of the other assembly at the same angle of a bar, (nq,).
 
-    The bars that follow it are reflected in the line that they span together, and the
-    gap of the engine is closed from there. None where it does not close.
+    None where it does not close.
     """
-    line = 0j
-    for still in (1, bar):
-        side = cmath.rect(loop.lengths[still - 1], loop.angles[still - 1])
-        line += _DIRECTIONS[still] * side
-    angles = [2.0 * cmath.phase(line) - angle for angle in loop.angles]
-    angles[bar - 1] = loop.angles[bar - 1]
-    qpos = turn_hinges(model, loop, *angles[1:])
+    qpos = assemble(model, loop, bar, loop.angles[bar - 1], other=True)
+    if qpos is None:
+        return None
     # put together anew, no spring is wound by more than half a turn
     for pin, joint in loop.hinges.items():
         if pin == DRIVEN_PINS.get(bar):
@@ -983,9 +994,7 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | Non
         address = model.jnt_qposadr[joint]
         drawn = model.qpos0[address]
         qpos[address] = drawn + math.remainder(qpos[address] - drawn, math.tau)
-    if not LoopInside(model, loop, bar=bar).close_gap(qpos):
-        return None
-    return qpos
+    return qpos if LoopInside(model, loop, bar=bar).close_gap(qpos) else None
 
 
 def _find_instant(

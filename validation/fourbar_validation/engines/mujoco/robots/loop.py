@@ -4,7 +4,7 @@ Everything here is plain data, without MuJoCo.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,6 +18,8 @@ SITE_ROLES = ("B3", "B4")
 """Roles of the sites of pin B on the coupler and on the output."""
 DRIVEN_PINS = {2: "O2", 4: "O4"}
 """Pin between the ground and a commanded bar, where a motor turns it."""
+FOLLOWING = {bar: tuple(b for b in MOVING_BARS if b != bar) for bar in MOVING_BARS}
+"""The two moving bars that follow a commanded one."""
 FLAT = 2e-3
 """rad; where the outputs of both assemblies are nearer the pose does not tell which it
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
@@ -118,14 +120,12 @@ class RobotLoop:
         """Longest moving bar, m."""
         return max(self.lengths[1:])
 
-    @property
-    def is_flat(self) -> bool:
-        """Tell whether the bars of pin B were in line before the loops were closed.
+    def is_flat(self, bar: int) -> bool:
+        """Tell whether the bars that follow one were in line before closing.
 
         The pose then does not tell the assembly.
         """
-        _, _, theta_3, theta_4 = self.stated_angles
-        return abs(math.sin(theta_4 - theta_3)) <= FLAT
+        return is_in_line(self.stated_angles, bar)
 
     def seen_from_behind(self) -> "RobotLoop":
         """Return the loop with the other normal of its plane.
@@ -230,6 +230,17 @@ class LoopScene:
     """Sentences on what was chosen, and on what the scene leaves out, with its size."""
     notes: tuple[str, ...] = ()
     """Sentences on what was done to the file and its pose."""
+
+
+def is_in_line(angles: Sequence[float], bar: int) -> bool:
+    """Tell whether the bars that follow one are in line, by theta_1 to theta_4, rad."""
+    first, second = (angles[other - 1] for other in FOLLOWING[bar])
+    return abs(math.sin(second - first)) <= FLAT
+
+
+def name_following(bar: int) -> str:
+    """Name the two bars that follow a commanded one."""
+    return " and ".join(BAR_NAMES[other] for other in FOLLOWING[bar])
 
 
 def write_length(metres: float) -> str:

@@ -46,12 +46,12 @@ from fourbar_validation.engines.mujoco.robots.drive import (
 )
 from fourbar_validation.engines.mujoco.robots.inside import (
     HEAVY,
-    OTHER_ASSEMBLY,
     LoopInside,
 )
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
+    find_circuits,
     find_loop_of_scene,
     find_turn,
 )
@@ -247,6 +247,7 @@ def _measure_loop(
         turned,
         (
             *_describe_noslip(inside, motion, states, scales),
+            *_describe_other_circuit(inside, scene, states),
             *_describe_findings(inside, states, through),
         ),
         read_settings(inside.model, loop),
@@ -265,8 +266,6 @@ def _measure_loop(
         inside.as_it_is,
         inside.flywheel,
         tuple(inside.list_unmet_stops()),
-        refusal == OTHER_ASSEMBLY
-        or (through is not None and through.other_assembly is not None),
     )
 
 
@@ -281,6 +280,25 @@ def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
             runs.append([])
     longest = max(len(run) for run in runs)
     return next(tuple(run) for run in runs if len(run) == longest)
+
+
+def _describe_other_circuit(
+    inside: LoopInside, scene: Scene, states: InsideAnswer
+) -> Iterator[str]:
+    """Say where the loop is in a circuit to which no motion leads from its pose."""
+    theta_1 = inside.loop.angles[0]
+    angles = [(theta_1, *row.bars[:3]) for row in states.rows]
+    here, *circuits = find_circuits(scene, [inside.loop.angles, *angles])
+    rows = zip(states.rows, circuits, strict=True)
+    joints = [row.joint for row, circuit in rows if circuit not in (here, -1)]
+    if joints:
+        ends = (min(joints), max(joints))
+        places = " to ".join(f"{math.degrees(end):.4g}" for end in ends)
+        yield (
+            f"at {len(joints)} of {len(circuits)} positions, {inside.name} ="
+            f" {places} deg, the loop is in its other circuit: no motion leads there"
+            " from its pose"
+        )
 
 
 def _describe_findings(
@@ -372,17 +390,11 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
             None,
             "is needed: without a speed there is no torque to compare",
         )
-    states = np.unique(
-        np.column_stack(
-            np.broadcast_arrays(
-                commanded.angle + turned, commanded.speed, commanded.acceleration
-            )
-        ),
-        axis=0,
-    )
-    angles, *rates = (tuple(column.tolist()) for column in states.T)
-    speed, acceleration = (one if np.ptp(one) else one[0] for one in rates)
-    return LoopMotion(angles, speed, acceleration)
+    rates = (commanded.speed, commanded.acceleration)
+    states = np.column_stack(np.broadcast_arrays(commanded.angle + turned, *rates))
+    angles, *rows = np.unique(states, axis=0).T.tolist()
+    speed, acceleration = (tuple(row) if np.ptp(row) else row[0] for row in rows)
+    return LoopMotion(tuple(angles), speed, acceleration)
 
 
 def _take_span(
@@ -428,15 +440,10 @@ def _compare_at_same_angles(
         return Influence(math.inf, math.inf)
     worst = 0.0
     median = 0.0
-    pairs = [*zip(one.rows, other.rows, strict=False)]
+    count = min(len(one.rows), len(other.rows))
+    first, second = one.differences(), other.differences()
     for name, scale in scales.items():
-        first, second = (
-            np.array(
-                [row.soft.values()[name] - row.rigid.values()[name] for row in rows]
-            )
-            for rows in zip(*pairs, strict=True)
-        )
-        changes = measure_sizes(first - second)
+        changes = measure_sizes(first[name][:count] - second[name][:count])
         worst = max(worst, divide(float(changes.max()), scale))
         median = max(median, divide(float(np.median(changes)), scale))
     return Influence(worst, median)

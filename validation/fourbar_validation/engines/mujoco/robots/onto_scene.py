@@ -43,6 +43,8 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     PoseOptions,
     RobotFile,
     RobotLoop,
+    is_in_line,
+    name_following,
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     PosedRobot,
@@ -72,6 +74,10 @@ _NOTHING_CLOSES = {
     ),
 }
 """Why a file of each format has no loop, and what to do."""
+_BEHIND = (
+    "its plane is seen from behind, where it is in the assembly of the scene; gravity"
+    " does not tell the side"
+)
 _MOST_SITES = 12
 """Sites of which two are tried as the pin that closes a loop."""
 ALIKE = 1e-6
@@ -266,20 +272,21 @@ def close_onto(
     InputError : gravity tells that the pose is of the other assembly, from which the
         linkage does not move into that of the scene.
     """
-    if loop.is_flat:
-        behind = not _fits_gravity(scene, posed, loop) and _fits_gravity(
-            scene,
-            posed,
-            loop.seen_from_behind(),
-        )
+    sides = (loop, loop.seen_from_behind())
+    bar = command(scene).bar
+    in_front, from_behind = (_fits_gravity(scene, posed, side) for side in sides)
+    if loop.is_flat(bar):
+        behind = from_behind and not in_front
         return _close_flat(scene, posed, loop, pose, behind)
     behind = is_seen_from_behind(scene, loop.angles)
-    sides = (loop, loop.seen_from_behind())
-    if not _fits_gravity(scene, posed, sides[behind]) and _fits_gravity(
-        scene, posed, sides[not behind]
-    ):
-        return _move_over(scene, posed, loop, pose, not behind)
-    return sides[behind], posed
+    if in_front == from_behind:
+        if not behind:
+            return loop, posed
+        seen = replace(sides[1], remarks=(*loop.remarks, _BEHIND))
+        return seen, posed
+    if behind == from_behind:
+        return sides[behind], posed
+    return _move_over(scene, posed, loop, pose, not behind)
 
 
 def _sample_loop(
@@ -317,19 +324,24 @@ def _move_over(
     if reflected is not None:
         there = move_to(posed, reflected)
         moved = _sample_loop(there, loop, pose, behind)
-        if _find_circuit(scene, seen) == _find_circuit(scene, moved):
+        before, after = find_circuits(scene, [seen.angles, moved.angles])
+        if before == after:
             remark = f"{text}: it is moved there"
             return replace(moved, remarks=(*moved.remarks, remark)), there
         advice = f"give --pose {write_pose(posed.model, seen, reflected)}"
     raise InputError("--pose", None, f"{text}: {advice}")
 
 
-def _find_circuit(scene: Scene, loop: RobotLoop) -> int:
-    """Return the circuit of a scene's linkage in which a loop stands."""
-    theta_1, theta_2, theta_3, theta_4 = loop.angles
-    angle = np.array([theta_2 - theta_1 + scene.linkage.ground_angle])
-    branch = OPEN if math.sin(theta_3 - theta_4) > 0.0 else CROSSED
-    return int(find_circuit(scene.linkage, angle, branch)[0])
+def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
+    """Return the circuits of a scene's linkage in which a loop stands, (n,).
+
+    `angles`: theta_1 to theta_4 of the loop, (n, 4), rad.
+    """
+    theta_1, theta_2, theta_3, theta_4 = np.transpose(angles)
+    branches = np.where(np.sin(theta_3 - theta_4) > 0.0, OPEN, CROSSED).astype(np.int8)
+    angle = theta_2 - theta_1 + scene.linkage.ground_angle
+    circuits: list[int] = find_circuit(scene.linkage, angle, branches).tolist()
+    return circuits
 
 
 def _close_flat(
@@ -341,7 +353,7 @@ def _close_flat(
 ) -> tuple[RobotLoop, PosedRobot]:
     """Close a loop whose pose does not tell its assembly onto that of a scene."""
     loop = _sample_loop(posed, loop, pose, behind)
-    if _measure_sine(loop) <= FLAT:
+    if is_in_line(loop.angles, command(scene).bar):
         posed = move_to(posed, _leave_flat(scene, posed, loop))
         loop = _sample_loop(posed, loop, pose, behind)
     missed = miss_output(scene, loop.angles)
@@ -355,8 +367,8 @@ def _close_flat(
             loop = other
             missed = missed_by_other
     text = (
-        "the bars of pin B are in line in the pose before closing, which does not tell"
-        " the assembly: "
+        f"{name_following(command(scene).bar)} are in line in the pose before closing,"
+        " which does not tell the assembly: "
     )
     if missed <= FLAT:
         name = BRANCH_NAMES[scene.motion.branch]
@@ -386,11 +398,6 @@ def _leave_flat(
             best = qpos
             largest = size
     return best
-
-
-def _measure_sine(loop: RobotLoop) -> float:
-    """Return the sine of the angle between bars 3 and 4 in the pose, by its size."""
-    return abs(math.sin(loop.angles[3] - loop.angles[2]))
 
 
 def _fits_gravity(

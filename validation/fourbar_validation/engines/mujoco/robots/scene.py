@@ -549,13 +549,13 @@ class SceneOfLoop:
             scene = Scene(linkage, Motion(theta_2, branch=branch))
             apart[branch] = miss_output(scene, angles)
         if not abs(apart[OPEN] - apart[CROSSED]) > FLAT:
-            text = "the bars of pin B are in line in this pose: open is taken"
+            text = "coupler and output are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
             return OPEN
         branch = OPEN if apart[OPEN] < apart[CROSSED] else CROSSED
-        if self.loop.is_flat:
+        if self.loop.is_flat(2):
             text = (
-                "the bars of pin B are in line in the pose before closing, which does"
+                "coupler and output are in line in the pose before closing, which does"
                 f" not tell the assembly: it closed to the {BRANCH_NAMES[branch]} one"
             )
             reflected = reflect(self.model, self.loop)
