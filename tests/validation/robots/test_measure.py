@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +16,9 @@ from fourbar.quantities import PIN_FORCES
 from fourbar_validation.advise.advise import advise_command as advise
 from fourbar_validation.engines.mujoco.robots.answers import (
     BarMotion,
+    InsideAnswer,
     InsideRow,
+    LoopMeasurement,
     PinsAndTorque,
 )
 from fourbar_validation.robots.check import check_mjcf_command as check_mjcf
@@ -97,13 +100,14 @@ def test_forces_in_a_plane_that_is_turned_are_those_of_the_scene():
         row = InsideRow(theta_2 + turned, 10.0, 5.0, 0.0, right, right, 0.0, bars, 1.0)
         rows.append(row)
     measured = SimpleNamespace(scene=scene, turned=turned)
-    answer = _make_answer(
-        measured, SimpleNamespace(rows=rows, open=[]), "engine", "setting"
-    )
+    for method in (LoopMeasurement.command, LoopMeasurement.collect):
+        setattr(measured, method.__name__, partial(method, measured))
+    inside = InsideAnswer(rows)
+    answer = _make_answer(measured, inside, "engine", "setting")
     assert answer.at.angle == pytest.approx(solution.theta_2, abs=1e-12)
     for name, values in answer.quantities.items():
         np.testing.assert_allclose(values, solution[name], atol=1e-10, err_msg=name)
-    differences = _subtract_formulas(rows, solution, measured)
+    differences = _subtract_formulas(inside, solution, measured)
     assert {*differences} == {"torque", *PIN_FORCES}
     assert max(values.max() for values in differences.values()) < 1e-10
 
