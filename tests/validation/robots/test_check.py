@@ -69,6 +69,10 @@ FEW = Scene(
     effects=CRANK_ROCKER.effects,
     title="no loads",
 )
+STILL = replace(
+    FEW, motion=fourbar.Motion(FEW.motion.angle, np.linspace(10.0, 11.0, 13))
+)
+"""The same at a speed of each position: no motion through time."""
 SPRING = Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05)
 TORQUE_AND_PINS = ("torque", *PIN_FORCES)
 STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
@@ -347,7 +351,7 @@ def work_of_load(s):
     ],
 )
 def test_what_a_planted_difference_does_to_the_torque_is_its_virtual_work(what, more):
-    scene = replace(CRANK_ROCKER, motion=FEW.motion)
+    scene = replace(CRANK_ROCKER, motion=STILL.motion)
     answer = answer_of(examine(scene, planted(what), {}), FILE_AT_ONE_STATE)
     ours = solve(scene, "force", at=answer.at)
     off = answer.quantities["torque"] - ours.torque
@@ -541,11 +545,11 @@ def costly():
     listed = {}
     for key, old, new in COSTLY:
         assert old in text
-        spoilt[key] = examine(FEW, text.replace(old, new), MINE)
-        listed[key] = differences(FEW, spoilt[key])[key]
+        spoilt[key] = examine(STILL, text.replace(old, new), MINE)
+        listed[key] = differences(STILL, spoilt[key])[key]
     tolerance = "option.tolerance"
-    listed[tolerance] = differences(FEW, spoilt[key])[tolerance]
-    return spoilt, price_all(FEW, listed)
+    listed[tolerance] = differences(STILL, spoilt[key])[tolerance]
+    return spoilt, price_all(STILL, listed)
 
 
 @pytest.mark.slow
@@ -559,7 +563,7 @@ def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
     spoilt, priced = costly
     first, second = order([priced["option.tolerance"], priced[key]])
     assert first.key == key and first.cost is not None and second.cost is not None
-    expected = errors(FEW, spoilt[key], FILE_AT_ONE_STATE)[first.quantity]
+    expected = errors(STILL, spoilt[key], FILE_AT_ONE_STATE)[first.quantity]
     assert first.cost == pytest.approx(expected, rel=0.2)
     assert second.cost < 0.01 * first.cost
 
@@ -569,6 +573,7 @@ SPRUNG = replace(
     motion=FEW.motion,
     effects=(Gravity(), Torsion.at(O4=(0.3, 0.4, 0.0)), Springs((SPRING,))),
 )
+STILL_SPRUNG = replace(SPRUNG, motion=STILL.motion)
 SPOILT = {  # loads of the generated file itself, and what is attached to it
     "loads.output, world axes.couple": ('0 0 0 0 0 -0.05"', '0 0 0 0 0 -0.5"'),
     "loads.coupler, axes of the coupler.force": (
@@ -596,9 +601,9 @@ def attached():
     listed = {}
     for key, (old, new) in SPOILT.items():
         assert old in text
-        spoilt[key] = examine(SPRUNG, text.replace(old, new), {})
-        (listed[key],) = differences(SPRUNG, spoilt[key]).values()
-    return spoilt, price_all(SPRUNG, listed)
+        spoilt[key] = examine(STILL_SPRUNG, text.replace(old, new), {})
+        listed[key] = differences(STILL_SPRUNG, spoilt[key])[key]
+    return spoilt, price_all(STILL_SPRUNG, listed)
 
 
 @pytest.mark.slow
@@ -606,7 +611,7 @@ def attached():
 def test_what_is_attached_costs_what_it_does_in_the_file_itself(key, attached):
     spoilt, priced = attached
     assert priced[key].key == key
-    rows = errors(SPRUNG, spoilt[key], FILE_AT_ONE_STATE)
+    rows = errors(STILL_SPRUNG, spoilt[key], FILE_AT_ONE_STATE)
     worst = max(rows[name] for name in TORQUE_AND_PINS)
     assert priced[key].cost == pytest.approx(worst, abs=FLOOR)
 
