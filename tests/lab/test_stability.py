@@ -17,11 +17,11 @@ from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
 
 pytestmark = pytest.mark.slow  # random campaigns
-SAMPLES = 20
-"""Per family: about 1 s each; the ten thousand of each are `python -m fourbar_lab
+SAMPLES = 10
+"""Per family: half a second each; the ten thousand of each are `python -m fourbar_lab
 stability`.
 """
-FED_BACK = 8
+FED_BACK = 4
 """Per family and bar."""
 ONCE_BAD = {
     # seed, number, and what once was beyond its bound there
@@ -88,7 +88,7 @@ def tallies():
 def test_every_output_is_within_what_the_inputs_last_digits_do(family, tallies):
     tally = tallies[family]
     assert tally.samples == SAMPLES
-    assert tally.not_assembled < SAMPLES / 10
+    assert tally.not_assembled <= SAMPLES / 10
     assert not tally.warned
     bad = {name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0}
     assert not bad
