@@ -21,6 +21,7 @@ from fourbar_lab.worlds import (
     measure_worlds,
 )
 from tests.lab.simulators.test_simulators import ask_position
+from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
 MUJOCO = "MuJoCo, one core"
@@ -133,7 +134,7 @@ class Elsewhere(MujocoFile):
         return super().in_worlds(scene, count)
 
 
-@pytest.mark.parametrize("on_gpu", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("on_gpu", slow_but({True}, [True, False]))
 def test_with_a_gpu_or_on_any_device_all_are_run(on_gpu, monkeypatch, capsys):
     monkeypatch.setattr(Elsewhere, "on_gpu", on_gpu)
     monkeypatch.setattr(worlds, "load_simulator", lambda _: Elsewhere)

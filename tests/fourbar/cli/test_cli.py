@@ -28,6 +28,7 @@ from fourbar.files import load, save
 from fourbar.quantities import UNITS, VECTORS
 from fourbar.show import tables
 from tests.support.scenes import balance, crank_rocker, thesis
+from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
 MODELS = ROOT / "models"
@@ -77,9 +78,7 @@ def read_csv(ended):
     return list(csv.DictReader(io.StringIO(out)))
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param("thesis", marks=pytest.mark.slow), "drag_link"]
-)
+@pytest.mark.parametrize("name", slow_but({"drag_link"}, ["thesis", "drag_link"]))
 def test_json_and_csv_have_every_key_and_every_digit(name, run):
     file = MODELS / f"{name}.toml"
     document = strict(run("analyze", file, "--json"))
@@ -138,7 +137,7 @@ def test_a_free_motion_has_time_and_no_drive(run):
 
 @pytest.mark.parametrize(
     "ending",
-    ["csv", "json", pytest.param("txt", marks=pytest.mark.slow)],
+    slow_but({"csv"}, ["csv", "json", "txt"]),
 )
 def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(ending, run):
     named, asked = Path(f"named.{ending}"), Path("asked")

@@ -17,6 +17,7 @@ pytest.importorskip(
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
 from fourbar.edit.exports import evaluate_scene
+from tests.support.shares import slow_but
 
 MODELS = Path(__file__).parents[3] / "models"
 BOUNDED = (
@@ -40,7 +41,7 @@ def load_coarse(name):
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(BOUNDED[0], marks=pytest.mark.slow), *BOUNDED[1:]],
+    slow_but({"gallery/bonnet_hinge", "capabilities/cylinder_3_4"}, BOUNDED),
 )
 def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
@@ -71,10 +72,7 @@ def test_while_one_drags_the_numbers_of_the_positions_are_reached_at_least(name)
 
 @pytest.mark.parametrize(
     "name",
-    [
-        UNBOUNDED[0],
-        *(pytest.param(name, marks=pytest.mark.slow) for name in UNBOUNDED[1:]),
-    ],
+    slow_but({"thesis"}, UNBOUNDED),
 )
 def test_what_grows_without_bound_is_no_number(name):
     scene = fourbar.load(MODELS / f"{name}.toml")

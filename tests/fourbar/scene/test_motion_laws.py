@@ -227,6 +227,7 @@ def write_note(scene):
     return " ".join(" ".join(write_block(scene, solve(scene, "error"))).split())
 
 
+@pytest.mark.slow
 def test_what_leaves_no_choice_says_nothing_of_its_ends():
     periodic = Law(
         (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi), ends="periodic"

@@ -39,6 +39,7 @@ from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import bare
+from tests.support.shares import slow_but
 
 U = 2.0**-53
 MODELS = sorted(Path("models").glob("*.toml"))
@@ -229,7 +230,7 @@ def test_the_commanded_angle_follows_its_key_alone_and_may_have_a_tolerance():
     assert spread.worst == pytest.approx(largest, rel=1e-9)
 
 
-@pytest.mark.parametrize("bar", [3, 4])
+@pytest.mark.parametrize("bar", slow_but({3}, [3, 4]))
 def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar):
     free = Free(0.4, 8)
     scene = replace(LOADED, effects=(*LOADED.effects, Viscous.at(O2=0.01)), loads=())

@@ -17,6 +17,7 @@ from fourbar.show.acting import list_drawn_notes, list_spring_notes
 from fourbar.show.block import write_block
 from fourbar.solution import DEGREES
 from tests.support.scenes import bare
+from tests.support.shares import slow_but
 
 HATCH = """
 [lengths]
@@ -84,6 +85,7 @@ def test_a_gas_spring_beyond_its_stroke_is_told(tmp_path, capsys):
     assert "longer than its extended length of 400 mm here" in printed
 
 
+@pytest.mark.slow
 def test_a_gas_spring_within_its_stroke_is_not_told(tmp_path, capsys):
     file = write(tmp_path, "600 mm", "300 mm")
     for command in ("analyze", "equilibrium"):
@@ -91,6 +93,7 @@ def test_a_gas_spring_within_its_stroke_is_not_told(tmp_path, capsys):
         assert "gas spring" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_spring_at_its_end_is_within_its_stroke(tmp_path, capsys):
     longest = sqrt(0.13 + 0.12 * math.sin(math.radians(80.0)))
     file = write(tmp_path, f"{1000.0 * longest!r} mm", "150 mm")
@@ -119,7 +122,7 @@ MOTIONS = {
 }
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", slow_but({"a stroke"}, MOTIONS))
 def test_ends_are_found_whatever_is_commanded(motion, tmp_path, capsys):
     file = Path(write(tmp_path, "400 mm", "150 mm"))
     text = file.read_text(encoding="utf-8").replace(SWEEP, MOTIONS[motion])
@@ -172,20 +175,20 @@ def test_a_spring_that_changes_its_sense_is_told_where(length):
         assert (said in told(some)) == (length == "400 mm")
 
 
-@pytest.mark.parametrize(
-    "load, said",
-    [
-        ('bar = 4\nmoment = "1 N m"', "load 1 enters bar 4 at O4"),
-        ('bar = 3\nmoment = "1 N m"', "load 1 enters bar 3 at G"),
-        ('bar = 4\nmoment = "1 N m"\nfrom_pin = ["1 mm", "0 deg"]', ""),
-        ('bar = 4\nmoment = "1 N m"\nforce = ["1 N", "0 deg"]', ""),
-        (
-            'bar = 4\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]',
-            "load 1: arm counts from G of bar 4, taken to be mid-bar",
-        ),
-        ('bar = 2\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]', ""),
-    ],
-)
+TAKEN = [
+    ('bar = 4\nmoment = "1 N m"', "load 1 enters bar 4 at O4"),
+    ('bar = 3\nmoment = "1 N m"', "load 1 enters bar 3 at G"),
+    ('bar = 4\nmoment = "1 N m"\nfrom_pin = ["1 mm", "0 deg"]', ""),
+    ('bar = 4\nmoment = "1 N m"\nforce = ["1 N", "0 deg"]', ""),
+    (
+        'bar = 4\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]',
+        "load 1: arm counts from G of bar 4, taken to be mid-bar",
+    ),
+    ('bar = 2\nforce = ["1 N", "0 deg"]\narm = ["1 mm", "0 deg"]', ""),
+]
+
+
+@pytest.mark.parametrize("load, said", slow_but(TAKEN[:2], TAKEN))
 def test_a_place_that_is_taken_is_named(load, said):
     """Bar 2 has a mass, whose centre the arm counts from."""
     block = told(f"{HATCH.partition('[effects]')[0]}[[loads]]\n{load}\n")
@@ -253,6 +256,7 @@ def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     assert f"pulls from {places[0]} to {places[1]} and" in note
 
 
+@pytest.mark.slow
 def test_a_spring_pulls_in_a_release_from_between_its_instants():
     """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
     linkage = bare(0.3, 0.1, 0.25, 0.22)

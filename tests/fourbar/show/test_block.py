@@ -287,6 +287,7 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(tmp_path, capsys):
     assert 12 <= len(capsys.readouterr().out.splitlines()) <= 19
 
 
+@pytest.mark.slow
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held():
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
     sweep = Motion(Sweep(0.2, 1.4, 6), 0.0)
@@ -334,6 +335,7 @@ def test_each_position_at_rest_has_its_own_range():
     assert "of these positions" not in text and "without bound" not in text
 
 
+@pytest.mark.slow
 def test_a_reversal_of_a_motion_law_is_named_by_its_angle():
     """Half of A (1 - cos) swings from 0.3 to 2.0 rad and back.
 
@@ -413,6 +415,7 @@ def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
     assert "bending" not in text and "rounding changes none" in text
 
 
+@pytest.mark.slow
 def test_rates_stand_in_place_of_zeros_where_nothing_acts():
     lengths = (0.1, 0.25, 0.22)
     bare = FourBar(0.3, *map(Bar, lengths))

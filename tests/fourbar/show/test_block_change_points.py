@@ -55,6 +55,7 @@ def first_line(scene):
     return write_block(scene, solve(scene))[0]
 
 
+@pytest.mark.slow
 def test_a_new_parallelogram_is_one_at_every_angle(tmp_path):
     """Bars of 0.1, 0.3, 0.1 kg.
 
@@ -108,6 +109,7 @@ def test_headings_name_the_assembly(lengths, motion, head):
     assert said == ("theta_3" in motion)
 
 
+@pytest.mark.slow
 def test_a_single_change_point_takes_two_turns():
     linkage = uniform(4.0, 1.0, 2.0, 3.0)
     one, two = (

@@ -124,6 +124,7 @@ def test_the_reason_is_said_where_a_law_begins():
     assert numbers(rows[1]) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "omega, why",
     [

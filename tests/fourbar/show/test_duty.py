@@ -202,6 +202,7 @@ def test_a_law_over_one_turn_is_closed_where_speed_and_acceleration_repeat():
     assert closed == {"free": False, "rest": False, "periodic": True}
 
 
+@pytest.mark.slow
 def test_a_law_of_one_turn_is_not_closed_where_the_assembly_needs_two():
     linkage = uniform(4.0, 1.0, 2.0, 3.0)
     closed = []
@@ -255,6 +256,7 @@ def test_a_position_without_forces_is_not_where_a_light_load_is_largest():
     assert load.where == s.theta_2[np.nanargmax(size)]
 
 
+@pytest.mark.slow
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
     torsion = fourbar.effects.Torsion((("A", 2.0, math.radians(86.0), 0.0),))

@@ -83,6 +83,7 @@ def test_without_pandas_one_line_says_what_to_install(monkeypatch):
         solve(thesis()).to_pandas()
 
 
+@pytest.mark.slow
 def test_showing_needs_numpy_alone():
     code = (
         "import sys, fourbar as f; s = f.Scene(f.FourBar(4.0, f.Bar(2.0), f.Bar(5.0),"

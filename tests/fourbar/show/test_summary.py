@@ -24,6 +24,7 @@ from fourbar.show.motion_curves import acts, describe_motion
 from fourbar.show.summary import summarize
 from fourbar.studies.internal_forces import largest_bending
 from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.shares import slow_but
 
 NODES, WEIGHTS = leggauss(600)
 """Positions of each smooth piece of a motion, closer to each other at its ends."""
@@ -124,7 +125,10 @@ def scan(scene, ends, *corners):
     return np.concatenate(places), np.concatenate(weights)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    slow_but({"turn", "load with corners", "fall in 5 ms", "stroke"}, SCENES),
+)
 def test_facts_are_those_of_a_dense_scan(name):
     scene, pin = SCENES[name]
     solution = solve(scene)
@@ -241,6 +245,7 @@ def test_a_list_has_its_own_peaks_and_means():
     assert entry["rms_torque"] == pytest.approx(rms, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones():
     """Nothing acts but one force, so that everything is in proportion to it."""
     small, huge = (
@@ -317,6 +322,7 @@ def release_pendulum(omega, duration, *effects):
     return summarize(scene, solve(scene))
 
 
+@pytest.mark.slow
 def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes():
     """The period of a pendulum is an elliptic integral."""
     facts = release_pendulum(0.0, 1.7)
@@ -343,6 +349,7 @@ def test_a_released_turn_has_its_period():
     assert facts.period == pytest.approx(period, rel=EXTREME)
 
 
+@pytest.mark.slow
 def test_transmission_angle_is_the_least_of_all_stretches():
     """The coupler rocks in two stretches; the sine of mu is positive in one of them and
     negative in the other.

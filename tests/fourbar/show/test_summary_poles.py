@@ -21,6 +21,7 @@ from fourbar.show.motion_curves import describe_motion
 from fourbar.show.summary import summarize
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.shares import slow_but
 
 GROWN = 2.5
 """Times that a size grows from a distance of 1e-4 of a pole to 1e-6 of it: at least as
@@ -126,7 +127,10 @@ POLES = {
 """Scenes, and the places at which something grows without bound, in their order."""
 
 
-@pytest.mark.parametrize("name", POLES)
+@pytest.mark.parametrize(
+    "name",
+    slow_but({"cylinder in line with the crank", "limits of the output"}, POLES),
+)
 def test_what_grows_without_bound_is_no_number_anywhere(name):
     scene, places = POLES[name]
     facts = find_facts(scene)

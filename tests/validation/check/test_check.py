@@ -29,6 +29,7 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.scales import TERMS_OF_UNIT, scale_of
 from fourbar_validation.compare.tolerance import POWER
 from tests.support.scenes import bare
+from tests.support.shares import slow_but
 
 MODELS = Path(__file__).parents[3] / "models"
 THESIS, CRANK_ROCKER = MODELS / "thesis.toml", MODELS / "crank_rocker.toml"
@@ -605,7 +606,11 @@ def test_one_component_is_judged_by_itself(letter, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("torque", "code"), [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)]
+    ("torque", "code"),
+    slow_but(
+        {("0.0", HOLDS), ("0.04", FAILED)},
+        [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)],
+    ),
 )
 def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, check):
     """Bars without mass or load take no torque.
@@ -760,12 +765,7 @@ FAR_OFF = 1e-6
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param("drawn", marks=pytest.mark.slow),
-        pytest.param("springs", marks=pytest.mark.slow),
-        "push_output",
-    ],
+    "name", slow_but({"push_output"}, ["drawn", "springs", "push_output"])
 )
 def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     """Those that are made of a solution's quantities are judged too."""
@@ -873,6 +873,7 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tm
     assert judgement.status == HOLDS and judgement.compared > 100
 
 
+@pytest.mark.slow
 def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tmp_path):
     rates = {
         "omega_2": np.linspace(2.0, 9.0, 12),
@@ -1050,6 +1051,7 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     assert "looks like" not in printed
 
 
+@pytest.mark.slow
 def test_a_mistake_in_numbers_of_seven_digits_is_named_with_the_digits(judged):
     """Gravity is reversed, and a part of 1e-7 of another mistake remains."""
     scene = replace(OURS, effects=(fourbar.Gravity(),))
@@ -1155,9 +1157,7 @@ def rounded(values, digits):
     return np.array([float(f"{x:.{digits - 1}e}") for x in values.tolist()])
 
 
-@pytest.mark.parametrize(
-    ("digits", "power"), [pytest.param(8, -7, marks=pytest.mark.slow), (5, -4)]
-)
+@pytest.mark.parametrize(("digits", "power"), slow_but({(5, -4)}, [(8, -7), (5, -4)]))
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     digits, power, check
 ):
@@ -1180,7 +1180,7 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     assert code == FAILED and "all agree within" not in printed
 
 
-@pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sign", slow_but({1.0}, [1.0, -1.0]))
 def test_a_table_with_mistakes_and_few_right_digits_is_told_both(sign, check):
     """Angles half a turn off, perhaps forces of the other sign, and 8 right digits.
 

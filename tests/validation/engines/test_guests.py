@@ -37,6 +37,7 @@ from tests.support.guests import (
 )
 from tests.support.here import Heard, judge_here
 from tests.support.scenes import crank_rocker
+from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
 HERE = "tests.support.hostile_class:"
@@ -111,9 +112,7 @@ def others_agree(by_engine):
     return all(verdicts(rows) == {AGREES} for rows in others)
 
 
-@pytest.mark.parametrize(
-    "language", ["python", pytest.param("node", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("language", slow_but({"python"}, ["python", "node"]))
 def test_a_program_in_any_language_agrees(language, tmp_path):
     if language == "node" and shutil.which("node") is None:
         pytest.skip("no node")

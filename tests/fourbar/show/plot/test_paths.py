@@ -31,6 +31,7 @@ def measure_chords(path):
     return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
 
 
+@pytest.mark.slow
 def test_the_whole_circuit_is_traced_without_a_corner():
     """By degrees of the input this path has chords of 40 mm; its extent is 120 mm."""
     view = make_view(loads(COORDINATES))

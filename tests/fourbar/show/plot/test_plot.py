@@ -59,6 +59,7 @@ from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.view import CLEAR, choose_common_position, make_view, set_branch
 from fourbar.show.units import choose_unit
 from tests.support.scenes import crank_rocker, thesis
+from tests.support.shares import slow_but
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
 BALANCE = 1e-12
@@ -198,7 +199,10 @@ def compose_gallery(name, dimensions=True):
 
 @pytest.mark.parametrize(
     "name, dimensions",
-    [("tailgate", True), ("landing_gear", True), ("double_crank_pump", False)],
+    slow_but(
+        {("landing_gear", True)},
+        [("tailgate", True), ("landing_gear", True), ("double_crank_pump", False)],
+    ),
 )
 def test_a_leader_crosses_neither_a_text_nor_another_leader(name, dimensions):
     axes, paths = compose_gallery(name, dimensions)
@@ -326,6 +330,7 @@ def test_the_sensitivities_have_the_units_asked_for_and_whole_names():
     assert f"{largest:.3g} lbf in" in panels[0].texts[0].get_text()
 
 
+@pytest.mark.slow
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     sweep = make_view(thesis(FULL_TURN)).sweep
     figure = composed(thesis(FULL_TURN), "torque")

@@ -5,6 +5,7 @@ Motion laws and loads over theta_2.
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -18,6 +19,7 @@ from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
+from tests.support.shares import slow_but
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by
@@ -105,7 +107,7 @@ def test_the_law_is_followed_at_its_own_times():
     )
 
 
-@pytest.mark.parametrize("omega", [10.0, -10.0])
+@pytest.mark.parametrize("omega", slow_but({-10.0}, [10.0, -10.0]))
 def test_a_table_that_ends_where_the_sweep_does(omega):
     motion = fourbar.Motion(fourbar.Sweep(0.1, 2.0, 12), omega)
     assert (
@@ -186,8 +188,10 @@ def test_the_callback_ends_with_the_run():
     assert mujoco.get_mjcb_act_bias() is None
 
 
-@pytest.mark.parametrize("torque", [0.05, 5.0])
-@pytest.mark.parametrize("omega", [10.0, 0.01])
+@pytest.mark.parametrize(
+    ("omega", "torque"),
+    slow_but({(10.0, 0.05), (0.01, 5.0)}, product([10.0, 0.01], [0.05, 5.0])),
+)
 def test_dry_friction_is_simulated_at_any_speed(omega, torque):
     """Slow slip and large torques.
 

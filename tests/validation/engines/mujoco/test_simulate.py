@@ -32,6 +32,7 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker, low_parallelogram, thesis
+from tests.support.shares import slow_but
 from tests.validation.engines.test_engines import commanded
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -96,7 +97,10 @@ def compared(posed, answer):
     ).rows()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    slow_but({"thesis", "crossed", "drag link, drive on bar 3", "viscous"}, SCENES),
+)
 def test_within_1e_5_of_the_scale(name):
     posed = SCENES[name]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
@@ -200,6 +204,7 @@ def test_a_change_point_is_a_declared_limit():
         assert (refusal is not None and "change point" in refusal) == refused
 
 
+@pytest.mark.slow
 def test_error_falls_with_the_fourth_power_of_the_timestep():
     """RK4, the closure's time constant held in seconds.
 

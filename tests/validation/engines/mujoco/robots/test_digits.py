@@ -29,6 +29,7 @@ from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.measure import RIGID, list_errors_by_method
 from tests.support.robots import FOOT_PARALLELOGRAM, rotation
+from tests.support.shares import slow_but
 
 ANCHOR = 'anchor="-0.06 0 0"'
 QUATERNION = "0.982434 0 0.18661 0"
@@ -164,7 +165,7 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
     assert classify(made.scene.linkage).name == "parallelogram"
 
 
-@pytest.mark.parametrize("text", [FREE, FIVE_DIGITS, LARGE])
+@pytest.mark.parametrize("text", slow_but({FIVE_DIGITS}, [FREE, FIVE_DIGITS, LARGE]))
 def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
     """The rigid robot is that of the formulas within the digits of its lengths."""
     file = RobotFile(Path("foot.xml"), text)

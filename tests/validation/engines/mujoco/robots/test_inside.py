@@ -201,6 +201,7 @@ def _turn_back(inside, made):
     return inside.loop.angles[0] - made.scene.linkage.ground_angle
 
 
+@pytest.mark.slow
 def test_the_start_of_a_simulation_is_not_judged():
     """It begins exactly closed, where the loop has not yielded yet.
 

@@ -67,6 +67,7 @@ def test_states_are_compared_in_the_assembly_of_the_robot(start):
     assert find_left_out(measured(SINGLE, j2=start)) < 1e-8
 
 
+@pytest.mark.slow
 def test_a_state_after_a_turn_is_that_of_the_same_motion():
     """Beyond its change point the other assembly has the branch of the scene."""
     loop = measured(SINGLE, j2="10deg")

@@ -155,6 +155,7 @@ HALVES = Planar(
 """A parallelogram whose coupler is two halves."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "file",
     [
@@ -206,6 +207,7 @@ def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar():
     assert loop.influence is not None and loop.influence.worst < 1.0
 
 
+@pytest.mark.slow
 def test_a_torque_beside_a_change_point_is_judged_by_itself():
     """Viscous couples of 0.5 N m at O2 and O4, and the weights on level cranks."""
     file = RobotFile(Path("foot.xml"), FOOT_PARALLELOGRAM)
@@ -267,6 +269,7 @@ def test_an_actuator_without_a_name_is_told_by_its_joint():
     assert "not in the scene: an actuator without a name, on hinge_2" in made.remarks
 
 
+@pytest.mark.slow
 def test_what_a_second_solver_of_dry_friction_changes_is_said():
     """The same file without it is measured by itself.
 

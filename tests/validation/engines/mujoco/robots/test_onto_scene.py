@@ -61,9 +61,8 @@ def make_scene(branch, gravity=None):
     return fourbar.Scene(linkage, motion, effects=effects)
 
 
-@pytest.mark.parametrize(
-    "branch", ["open", pytest.param("crossed", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("branch", ["open", "crossed"])
 def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch):
     scene = make_scene(branch)
     measured = measure_loops(FILE, MeasureOptions(PoseOptions()), scene)

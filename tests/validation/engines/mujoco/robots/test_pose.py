@@ -88,6 +88,7 @@ def test_a_file_without_joints_or_equalities_has_a_pose():
         assert not posed.notes
 
 
+@pytest.mark.slow
 def test_closing_does_not_leave_the_range_of_a_joint():
     joints = {"crank": "20deg"}
     free = pose_robot(compiled(FOOT.read_text()), PoseOptions(joints=joints))

@@ -26,6 +26,7 @@ from fourbar_validation.robots.measure import (
     list_errors_by_method,
     read_measure_options,
 )
+from tests.support.shares import slow_but
 
 FOOT = Path(__file__).parents[5] / "models" / "robots" / "biped_foot.xml"
 LIGHT_LOAD = 0.3
@@ -131,6 +132,7 @@ def write_leg(sense):
     )
 
 
+@pytest.mark.slow
 def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     """The range is measured again, and the whole motion is not within the error."""
     wanted = 1e-4
@@ -160,7 +162,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     assert search(0, 8).find_range(stiff, 1e-12) is None
 
 
-@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("sense", slow_but({-1}, [1, -1]))
 def test_a_range_is_that_of_the_driven_joint(sense):
     span = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
     options = MeasureOptions(PoseOptions(), span=span)
