@@ -226,9 +226,10 @@ class _RobotReading:
             root = self._parse_text(mend_text(text), path)
         except (ET.ParseError, ValueError):
             raise self._refuse(path.name, f"is no XML: {error}") from None
-        self.notes.append(
-            f"{path.name} is no XML ({error}), but read as simulators read it"
-        )
+        if not error.startswith("unbound prefix"):  # as in every SDF of Drake's
+            self.notes.append(
+                f"{path.name} is no XML ({error}), but read as simulators read it"
+            )
         return root
 
     def _parse_text(self, text: str, path: Path) -> ET.Element:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fourbar.errors import InputError
+from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from tests.support.robots import Planar
@@ -37,6 +38,30 @@ def test_the_rest_pose_of_a_closed_file_stays():
     posed = pose_robot(model, PoseOptions())
     assert np.array_equal(posed.data.qpos, model.qpos0)
     assert not posed.notes
+
+
+CLAMP = """
+<mujoco><compiler angle="radian"/><worldbody>
+  <body><joint name="handle" range="-1.16 2.12"/><geom size=".01"/>
+    <body pos=".1 0 0"><joint range="-3.05 3.05"/><geom size=".01"/>
+      <site name="coupler" pos=".2 0 0"/></body></body>
+  <body pos=".18 0 0"><joint range="-2.72 .35"/><geom size=".01"/>
+    <site name="rocker" pos=".14 0 0"/></body></worldbody>
+  <equality><connect site1="coupler" site2="rocker"/></equality></mujoco>"""
+"""A toggle clamp whose ranges hold one of its two assemblies; all joints at zero it is
+stretched.
+"""
+
+
+@pytest.mark.parametrize("joints", [{}, {"handle": "1.62 rad"}, {"handle": "-20 deg"}])
+def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(joints):
+    model = compiled(CLAMP)
+    qpos = pose_robot(model, PoseOptions(joints=joints)).data.qpos
+    assert gap(model, qpos) < 1e-9
+    low, high = model.jnt_range.T
+    assert ((low <= qpos) & (qpos <= high)).all()
+    if joints:
+        assert qpos[0] == pytest.approx(require("handle", joints["handle"], "rad"))
 
 
 def test_a_stated_joint_stays_and_the_loop_closes_around_it():
@@ -124,7 +149,7 @@ def test_a_pose_that_cannot_close_says_what_is_left():
 @pytest.mark.parametrize(
     ("joints", "words"),
     [
-        ({"crank": "20"}, 'did you mean "20deg"'),
+        ({"crank": "20"}, 'did you mean "20rad" or "20deg"'),
         ({"crank": "20 mm"}, "crank"),
         ({"wheel": "20deg"}, "no such joint"),
     ],

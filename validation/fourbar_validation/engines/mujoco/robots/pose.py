@@ -8,7 +8,9 @@ the loops.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -43,6 +45,8 @@ LARGEST_RESIDUAL = 1e-5
 MOST_NEWTON_STEPS = 100
 LONGEST_NEWTON_STEP = 0.3
 """rad or m; longer steps leave the region where the loops are nearly linear."""
+PARTS_OF_A_RANGE = (0.25, 0.75)
+"""Places in a joint's range from which closing is tried again."""
 _DAMPING = 1e-4
 """Weight of a step against the residuals. It keeps what no equality decides where it
 is.
@@ -97,6 +101,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     closed = passive.close(stated)
     if passive.size(closed) > CLOSED_IN_THE_FILE:
         closed = closing.close(stated)
+    for start in closing.list_starts(stated):  # where a range stops it short of closing
+        if closing.size(closed) <= LARGEST_RESIDUAL:
+            break
+        closed = min(closed, closing.close(start), key=closing.size)
     after = closing.size(closed)
     moved = _list_moved(model, stated, closed)
     if moved and after <= LARGEST_RESIDUAL:
@@ -215,11 +223,11 @@ def _read_joint_position(
         return require(f"--pose {name}", text, unit)
     if number == 0.0:
         return number
-    likely = "deg" if unit == "rad" else "mm"
+    other = "deg" if unit == "rad" else "mm"
     raise InputError(
         f"--pose {name}",
         text,
-        f'the unit is missing; did you mean "{text}{likely}"?',
+        f'the unit is missing; did you mean "{text}{unit}" or "{text}{other}"?',
     )
 
 
@@ -293,6 +301,18 @@ class _Closing:
         """Return the largest residual in a pose, m or rad."""
         residuals, _ = self._evaluate(qpos)
         return float(np.abs(residuals).max(initial=0.0))
+
+    def list_starts(self, stated: Array) -> Iterator[Array]:
+        """List poses, (nq,), whose limited joints are mid-range, but one of them."""
+        places = self.model.jnt_qposadr[self.joints]
+        places = places[np.isfinite(self.low[places])]
+        for place, part in ((None, 0.5), *product(places, PARTS_OF_A_RANGE)):
+            qpos = stated.copy()
+            for limited in places:
+                low, high = self.low[limited], self.high[limited]
+                share = part if limited == place else 0.5
+                qpos[limited] = low + share * (high - low)
+            yield qpos
 
     def close(self, start: Array) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,)."""
