@@ -56,6 +56,11 @@ _MEANT = {
     **{"I": "inertia", "link": "bar", "start": "from", "stop": "to", "end": "to"},
 }
 """Words that are no keys, and the keys that may be meant by them."""
+_FORMULAS = dict.fromkeys(
+    ("radius_of_gyration", "gyration", "k_G"),
+    "write inertia = m k^2, or m (k^2 - r^2) if k is about a pin at r from the centre",
+)
+"""Words for what a key states by a formula."""
 _TABLE_OF = {
     "ground_angle": "lengths",
     **dict.fromkeys(("branch", "side", "stroke", "law", "free"), "motion"),
@@ -119,6 +124,8 @@ class Reader:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
                 if _TABLE_OF.get(name, key) != key:
                     known = f"write it under [{_TABLE_OF[name]}]"
+                if "inertia" in names and name in _FORMULAS:
+                    known = _FORMULAS[name]
                 hint = ELSEWHERE if _is_elsewhere(key, value, names) else known
                 raise self.refuse(_join_key(key, name), entry, f"unknown key; {hint}")
         return value

@@ -98,6 +98,12 @@ MISTAKES = [
         )
     ),
     (
+        "radius of gyration",
+        "mass =",
+        "radius_of_gyration =",
+        ["write inertia = m k^2, or m (k^2 - r^2)"],
+    ),
+    (
         "a pin is no point",
         'from_pin = ["5 cm", "0 deg"]',
         'point = "B"',
