@@ -31,8 +31,8 @@ def test_the_search_knows_when_nothing_serves():
     scene = turning(positions=12)
     setup = TrialSetup(scene, command(scene))
     assert try_all_settings(setup, 1e-3, {("RK4", True): 1.0}) is not None
-    trials: list[object] = []
-    setup.try_out = lambda settings: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
+    trials = []
+    setup.try_out = lambda settings: trials.append(settings) or hopeless(scene)
     assert (
         try_all_settings(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
     )
@@ -66,7 +66,7 @@ def test_a_count_that_cannot_decide_says_which_one_can(tmp_path, monkeypatch, ca
 
 
 def test_a_measure_is_resumed(tmp_path, monkeypatch):
-    made: list[int] = []
+    made = []
 
     def case(seed, index, costs):
         made.append(index)

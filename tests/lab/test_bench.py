@@ -94,7 +94,7 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch):
 def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch):
     monkeypatch.setattr(contenders, "POSITIONS_OF_ONE_CALL", 1000)
     monkeypatch.setattr(contenders, "LEAST_POSITIONS", 1)
-    sizes: list[int] = []
+    sizes = []
     times = contenders.time_positions(
         {"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1
     )

@@ -69,10 +69,10 @@ def test_half_are_adversarial():
 def small_error(true):
     """One part in 1e9 of the moment of bar 3."""
 
-    def wrong(lengths, angles, drive_bar, w, *others):  # type: ignore[no-untyped-def]
+    def wrong(lengths, angles, drive_bar, w, *others):
         return true(
             lengths, angles, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others
-        )  # type: ignore[operator]
+        )
 
     return wrong
 
@@ -128,7 +128,7 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch):
     true = fourbar.solve
 
     def pretend(*arguments, **keywords):
-        solution = true(*arguments, **keywords)  # type: ignore[arg-type]
+        solution = true(*arguments, **keywords)
         solution.status_code[:] = 0
         return solution
 

@@ -62,8 +62,8 @@ def test_the_harness_alone_catches_a_wrong_sign(monkeypatch):
     true = harness.solve
 
     def wrong(*arguments, **keywords):
-        solution = true(*arguments, **keywords)  # type: ignore[arg-type]
-        return replace(solution, F14=-solution.F14)  # type: ignore[type-var,operator]
+        solution = true(*arguments, **keywords)
+        return replace(solution, F14=-solution.F14)
 
     monkeypatch.setattr("fourbar_validation.run.question.solve", wrong)
     assert is_caught(SCENE, command, answers)
@@ -137,7 +137,7 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
     some = [
         harness.Mutant(str(n), lambda: None, (lambda: None).__code__)
         for n, _ in enumerate(verdicts)
-    ]  # type: ignore[arg-type]
+    ]
     next_verdicts = iter(verdicts)
     monkeypatch.setattr(harness, "make_baselines", list)
     monkeypatch.setattr(harness, "compile_mutants", lambda _: some)

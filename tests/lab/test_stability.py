@@ -232,7 +232,7 @@ def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(num
 
 def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch):
     def lost(*arguments, **options):
-        solution = fourbar.solve(*arguments, **options)  # type: ignore[arg-type]
+        solution = fourbar.solve(*arguments, **options)
         solution.theta_3[:] = np.nan
         return solution
 

@@ -6,11 +6,8 @@ its distance and angle follow, and the pins stay. The arithmetic is the harness'
 """
 
 import cmath
-from collections.abc import Mapping
-from typing import Any
 
 from fourbar.linkage import BAR_NAMES, BAR_NUMBERS, ENDS, FIRST_PIN
-from fourbar.scene.drawing import DrawnPins
 
 DRAWN_SETTING = "drawn"
 """Setting of rows that judge numbers of a drawing."""
@@ -22,13 +19,13 @@ _ALONG_AXES = (1.0, 1.0j)
 """A coordinate's direction in the plane, by its index."""
 
 
-def is_coordinate(key: str) -> bool:
+def is_coordinate(key):
     """Return whether a key names a coordinate of a drawn pin or place."""
     stem, _, _ = key.rpartition(".")
     return key.startswith(_OF_PINS) or stem.endswith(_OF_PLACES)
 
 
-def find_entry(document: Any, key: str) -> tuple[Any, Any]:
+def find_entry(document, key):
     """Find the table that holds a number, and its name or index there.
 
     Raises KeyError if the file leaves it out.
@@ -44,7 +41,7 @@ def find_entry(document: Any, key: str) -> tuple[Any, Any]:
 class Coordinates:
     """Coordinates of a drawing, beside the tables of a file that states lengths."""
 
-    def __init__(self, drawing: DrawnPins, document: Mapping[str, Any]) -> None:
+    def __init__(self, drawing, document):
         self.pins = {
             pin: complex(*getattr(drawing, pin)) for pin in ("O2", "A", "B", "O4")
         }
@@ -53,7 +50,7 @@ class Coordinates:
         """Length of the shortest bar, m."""
         self._document = document
 
-    def read(self, key: str) -> float:
+    def read(self, key):
         """Read a coordinate, m.
 
         Raises KeyError for a place that the file leaves out.
@@ -67,14 +64,14 @@ class Coordinates:
             place += cmath.rect(distance, angle) * self._find_direction(bar)
         return (place.real, place.imag)[axis]
 
-    def follow(self, changes: Mapping[str, float]) -> dict[str, float]:
+    def follow(self, changes):
         """Return what the file's numbers change by.
 
         Changes of coordinates are turned into those of lengths, angles and distances;
         others stay.
         """
         followed = {}
-        moves = dict[str, complex]()
+        moves = {}
         for key, change in changes.items():
             if is_coordinate(key):
                 name, axis = _split(key)
@@ -87,7 +84,7 @@ class Coordinates:
                 followed |= self._follow_place(name, move)
         return followed
 
-    def move_origin(self, changes: Mapping[str, float]) -> complex:
+    def move_origin(self, changes):
         """Return the place of O2 in the drawing after such changes, m."""
         return complex(
             *(
@@ -96,7 +93,7 @@ class Coordinates:
             )
         )
 
-    def _follow_pins(self, moves: Mapping[str, complex]) -> dict[str, float]:
+    def _follow_pins(self, moves):
         """Return by what lengths and the ground's angle change.
 
         A length that is drawn within a rounding keeps its rounding.
@@ -113,7 +110,7 @@ class Coordinates:
                 changes["lengths.ground_angle"] = turned
         return changes
 
-    def _follow_place(self, name: str, move: complex) -> dict[str, float]:
+    def _follow_place(self, name, move):
         """Return by what distance and angle of a place on its bar change."""
         bar, distance, angle = self._find_pair(name)
         on_bar = cmath.rect(distance, angle)
@@ -122,7 +119,7 @@ class Coordinates:
         pair = _name_pair(name)
         return {f"{pair}.0": abs(on_bar) - distance, f"{pair}.1": turned}
 
-    def _find_pair(self, name: str) -> tuple[int, float, float]:
+    def _find_pair(self, name):
         """Find the bar of a place, with distance (m) and angle (rad) on it."""
         holder, last = find_entry(self._document, _name_pair(name))
         distance, angle = (float(text.partition(" ")[0]) for text in holder[last])
@@ -132,13 +129,13 @@ class Coordinates:
             bar = holder["bar"]
         return bar, distance, angle
 
-    def _find_direction(self, bar: int) -> complex:
+    def _find_direction(self, bar):
         """Return the drawn direction of a bar, a unit vector."""
         vector = _find_vectors(self.pins)[bar]
         return vector / abs(vector)
 
 
-def _split(key: str) -> tuple[str, int]:
+def _split(key):
     """Split the key of a coordinate into the name of pin or place and the axis."""
     stem, _, axis = key.rpartition(".")
     if key.startswith(_OF_PINS):
@@ -146,13 +143,13 @@ def _split(key: str) -> tuple[str, int]:
     return stem.removesuffix(_OF_PLACES), int(axis)
 
 
-def _name_pair(name: str) -> str:
+def _name_pair(name):
     """Return the key of the pair by which a file without a drawing states a place."""
     if name.endswith(_MASS_CENTRE):
         return name
     return name + _FORM_OF_PLACES
 
 
-def _find_vectors(pins: Mapping[str, complex]) -> dict[int, complex]:
+def _find_vectors(pins):
     """Return the vectors of the bars, from pin to pin, m."""
     return {bar: pins[second] - pins[first] for bar, (first, second) in ENDS.items()}

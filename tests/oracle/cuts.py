@@ -12,10 +12,7 @@ import numpy as np
 
 import fourbar
 from fourbar.linkage import ENDS, MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import Array
-from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -23,7 +20,6 @@ from fourbar_validation.compare.pins import (
     find_mass,
     state_from_pins,
 )
-from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.engines.free_body import speeds_and_accelerations
 from fourbar_validation.engines.free_body_effects import (
@@ -35,7 +31,6 @@ from fourbar_validation.engines.free_body_effects import (
     list_sliding_pins,
     make_vector,
 )
-from fourbar_validation.run.question import Question
 from tests.oracle.bounds import CUT
 from tests.oracle.variants import ask_free_bodies, make_row, take_few
 
@@ -45,7 +40,7 @@ pin, and none is at another foot.
 """
 
 
-def internal_forces(question: Question) -> list[Row]:
+def internal_forces(question):
     """Judge N, V, M of each bar at a few cuts and positions.
 
     No cut may bend more than the largest moment.
@@ -87,7 +82,7 @@ def internal_forces(question: Question) -> list[Row]:
     return rows
 
 
-def move_bars(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
+def move_bars(scene, command, answer):
     """Move the bars as the free bodies have them."""
     theta = [answer.quantities[f"theta_{bar}"] for bar in MOVING_BARS]
     omega, alpha = (
@@ -110,14 +105,14 @@ class Piece(BodyWrenches):
     place: Any = 0.0
     """Foot of a pure couple."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         n = len(self.motion.theta_2)
         super().__init__(n)
         self.N, self.V, self.M = np.zeros(n), np.zeros(n), np.zeros(n)
         self.pushing, self.turning = np.zeros(n), np.zeros(n)
         """Sums of the absolute terms of the whole bar, N and N m."""
 
-    def push(self, bar: int, force: Any, arm: Any) -> None:
+    def push(self, bar, force, arm):
         """Add a force, world axes, at an arm from the bar's first pin, on the piece
         of its foot.
         """
@@ -137,13 +132,13 @@ class Piece(BodyWrenches):
         self.pushing += np.abs(turned)
         self.turning += np.abs(turned) * (np.abs(lever) + abs(self.cut))
 
-    def couple(self, bar: int, couple: Any) -> None:
+    def couple(self, bar, couple):
         """Add a couple, to the piece on which its place lies."""
         if bar == self.bar:
             self.M += np.where(self.place > self.cut, couple, 0.0)
             self.turning += np.abs(couple)
 
-    def twist_at(self, pin: str, couple: Any) -> None:
+    def twist_at(self, pin, couple):
         """Add a couple between two bars at their pin."""
         if self.bar in PINS[pin]:
             length = self.motion.linkage.bar(self.bar).length
@@ -155,13 +150,7 @@ class Piece(BodyWrenches):
             self.place = 0.0
 
 
-def free_piece(
-    scene: Scene,
-    motion: BodyMotion,
-    answer: Answer,
-    bar: int,
-    cut: float,
-) -> Piece:
+def free_piece(scene, motion, answer, bar, cut):
     """Free the piece of a bar beyond a cut."""
     described = scene.linkage.bar(bar)
     piece = Piece(bar, cut, motion)
@@ -181,10 +170,10 @@ def free_piece(
             piece.place = (np.conj(motion.unit[bar]) * arm).real
             apply_load(load, motion, piece)
             piece.place = 0.0
-    gravity: Any = 0.0
+    gravity = 0.0
     for effect in scene.effects:
         if effect.key == "gravity" and uniform:
-            gravity = make_vector((effect.magnitude, effect.angle))  # type: ignore[attr-defined]
+            gravity = make_vector((effect.magnitude, effect.angle))
         else:
             apply_effect(effect, motion, piece)
     for pin, radius in list_sliding_pins(scene).items():
@@ -195,7 +184,7 @@ def free_piece(
             * np.hypot(*answer.quantities[PIN_FORCE[pin]].T),
         )
     if bar == 3:
-        a_pin: Any = motion.swing(2, motion.first_pin[3])
+        a_pin = motion.swing(2, motion.first_pin[3])
     else:
         a_pin = 0.0
     if uniform:
@@ -216,13 +205,7 @@ def free_piece(
     return piece
 
 
-def _push_rigid(
-    piece: Piece,
-    mass: float,
-    ends: tuple[float, float],
-    a_pin: Any,
-    gravity: Any,
-) -> None:
+def _push_rigid(piece, mass, ends, a_pin, gravity):
     """Put weight and inertia of a piece of a uniform bar on it.
 
     The piece is that of a rigid bar between two places.
@@ -237,7 +220,7 @@ def _push_rigid(
     piece.place = 0.0
 
 
-def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: Piece) -> None:
+def _push_drive(scene, motion, answer, piece):
     """Put the couple of the drive at the first pin of its bar.
 
     A force of the drive acts at the ends of its line.
@@ -248,6 +231,6 @@ def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: Piece) 
         return
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     line = place_line(scene.linkage, scene.drive, theta)
-    force: Array = answer.quantities["drive_force"]
+    force = answer.quantities["drive_force"]
     for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
         piece.push(point.bar, sense * force * line.unit, arm)

@@ -10,19 +10,16 @@ Free bodies held at many positions between say that no equilibrium was missed.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import fourbar
 from fourbar.formulas.mobility import change_points, find_intervals, turns_fully
-from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, find_signs
+from fourbar.linkage import MOVING_BARS
+from fourbar.scene import Command, find_signs
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.pins import (
     find_centre,
     find_inertia,
@@ -39,7 +36,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
-from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.question import NotAskedError
 from tests.oracle.bounds import REST
 from tests.oracle.variants import make_row
 
@@ -66,7 +63,7 @@ class Derived(NamedTuple):
     size: float
 
 
-def equilibria(question: Question) -> Iterator[Row]:
+def equilibria(question):
     """Judge torque, slope and frequency at every equilibrium, and that none is
     missed.
     """
@@ -77,7 +74,7 @@ def equilibria(question: Question) -> Iterator[Row]:
     answer = fourbar.equilibrium(question.scene)
     if answer.indifferent:
         raise NotAskedError("the linkage is indifferent")
-    branches: tuple[int, ...] = (1, -1)
+    branches = (1, -1)
     if turns_fully(scene.linkage) and not change_points(scene.linkage):
         branches = (int(question.solution.branch[0]),)
     torques = {branch: _hold(scene, theta_2, branch) for branch in branches}
@@ -118,7 +115,7 @@ def equilibria(question: Question) -> Iterator[Row]:
             yield make_row(question, "equilibria", name, error, REST, angles, compared)
 
 
-def _at_rest(scene: Scene) -> Scene:
+def _at_rest(scene):
     """Leave out dry friction, which has equilibria of its own, and the drive."""
     if scene.counts_turns:
         raise NotAskedError(
@@ -140,7 +137,7 @@ def _at_rest(scene: Scene) -> Scene:
     )
 
 
-def _list_samples(question: Question) -> Array:
+def _list_samples(question):
     """List the input's angles at which it is held, all that it reaches or its sweep
     has.
     """
@@ -172,7 +169,7 @@ def _list_samples(question: Question) -> Array:
     )
 
 
-def _hold(scene: Scene, angle: Array, branch: int) -> Array:
+def _hold(scene, angle, branch):
     """Ask the free bodies for the torque on the input at rest.
 
     NaN where it is ill-conditioned or does not assemble.
@@ -194,13 +191,7 @@ def _hold(scene: Scene, angle: Array, branch: int) -> Array:
     return np.where(sound, answer.quantities["torque"], np.nan)
 
 
-def _count_missed(
-    scene: Scene,
-    branch: int,
-    theta_2: Array,
-    torque: Array,
-    places: list[tuple[float, float]],
-) -> int:
+def _count_missed(scene, branch, theta_2, torque, places):
     """Count the steps with a sign change of the torque and no equilibrium.
 
     The reverse counts too.
@@ -224,7 +215,7 @@ def _count_missed(
             open_steps[max(first, 0) : max(last + 1, 0)] = True
     differing = ~open_steps & ((torque[:-1] * torque[1:] < 0.0) != (counted % 2 == 1))
 
-    def is_certain(index: int) -> bool:
+    def is_certain(index):
         held = _derive_torque(scene, 2, float(theta_2[index]), branch)
         return (
             held is not None
@@ -238,10 +229,7 @@ def _count_missed(
     )
 
 
-def _judge_equilibrium(
-    scene: Scene,
-    equilibrium: Equilibrium,
-) -> tuple[float, dict[str, float]]:
+def _judge_equilibrium(scene, equilibrium):
     """Return by how much the equilibrium may be off, rad, and the errors of torque,
     slope, inertia and frequency. No errors where nothing is decided: that near to a
     singular position first order predicts nothing.
@@ -289,7 +277,7 @@ def _judge_equilibrium(
     return off, errors
 
 
-def _difference_over_size(apart: float, size: float) -> float:
+def _difference_over_size(apart, size):
     if size:
         return abs(apart) / size
     if apart == 0.0:
@@ -297,12 +285,7 @@ def _difference_over_size(apart: float, size: float) -> float:
     return math.inf
 
 
-def _derive_torque(
-    scene: Scene,
-    bar: int,
-    angle: float,
-    branch: int,
-) -> tuple[Derived, Derived, Derived] | None:
+def _derive_torque(scene, bar, angle, branch):
     """Derive the torque on a bar held at rest, its slope, and the bar's inertia.
 
     The slope is over the bar's angle. None where there are none, or where the rounding
@@ -318,7 +301,7 @@ def _derive_torque(
         make_balls,
     )
 
-    commanded_motion: Any = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
+    commanded_motion = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
     scene = replace(scene, motion=Motion(**commanded_motion), drive_bar=bar)
     x = make_balls(scene, angle)
     x |= {
@@ -330,7 +313,7 @@ def _derive_torque(
     step = arb(2) ** -STEP_BITS
     commanded = f"theta_{bar}"
 
-    def derive(**changed: Any) -> tuple[list[Any], dict[str, Any], Any] | None:
+    def derive(**changed):
         """Return torque, slope, inertia and angles; all outputs; and a ratio.
 
         The ratio is the change of theta_2 per rad of the bar.
@@ -397,12 +380,12 @@ def _derive_torque(
     return torque, slope, inertia
 
 
-def _sum_inertias(scene: Scene) -> float:
+def _sum_inertias(scene):
     """Sum m L^2 and I of the bars, and the inertias of flywheels.
 
     L is the linkage's longest reach.
     """
-    linkage: FourBar = scene.linkage
+    linkage = scene.linkage
     bars = [linkage.bar(number) for number in MOVING_BARS]
     reach = max(linkage.lengths) + max(abs(find_centre(bar)[0]) for bar in bars)
     wheels = (

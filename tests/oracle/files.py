@@ -6,25 +6,22 @@ The free bodies assemble them.
 import cmath
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.effects import Effect, Friction, Gravity, Viscous
+from fourbar.effects import Friction, Gravity, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf.assembly import write_sdf as sdf_text
 from fourbar.mjcf.assembly import write_usd as usd_text
-from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import REFUSES, Row, keep_worst
 from fourbar_validation.compare.tolerance import EPS, K
-from fourbar_validation.run.question import Question
 from tests.oracle.variants import (
     ask_free_bodies,
     hold_to,
@@ -60,21 +57,17 @@ class Contents(NamedTuple):
     friction: dict[str, float]
 
 
-def sdf(question: Question) -> list[Row]:
+def sdf(question):
     """Judge the SDF for Gazebo."""
     return _judge_file(question, "sdf", lambda scene: _read_sdf(sdf_text(scene)))
 
 
-def usd(question: Question) -> list[Row]:
+def usd(question):
     """Judge the USD."""
     return _judge_file(question, "usd", lambda scene: _read_usd(usd_text(scene)))
 
 
-def _judge_file(
-    question: Question,
-    engine: str,
-    read: Callable[[Scene], Contents],
-) -> list[Row]:
+def _judge_file(question, engine, read):
     """Compare a file at its own position and at some more.
 
     Loads are what a simulator adds.
@@ -111,7 +104,7 @@ def _judge_file(
         )
 
 
-def _build_scene(held: Contents, scene: Scene) -> Scene:
+def _build_scene(held, scene):
     """Build the scene that a file describes, with motion and drive of another scene."""
     bodies = held.bodies
     pins = held.pins
@@ -130,7 +123,7 @@ def _build_scene(held: Contents, scene: Scene) -> Scene:
         )
         for name, end in ends.items()
     )
-    effects: tuple[Effect, ...] = (Gravity(*cmath.polar(held.gravity)),)
+    effects = (Gravity(*cmath.polar(held.gravity)),)
     if held.damping:
         effects += (Viscous.at(**held.damping),)
     if held.friction:
@@ -142,10 +135,10 @@ def _build_scene(held: Contents, scene: Scene) -> Scene:
     )
 
 
-def _read_sdf(text: str) -> Contents:
+def _read_sdf(text):
     root = ET.fromstring(text)
 
-    def numbers(element: ET.Element, path: str) -> list[float]:
+    def numbers(element, path):
         return [float(number) for number in element.findtext(path, "nan").split()]
 
     bodies = {}
@@ -157,8 +150,8 @@ def _read_sdf(text: str) -> Contents:
         bodies[link.get("name", "")] = _FileBody(
             complex(x, y), turn, mass, inertia, centre
         )
-    pins: dict[str, complex] = {}
-    dynamics: dict[str, dict[str, float]] = {"damping": {}, "friction": {}}
+    pins = {}
+    dynamics = {"damping": {}, "friction": {}}
     for joint in root.iter("joint"):
         pin = joint.get("name", "")
         child = bodies[joint.findtext("child", "")]
@@ -180,14 +173,14 @@ def _read_sdf(text: str) -> Contents:
     )
 
 
-def _read_usd(text: str) -> Contents:
-    def numbers(block: str, key: str) -> list[float]:
+def _read_usd(text):
+    def numbers(block, key):
         match = re.search(rf"{re.escape(key)} = (.*)", block)
         if match:
             return [float(number) for number in re.findall(NUMBER_IN_A_FILE, match[1])]
         return [math.nan] * 4
 
-    def turn(block: str, key: str) -> float:
+    def turn(block, key):
         w, _, _, z = numbers(block, key)
         return 2.0 * math.atan2(z, w)
 
@@ -245,11 +238,11 @@ def _read_usd(text: str) -> Contents:
     )
 
 
-def _read_turns(bodies: dict[str, _FileBody]) -> dict[str, float]:
+def _read_turns(bodies):
     return {bar: body.turn for bar, body in bodies.items()}
 
 
-def _read_noted(text: str) -> dict[str, float]:
+def _read_noted(text):
     """Read the angles that the file states in words."""
     return {
         bar: float(match[1])

@@ -3,12 +3,8 @@
 An oracle takes a question of the harness and yields its rows. No run makes them.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-
-from fourbar.scene import Scene
-from fourbar_validation.compare.rows import Row
 from fourbar_validation.run.judge import make_question
-from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.question import NotAskedError
 from tests.oracle.cuts import internal_forces
 from tests.oracle.equilibria import equilibria
 from tests.oracle.files import sdf, usd
@@ -16,10 +12,9 @@ from tests.oracle.printed import blocks, error_bars, friction_residual, points
 from tests.oracle.sensitivities import sensitivity, study, tolerances
 from tests.oracle.summary import summary
 
-Oracle = Callable[[Question], Iterable[Row]]
-AT_POSITIONS: tuple[Oracle, ...] = (points, blocks, error_bars, friction_residual)
+AT_POSITIONS = (points, blocks, error_bars, friction_residual)
 """Oracles of the numbers of a solution."""
-OF_FORCES: tuple[Oracle, ...] = (
+OF_FORCES = (
     *(study, sensitivity, tolerances, internal_forces),
     *(summary, equilibria, sdf, usd),
 )
@@ -29,7 +24,7 @@ AT_THETA_2 = (error_bars, sdf, usd)
 """Oracles that need a command of theta_2."""
 
 
-def ask(oracle: Oracle, question: Question) -> Iterator[Row]:
+def ask(oracle, question):
     """Yield the rows of an oracle.
 
     Raises NotAskedError where the scene has nothing that it could compare.
@@ -45,7 +40,7 @@ def ask(oracle: Oracle, question: Question) -> Iterator[Row]:
     yield from oracle(question)
 
 
-def judge_by(scene: Scene, *names: str) -> list[Row]:
+def judge_by(scene, *names):
     """Return the rows of some oracles, or of all that the scene has something for.
 
     Raises NotAskedError where the scene has nothing for one of the named oracles.
@@ -53,7 +48,7 @@ def judge_by(scene: Scene, *names: str) -> list[Row]:
     if scene.motion.free is not None:
         return []
     question = make_question("", scene, ())
-    rows: list[Row] = []
+    rows = []
     for name in names or ORACLES:
         try:
             rows += ask(ORACLES[name], question)

@@ -2,7 +2,6 @@
 answers.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,9 +11,7 @@ from numpy.typing import NDArray
 from fourbar.effects import Springs, Torsion
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import FORCE_NAMES, OK, PIN_FORCES, Array
-from fourbar.scene import Command, Scene
-from fourbar.solution import Solution
+from fourbar.quantities import FORCE_NAMES, OK, PIN_FORCES
 from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
@@ -49,7 +46,6 @@ from fourbar_validation.engines.free_body_effects import sum_acting
 from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import (
-    Question,
     select_positions,
     spread_evenly,
 )
@@ -70,7 +66,7 @@ half of them do.
 """
 
 
-def points(question: Question) -> Iterator[Row]:
+def points(question):
     """Check the scene's own points."""
     if (
         question.scene.points
@@ -85,13 +81,7 @@ def points(question: Question) -> Iterator[Row]:
         )
 
 
-def compare_points(
-    question: Question,
-    scene: Scene,
-    solution: Solution,
-    reference: Solution,
-    least: float = 0.0,
-) -> Row:
+def compare_points(question, scene, solution, reference, least=0.0):
     """Compare places, velocities and accelerations of a scene's own points with
     those that follow from the angles of another derivation.
 
@@ -143,7 +133,7 @@ class PointMotion(NamedTuple):
     feet: list[NDArray[np.complex128]]
 
 
-def move_points(scene: Scene, reference: Solution) -> dict[str, PointMotion]:
+def move_points(scene, reference):
     """Move a scene's own points as the angles of another derivation have them."""
     link = scene.linkage
     n = len(reference)
@@ -163,11 +153,7 @@ def move_points(scene: Scene, reference: Solution) -> dict[str, PointMotion]:
         for bar in theta
     }
 
-    def swing(
-        bar: int,
-        distance: float,
-        angle: float,
-    ) -> list[NDArray[np.complex128]]:
+    def swing(bar, distance, angle):
         arm = distance * np.exp(1j * (theta[bar] + angle))
         return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
 
@@ -183,16 +169,12 @@ def move_points(scene: Scene, reference: Solution) -> dict[str, PointMotion]:
     return moved
 
 
-def _find_true_value(
-    reference: Solution,
-    quantity: str,
-    n: int,
-) -> Array:
-    values: Array | None = getattr(reference, quantity)
+def _find_true_value(reference, quantity, n):
+    values = getattr(reference, quantity)
     return np.zeros(n) if values is None else values
 
 
-def blocks(question: Question) -> Iterator[Row]:
+def blocks(question):
     """Check a sweep of more than one block of positions.
 
     The ends of its blocks are held against the scene's own sweep.
@@ -214,8 +196,8 @@ def blocks(question: Question) -> Iterator[Row]:
     if loaded_pins > 1:  # each may take a search
         repeated.angle[1 : POSITIONS_OF_A_BLOCK - 1] = np.nan
     # every other quantity of thousands of positions would cost as much again
-    expected: dict[str, Array] = {}
-    together: dict[str, Array] = {}
+    expected = {}
+    together = {}
     for name in ("sin_mu", "B", "alpha_3", *FORCE_NAMES):
         values = getattr(solution, name)
         if values is not None:
@@ -252,7 +234,7 @@ def blocks(question: Question) -> Iterator[Row]:
     yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=theta_2)
 
 
-def error_bars(question: Question) -> Iterator[Row]:
+def error_bars(question):
     """Check the error bars by the true error, in 320 bits.
 
     No bar may be larger than what a comparison is allowed.
@@ -332,11 +314,7 @@ def error_bars(question: Question) -> Iterator[Row]:
         )
 
 
-def _compute_pulls(
-    scene: Scene,
-    command: Command,
-    solution: Solution,
-) -> Iterator[Array]:
+def _compute_pulls(scene, command, solution):
     """Compute from free bodies what springs, torsion springs and loads over a table
     do, N and N m, (n,).
     """
@@ -348,7 +326,7 @@ def _compute_pulls(
         solution.theta_4,
     )
     scene = state_from_pins(scene)
-    alone: list[Scene] = [
+    alone = [
         replace(scene, loads=(load,), effects=())
         for load in scene.loads
         if load.table is not None
@@ -357,7 +335,7 @@ def _compute_pulls(
         if isinstance(effect, (Springs, Torsion)):
             kind = type(effect)
             alone += [
-                replace(scene, loads=(), effects=(kind((one,)),))  # type: ignore[arg-type]
+                replace(scene, loads=(), effects=(kind((one,)),))
                 for one in effect.springs
             ]
     for one in alone:
@@ -365,10 +343,10 @@ def _compute_pulls(
         yield sum(
             np.abs(wrenches.force[bar]) + np.abs(wrenches.moment[bar])
             for bar in MOVING_BARS
-        )  # type: ignore[misc]
+        )
 
 
-def friction_residual(question: Question) -> Iterator[Row]:
+def friction_residual(question):
     """Check that what remains of friction couples is rounding, and somewhere not
     less.
     """

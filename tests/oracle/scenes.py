@@ -32,6 +32,6 @@ WRITTEN = {
 }
 
 
-def take_scene(name: str) -> Scene:
+def take_scene(name):
     """Return a scene of the sample, or one of those on which faults are tried."""
     return WRITTEN[name] if name in WRITTEN else FAULT_SCENES[name]

@@ -3,7 +3,6 @@ bodies say of changed linkages.
 """
 
 import math
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -15,15 +14,12 @@ import fourbar
 from fourbar.effects import Load
 from fourbar.effects.load import Table
 from fourbar.quantities import FORCE_NAMES, LINE, UNKNOWNS, Array
-from fourbar.scene import Scene
 from fourbar.scene.numbers import POINT_STAGES, Point
 from fourbar.studies.keys import command_key
-from fourbar.studies.spread import Spread
-from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.rows import Row, keep_worst
+from fourbar_validation.compare.rows import keep_worst
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import divide, magnitude
-from fourbar_validation.run.question import NotAskedError, Question, take_member
+from fourbar_validation.run.question import NotAskedError, take_member
 from tests.oracle.bounds import DIFFERENCES, SPREAD
 from tests.oracle.coordinates import DRAWN_SETTING, is_coordinate
 from tests.oracle.printed import move_points
@@ -54,7 +50,7 @@ _CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 """rad from the first position; where the table of a load that the run adds is bent."""
 
 
-def furnish(scene: Scene, question: Question) -> Scene:
+def furnish(scene, question):
     """Give the scene a point on each bar and a load over a table, if it has none.
 
     The load is as large as the scene's forces.
@@ -91,20 +87,20 @@ def furnish(scene: Scene, question: Question) -> Scene:
     return scene
 
 
-def _group_keys(keys: Iterable[str]) -> dict[str, list[str]]:
+def _group_keys(keys):
     """Group the keys of numbers that vary together, by the setting of their rows.
 
     Lengths and polar pairs follow from the coordinates of a drawing: these are a group
     of their own.
     """
-    groups = dict[str, list[str]]()
+    groups = {}
     for key in keys:
         setting = DRAWN_SETTING if is_coordinate(key) else "exact"
         groups.setdefault(setting, []).append(key)
     return groups
 
 
-def study(question: Question) -> list[Row]:
+def study(question):
     """Judge square studies in which many numbers vary, member by member.
 
     In one these are the numbers of a scene that is stated by lengths, of a drawn scene
@@ -119,12 +115,7 @@ def study(question: Question) -> list[Row]:
     return rows
 
 
-def _judge_study(
-    question: Question,
-    scene: Scene,
-    nominal: Answer,
-    keys: list[str],
-) -> list[Row]:
+def _judge_study(question, scene, nominal, keys):
     """Judge a study in which the numbers of some keys vary."""
     places = np.asarray(scene.motion.angle)
     apart = MEMBERS_APART
@@ -145,7 +136,7 @@ def _judge_study(
             for number in range(_MEMBERS)
         ]
     )
-    members: dict[int, Scene] = {}
+    members = {}
     for number, member_positions in enumerate(positions):
         with suppress(
             NotAskedError
@@ -204,7 +195,7 @@ distribution; the nodes are in parts of the width.
 """
 
 
-def sensitivity(question: Question) -> list[Row]:
+def sensitivity(question):
     """Judge the derivatives of unknowns and points along one direction in the
     numbers of a scene, and along another one in the coordinates of its drawing.
     """
@@ -222,17 +213,11 @@ def sensitivity(question: Question) -> list[Row]:
     return rows
 
 
-def _judge_slopes(
-    question: Question,
-    derivatives: fourbar.Sensitivity,
-    file: SceneFile,
-    nominal: Answer,
-    direction: dict[str, float],
-) -> list[Row]:
+def _judge_slopes(question, derivatives, file, nominal, direction):
     """Judge the derivatives along a direction, by the numbers of its keys."""
     scene = file.scene
 
-    def along(part: float) -> dict[str, Array]:
+    def along(part):
         changes = {key: part * RELATIVE_STEP * step for key, step in direction.items()}
         moved = file.move(changes)
         answer = ask_beside(moved, scene, nominal)
@@ -243,7 +228,7 @@ def _judge_slopes(
     at_nominal = nominal.quantities | points_at
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     comparable = np.array([status == "ok" for status in derivatives.status])
-    errors = dict[str, Array]()
+    errors = {}
     for name in (*UNKNOWNS, LINE.value, *points_at):
         if name not in at_nominal:
             continue
@@ -282,7 +267,7 @@ def _judge_slopes(
     ]
 
 
-def _place_points(scene: Scene, answer: Answer, origin: complex) -> dict[str, Array]:
+def _place_points(scene, answer, origin):
     """Return places, velocities and accelerations of the scene's points by an
     answer's angles, in the coordinates of a drawing.
 
@@ -300,7 +285,7 @@ def _place_points(scene: Scene, answer: Answer, origin: complex) -> dict[str, Ar
     return placed
 
 
-def tolerances(question: Question) -> list[Row]:
+def tolerances(question):
     """Judge the spread that a few tolerances make, the scene's own or given ones."""
     scene = take_few(question)
     width = _GIVEN * min(scene.linkage.lengths)
@@ -315,7 +300,7 @@ def tolerances(question: Question) -> list[Row]:
     _require_beside(scene)
     spread = fourbar.tolerances(scene, SPREAD_SAMPLES)
     expected = _compute_expected(scene)
-    errors: dict[str, Array] = {}
+    errors = {}
     for name in (*UNKNOWNS, LINE.value):
         parts = [
             part
@@ -339,12 +324,12 @@ def tolerances(question: Question) -> list[Row]:
     ]
 
 
-def _find_worst_deviation(tolerance: fourbar.Tolerance) -> float:
+def _find_worst_deviation(tolerance):
     """Return how far the worst case of a tolerance reaches."""
     return tolerance.width * (3.0 if tolerance.sigma else 1.0)
 
 
-def _require_beside(scene: Scene) -> None:
+def _require_beside(scene):
     """Require that what the tolerances reach keeps to the nominal assembly.
 
     Raises NotAskedError if they reach past the change point of the nominal linkage by
@@ -384,7 +369,7 @@ class Expected(NamedTuple):
     high: Array
 
 
-def _compute_expected(scene: Scene) -> dict[str, Expected]:
+def _compute_expected(scene):
     """Compute what the free bodies of changed linkages answer.
 
     The result is by the parts of the unknowns.
@@ -395,7 +380,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     file = SceneFile(bare)
     numbers = file.find_stated(tolerance.key for tolerance in scene.tolerances)
 
-    def changed(changes: dict[str, float]) -> dict[str, Array]:
+    def changed(changes):
         parts = split_unknowns(ask_beside(file.move(changes), bare, answer))
         return {
             part: _subtract(part, values, nominal[part])
@@ -460,7 +445,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     return expected
 
 
-def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
+def _compute_off(spread, expected, slight):
     """Compute by what part the figures of a spread are off, (n,)."""
     bent = expected.bent
     every = bent >= 0.0
@@ -490,7 +475,7 @@ def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
     return np.asarray(np.max(errors, axis=0))
 
 
-def _subtract(name: str, one: Array, minus: Array) -> Array:
+def _subtract(name, one, minus):
     """Subtract, angles within half a turn."""
     difference = one - minus
     return np.asarray(

@@ -8,10 +8,9 @@ forces.
 
 import math
 import re
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Legendre
@@ -19,15 +18,12 @@ from numpy.polynomial.legendre import leggauss
 
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
-from fourbar.scene import Scene, command_at
+from fourbar.scene import command_at
 from fourbar.scene.motion import FromLimit
 from fourbar.show.block import write_block, write_motor
 from fourbar.show.duty import shaking_force
-from fourbar.show.summary import Facts, Peak, summarize
-from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Answer
+from fourbar.show.summary import Facts, summarize
 from fourbar_validation.compare.pins import state_from_pins
-from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -46,7 +42,6 @@ from tests.oracle.bounds import (
 )
 from tests.oracle.cuts import (
     CUT_POSITIONS,
-    Piece,
     free_piece,
     move_bars,
 )
@@ -117,22 +112,22 @@ class _SummaryJudge:
     """Errors in parts of the value, by the name of the row."""
 
     @property
-    def scene(self) -> Scene:
+    def scene(self):
         """Return the scene."""
         return self.facts.scene
 
     @property
-    def solution(self) -> Solution:
+    def solution(self):
         """Return the solution of the scene's own positions."""
         return self.facts.solution
 
     @cached_property
-    def own(self) -> Answer:
+    def own(self):
         """Return the free bodies' answer at the scene's own positions."""
         return ask_free_bodies(self.scene, self.solution.at)
 
     @cached_property
-    def bends(self) -> Array:
+    def bends(self):
         """Return the times within the motion at which one part of a law follows."""
         law = self.scene.motion.law
         if law is None:
@@ -140,13 +135,13 @@ class _SummaryJudge:
         return np.array(law.time[1:-1])
 
     @cached_property
-    def fine_places(self) -> Array:
+    def fine_places(self):
         """Return many places between the scene's own."""
         own = self.solution.at.places
         places = np.linspace(own[0], own[-1], PEAK_INTERVALS + 1)
         return np.union1d(places, self.bends) if len(self.bends) else places
 
-    def integrates(self, name: str) -> bool:
+    def integrates(self, name):
         """Return whether a quantity has an integral over the motion.
 
         The free bodies must know it at all of the many positions.
@@ -155,12 +150,12 @@ class _SummaryJudge:
         return known and self.facts.motion.is_steady and name not in self.growing
 
     @property
-    def growing(self) -> set[str]:
+    def growing(self):
         """Return the names of what is said to grow without bound."""
         return self.facts.motion.panels.growing
 
     @cached_property
-    def fine(self) -> Answer:
+    def fine(self):
         """Return their answer at many positions.
 
         Left out are those beside a pole that they cannot know.
@@ -172,14 +167,14 @@ class _SummaryJudge:
         return answer if known.all() else self.ask(places[known])
 
     @cached_property
-    def motor(self) -> dict[str, Any]:
+    def motor(self):
         """Return the entry of the JSON."""
         entry = write_motor(self.scene, self.solution, {})
         assert entry is not None
         return entry
 
     @cached_property
-    def closed(self) -> bool:
+    def closed(self):
         """Return whether the free bodies end as they begin, after whole turns."""
         at = self.solution.at
         if at.moves_stroke or abs(at.angle[-1] - at.angle[0]) < math.pi:
@@ -195,19 +190,19 @@ class _SummaryJudge:
         return True
 
     @cached_property
-    def loaded_pins(self) -> set[str]:
+    def loaded_pins(self):
         """Return the pins whose load is more than the rounding of the largest."""
         return {pin for pin, load in self._loads.items() if load > self._rounding}
 
     @cached_property
-    def drives(self) -> bool:
+    def drives(self):
         """Return whether the drive exerts more than the rounding of pin forces."""
         values, _ = _find_work(self, self.own)
         lever = 1.0 if self.facts.linear else max(self.scene.linkage.lengths)
         return bool(np.abs(values).max() > self._rounding * lever)
 
     @cached_property
-    def _loads(self) -> dict[str, float]:
+    def _loads(self):
         """Return the largest load of each pin, N."""
         quantities = self.own.quantities
         return {
@@ -216,22 +211,22 @@ class _SummaryJudge:
         }
 
     @property
-    def _rounding(self) -> float:
+    def _rounding(self):
         return BALANCED_SHARE * max(self._loads.values())
 
-    def ask(self, places: Any) -> Answer:
+    def ask(self, places):
         """Ask the free bodies at other positions of the motion."""
         return ask_free_bodies(self.scene, command_at(self.scene, np.ravel(places)))
 
-    def add(self, row: str, error: Any) -> None:
+    def add(self, row, error):
         """Add errors to a row."""
         self.errors.setdefault(row, []).extend(np.ravel(error).tolist())
 
-    def add_value(self, row: str, ours: float | None, theirs: float) -> None:
+    def add_value(self, row, ours, theirs):
         """Add the error of a number."""
         self.add(row, math.nan if ours is None else abs(ours - theirs) / abs(theirs))
 
-    def add_peak(self, row: str, peak: Peak, at_peak: Array, fine: Array) -> None:
+    def add_peak(self, row, peak, at_peak, fine):
         """Add by how much a peak is no value at its place.
 
         Another value may exceed it; by how much is added too.
@@ -240,7 +235,7 @@ class _SummaryJudge:
         self.add(row, np.abs(np.abs(at_peak) - size) / size)
         self.add_excess(row, (np.abs(fine).max() - size) / size)
 
-    def add_excess(self, row: str, *excess: Any) -> None:
+    def add_excess(self, row, *excess):
         """Add the largest of some excesses, or zero where none is one.
 
         NaN if one is no number.
@@ -248,14 +243,14 @@ class _SummaryJudge:
         self.add(row, np.max((*excess, 0.0)))
 
 
-def _find_conditions(scene: Scene, answer: Answer) -> Array:
+def _find_conditions(scene, answer):
     """Find the conditions of motion and drive by the free bodies' angles, (2, n)."""
     reference = make_reference(scene, answer)
     assert reference is not None and reference.drive_condition is not None
     return np.stack((reference.condition, reference.drive_condition))
 
 
-def summary(question: Question) -> list[Row]:
+def summary(question):
     """Judge ranges, peaks, RMS, energies, pin loads and more.
 
     Shaking force, bending and bore are judged too.
@@ -282,7 +277,7 @@ def summary(question: Question) -> list[Row]:
     return rows
 
 
-def summarize_scene(question: Question) -> Facts:
+def summarize_scene(question):
     """Summarize the scene.
 
     Raises NotAskedError if its motion has nothing between its positions, or poles.
@@ -300,7 +295,7 @@ def summarize_scene(question: Question) -> Facts:
     return summarize(scene, solution)
 
 
-def _judge_ranges(judged: _SummaryJudge) -> None:
+def _judge_ranges(judged):
     """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
     for bar in MOVING_BARS:
         ends = judged.facts.angles[bar]
@@ -325,7 +320,7 @@ def _judge_ranges(judged: _SummaryJudge) -> None:
     judged.add_excess("ranges", square - squares[1].min())
 
 
-def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
+def _find_work(judged, answer):
     """Return torque or force of the drive, and its speed."""
     scene = judged.scene
     values = answer.quantities[name_driving(scene)]
@@ -336,7 +331,7 @@ def _find_work(judged: _SummaryJudge, answer: Answer) -> tuple[Array, Array]:
     return values, reference.stroke_speed
 
 
-def _judge_drive(judged: _SummaryJudge) -> None:
+def _judge_drive(judged):
     """Judge the peaks of the drive and its bore, as printed and in the JSON."""
     facts = judged.facts
     entry = judged.motor
@@ -365,7 +360,7 @@ def _judge_drive(judged: _SummaryJudge) -> None:
     _judge_bore(judged, fine_values)
 
 
-def _find_turned(judged: _SummaryJudge) -> float:
+def _find_turned(judged):
     """Find the angle that the commanded bar turns, with its sense, rad."""
     at = judged.solution.at
     sense = np.sign(np.mean(np.asarray(at.speed, float)))
@@ -380,13 +375,13 @@ class _Panels(NamedTuple):
     values: Array
     """(panels, nodes, curves)."""
 
-    def mean_square(self, curves: slice) -> float:
+    def mean_square(self, curves):
         """Return the mean of the square of some curves together."""
         width = self.high - self.low
         squares = width @ _average_squares(self.values[:, :, curves]).sum(axis=1)
         return float(squares / width.sum())
 
-    def accumulate(self, curve: int, less: float = 0.0) -> Array:
+    def accumulate(self, curve, less=0.0):
         """Return the integral of a curve, less a number, up to each edge and zero."""
         totals = [np.zeros(1)]
         for low, high, values in zip(
@@ -400,16 +395,16 @@ class _Panels(NamedTuple):
         return np.concatenate(totals)
 
 
-def _average_squares(values: Array) -> Array:
+def _average_squares(values):
     """Return the mean square of each curve on each panel."""
-    mean: Array = np.einsum("n,pnk->pk", 0.5 * _WEIGHTS, np.square(values))
+    mean = np.einsum("n,pnk->pk", 0.5 * _WEIGHTS, np.square(values))
     return mean
 
 
-def _lay_panels(sample: Callable[[Array], Array], edges: Array) -> _Panels:
+def _lay_panels(sample, edges):
     """Halve the panels between edges until every mean square settles."""
 
-    def at_nodes(low: Array, high: Array) -> Array:
+    def at_nodes(low, high):
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         places = middle[:, np.newaxis] + half[:, np.newaxis] * _NODES
         return sample(places.ravel()).reshape(*places.shape, -1)
@@ -438,7 +433,7 @@ def _lay_panels(sample: Callable[[Array], Array], edges: Array) -> _Panels:
     return _Panels(*(part[order] for part in together))
 
 
-def _judge_integrals(judged: _SummaryJudge) -> None:
+def _judge_integrals(judged):
     """Judge RMS, energies, swing and mean torque over the motion."""
     conditions = _find_conditions(judged.scene, judged.fine)[0]
     if conditions.min() <= np.abs(np.diff(conditions)).max():
@@ -450,7 +445,7 @@ def _judge_integrals(judged: _SummaryJudge) -> None:
     columns = {name: slice(2 * i - 2, 2 * i) for i, name in enumerate(names)}
     columns |= {drive: slice(0, 1), "power": slice(1, 2)}
 
-    def sample(places: Array) -> Array:
+    def sample(places):
         answer = judged.ask(places)
         values, speed = _find_work(judged, answer)
         pins = [answer.quantities[name] for name in PIN_FORCE.values()]
@@ -465,7 +460,7 @@ def _judge_integrals(judged: _SummaryJudge) -> None:
     first = np.linspace(ends.min(), ends.max(), FIRST_PANELS + 1)
     panels = _lay_panels(sample, np.union1d(first, judged.bends))
 
-    def judge_mean(ours: float | None, name: str) -> None:
+    def judge_mean(ours, name):
         rms = math.sqrt(panels.mean_square(columns[name]))
         if judged.integrates(name) and rms != 0.0:
             judged.add_value("integrals", ours, rms)
@@ -500,7 +495,7 @@ def _judge_integrals(judged: _SummaryJudge) -> None:
         judged.add("integrals", divide(abs(of_mean), most))
 
 
-def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
+def _judge_bore(judged, fine):
     """Judge the bores that are printed for a cylinder that pushes, and that pulls."""
     if not judged.facts.linear or judged.growing:
         return
@@ -519,7 +514,7 @@ def _judge_bore(judged: _SummaryJudge, fine: Array) -> None:
             judged.add_value("bore", printed.get(word), bore)
 
 
-def _judge_pins(judged: _SummaryJudge) -> None:
+def _judge_pins(judged):
     """Judge peak and place of each pin's load, printed and in the JSON.
 
     The force on the frame is judged too.
@@ -548,7 +543,7 @@ def _judge_pins(judged: _SummaryJudge) -> None:
             judged.add("frame_force", apart / size)
 
 
-def _judge_bending(judged: _SummaryJudge) -> None:
+def _judge_bending(judged):
     """Judge the largest bending moment of each bar: cut at its place, and at many
     positions.
     """
@@ -584,7 +579,7 @@ def _judge_bending(judged: _SummaryJudge) -> None:
         judged.add_excess("bending", (most - size) / size)
 
 
-def _exceed_rounding(pieces: Sequence[Piece]) -> float:
+def _exceed_rounding(pieces):
     """Return zero if no moment of some pieces exceeds the rounding of its terms.
 
     Otherwise return infinity.
@@ -593,7 +588,7 @@ def _exceed_rounding(pieces: Sequence[Piece]) -> float:
     return 0.0 if np.all(vanish) else math.inf
 
 
-def _judge_growth(judged: _SummaryJudge) -> None:
+def _judge_growth(judged):
     """Fail what is said to grow without bound far from every pole.
 
     The bars are far from poles throughout the motion. What grows has neither a peak nor

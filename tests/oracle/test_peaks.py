@@ -132,7 +132,7 @@ def draw_motion(seed, number):
     dwell, rise, fall, rest = 10.0 ** rng.uniform(-2.3, 0.0, 4)
     if rng.random() < 0.2:
         half = 0.5 * (last - first)
-        law: Rise | Sine = Sine(first + half, half, TURN / rise, dwell, fall, steps)
+        law = Sine(first + half, half, TURN / rise, dwell, fall, steps)
     else:
         kind = str(rng.choice(RISE_LAWS))
         falls = {"fall": fall, "rest": rest} if rng.random() < 0.8 else {}

@@ -5,21 +5,18 @@ results.
 import json
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from fourbar.files import dump, loads
-from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS, Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
 from fourbar.scene import command as command_of
-from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Answer
+from fourbar.scene import with_signs
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import Row
@@ -27,7 +24,6 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     WELL_CONDITIONED,
-    ErrorBound,
     magnitude,
     sum_lengths,
 )
@@ -37,7 +33,6 @@ from fourbar_validation.engines.registry import make_prediction
 from fourbar_validation.run.question import (
     FREE_BODY,
     NotAskedError,
-    Question,
     spread_evenly,
 )
 from tests.oracle.coordinates import (
@@ -66,7 +61,7 @@ if they miss its change point by less than twice as much. See `_measure_misses`.
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
-def take_few(question: Question) -> Scene:
+def take_few(question):
     """Take the scene at a few of its positions.
 
     Small changes of its numbers change its quantities little there.
@@ -108,7 +103,7 @@ def take_few(question: Question) -> Scene:
     return at_places(replace(scene, title="", source="", pictures=()), places)
 
 
-def at_places(scene: Scene, places: Array) -> Scene:
+def at_places(scene, places):
     """Command other angles or strokes."""
     return replace(scene, motion=scene.motion.replace(angle=places))
 
@@ -129,7 +124,7 @@ class SceneFile:
     drawing move what it states.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene):
         self.scene = scene
         # tolerances may be of coordinates, which this file does not have
         stated = replace(scene, drawing=None, coordinates=(), tolerances=())
@@ -141,7 +136,7 @@ class SceneFile:
             key: _write_toml_line(key, value) for key, value in self._document.items()
         }
 
-    def find_stated(self, keys: Iterable[str]) -> dict[str, _FileNumber]:
+    def find_stated(self, keys):
         """Find those of the keys whose numbers the file states.
 
         Of motion.theta_2 it is the first.
@@ -155,7 +150,7 @@ class SceneFile:
                 stated[key] = _FileNumber(number, part * size)
         return stated
 
-    def _find_number(self, key: str) -> tuple[float, float]:
+    def _find_number(self, key):
         """Find a number and the size of what it may be moved by.
 
         Raises KeyError if the file leaves it out.
@@ -172,13 +167,13 @@ class SceneFile:
             return number, 1.0
         return number, number
 
-    def find_origin(self, changes: Mapping[str, float]) -> complex:
+    def find_origin(self, changes):
         """Return the place of O2, m, after coordinates of a drawing were changed."""
         if self._coordinates is None:
             return 0j
         return self._coordinates.move_origin(changes)
 
-    def move(self, changes: Mapping[str, float]) -> Scene:
+    def move(self, changes):
         """Read the file after some of its numbers were changed by so much.
 
         motion.theta_2 moves every position.
@@ -215,18 +210,18 @@ class SceneFile:
         return loads("\n".join(lines.values()))
 
 
-def _change_entry(quantity: str | float, change: float) -> str | float:
+def _change_entry(quantity, change):
     number, _, unit = str(quantity).partition(" ")
     if unit:
         return f"{float(number) + change!r} {unit}"
     return float(number) + change
 
 
-def _write_toml_line(key: str, value: Any) -> str:
+def _write_toml_line(key, value):
     return f"{json.dumps(key)} = {_write_toml(value)}"
 
 
-def _write_toml(value: Any) -> str:
+def _write_toml(value):
     if isinstance(value, dict):
         return (
             "{" + ", ".join(_write_toml_line(*entry) for entry in value.items()) + "}"
@@ -236,7 +231,7 @@ def _write_toml(value: Any) -> str:
     return json.dumps(value)
 
 
-def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
+def ask_free_bodies(scene, command=None):
     """Ask the free bodies at the scene's own positions, or others."""
     with np.errstate(all="ignore"):
         return ask_at(
@@ -244,7 +239,7 @@ def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
         )
 
 
-def is_near_change_point(linkage: FourBar) -> bool:
+def is_near_change_point(linkage):
     """Return whether two lengths are together nearly as long as the other two."""
     d, a, b, c = linkage.lengths
     differences = d + a - b - c, d + b - a - c, d + c - a - b
@@ -252,7 +247,7 @@ def is_near_change_point(linkage: FourBar) -> bool:
     return least <= MISS_OF_A_CHANGE_POINT * sum_lengths(linkage)
 
 
-def _measure_misses(linkage: FourBar, bar: int) -> Array:
+def _measure_misses(linkage, bar):
     """Measure by how much change points are missed at the ends of the diagonal's range.
 
     With the bar commanded, the diagonal is at least |d - r| and at most d + r, where r
@@ -264,11 +259,11 @@ def _measure_misses(linkage: FourBar, bar: int) -> Array:
     r = lengths.pop(bar - 2)
     m, n = lengths
     misses = np.array([(d - r) ** 2 - (m - n) ** 2, (d + r) ** 2 - (m + n) ** 2])
-    missed: Array = np.abs(misses) / sum_lengths(linkage) ** 2
+    missed = np.abs(misses) / sum_lengths(linkage) ** 2
     return missed
 
 
-def stays_beside(member: Scene, scene: Scene) -> bool:
+def stays_beside(member, scene):
     """Return whether a member misses by little each change point that the scene has."""
     bar = scene.motion.bar
     nominal = _measure_misses(scene.linkage, bar)
@@ -276,7 +271,7 @@ def stays_beside(member: Scene, scene: Scene) -> bool:
     return bool(np.all(changed[nominal <= PERTURBATION_TRIED] <= PERTURBATION_TRIED))
 
 
-def ask_beside(member: Scene, scene: Scene, nominal: Answer) -> Answer:
+def ask_beside(member, scene, nominal):
     """Ask the free bodies about a linkage with slightly changed numbers.
 
     Near a change point each position has the closure nearest to the nominal one: of
@@ -306,13 +301,7 @@ def ask_beside(member: Scene, scene: Scene, nominal: Answer) -> Answer:
     return ask_free_bodies(member, commanded._replace(branch=nearest))
 
 
-def hold_to(
-    question: Question,
-    engine: str,
-    scene: Scene,
-    solution: Solution,
-    answer: Answer,
-) -> list[Row]:
+def hold_to(question, engine, scene, solution, answer):
     """Compare a solution with the answer of the free bodies.
 
     A public call gave the solution for a scene.
@@ -339,15 +328,7 @@ def hold_to(
     return rows
 
 
-def make_row(
-    question: Question,
-    engine: str,
-    quantity: str,
-    error: Array,
-    tolerance: ErrorBound,
-    theta_2: Array,
-    reason: str,
-) -> Row:
+def make_row(question, engine, quantity, error, tolerance, theta_2, reason):
     """Make the row of a quantity whose errors are held to one tolerance.
 
     The errors are those at some positions.
@@ -358,7 +339,7 @@ def make_row(
     )
 
 
-def split_unknowns(answer: Answer) -> dict[str, Array]:
+def split_unknowns(answer):
     """Split the unknowns of a position.
 
     Vectors become components, pin forces also their magnitudes.

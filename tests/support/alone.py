@@ -9,7 +9,6 @@ import os
 import runpy
 import sys
 from multiprocessing import get_context
-from pathlib import Path
 
 LIBRARIES = ["numpy", "click", "rich.table", "pint", "mpmath", "pyarrow.parquet"]
 TIME = 60.0
@@ -18,7 +17,7 @@ CLEAN = get_context("forkserver")
 CLEAN.set_forkserver_preload(LIBRARIES)
 
 
-def become(program: str, line: list[str], folder: Path) -> None:
+def become(program, line, folder):
     """`python -m program line` in a folder, with what it prints in two files there."""
     assert not {name.partition(".")[0] for name in sys.modules} & {
         "fourbar",
@@ -31,7 +30,7 @@ def become(program: str, line: list[str], folder: Path) -> None:
     runpy.run_module(program, run_name="__main__", alter_sys=True)
 
 
-def alone(program: str, line: list[str], folder: Path) -> tuple[int | None, str]:
+def alone(program, line, folder):
     """The status of a command, and what it complained of."""
     process = CLEAN.Process(target=become, args=(program, line, folder))
     process.start()

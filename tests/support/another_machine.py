@@ -45,7 +45,7 @@ CORES = {
 """The commonest first."""
 
 
-def here() -> str:
+def here():
     """What this process calculates with.
 
     The BLAS kernel of NumPy and the vectorised functions of NumPy.
@@ -58,7 +58,7 @@ def here() -> str:
     )
 
 
-def environment(core: str) -> dict[str, str]:
+def environment(core):
     """The variables under which OpenBLAS takes this CPU for another.
 
     NumPy and the C library follow them too.
@@ -76,7 +76,7 @@ def environment(core: str) -> dict[str, str]:
 
 
 @cache
-def machine(core: str | None = None) -> str:
+def machine(core=None):
     """Return what a fresh process calculates with, under the variables of a core if one
     is named.
     """
@@ -92,7 +92,7 @@ def machine(core: str | None = None) -> str:
     ).stdout.strip()
 
 
-def why_not(core: str) -> str | None:
+def why_not(core):
     """Why nothing is to be learned from a core here, or None."""
     if not __cpu_features__.get(CORES[core].needs):
         return f"this CPU has no {CORES[core].needs}"
@@ -110,5 +110,5 @@ def why_not(core: str) -> str | None:
     return twin and f"the same as {twin} here"
 
 
-def test_this_is_another_machine() -> None:
+def test_this_is_another_machine():
     assert here() != os.environ[BEFORE]

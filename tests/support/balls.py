@@ -4,11 +4,11 @@ import numpy as np
 from flint import arb, ctx
 
 import fourbar
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import with_signs
 from fourbar_validation.engines.balls import compute_outputs, make_balls
 
 
-def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.ndarray]:
+def answer_in_balls(scene, at=None):
     """Compute each output at each position, rounded once.
 
     (n,), vectors (n, 2), NaN where it has no value.

@@ -14,9 +14,8 @@ import numpy as np
 
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.mjcf.document import compute_load_ratio
-from fourbar.scene import Scene, command
+from fourbar.scene import command
 from fourbar.scene.motion import Motion
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines import pinocchio
 from fourbar_validation.engines.limits import (
@@ -51,12 +50,12 @@ class Measured(NamedTuple):
     holds: Callable[[float], bool]
 
 
-def _simulated(scene: Scene) -> Answer:
+def _simulated(scene):
     """The simulation itself, whatever its declared limits."""
     return simulate._Simulation(RECIPE, scene, command(scene), bounded=False).answer()
 
 
-def _near_toggle(sine: float) -> bool:
+def _near_toggle(sine):
     """Tell whether a sweep that ends near a toggle is followed without an alarm.
 
     |sin mu| has this value at its end.
@@ -70,22 +69,22 @@ def _near_toggle(sine: float) -> bool:
     ).alarms
 
 
-def _base() -> Scene:
+def _base():
     return sweep_turn(dress((0.3, 0.1, 0.25, 0.22)))
 
 
-def _at_speed(omega_2: float) -> Scene:
+def _at_speed(omega_2):
     return replace(_base(), motion=_base().motion.replace(speed=omega_2))
 
 
-def _crank_acceleration(value: float) -> bool:
+def _crank_acceleration(value):
     answer = _simulated(
         replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=())
     )
     return not answer.alarms and answer.evidence["force_gap"] < 1e-3
 
 
-def _loaded(ratio: float) -> bool:
+def _loaded(ratio):
     (_, scene), *_ = scale_loads(exponents=(3,))
     times = ratio / compute_load_ratio(scene)
     heavier = tuple(
@@ -100,7 +99,7 @@ def _loaded(ratio: float) -> bool:
     return not answer.alarms and answer.evidence["acceleration_gap"] < SIMULATED.factor
 
 
-def compile_body(mass: float, inertia: float) -> mujoco.MjModel:
+def compile_body(mass, inertia):
     """Compile one moving body."""
     inertias = " ".join([repr(inertia)] * 3)
     return mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody><body><joint/>
@@ -108,7 +107,7 @@ def compile_body(mass: float, inertia: float) -> mujoco.MjModel:
         </body></worldbody></mujoco>""")
 
 
-def _compiles(inertia: float) -> bool:
+def _compiles(inertia):
     try:
         compile_body(1.0, inertia)
     except ValueError:
@@ -116,7 +115,7 @@ def _compiles(inertia: float) -> bool:
     return True
 
 
-def _centre_kept(r: float) -> bool:
+def _centre_kept(r):
     """Tell whether the compiled MJCF keeps a mass centre at a distance r from its pin,
     m.
     """
@@ -129,7 +128,7 @@ def _centre_kept(r: float) -> bool:
     )
 
 
-def _proximal(mu: float) -> bool:
+def _proximal(mu):
     """Tell whether Pinocchio's constrained acceleration is finite at a proximal mu."""
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
     kept = pinocchio.PROXIMAL_SETTINGS

@@ -1,20 +1,16 @@
 """A loop closed by circles that meet, in as many digits as mpmath works with."""
 
-from typing import Any
-
 from mpmath import mp
-
-from fourbar.linkage import FourBar
 
 
 class ExactLoop:
     """Directions of the bars of a linkage, apart from every formula of the package."""
 
-    def __init__(self, linkage: FourBar) -> None:
+    def __init__(self, linkage):
         self.lengths = [mp.mpf(float(length)) for length in linkage.lengths]
         self.theta_1 = mp.mpf(float(linkage.ground_angle))
 
-    def close(self, bar: int, angle: Any, sign: int) -> dict[int, Any]:
+    def close(self, bar, angle, sign):
         """Return e^{i theta} of bars 1 to 4 at the angle of bar 2, 3 or 4.
 
         `sign`: of sin(theta_4 - theta_3), sin(theta_4 - theta_2) or
@@ -34,14 +30,14 @@ class ExactLoop:
         A = _meet(mp.mpc(0), a, B, b, -sign)
         return {1: ground, 2: A / a, 3: (B - A) / b, 4: turned}
 
-    def rates(self, bar: int, angle: Any, sign: int) -> dict[int, tuple[Any, Any]]:
+    def rates(self, bar, angle, sign):
         """Return the first and second derivative of each bar's angle by that of one.
 
         They are those of angles about the direction itself, which do not jump.
         """
         here = self.close(bar, angle, sign)
 
-        def turn(number: int, x: Any) -> Any:
+        def turn(number, x):
             return mp.arg(self.close(bar, x, sign)[number] / here[number])
 
         return {
@@ -52,7 +48,7 @@ class ExactLoop:
         }
 
 
-def _meet(first: Any, r: Any, second: Any, s: Any, side: int) -> Any:
+def _meet(first, r, second, s, side):
     """Return where two circles meet: left of the way between them if side is +1."""
     apart = second - first
     e = abs(apart)

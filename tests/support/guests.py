@@ -9,7 +9,6 @@ import re
 import shlex
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -22,7 +21,7 @@ PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
 """The page's engine in plain Python."""
 
 
-def write_program(folder: Path, name: str, *replacements: tuple[str, str]) -> str:
+def write_program(folder, name, *replacements):
     text = PLAIN.replace('"plain"', repr(name))
     for old, new in replacements:
         assert old in text
@@ -35,7 +34,7 @@ def write_program(folder: Path, name: str, *replacements: tuple[str, str]) -> st
 class Hosted(processes.Running):
     """A class or adapter that our host serves in this process; programs run as ever."""
 
-    def _ask(self, question: dict[str, Any], positions: int) -> dict[str, Any]:
+    def _ask(self, question, positions):
         if "fourbar_validation.engine" not in self.program.command:
             return super()._ask(question, positions)
         self._number += 1
@@ -46,20 +45,20 @@ class Hosted(processes.Running):
 
 
 @pytest.fixture
-def hosted(monkeypatch: pytest.MonkeyPatch) -> None:
+def hosted(monkeypatch):
     """Serves classes in this process: all but what a process of their own is for."""
     monkeypatch.setattr(guests, "Running", Hosted)
     monkeypatch.setattr(engine, "_hash_code", lambda module: "")
 
 
-def end_guests() -> None:
+def end_guests():
     """End the programs that this process started."""
     for running in guests._RUNNING.values():
         running.end()
     guests._RUNNING.clear()
 
 
-def list_processes(mark: str) -> list[int]:
+def list_processes(mark):
     """List the processes whose environment has the mark."""
     processes = []
     for entry in Path("/proc").iterdir():

@@ -1,13 +1,8 @@
 """Runs judged in this process, where it is not their workers that are tested."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any
-
-import pytest
 
 from fourbar_validation.engines import workers
-from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run.plan import Progress
 
@@ -15,18 +10,18 @@ from fourbar_validation.run.plan import Progress
 class Heard(Progress):
     """Listener that keeps what a run told: its notes, and the scenes of each stage."""
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.scenes: Counter[str] = Counter()
+    def __init__(self):
+        self.lines = []
+        self.scenes = Counter()
 
-    def note(self, line: str) -> None:
+    def note(self, line):
         self.lines.append(line)
 
-    def advance(self, stage: str, scenes: int) -> None:
+    def advance(self, stage, scenes):
         self.scenes[stage] += scenes
 
 
-def summary_of(records: Iterable[Record]) -> Summary:
+def summary_of(records):
     """What a run comes to in which these scenes were judged."""
     summary = Summary()
     for record in records:
@@ -34,15 +29,10 @@ def summary_of(records: Iterable[Record]) -> Summary:
     return summary
 
 
-def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
+def judge_here(monkeypatch):
     """Do the items of the workers in this process, one after another."""
 
-    def over_none(
-        function: Callable[[Any], Any],
-        tasks: Iterable[workers.Task],
-        *_: object,
-        **__: object,
-    ) -> Iterator[tuple[int, list[Any]]]:
+    def over_none(function, tasks, *_, **__):
         for number, items in tasks:
             yield number, [function(item) for item in items]
 

@@ -10,14 +10,13 @@ Nothing happens to them at a limit position. At a change point t = 0 and the quo
 """
 
 import math
-from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb, arb_series, ctx
 
-from fourbar import FourBar, Gravity, Load, Viscous
+from fourbar import Gravity, Load, Viscous
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar_validation.engines.balls import compute_directions
 
@@ -37,8 +36,6 @@ SHORTER = tuple(0.85**k for k in range(9))
 
 Ball = Any
 """arb or arb_series."""
-Three = Sequence[Ball]
-"""Of bars 2, 3, 4."""
 
 
 class Reference(NamedTuple):
@@ -61,13 +58,13 @@ class Step(NamedTuple):
     theta: list[list[Ball]]
     omega: list[list[Ball]]
 
-    def at(self, h: Ball) -> tuple[list[Ball], list[Ball]]:
+    def at(self, h):
         """Angles and speeds h seconds after the start."""
         return [_sum(terms, h) for terms in self.theta], [
             _sum(terms, h) for terms in self.omega
         ]
 
-    def length(self) -> Ball:
+    def length(self):
         """The step at whose end the last two terms are TRUNCATION."""
         return arb(
             min(
@@ -79,18 +76,18 @@ class Step(NamedTuple):
         )
 
 
-def _sum(terms: Sequence[Ball], h: Ball) -> Ball:
+def _sum(terms, h):
     total = arb(0)
     for term in reversed(terms):
         total = total * h + term
     return total.mid()  # without its radius: this is no proof
 
 
-def _dot(u: Three, v: Three) -> Ball:
+def _dot(u, v):
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-def _cross(u: Three, v: Three) -> list[Ball]:
+def _cross(u, v):
     return [
         u[1] * v[2] - u[2] * v[1],
         u[2] * v[0] - u[0] * v[2],
@@ -101,13 +98,13 @@ def _cross(u: Three, v: Three) -> list[Ball]:
 class Equations:
     """The accelerations of one linkage in theta_2, theta_3, theta_4."""
 
-    def __init__(self, linkage: FourBar, terms: Sequence[Any]) -> None:
+    def __init__(self, linkage, terms):
         self.lengths = d, a, _, _ = tuple(arb(length) for length in linkage.lengths)
         theta_1 = arb(linkage.ground_angle)
         self.O4 = d * theta_1.cos(), d * theta_1.sin()
         bars = [linkage.bar(number) for number in MOVING_BARS]
         mass = [arb(bar.mass) for bar in bars]
-        polar = [(arb(bar.mass_centre[0]), arb(bar.mass_centre[1])) for bar in bars]  # type: ignore[index]
+        polar = [(arb(bar.mass_centre[0]), arb(bar.mass_centre[1])) for bar in bars]
         self.centre = [(r * phi.cos(), r * phi.sin()) for r, phi in polar]
         self.M = [
             arb(bar.moment_of_inertia) + m * r * r
@@ -124,11 +121,11 @@ class Equations:
         # of forces in the world's axes at places of a bar's own: the couple at its
         # angles 0 and -90 deg
         self.turning = [[arb(0), arb(0)] for _ in bars]
-        self.damping: list[tuple[int, int, Ball]] = []
+        self.damping = []
         for term in terms:
             self._add(term, mass)
 
-    def _add(self, term: Any, mass: list[Ball]) -> None:
+    def _add(self, term, mass):
         if isinstance(term, Gravity):
             for k in range(3):
                 _push(self.world[k], mass[k] * arb(term.magnitude), arb(term.angle))
@@ -139,7 +136,7 @@ class Equations:
         else:
             raise NotImplementedError(type(term).__name__)
 
-    def _add_load(self, load: Load) -> None:
+    def _add_load(self, load):
         """Add a load at G: its force in the axes that it is stated in, its couple about
         G.
         """
@@ -166,13 +163,7 @@ class Equations:
         else:
             self.couple[k] += x * fy - y * fx
 
-    def start(
-        self,
-        linkage: FourBar,
-        theta_2: float,
-        omega_2: float,
-        branch: int,
-    ) -> tuple[list[Ball], list[Ball]]:
+    def start(self, linkage, theta_2, omega_2, branch):
         """Angles and speeds; not at a limit position."""
         x = dict(zip(("d", "a", "b", "c"), self.lengths, strict=True))
         closed = compute_directions(
@@ -183,23 +174,23 @@ class Equations:
         t = self.direction(theta)
         return theta, [(arb(omega_2) * w / t[0]).mid() for w in t]
 
-    def loop(self, C: Three, S: Three) -> tuple[list[Ball], list[Ball]]:
+    def loop(self, C, S):
         """P_x, P_y: derivatives of a u_2 + b u_3 - c u_4."""
         _, a, b, c = self.lengths
         return [-a * S[0], -b * S[1], c * S[2]], [a * C[0], b * C[1], -c * C[2]]
 
-    def direction(self, theta: Three) -> list[Ball]:
+    def direction(self, theta):
         """t = P_x x P_y."""
         return _cross(*self.loop([q.cos() for q in theta], [q.sin() for q in theta]))
 
-    def stretch(self, theta: Three) -> float:
+    def stretch(self, theta):
         """|t| of the product of the two longest moving bars: 0 at a change point."""
         t = self.direction(theta)
         return float(_dot(t, t).sqrt()) / math.prod(
             sorted(map(float, self.lengths[1:]))[1:]
         )
 
-    def closed(self, theta: Three, omega: Three) -> tuple[list[Ball], list[Ball]]:
+    def closed(self, theta, omega):
         """The nearest angles and speeds that close the loop.
 
         An open one has no change point to pass.
@@ -218,7 +209,7 @@ class Equations:
         share = _dot(t, omega) / _dot(t, t)
         return list(theta), [(w * share).mid() for w in t]
 
-    def accelerations(self, theta: Three, omega: Three) -> list[Ball]:
+    def accelerations(self, theta, omega):
         """alpha_2, alpha_3, alpha_4."""
         S, C = zip(*(q.sin_cos() for q in theta), strict=True)
         squared = [w * w for w in omega]
@@ -246,7 +237,7 @@ class Equations:
         share, work = 1 / _dot(t, Mt), _dot(t, f)
         return [(u + work * v) * share for u, v in zip(bound, t, strict=True)]
 
-    def forces(self, C: Three, S: Three, omega: Three) -> list[Ball]:
+    def forces(self, C, S, omega):
         """The couple of everything that acts on each angle."""
         total = list(self.couple)
         for k in range(3):
@@ -274,7 +265,7 @@ class Equations:
                     total[bar - 2] = total[bar - 2] + couple
         return total
 
-    def step(self, theta: Three, omega: Three) -> Step:
+    def step(self, theta, omega):
         """The series of the motion, one term longer with each evaluation."""
         angles, speeds = (
             [[q, w] for q, w in zip(theta, omega, strict=True)],
@@ -291,18 +282,18 @@ class Equations:
         return Step(angles, speeds)
 
 
-def _push(total: list[Ball], size: Ball, angle: Ball) -> None:
+def _push(total, size, angle):
     total[0] += size * angle.cos()
     total[1] += size * angle.sin()
 
 
-def _sine(theta: Three, i: int = 1, j: int = 2) -> float:
+def _sine(theta, i=1, j=2):
     """sin(theta_4 - theta_3), or of two other bars."""
     return float((theta[j] - theta[i]).sin())
 
 
 @contextmanager
-def _digits() -> Iterator[None]:
+def _digits():
     """flint's context is one for the process."""
     before = ctx.prec, ctx.cap
     ctx.prec = BITS
@@ -312,19 +303,12 @@ def _digits() -> Iterator[None]:
         ctx.prec, ctx.cap = before
 
 
-def released(
-    linkage: FourBar,
-    terms: Sequence[Any],
-    theta_2: float,
-    omega_2: float,
-    branch: int,
-    times: np.ndarray,
-) -> Reference:
+def released(linkage, terms, theta_2, omega_2, branch, times):
     """The motion under loads, gravity and viscous damping, with nothing driving it."""
     with _digits():
         equations = Equations(linkage, terms)
         theta, omega = equations.start(linkage, theta_2, omega_2, branch)
-        rows: list[list[float]] = []
+        rows = []
         t, limits, change_points = arb(0), 0, 0
         while len(rows) < len(times):
             step = equations.step(theta, omega)

@@ -1,17 +1,13 @@
 """Recorded runs whose rows are all at hand."""
 
-from collections.abc import Iterable
-from pathlib import Path
-
 from pandas import DataFrame
 
-from fourbar_validation.compare.rows import COLUMN_TYPES, Row, write_results
+from fourbar_validation.compare.rows import COLUMN_TYPES, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.changes import Differences, Kind, compare_runs
+from fourbar_validation.regression.changes import compare_runs
 from fourbar_validation.regression.record import (
-    About,
     describe_run,
     open_run,
     write_about,
@@ -23,12 +19,7 @@ HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
 """First line of a table of times."""
 
 
-def save_run(
-    folder: Path,
-    rows: list[Row],
-    times: str = "",
-    about: About = HERE,
-) -> Path:
+def save_run(folder, rows, times="", about=HERE):
     """Write the folder of a run with these rows.
 
     Lines of times are written if there are any.
@@ -41,16 +32,13 @@ def save_run(
     return folder
 
 
-def read_run(path: Path) -> tuple[About, list[Row]]:
+def read_run(path):
     """What a run was made with, and all its rows."""
     run = open_run(path)
     return run.about, list(run.rows())
 
 
-def compare_rows(
-    old: tuple[About, Iterable[Row]],
-    new: tuple[About, Iterable[Row]],
-) -> Differences:
+def compare_rows(old, new):
     """Two runs compared by their rows."""
     before, after = (
         DataFrame(
@@ -62,6 +50,6 @@ def compare_rows(
     return compare_runs((old[0], before), (new[0], after))
 
 
-def kinds(old: Iterable[Row], new: Iterable[Row]) -> list[Kind]:
+def kinds(old, new):
     """Kind of change of each line of two runs, in the order of the table."""
     return [*compare_rows((HERE, old), (HERE, new)).table.kind]

@@ -1,7 +1,6 @@
 """Scenes that several tests share, built in code."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,7 @@ CYLINDER = fourbar.LinearDrive(
 """From the ground to the input of the crank-rocker."""
 
 
-def crank_rocker(**changes: object) -> fourbar.Scene:
+def crank_rocker(**changes):
     """A crank-rocker with gravity, an offset mass centre, a force and a couple."""
     linkage = fourbar.FourBar(
         0.3,
@@ -27,7 +26,7 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
         fourbar.Bar(0.22, 0.4),
         ground_angle=0.2,
     )
-    parts: dict[str, object] = {
+    parts = {
         "linkage": linkage,
         "motion": fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
         "loads": (
@@ -37,18 +36,16 @@ def crank_rocker(**changes: object) -> fourbar.Scene:
         "effects": (fourbar.Gravity(),),
         "title": "crank-rocker",
     }
-    return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
+    return fourbar.Scene(**{**parts, **changes})
 
 
-def bare(
-    d: float, a: float, b: float, c: float, theta_1: float = 0.0
-) -> fourbar.FourBar:
+def bare(d, a, b, c, theta_1=0.0):
     """Make a linkage of bars without mass."""
     moving = (fourbar.Bar(length) for length in (a, b, c))
     return fourbar.FourBar(d, *moving, ground_angle=theta_1)
 
 
-def draw_linkage(rng: np.random.Generator, integers: bool = False) -> fourbar.FourBar:
+def draw_linkage(rng, integers=False):
     """Draw lengths that can close, of 0.1 to 1 or of whole numbers, and theta_1."""
     while True:
         lengths = rng.integers(1, 7, 4) if integers else rng.uniform(0.1, 1.0, 4)
@@ -57,7 +54,7 @@ def draw_linkage(rng: np.random.Generator, integers: bool = False) -> fourbar.Fo
             return bare(*map(float, lengths), float(theta_1))
 
 
-def balance(left: float, omega_2: float = 0.01) -> fourbar.Scene:
+def balance(left, omega_2=0.01):
     """Make a crank whose counterweight leaves a part of its weight's moment."""
     linkage = fourbar.FourBar(
         0.3,
@@ -76,7 +73,7 @@ TURN = crank_rocker(
 """A turn of the crank-rocker with points on coupler and output."""
 
 
-def low_parallelogram(steps: int = 8, **changes: object) -> fourbar.Scene:
+def low_parallelogram(steps=8, **changes):
     """Return a parallelogram below its ground's line, beyond a change point.
 
     The assembly is "open", and the sine between bars 3 and 4 is negative all the way:
@@ -86,22 +83,22 @@ def low_parallelogram(steps: int = 8, **changes: object) -> fourbar.Scene:
     ground_angle = 0.2
     linkage = replace(fourbar.uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)
     start, stop = np.radians([200.0, 340.0]) + ground_angle
-    parts: dict[str, object] = {
+    parts = {
         "linkage": linkage,
         "motion": fourbar.Motion(fourbar.Sweep(start, stop, steps), 6.0),
         "effects": (fourbar.Gravity(),),
         "title": "parallelogram below its ground",
     }
-    return fourbar.Scene(**{**parts, **changes})  # type: ignore[arg-type]
+    return fourbar.Scene(**{**parts, **changes})
 
 
-def thesis(theta_2: object = None) -> fourbar.Scene:
+def thesis(theta_2=None):
     """The thesis's model mechanism, uniform bars 2.54 cm wide.
 
     The source is Linares Mendoza, sections 4.12 and 5.7.
     """
 
-    def inertia(mass: float, length: float) -> float:
+    def inertia(mass, length):
         return mass * (length**2 + 0.0254**2) / 12.0
 
     linkage = fourbar.FourBar(
@@ -120,13 +117,10 @@ def thesis(theta_2: object = None) -> fourbar.Scene:
         4,
         tuple(loads),
         title="thesis",
-    )  # type: ignore[arg-type]
+    )
 
 
-def change_place(
-    load: fourbar.Load,
-    change: Callable[[float, float], tuple[float, float]],
-) -> dict[str, tuple[float, float]]:
+def change_place(load, change):
     """Return the place of a load changed, in the form in which it is stated."""
     forms = ("from_pin", "from_centre", "arm")
     return {
@@ -136,7 +130,7 @@ def change_place(
     }
 
 
-def mirrored(scene: fourbar.Scene) -> fourbar.Scene:
+def mirrored(scene):
     """Return the scene with y to -y.
 
     Angles, couples, speeds and the branch change sign. Effects other than gravity stay:

@@ -70,7 +70,7 @@ class TurningWheel:
 class Loop:
     """Four bars as plain numbers, and what acts on them."""
 
-    def __init__(self, scene: fourbar.Scene) -> None:
+    def __init__(self, scene):
         self.d, self.a, self.b, self.c = map(float, scene.linkage.lengths)
         self.theta_1 = float(scene.linkage.ground_angle)
         bars = (scene.linkage.input, scene.linkage.coupler, scene.linkage.output)
@@ -89,10 +89,10 @@ class Loop:
             assert isinstance(effect, fourbar.Gravity), "the second loop knows no other"
             self.gravity = complex(effect.magnitude * np.exp(1j * effect.angle))
         self.loads = scene.loads
-        self.drive: int | fourbar.LinearDrive = scene.drive or scene.drive_bar
+        self.drive = scene.drive or scene.drive_bar
         self.branch = 1.0 if scene.motion.branch == 1 else -1.0
 
-    def assemble(self, theta_2: float) -> tuple[float, float]:
+    def assemble(self, theta_2):
         """Intersect the circles about A and O4.
 
         The branch is the side of the diagonal on which B lies.
@@ -111,7 +111,7 @@ class Loop:
                 return theta_3, theta_4
         raise AssertionError("the circles do not meet")
 
-    def speeds(self, angles: Array, omega_2: float) -> Array:
+    def speeds(self, angles, omega_2):
         """Differentiate a e^(i t2) + b e^(i t3) - c e^(i t4) = const."""
         first, second, third = (
             1j * np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
@@ -120,7 +120,7 @@ class Loop:
         right = [-first.real * omega_2, -first.imag * omega_2]
         return np.array([omega_2, *np.linalg.solve(matrix, right)])
 
-    def outside_forces(self, angles: Array) -> list[tuple[complex, float]]:
+    def outside_forces(self, angles):
         """Return force and couple of gravity and loads on bars 2, 3 and 4.
 
         Each couple is about the first pin of the bar.
@@ -139,12 +139,7 @@ class Loop:
             sums.append((force, couple))
         return sums
 
-    def load_vectors(
-        self,
-        load: fourbar.Load,
-        number: int,
-        angles: Array,
-    ) -> tuple[complex, complex]:
+    def load_vectors(self, load, number, angles):
         """Return a load's force in world axes and its arm from the bar's first pin."""
         turned = complex(np.exp(1j * angles[number]))
         push, centre = _polar(load.force or (0.0, 0.0)), self.centres[number]
@@ -154,13 +149,13 @@ class Loop:
             return push, centre * turned + _polar(load.arm)
         return push, self.load_place(load, number) * turned
 
-    def load_place(self, load: fourbar.Load, number: int) -> complex:
+    def load_place(self, load, number):
         """Return where a load acts on its bar, from the first pin; a couple, at G."""
         if load.from_pin is not None:
             return _polar(load.from_pin)
         return self.centres[number] + _polar(load.from_centre or (0.0, 0.0))
 
-    def drive_direction(self, angles: Array) -> tuple[list[complex], list[float]]:
+    def drive_direction(self, angles):
         """Return the forces on bars 2, 3 and 4, and their couples about the first pin
         of the bar, of a drive of size one.
         """
@@ -184,7 +179,7 @@ class Loop:
                 couples[bar - 2] += _cross(arm, push)
         return forces, couples
 
-    def first_pins(self, angles: Array) -> list[complex]:
+    def first_pins(self, angles):
         """Return O2, A and O4."""
         return [
             0j,
@@ -192,14 +187,7 @@ class Loop:
             self.d * np.exp(1j * self.theta_1),
         ]
 
-    def write(
-        self,
-        settings: LoopSettings,
-        timestep: float,
-        wheel: float,
-        carrier: Servo | TurningWheel | None = None,
-        omega: float = 0.0,
-    ) -> str:
+    def write(self, settings, timestep, wheel, carrier=None, omega=0.0):
         """Write the MJCF.
 
         Crank and coupler are in series, the rocker stands by itself, and a `connect`
@@ -207,7 +195,7 @@ class Loop:
         """
         lengths = (self.a, self.b, self.c)
 
-        def bar(number: int) -> str:
+        def bar(number):
             centre = self.centres[number]
             inertia = " ".join([repr(self.inertias[number])] * 3)
             armature = f' armature="{wheel!r}"' if number == 0 else ""
@@ -217,7 +205,7 @@ class Loop:
                 f'<joint name="pin{number}" axis="0 0 1"{armature}/>'
             )
 
-        def closing_site(number: int) -> str:
+        def closing_site(number):
             site = f'<site name="B{number}" pos="{lengths[number]!r} 0 0"/>'
             if settings.pad is None:
                 return site
@@ -237,7 +225,7 @@ class Loop:
             option = 'solver="Newton" tolerance="0" iterations="10"'
         gravity = f"{self.gravity.real!r} {self.gravity.imag!r} 0"
         ground = _polar((self.d, self.theta_1))
-        sites: list[list[str]] = [[], [], []]
+        sites = [[], [], []]
         motors = []
         for index, load in enumerate(self.loads):
             number = load.bar - 2
@@ -305,11 +293,11 @@ class Sample:
 class Simulation:
     """A crank with a heavy flywheel carries the loop through its sweep."""
 
-    def __init__(self, scene: fourbar.Scene, settings: LoopSettings) -> None:
+    def __init__(self, scene, settings):
         self.loop = Loop(scene)
         self.settings = settings
         self.sweep = np.asarray(fourbar.solve(scene, "position").theta_2)
-        self.omega = float(scene.motion.omega_2)  # type: ignore[arg-type]
+        self.omega = float(scene.motion.omega_2)
         assert float(scene.motion.alpha_2) == 0.0, "the flywheel keeps its speed"
         self.timestep = 2.0 * math.pi / settings.steps_per_revolution / abs(self.omega)
         carried = settings.carrier is not None
@@ -323,11 +311,7 @@ class Simulation:
         self.probed = self.compile(self.wheel_read)
         self.probe = mujoco.MjData(self.probed)
 
-    def compile(
-        self,
-        wheel: float,
-        carrier: Servo | TurningWheel | None = None,
-    ) -> mujoco.MjModel:
+    def compile(self, wheel, carrier=None):
         """Compile the loop with a flywheel, or what else keeps the crank's speed."""
         text = self.loop.write(self.settings, self.timestep, wheel, carrier, self.omega)
         model = mujoco.MjModel.from_xml_string(text)
@@ -336,7 +320,7 @@ class Simulation:
             model.dof_invweight0[:] *= carrier.weight_factor
         return model
 
-    def start(self, theta_2: float) -> None:
+    def start(self, theta_2):
         """Close the loop at an angle of the crank; what keeps its speed is in step."""
         angles = np.array([theta_2, *self.loop.assemble(theta_2)])
         speeds = self.loop.speeds(angles, self.omega)
@@ -349,14 +333,14 @@ class Simulation:
             self.data.act[:] = theta_2
             self.data.ctrl[-1] = self.omega
 
-    def time_steps(self, count: int) -> float:
+    def time_steps(self, count):
         """Time so many steps from the start of the sweep, processor seconds."""
         self.start(float(self.sweep[0]))
         began = time.process_time()
         mujoco.mj_step(self.model, self.data, count)
         return time.process_time() - began
 
-    def run(self) -> list[Sample]:
+    def run(self):
         """Step through the sweep and read states on the way."""
         self.start(float(self.sweep[0] if self.omega > 0.0 else self.sweep[-1]))
         n = self.settings.steps_per_revolution
@@ -369,7 +353,7 @@ class Simulation:
             mujoco.mj_step(self.model, self.data)
         return samples
 
-    def read(self) -> Sample:
+    def read(self):
         """Read one state.
 
         The drive is the one that gives the crank the acceleration which the flywheel
@@ -388,7 +372,7 @@ class Simulation:
         forces = self.balance(angles, speeds, turned, closing, drive)
         return Sample(float(angles[0]), float(speeds[0]), alpha_2, forces)
 
-    def exerted(self) -> float:
+    def exerted(self):
         """Return the torque on the crank, N m: that of the servo, or the multiplier of
         the equality with the wheel.
         """
@@ -396,7 +380,7 @@ class Simulation:
             return float(self.data.actuator_force[-1])
         return float(self.data.efc_force[3])  # after the three rows of `connect`
 
-    def probe_drive(self, angles: Array, alpha_2: float) -> tuple[Array, Array, float]:
+    def probe_drive(self, angles, alpha_2):
         """Find the drive that gives the crank its acceleration.
 
         Return the accelerations of the joints and the closing force with it.
@@ -418,7 +402,7 @@ class Simulation:
         closing = rest_closing + part * (pushed_closing - rest_closing)
         return acceleration, closing, float(part * scale)
 
-    def generalized_drive(self, angles: Array) -> Array:
+    def generalized_drive(self, angles):
         """Return the generalized forces on the three joints of a drive of size one, by
         virtual work.
         """
@@ -429,14 +413,7 @@ class Simulation:
         on_crank = couples[0] + couples[1] + _cross(crank, pushes[1])
         return np.array([on_crank, couples[1], couples[2]])
 
-    def balance(
-        self,
-        angles: Array,
-        speeds: Array,
-        accelerations: Array,
-        closing: Array,
-        drive: float,
-    ) -> dict[str, Array]:
+    def balance(self, angles, speeds, accelerations, closing, drive):
         """Find each pin's force from Newton's law of its bar."""
         loop = self.loop
         outside = loop.outside_forces(angles)
@@ -462,7 +439,7 @@ class Simulation:
         }
 
 
-def measure(scene: fourbar.Scene, settings: LoopSettings) -> dict[str, float]:
+def measure(scene, settings):
     """Return the worst error of the drive and of each pin's force, relative to the
     largest value in the sweep.
     """
@@ -489,16 +466,16 @@ def measure(scene: fourbar.Scene, settings: LoopSettings) -> dict[str, float]:
     return errors
 
 
-def _add_crank(joints: Array) -> Array:
+def _add_crank(joints):
     """Return angles, speeds or accelerations of the bars: the coupler's joint turns
     on the crank.
     """
     return np.array([joints[0], joints[0] + joints[1], joints[2]])
 
 
-def _polar(pair: tuple[float, float]) -> complex:
+def _polar(pair):
     return complex(pair[0] * np.exp(1j * pair[1]))
 
 
-def _cross(arm: complex, force: complex) -> float:
+def _cross(arm, force):
     return float((arm.conjugate() * force).imag)

@@ -10,11 +10,9 @@ Nothing of the formulas and of the harness's engines is used.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fourbar.effects import Friction, Gravity, Load, Viscous
+from fourbar.effects import Friction, Gravity, Viscous
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -23,11 +21,12 @@ from fourbar_validation.compare.pins import (
     state_from_pins,
 )
 
-Array = NDArray[np.float64]
-_PINS = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
-"""Bars that meet at each pin."""
+_PINS = ("O2", "A", "B", "O4")
+_SIGNS = np.array([[1, 0, 0], [-1, 1, 0], [0, -1, 1], [0, 0, 1]])
+"""Sign of bars 2, 3 and 4 in the gap at each pin, (4, 3)."""
+_ON_NAMED_BAR = (1, -1, -1, 1)
+"""Sign of F12, F32, F43 and F14 in the multiplier of their pins."""
 _ANGLES = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4")
-NEWTON_STEPS = 60
 
 
 class Textbook:
@@ -36,8 +35,10 @@ class Textbook:
     name = "textbook"
     quantities = (*_ANGLES, *PIN_FORCES, "torque")
     effects = ("loads", "drive", "gravity", "viscous", "friction")
+    newton_steps = 60
+    """Steps of Newton's method at most, after the circles about A and O4 have met."""
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         """Answer, or refuse a scene with other effects."""
         known = (Gravity, Viscous, Friction)
         if (
@@ -46,57 +47,51 @@ class Textbook:
             or not all(isinstance(effect, known) for effect in scene.effects)
         ):
             return Answer(self.name, "exact", refusal="an effect has no model here")
-        scene = state_from_pins(scene)
+        bodies = _Bodies(state_from_pins(scene), self.newton_steps)
         n = len(command.theta_2)
         values = {
             name: np.full((n, 2) if name in PIN_FORCES else n, np.nan)
             for name in self.quantities
         }
         assembled = np.zeros(n, dtype=bool)
-        omega = np.broadcast_to(command.omega_2, n)
-        alpha = np.broadcast_to(command.alpha_2, n)
-        for i in range(n):
-            bodies = _Bodies(scene, float(command.theta_2[i]))
+        omega, alpha = np.broadcast_arrays(
+            command.omega_2, command.alpha_2, command.theta_2
+        )[:2]
+        for i, (theta_2, branch) in enumerate(
+            zip(command.theta_2, command.branch, strict=True)
+        ):
             try:
-                assembled[i] = bodies.close(int(command.branch[i]))
-                if not assembled[i]:
-                    continue
-                answered = bodies.solve(float(omega[i]), float(alpha[i]))
+                assembled[i] = bodies.close(float(theta_2), int(branch))
+                answered = bodies.solve(omega[i], alpha[i]) if assembled[i] else {}
             except np.linalg.LinAlgError:  # on a change point
-                assembled[i] = True
-                continue
+                assembled[i], answered = True, {}
             for name, number in answered.items():
                 values[name][i] = number
         return Answer(self.name, "exact", command, assembled, values)
 
 
 class _Bodies:
-    """Bars 2, 3, 4 at one position of the input."""
+    """Bars 2, 3, 4 at one position of the input: places `z` of G and angles `theta`."""
 
-    def __init__(self, scene: Scene, theta_2: float) -> None:
+    def __init__(self, scene, newton_steps):
         link = scene.linkage
-        self.scene, self.theta_2 = scene, theta_2
-        self.lengths = link.lengths
+        self.newton_steps = newton_steps
+        self.scene, self.lengths = scene, link.lengths
         self.ground = link.ground * np.exp(1j * link.ground_angle)
-        self.bars = {k: link.bar(k) for k in (2, 3, 4)}
-        self.centres = {}
-        for k, bar in self.bars.items():
-            distance, angle = find_centre(bar)
-            self.centres[k] = distance * np.exp(1j * angle)
+        bars = [link.bar(k) for k in (2, 3, 4)]
+        self.mass = np.array([find_mass(bar) for bar in bars])
+        self.inertia = np.array([find_inertia(bar) for bar in bars])
+        self.centre = np.array([_polar(find_centre(bar)) for bar in bars])
+        ends = np.diag(self.lengths[1:])[:2]  # A is the end of bar 2, B that of bar 3
+        ends = np.vstack((np.zeros(3), ends, np.zeros(3)))
+        ends[2, 2] = self.lengths[3]  # and of bar 4
+        self.arms = ends - self.centre
+        """Places of the pins from the centre of each bar, in its frame, (4, 3)."""
 
-    def arms(self, pin: str) -> dict[int, complex]:
-        """Return a pin's place from the centre of each bar there, in its frame."""
-        begins = {"O2": 2, "A": 3, "O4": 4}.get(pin)
-        return {
-            k: (0.0 if k == begins else self.bars[k].length) - self.centres[k]
-            for k in _PINS[pin]
-            if k != 1
-        }
-
-    def close(self, branch: int) -> bool:
+    def close(self, theta_2, branch):
         """Find the nine coordinates by Newton's method on the constraints."""
         _, a, b, c = self.lengths
-        A = a * np.exp(1j * self.theta_2)
+        A = a * np.exp(1j * theta_2)
         diagonal = self.ground - A
         e = abs(diagonal)
         cosine = (b * b + e * e - c * c) / (2.0 * b * e)
@@ -104,135 +99,90 @@ class _Bodies:
             return False
         theta_3 = np.angle(diagonal) + branch * math.acos(cosine)
         B = A + b * np.exp(1j * theta_3)
-        self.theta = {2: self.theta_2, 3: theta_3, 4: float(np.angle(B - self.ground))}
-        first = {2: 0j, 3: A, 4: self.ground}
-        self.place = {
-            k: first[k] + self.centres[k] * np.exp(1j * self.theta[k]) for k in first
-        }
+        self.theta_2 = theta_2
+        self.theta = np.array([theta_2, theta_3, np.angle(B - self.ground)])
+        first = np.array([0j, A, self.ground])
+        self.z = first + self.centre * np.exp(1j * self.theta)
         gap = self._gap()
-        for _ in range(NEWTON_STEPS):
-            step = np.linalg.solve(self.jacobian(), -gap)
-            before = self.place, self.theta
-            steps = {k: step[3 * (k - 2) : 3 * (k - 1)] for k in (2, 3, 4)}
-            self.place = {
-                k: place + complex(steps[k][0], steps[k][1])
-                for k, place in self.place.items()
-            }
-            self.theta = {k: x + float(steps[k][2]) for k, x in self.theta.items()}
+        for _ in range(self.newton_steps):
+            x, y, turn = np.split(np.linalg.solve(self.jacobian(), -gap), 3)
+            before = self.z, self.theta
+            self.z, self.theta = self.z + x + 1j * y, self.theta + turn
             last, gap = gap, self._gap()
             if not np.abs(gap).max() < np.abs(last).max():
-                self.place, self.theta = before
+                self.z, self.theta = before
                 break
         return True
 
-    def _gap(self) -> Array:
-        gaps = []
-        for pin, (one, other) in _PINS.items():
-            points = [self._point(pin, k) for k in (one, other)]
-            gaps += [(points[1] - points[0]).real, (points[1] - points[0]).imag]
-        return np.array([*gaps, self.theta[2] - self.theta_2])
+    @property
+    def turned(self):
+        """Return the arms in world axes with their signs."""
+        return _SIGNS * self.arms * np.exp(1j * self.theta)
 
-    def _point(self, pin: str, bar: int) -> complex:
-        if bar == 1:
-            return complex(self.ground) if pin == "O4" else 0j
-        return complex(
-            self.place[bar] + self.arms(pin)[bar] * np.exp(1j * self.theta[bar])
-        )
+    def _gap(self):
+        gaps = _SIGNS @ self.z + self.turned.sum(axis=1)
+        gaps[3] -= self.ground
+        return np.array([*gaps.real, *gaps.imag, self.theta[0] - self.theta_2])
 
-    def jacobian(self, bar: int = 2) -> Array:
+    def jacobian(self, bar=2):
         """Return the derivatives of the constraints, (9, 9); the last is of a bar."""
-        rows = np.zeros((9, 9))
-        for i, (pin, (one, other)) in enumerate(_PINS.items()):
-            for k, sign in ((one, -1.0), (other, 1.0)):
-                if k == 1:
-                    continue
-                arm = self.arms(pin)[k] * np.exp(1j * self.theta[k])
-                column = 3 * (k - 2)
-                rows[2 * i, column] = rows[2 * i + 1, column + 1] = sign
-                rows[2 * i, column + 2] = -sign * arm.imag
-                rows[2 * i + 1, column + 2] = sign * arm.real
-        rows[8, 3 * (bar - 2) + 2] = 1.0
-        return rows
+        turning, none = 1j * self.turned, np.zeros((4, 3))
+        driven = np.zeros((1, 9))
+        driven[0, 4 + bar] = 1.0
+        x, y = (_SIGNS, none, turning.real), (none, _SIGNS, turning.imag)
+        return np.vstack((np.hstack(x), np.hstack(y), driven))
 
-    def solve(self, omega_2: float, alpha_2: float) -> dict[str, object]:
+    def solve(self, omega_2, alpha_2):
         """Solve speeds, accelerations and multipliers."""
         jacobian = self.jacobian()
-        speeds = np.linalg.solve(jacobian, [0.0] * 8 + [omega_2])
-        omega = {k: float(speeds[3 * (k - 2) + 2]) for k in (2, 3, 4)}
-        gamma = []
-        for pin, (one, other) in _PINS.items():
-            centripetal = 0j
-            for k, sign in ((one, -1.0), (other, 1.0)):
-                if k != 1:
-                    arm = self.arms(pin)[k] * np.exp(1j * self.theta[k])
-                    centripetal += sign * omega[k] ** 2 * arm
-            gamma += [centripetal.real, centripetal.imag]
-        accelerations = np.linalg.solve(jacobian, [*gamma, alpha_2])
-        alpha = {k: float(accelerations[3 * (k - 2) + 2]) for k in (2, 3, 4)}
-        needed = np.zeros(9)
-        for k, bar in self.bars.items():
-            at = 3 * (k - 2)
-            needed[at : at + 2] = find_mass(bar) * accelerations[at : at + 2]
-            needed[at + 2] = find_inertia(bar) * alpha[k]
-        needed -= self._applied(omega)
+        omega = np.linalg.solve(jacobian, [0.0] * 8 + [omega_2])[6:]
+        centripetal = (self.turned * omega**2).sum(axis=1)
+        right = [*centripetal.real, *centripetal.imag, alpha_2]
+        accelerations = np.linalg.solve(jacobian, right)
+        force, couple = self._applied(omega)
+        weights = np.concatenate((self.mass, self.mass, self.inertia))
+        needed = weights * accelerations - [*force.real, *force.imag, *couple]
         driven = self.jacobian(self.scene.drive_bar)
-        multipliers = np.linalg.solve(driven.T, needed)
-        values: dict[str, object] = {"torque": multipliers[8]}
-        for k in (3, 4):
-            values |= {f"theta_{k}": self.theta[k], f"omega_{k}": omega[k]}
-            values[f"alpha_{k}"] = alpha[k]
-        pairs = zip(PIN_FORCES, _PINS.values(), strict=True)
-        for row, (name, (_, second)) in enumerate(pairs):
-            on_second = multipliers[2 * row : 2 * row + 2]
-            values[name] = on_second if second == int(name[2]) else -on_second
+        *pins, torque = np.linalg.solve(driven.T, needed)
+        pairs = np.reshape(pins, (2, 4)).T
+        values = {"torque": torque}
+        for k in (1, 2):
+            values |= {f"theta_{k + 2}": self.theta[k], f"omega_{k + 2}": omega[k]}
+            values[f"alpha_{k + 2}"] = accelerations[6 + k]
+        for name, sign, pair in zip(PIN_FORCES, _ON_NAMED_BAR, pairs, strict=True):
+            values[name] = sign * pair
         return values
 
-    def _applied(self, omega: dict[int, float]) -> Array:
-        """Return the generalized forces of loads and effects, (9,)."""
-        applied = np.zeros(9)
-
-        def push(bar: int, force: complex, arm: complex, couple: float = 0.0) -> None:
-            """Push at an arm from the mass centre, in world axes."""
-            at = 3 * (bar - 2)
-            moment = (arm.conjugate() * force).imag + couple
-            applied[at : at + 3] += force.real, force.imag, moment
-
+    def _applied(self, omega):
+        """Return force and couple about G on each bar, of loads and effects."""
+        force, couple = np.zeros(3, dtype=complex), np.zeros(3)
         for load in self.scene.loads:
-            push(load.bar, *self._find_load(load), load.moment)
+            push, arm = self._find_load(load)
+            force[load.bar - 2] += push
+            couple[load.bar - 2] += (arm.conjugate() * push).imag + load.moment
+        slip = _SIGNS @ omega
         for effect in self.scene.effects:
             if isinstance(effect, Gravity):
-                g = effect.magnitude * np.exp(1j * effect.angle)
-                for k, bar in self.bars.items():
-                    push(k, find_mass(bar) * complex(g), 0j)
+                force += self.mass * _polar((effect.magnitude, effect.angle))
                 continue
-            at_pins = (
-                effect.coefficients if isinstance(effect, Viscous) else effect.torques
-            )
-            for pin, size in at_pins:
-                one, other = _PINS[pin]
-                slip = omega.get(other, 0.0) - omega.get(one, 0.0)
-                couple = -size * (
-                    slip if isinstance(effect, Viscous) else np.sign(slip)
-                )
-                for bar, sign in ((other, 1.0), (one, -1.0)):
-                    if bar != 1:
-                        push(bar, 0j, 0j, sign * couple)
-        return applied
+            viscous = isinstance(effect, Viscous)
+            sizes = dict(effect.coefficients if viscous else effect.torques)
+            resisting = slip if viscous else np.sign(slip)
+            couple -= ([sizes.get(pin, 0.0) for pin in _PINS] * resisting) @ _SIGNS
+        return force, couple
 
-    def _find_load(self, load: Load) -> tuple[complex, complex]:
+    def _find_load(self, load):
         """Return a load's force and its arm from the mass centre, in world axes."""
         if load.force is None:
             return 0j, 0j
-        size, direction = load.force
-        turned = self.theta[load.bar]
-        if load.frame == "bar":
-            direction = direction + turned
-        force = complex(size * np.exp(1j * direction))
+        turned = np.exp(1j * self.theta[load.bar - 2])
+        push = _polar(load.force) * (turned if load.frame == "bar" else 1.0)
         if load.place is None:
-            assert load.arm is not None
-            distance, angle = load.arm
-            return force, complex(distance * np.exp(1j * angle))
-        assert load.place.from_pin is not None
-        distance, angle = load.place.from_pin
-        local = distance * np.exp(1j * angle) - self.centres[load.bar]
-        return force, complex(local * np.exp(1j * turned))
+            return push, _polar(load.arm)
+        arm = _polar(load.place.from_pin) - self.centre[load.bar - 2]
+        return push, arm * turned
+
+
+def _polar(pair):
+    """Return a vector of a size and a direction."""
+    return complex(pair[0] * np.exp(1j * pair[1]))

@@ -10,7 +10,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from tests.support.scenes import crank_rocker
 
@@ -21,16 +20,16 @@ class Few:
 
     names: tuple[str, ...] = ("a", "b", "c", "d")
 
-    def __len__(self) -> int:
+    def __len__(self):
         return len(self.names)
 
-    def name(self, index: int) -> str:
+    def name(self, index):
         return self.names[index]
 
-    def scene(self, index: int) -> Scene:
+    def scene(self, index):
         return crank_rocker(title=self.names[index])
 
-    def fingerprint(self) -> str:
+    def fingerprint(self):
         return repr(self.names)
 
 
@@ -39,7 +38,7 @@ class Unlucky:
 
     name = "unlucky"
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         for life in sorted(Path(os.environ["LIVES"]).iterdir()):
             life.unlink()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -51,7 +50,7 @@ class Moody:
 
     name = "moody"
 
-    def answer(self, scene: Scene, command: Command) -> Answer:
+    def answer(self, scene, command):
         if scene.title == "b":
             os.kill(os.getpid(), signal.SIGSEGV)
         if scene.title == "c":
@@ -59,7 +58,7 @@ class Moody:
         return Answer("moody", "exact", refusal="declined")
 
 
-def dies_at_first(*_: object) -> None:
+def dies_at_first(*_):
     """End the process and take one of its lives as long as the folder LIVES has any."""
     lives = sorted(Path(os.environ["LIVES"]).iterdir())
     if lives:
@@ -67,7 +66,7 @@ def dies_at_first(*_: object) -> None:
         os._exit(1)
 
 
-def start_and_sleep(starts: Path) -> str:
+def start_and_sleep(starts):
     """Work for some looks of the pool, before and after telling of it in a file."""
     time.sleep(1.0)
     with starts.open("a") as file:
@@ -76,7 +75,7 @@ def start_and_sleep(starts: Path) -> str:
     return "done"
 
 
-def die_with_the_pipe(_: object) -> None:
+def die_with_the_pipe(_):
     """Kill this worker while it holds the lock of the pipe that all workers share."""
     frame = sys._getframe()
     while "channel" not in frame.f_locals:

@@ -62,7 +62,7 @@ def compute_row(text, steps, folder):
         setup = TrialSetup(SCENE, command(SCENE))
         return judge_trial(SCENE, setup.try_out(read_settings(text, steps)))
     if "Euler" in text:
-        steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / MUJOCO_TIMESTEP  # type: ignore[arg-type]
+        steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / MUJOCO_TIMESTEP
     integrator = text.partition(",")[0]
     settings = replace(
         BEST,

@@ -12,7 +12,6 @@ import sys
 import textwrap
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -75,7 +74,7 @@ def latch(monkeypatch, tmp_path):
 
 def test_one_file_is_all_that_the_example_needs(latch):
     """The page's own test, with nothing registered anywhere."""
-    names: dict[str, Any] = {}
+    names = {}
     exec(block("python", number=1), names)
     names["test_every_exact_engine_agrees"]()
     assert "latch" in effects.list_kinds()
@@ -93,7 +92,7 @@ def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
         right(*arguments)
 
     monkeypatch.setattr(latch, method, twice)
-    names: dict[str, Any] = {}
+    names = {}
     exec(block("python", number=1), names)
     with pytest.raises(AssertionError):
         names["test_every_exact_engine_agrees"]()

@@ -420,7 +420,7 @@ def test_a_guest_its_worker_and_its_run_killed_in_turn_change_no_byte(
         for victim in ("guest", "worker", "run"):
             parts = len(list(out.glob("parts/0*")))
             wait_for_parts(out, process, at_least=parts + 1)
-            victims: list[int] = []
+            victims = []
             while not victims and process.poll() is None:
                 time.sleep(0.01)
                 victims = {
@@ -529,7 +529,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     With --no-pictures not at all.
     """
     judge_here(monkeypatch)
-    drawn: list[str] = []
+    drawn = []
     judge = pool.judge_job
 
     def noting(job):

@@ -86,7 +86,7 @@ def test_a_killed_accept_leaves_one_accepted_state_and_is_completed_by_another(
         number = (kill + 1) % 2
         line = ["accept", str(runs[number]), "--to", str(target)]
         after = float(rng.uniform(0.0, 0.03))
-        killed += kill_while(lambda line=line: status(line), changes(target), after)  # type: ignore[misc]
+        killed += kill_while(lambda line=line: status(line), changes(target), after)
         with suppress(InputError):  # a table that its record does not describe
             assert open_run(target).about.date in dates
         assert status(line) == HOLDS
@@ -114,7 +114,7 @@ def test_a_killed_collect_is_done_again_with_the_same_bytes(tmp_path, monkeypatc
     for _ in range(KILLS):
         line = ["collect", *folders, "-o", str(out)]
         after = float(rng.uniform(0.0, 0.3))
-        killed += kill_while(lambda line=line: status(line), changes(out), after)  # type: ignore[misc]
+        killed += kill_while(lambda line=line: status(line), changes(out), after)
         assert status(line) == HOLDS
         for name in ("results.csv", "results.parquet"):
             assert (out / name).read_bytes() == (whole / name).read_bytes()

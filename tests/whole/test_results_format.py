@@ -193,13 +193,13 @@ def test_the_pandas_snippet_runs(results, monkeypatch, capsys):
     exec(rows, {})
     printed = capsys.readouterr().out
     assert "free-body" in printed and "0 of " in printed
-    names: dict[str, object] = {}
+    names = {}
     exec(accepted, names)
     assert (
         "free-body" in capsys.readouterr().out
         and not len(names["failing"])
         and len(names["times"])
-    )  # type: ignore[arg-type]
+    )
 
 
 def test_the_sql_runs(results, monkeypatch):

@@ -88,7 +88,7 @@ def test_a_user_who_may_write_nowhere_gets_numbers_or_one_line(
 ):
     """Nor at home, where libraries keep their caches."""
     environment = os.environ | {"HOME": str(locked), "PYTHONDONTWRITEBYTECODE": "1"}
-    rights: list[str] = []
+    rights = []
     if os.geteuid() == 0:  # to whom no folder is locked, but by this
         if shutil.which("setpriv") is None:
             pytest.skip("root has all rights, and setpriv takes none away")

@@ -43,7 +43,7 @@ def test_a_page_does_and_prints_what_it_says(
         pytest.importorskip("pinocchio", reason="a recipe needs it: pip install pin")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "models").symlink_to(ROOT / "models")
-    names: dict[str, object] = {}
+    names = {}
     printed = ""
     commands = 0
     for language, text in BLOCK.findall((ROOT / f"{page}.md").read_text("utf-8")):

@@ -4,7 +4,6 @@ module of this project.
 
 import ast
 import json
-from typing import Any
 
 import numpy as np
 import pytest
@@ -39,7 +38,7 @@ def test_newton_s_free_bodies_find_our_answers(quantity):
         if isinstance(node, ast.Assign)
         or (isinstance(node, ast.FunctionDef) and node.name.startswith("solve"))
     ]
-    names: dict[str, Any] = {"np": np}
+    names = {"np": np}
     exec(compile(ast.Module(numbers, []), str(NEWTON), "exec"), names)
     problem = json.loads((PROBLEMS / "newton_128.json").read_text())
     command, answers = problem["command"], np.array(problem["answers"][quantity])

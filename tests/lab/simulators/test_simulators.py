@@ -259,7 +259,7 @@ def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch):
             BytesIO(json.dumps({"id": 1, **question}).encode()),
             replies,
         )
-        reply: dict[str, Any] = json.loads(replies.getvalue())
+        reply = json.loads(replies.getvalue())
         return reply
 
     told = {key: PROBLEM[key] for key in ("scene", "command")}
@@ -349,7 +349,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
 
     def answered(state):
         state.data.qpos[:], state.data.qvel[:] = state.qpos, state.qvel
-        instant: Instant = mujoco_c._evaluate_mujoco(state.model, state.data)
+        instant = mujoco_c._evaluate_mujoco(state.model, state.data)
         return instant
 
     now, by = answered(gradients.compile_and_assemble(scene, theta_2, "mujoco")), {}

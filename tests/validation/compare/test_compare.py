@@ -4,7 +4,6 @@ The unit of an error where nothing is allowed is tested too.
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ ALLOWED = 1e-14
 def judge_quantity(*error, predicted=None, **changes):
     """Judge the errors of a quantity, between two that are exact."""
     n = len(error)
-    parts: dict[str, Any] = {
+    parts = {
         "allowed": np.full(n, ALLOWED),
         "relative": np.ones(n, dtype=bool),
         "mask": np.ones(n, dtype=bool),
@@ -184,6 +183,6 @@ def test_an_error_within_the_rounding_of_theta_2_is_taken_again():
         "force",
     )
     answered = {"torque": solution.torque}
-    again = compare(shift, nothing, lambda mask: answered)["torque"]  # type: ignore[dict-item, return-value]
+    again = compare(shift, nothing, lambda mask: answered)["torque"]
     assert again.verdict == AGREES and "within the rounding of theta_2" in again.reason
     assert K * LAST_DIGIT <= again.allowed < 1e-6

@@ -50,7 +50,7 @@ def compare(answer, **held):
         SCENE,
         answer,
         FORMULAS,
-        Demands(EQUIVALENCE, COMPARED_QUANTITIES, **held),  # type: ignore[arg-type]
+        Demands(EQUIVALENCE, COMPARED_QUANTITIES, **held),
     )
     return {row.quantity: row for row in [*comparison.rows(), comparison.closure()]}
 
@@ -132,7 +132,7 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
     assert row.quantity == "assembled" and row.failed
 
 
-def replace_assembled(answer, assembled):  # type: ignore[type-arg]
+def replace_assembled(answer, assembled):
     answer.assembled = assembled
     return answer
 
@@ -197,7 +197,7 @@ def test_what_is_predicted_is_not_multiplied_by_the_terms_that_cancel():
 
 @pytest.mark.parametrize(("times", "verdict"), [(9.0, DEGRADED), (11.0, FAILS)])
 def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(times, verdict):
-    most = np.abs(FORMULAS.torque).max()  # type: ignore[type-var]
+    most = np.abs(FORMULAS.torque).max()
     expected = np.full(POSITIONS, 1e-10 * most)
 
     def predict(name, where):

@@ -112,7 +112,7 @@ def test_a_curve_is_not_drawn_across_the_jump():
     reversals = find_reversals(posed, command(posed), solution)
     x, y = break_curve(
         solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0]
-    )  # type: ignore[index]
+    )
     gaps = np.flatnonzero(np.isnan(y))
     assert len(gaps) == len(reversals) == 2 and len(x) == len(y) == len(solution) + 6
     for gap, reversal in zip(gaps, reversals, strict=True):

@@ -11,7 +11,6 @@ import pytest
 
 import fourbar
 from fourbar.effects import (
-    Effect,
     Flywheel,
     Friction,
     Gravity,
@@ -33,7 +32,7 @@ from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
-ACTING: dict[str, Effect] = {
+ACTING = {
     "gravity": Gravity(9.81, 0.3),
     "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
     "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),

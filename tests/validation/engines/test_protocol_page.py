@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -140,7 +139,7 @@ def check(part):
 def test_what_the_judge_writes_is_what_the_schema_says():
     seen, question = 0, check("question")
     for scene in scenes():
-        told: dict[str, Any] = {"id": seen, "scene": protocol.scene_to_json(scene)}
+        told = {"id": seen, "scene": protocol.scene_to_json(scene)}
         if scene.motion.free is None:
             told |= {
                 "ask": "answer",

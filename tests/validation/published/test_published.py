@@ -62,17 +62,13 @@ PRINTED_GAP = 20.0 * np.radians(0.5e-5) + 55.0 * np.radians(0.5e-6)
 """cm; theta_4 is printed to five decimals of a degree at least, theta_3 to six: half a
 unit of each, by its bar.
 """
-T4 = (
-    309.30935923198564, 309.330779939797, 309.313000742774, 309.304477356844,
-    309.002005400392, 308.804407126702, 308.8044071267012, 308.80440716278196,
-)  # fmt: skip
-F12X = (
-    7.033117757022,
-    7.033839565011,
-    161.418472567466,
-    161.418320162565,
-    161.418168408309,
-)
+LADDER = {
+    "T4": """309.30935923198564 309.330779939797 309.313000742774 309.304477356844
+             309.002005400392 308.804407126702 308.8044071267012 308.80440716278196""",
+    "F12x": """7.033117757022 7.033839565011 161.418472567466 161.418320162565
+               161.418168408309""",
+}
+"""What each error of the thesis, one after another, makes of two unknowns."""
 MODELS = Path(__file__).parents[3] / "models"
 
 
@@ -83,27 +79,19 @@ def list_all():
 
 
 def test_the_published_torque_error_by_error():
-    for name, listed in (("T4", T4), ("F12x", F12X)):
-        for figure, (_, x), (_, *step) in zip(
-            listed,
-            climb_ladder(),
-            ERRATA_IN_ORDER,
-            strict=name == "T4",
-        ):
-            assert x[name] == pytest.approx(
-                figure,
-                rel=0.0,
-                abs=LISTED + bound_round_off(*step)[name],
-            )
+    steps = zip(climb_ladder(), ERRATA_IN_ORDER, strict=True)
+    for number, ((_, x), (_, *step)) in enumerate(steps):
+        for name, listed in LADDER.items():
+            for figure in listed.split()[number : number + 1]:
+                allowed = LISTED + bound_round_off(*step)[name]
+                assert abs(x[name] - float(figure)) <= allowed
+    assert number + 1 == len(LADDER["T4"].split())
 
 
 def test_the_thesis_without_its_errors_is_ours():
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
-    right, program, apart = (
-        compute_right_unknowns(),
-        climb_ladder()[0][1],
-        bound_round_off(ProgramErrors()),
-    )
+    right, (_, program) = compute_right_unknowns(), climb_ladder()[0]
+    apart = bound_round_off(ProgramErrors())
     assert program.keys() == right.keys()
     for name, unknown in program.items():
         assert unknown == pytest.approx(right[name], rel=0.0, abs=apart[name])
@@ -116,12 +104,8 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise():
     """
     matrix, sides = make_equations(ProgramErrors())
     with mpmath.workdps(50):
-        exact = [
-            float(x)
-            for x in mpmath.lu_solve(
-                mpmath.matrix(matrix.tolist()), mpmath.matrix(sides.tolist())
-            )
-        ]
+        system = (mpmath.matrix(numbers.tolist()) for numbers in (matrix, sides))
+        exact = [float(x) for x in mpmath.lu_solve(*system)]
     order, worst = np.random.default_rng(0), np.zeros(13)
     for _ in range(200):
         rows = order.permutation(13)
@@ -137,21 +121,12 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise():
 def test_rows_for_the_report():
     rows = list_ladder_rows()
     ladder = [row for row in rows if row[0]]
-    assert [did.partition(" ")[0] for did, *_ in ladder] == [
-        "nothing",
-        "#3",
-        "#1",
-        "#2",
-        "#4",
-        "#5",
-        "I_G3,",
-        "#5b",
-    ]
+    begin = " ".join(did.partition(" ")[0] for did, *_ in ladder)
+    assert begin == "nothing #3 #1 #2 #4 #5 I_G3, #5b"
     assert rows[0][2:] == ("309.309359232", "7.033", "-2.121")
     assert rows[-2][2:] == rows[-1][2:] == ("308.804407163", "161.418", "-156.506")
-    assert (
-        all(did and right for did, right, *_ in ladder) and len(rows) == len(ladder) + 2
-    )
+    assert all(did and right for did, right, *_ in ladder)
+    assert len(rows) == len(ladder) + 2
 
 
 @pytest.mark.parametrize(
@@ -193,16 +168,11 @@ def test_every_figure_is_compared():
         "Maple": 5,
         "public test cases": 16,
     }
-    assert len({(figure.table, figure.name) for figure in list_all()}) == len(
-        list_all()
-    )
-    assert Counter(
-        figure.verdict() for figure in list_all() if figure.table != "public test cases"
-    ) == {
-        "rounded": 1233,
-        "truncated": 28,
-        "differs": 60,
-    }
+    names = {(figure.table, figure.name) for figure in list_all()}
+    assert len(names) == len(list_all())
+    of_thesis = [one for one in list_all() if one.table != "public test cases"]
+    verdicts = Counter(figure.verdict() for figure in of_thesis)
+    assert verdicts == {"rounded": 1233, "truncated": 28, "differs": 60}
 
 
 def test_every_difference_is_what_its_errata_make_of_ours():
@@ -212,25 +182,18 @@ def test_every_difference_is_what_its_errata_make_of_ours():
     """
     differ = [figure for figure in list_all() if figure.verdict() == "differs"]
     assert all(is_explained(figure) for figure in differ)
-    misprints = {
-        figure.name: figure.errata for figure in differ if not figure.reproduced()
-    }
+    misprints = {one.name: one.errata for one in differ if not one.reproduced()}
+    twelve, seventeen = ("12b",), ("17",)
     assert misprints == {
-        "k3_2_in_eq_5_6": ("12b",),
-        "k4_1": ("12b",),
-        "tetaDos_deg": ("17",),
+        "k3_2_in_eq_5_6": twelve,
+        "k4_1": twelve,
+        "tetaDos_deg": seventeen,
     }
-    assert {name for name, entry in ERRATA.items() if not entry.reproduced} == {
-        "12b",
-        "17",
-    }
-    unknowns = [figure for figure in differ if "unknowns" in figure.table]
-    recipe = [figure for figure in differ if set(figure.errata) <= {"1", "2", "3"}]
-    assert (len(unknowns), len(recipe), len(differ)) == (
-        26,
-        10,
-        60,
-    )  # as data/README.md says
+    unmade = {name for name, entry in ERRATA.items() if not entry.reproduced}
+    assert unmade == {*twelve, *seventeen}
+    # as data/README.md says
+    assert sum("unknowns" in figure.table for figure in differ) == 26
+    assert sum(set(figure.errata) <= {"1", "2", "3"} for figure in differ) == 10
 
 
 def test_each_erratum_named_is_needed():
@@ -249,16 +212,8 @@ def test_each_erratum_named_is_needed():
 def test_errata_are_complete():
     assert {str(n) for n in range(1, 41)} <= set(ERRATA)
     for entry in ERRATA.values():
-        assert all(
-            (
-                entry.where,
-                entry.title,
-                entry.printed,
-                entry.right,
-                entry.derivation,
-                entry.effect,
-            )
-        )
+        said = (entry.where, entry.title, entry.printed, entry.right)
+        assert all((*said, entry.derivation, entry.effect))
 
 
 def solve_as_printed(sides, arms):
@@ -280,32 +235,13 @@ def solve_as_printed(sides, arms):
 
 def test_torques_that_the_errata_state():
     def program(*made):
-        return compute_thesis_program(
-            ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5)))
-        )["T4"]
+        errors = ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5)))
+        return compute_thesis_program(errors)["T4"]
 
     right = program()
-    states = {name: entry.effect for name, entry in ERRATA.items()}
-    assert f"{program(1) - right:.5f}" in states["1"]
-    assert (
-        f"{program(3, 2) - program(3):.5f}" in states["2"]
-        and f"{program(2) - right:.4f}" in states["2"]
-    )
-    assert (
-        f"{program(3) - right:+.5f}" in states["3"]
-        and f"{program(1, 2, 4, 5):.3f}" in states["3"]
-    )
-    assert (
-        f"{program(4) - right:.6f}" in states["4"]
-        and f"{program(1, 4) - program(1):.6f}" in states["4"]
-    )
-    assert (
-        f"{program(5) - right:.6f}" in states["5"]
-        and f"{program(1, 5) - program(1):.6f}" in states["5"]
-    )
-
+    printed = read_printed()
     k, matrix = (
-        {name: figure.printed for name, figure in read_printed()[table].items()}
+        {name: figure.printed for name, figure in printed[table].items()}
         for table in ("5.7 constants", "5.7 matrix")
     )
     names = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
@@ -316,31 +252,41 @@ def test_torques_that_the_errata_state():
         arms = [[numbers[f"k{bar}_{n}"] for n in (1, 2, 3, 4)] for bar in (2, 3, 4)]
         return solve_as_printed([numbers[name] for name in names], arms)
 
-    assert f"{hand(k, 'k4x'):.4f}" in states["7"]
-    assert f"{hand(k):.4f}" in states["8"] and f"{hand(k, 'k3_5'):.4f}" in states["8"]
-    assert f"{hand(k, 'k3_5', 'k4x'):.4f}" == f"{T4[-1]:.4f}"
-    assert f"{program(3, 1, 2, 4, 5) + 100 * 15 - 15:.3f}" in states["9"]
-    assert f"{hand(matrix):.6f}" in states["13"]
+    for erratum, words in (
+        (1, f"{program(1) - right:.5f}"),
+        (2, f"{program(3, 2) - program(3):.5f}"),
+        (2, f"{program(2) - right:.4f}"),
+        (3, f"{program(3) - right:+.5f}"),
+        (3, f"{program(1, 2, 4, 5):.3f}"),
+        (4, f"{program(4) - right:.6f}"),
+        (4, f"{program(1, 4) - program(1):.6f}"),
+        (5, f"{program(5) - right:.6f}"),
+        (5, f"{program(1, 5) - program(1):.6f}"),
+        (7, f"{hand(k, 'k4x'):.4f}"),
+        (8, f"{hand(k):.4f}"),
+        (8, f"{hand(k, 'k3_5'):.4f}"),
+        (9, f"{program(3, 1, 2, 4, 5) + 100 * 15 - 15:.3f}"),
+        (13, f"{hand(matrix):.6f}"),
+    ):
+        assert words in ERRATA[str(erratum)].effect
+    last = float(LADDER["T4"].split()[-1])
+    assert f"{hand(k, 'k3_5', 'k4x'):.4f}" == f"{last:.4f}"
 
 
 def test_open_loops_that_the_errata_state():
     """Closure of the angles as printed, in the thesis's polygon, cm."""
-    table = np.genfromtxt(
+    rows = np.loadtxt(
         FOLDER / "data" / "positions.csv",
         delimiter=",",
-        skip_header=1,
+        skiprows=1,
         usecols=range(5),
     )
     d, a, b, c = BAR_LENGTHS
-    unit = np.exp(1j * np.radians(table))
+    unit = np.exp(1j * np.radians(rows)).T
 
     def gaps(third, fourth):
-        return np.abs(
-            d * np.exp(1j * THETA_1)
-            + a * unit[:, 0]
-            + b * unit[:, third]
-            + c * unit[:, fourth]
-        )
+        crank = d * np.exp(1j * THETA_1) + a * unit[0]
+        return np.abs(crank + b * unit[third] + c * unit[fourth])
 
     first, second = gaps(1, 4), gaps(2, 3)
     assert f"{first.max():.3f} cm" in ERRATA["6"].derivation
@@ -361,14 +307,9 @@ def test_limits_that_the_errata_state():
 
 
 def test_public_test_cases_agree_to_the_last_digit():
-    assert {
-        figure.name: figure.verdict()
-        for figure in compare_textbooks()
-        if figure.verdict() != "rounded"
-    } == {}
-    assert {answer.scene for answer in list_answers()} == {
-        path.stem for path in TEXTBOOK_FOLDER.glob("*.toml")
-    }
+    assert {figure.verdict() for figure in compare_textbooks()} == {"rounded"}
+    scenes = {path.stem for path in TEXTBOOK_FOLDER.glob("*.toml")}
+    assert {answer.scene for answer in list_answers()} == scenes
     assert len({answer.where.split(",")[0] for answer in list_answers()}) >= 3
 
 
@@ -385,23 +326,19 @@ def test_answers_that_sympy_leaves_to_be_solved():
     )
     forcing = np.array([-0.031211821321648, -0.00066022608181, 0.001813559741243])
     relative = [
-        answer
+        answer.printed
         for answer in list_answers()
         if answer.note.startswith("the printed mass matrix")
     ]
-    assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == [
-        answer.printed for answer in relative
-    ]
+    assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == relative
 
 
 def test_quantities_of_an_answer():
     s = fourbar.solve(scenes.thesis())
     assert compute_value(s, "-F14_y", 0) == -s.F14[0, 1]
     assert compute_value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
-    assert compute_value(s, "v_A_x", 0) == pytest.approx(
-        -0.2244 * 0.48 * np.sin(THETA_2),
-        rel=TYPED,
-    )
+    v_A_x = -0.2244 * 0.48 * np.sin(THETA_2)
+    assert compute_value(s, "v_A_x", 0) == pytest.approx(v_A_x, rel=TYPED)
 
 
 @pytest.mark.parametrize(
@@ -411,35 +348,24 @@ def test_quantities_of_an_answer():
 )
 def test_inputs_are_those_of_the_model(scene):
     ours = make_model_scene(THETA_2)
-    assert ours.linkage.lengths == pytest.approx(scene.linkage.lengths, rel=TYPED)
-    assert ours.linkage.ground_angle == pytest.approx(
-        scene.linkage.ground_angle,
-        rel=TYPED,
-    )
-    for number in (2, 3, 4):
-        mine, theirs = ours.linkage.bar(number), scene.linkage.bar(number)
-        assert mine.mass == theirs.mass
-        assert mine.moment_of_inertia == pytest.approx(
-            theirs.moment_of_inertia,
-            rel=TYPED,
-        )
-        assert mine.mass_centre == pytest.approx(theirs.mass_centre, rel=TYPED)
-    assert (ours.drive_bar, ours.motion.omega_2) == (
-        scene.drive_bar,
-        scene.motion.omega_2,
-    )
-    assert (
-        ours.motion.branch == scene.motion.branch
-        and ours.effects == scene.effects == ()
-    )
-    assert len(ours.loads) == len(scene.loads)
-    for load, their in zip(ours.loads, scene.loads, strict=True):
-        assert (load.bar, load.frame) == (their.bar, their.frame)
-        assert load.moment == pytest.approx(their.moment, rel=TYPED)
-        assert (load.force is None) == (their.force is None)
-        if load.force is not None:
-            assert load.force == pytest.approx(their.force, rel=TYPED)
-            assert load.arm == pytest.approx(their.arm, rel=TYPED)
+    assert ours.effects == scene.effects == ()
+
+    def list_inputs(scene):
+        """Return words and numbers that a scene states."""
+        linkage, motion = scene.linkage, scene.motion
+        bars = [linkage.bar(number) for number in (2, 3, 4)]
+        words = [scene.drive_bar, motion.branch]
+        numbers = [motion.omega_2, *linkage.lengths, linkage.ground_angle]
+        for bar in bars:
+            numbers += [bar.mass, bar.moment_of_inertia, *bar.mass_centre]
+        for load in scene.loads:
+            words += [load.bar, load.frame, load.force is None]
+            numbers += [load.moment, *(load.force or ()), *(load.arm or ())]
+        return words, numbers
+
+    (words, numbers), (theirs, their_numbers) = map(list_inputs, (ours, scene))
+    assert words == theirs
+    assert numbers == pytest.approx(their_numbers, rel=TYPED)
 
 
 def test_the_command_explains_every_difference():
@@ -449,9 +375,8 @@ def test_the_command_explains_every_difference():
     for figure in list_all():
         line = f"{figure.table}: {figure.name}  printed {figure.printed}"
         assert (line in process.output) == (figure.verdict() == "differs")
-    assert CliRunner().invoke(published, ["--all"]).output.count("  printed ") == len(
-        list_all()
-    )
+    output = CliRunner().invoke(published, ["--all"]).output
+    assert output.count("  printed ") == len(list_all())
 
 
 def test_a_difference_without_an_erratum_fails(monkeypatch):
@@ -463,12 +388,7 @@ def test_a_difference_without_an_erratum_fails(monkeypatch):
         wrong._replace(errata=()),
         wrong._replace(errata=("99",), made=167.877224),
     ):
-        assert (
-            figure.verdict() == "differs"
-            and not is_explained(figure)
-            and explain_difference(figure)
-        )
-        monkeypatch.setattr(
-            command, "list_figures", lambda figure=figure: iter([figure])
-        )
+        assert figure.verdict() == "differs" and explain_difference(figure)
+        assert not is_explained(figure)
+        monkeypatch.setattr(command, "list_figures", lambda one=figure: iter([one]))
         assert CliRunner().invoke(published, standalone_mode=False).return_value == 1

@@ -18,7 +18,7 @@ ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-9, AGREES, "", 1.0, 1.
 
 
 def changed(**fields):
-    return replace(ROW, **fields)  # type: ignore[arg-type]
+    return replace(ROW, **fields)
 
 
 NAN = math.nan

@@ -368,7 +368,7 @@ def test_the_picture_shows_the_pin_force_that_fails():
 
 
 def record_of(name, rows, **parts):
-    return Record(name, title=name, rows=rows, **parts)  # type: ignore[arg-type]
+    return Record(name, title=name, rows=rows, **parts)
 
 
 def fail(row, error=1e-3):

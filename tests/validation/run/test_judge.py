@@ -11,7 +11,7 @@ import pytest
 import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCE_NAMES
-from fourbar.scene import Command, Scene, command, with_signs
+from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
@@ -192,7 +192,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
             (AGREES, True) if quantity in FORCE_NAMES else (FAILS, False)
         ), quantity
         if quantity not in FORCE_NAMES:
-            assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity  # type: ignore[index]
+            assert row.theta_2 == with_friction().motion.theta_2[AT_REST], quantity
 
 
 def test_where_no_digit_is_left_nothing_is_judged():
@@ -250,7 +250,7 @@ def test_positions_alone_need_no_forces():
     assert {row.quantity for row in rows} == {"closure"}
 
 
-def test_results_survive_the_file(tmp_path):  # type: ignore[no-untyped-def]
+def test_results_survive_the_file(tmp_path):
     rows = judge("scene", crank_rocker(), [Engine("echo", Echo, EQUIVALENCE)]).rows
     write_results(rows, tmp_path / "results.csv")
     again = list(read_columns(tmp_path / "results.csv"))
@@ -344,7 +344,7 @@ class Counting(FreeBody):
 
 
 def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypatch):
-    put: list[tuple[Scene, Command]] = []
+    put = []
     true = FreeBody.answer
 
     def noting(self, scene, command):
@@ -366,7 +366,7 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch):
 
     The engine finds its own.
     """
-    commands: list[Command] = []
+    commands = []
     answering = FreeBody.answer
 
     def seen(engine, scene, command):

@@ -228,7 +228,7 @@ def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypa
     from fourbar_validation.report import figures
 
     scene = falling()
-    shown: list[str] = []
+    shown = []
     monkeypatch.setattr(
         figures, "_draw_quantity", lambda quantity, *_: shown.append(quantity) or ""
     )

@@ -1,13 +1,12 @@
 """Scenes stated otherwise have the same numbers, and one that has not fails its row."""
 
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Effect, Place
+from fourbar.effects import Place
 from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import make_question
@@ -21,7 +20,7 @@ from fourbar_validation.run.transformed import (
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
-EVERYTHING: tuple[Effect, ...] = (
+EVERYTHING = (
     fourbar.Gravity(9.81, -1.2),
     fourbar.Viscous.at(A=0.02, O4=0.03),
     fourbar.Springs(
@@ -189,7 +188,7 @@ def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(command, gap
         missed = sense * gap * np.spacing(max(lengths))
         linkage = FourBar(ground + missed, *bars, ground_angle=0.4)
         angles = fourbar.Sweep(0.9, 5.9, 7)
-        stated: Any = {f"theta_{command}": angles, f"omega_{command}": 1.3}
+        stated = {f"theta_{command}": angles, f"omega_{command}": 1.3}
         motion = fourbar.Motion(**stated, branch=branch)
         rows = list_rows(fourbar.Scene(linkage, motion))
         assert not [row for row in rows.values() if row.failed], lengths
@@ -240,11 +239,11 @@ def test_one_number_that_differs_fails_its_row(name, monkeypatch):
 
 def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
     """As a fault would: gravity from the ground's line in place of the world's."""
-    field = fourbar.Gravity.field.fget  # type: ignore[attr-defined]
+    field = fourbar.Gravity.field.fget
     held = crank_rocker().linkage.ground_angle
 
     def turn(load):
-        return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))  # type: ignore[no-any-return]
+        return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))
 
     monkeypatch.setattr(fourbar.Gravity, "field", property(turn))
     rows = list_rows(crank_rocker())

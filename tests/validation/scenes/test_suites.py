@@ -5,7 +5,6 @@ How much is judged of a suite does not depend on pictures.
 
 import itertools
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -45,9 +44,9 @@ def uses(scene):
         yield "released with a flywheel"
     for effect in scene.effects:
         if effect.key == "springs":
-            yield from (f"spring with {s.acts}" for s in effect.springs)  # type: ignore[attr-defined]
+            yield from (f"spring with {s.acts}" for s in effect.springs)
         if effect.key == "torsion":
-            yield from (("torsion", pin) for pin, *_ in effect.springs)  # type: ignore[attr-defined]
+            yield from (("torsion", pin) for pin, *_ in effect.springs)
     if scene.tolerances:
         yield "tolerances"
     if scene.points:
@@ -73,7 +72,7 @@ def uses_of_law(law):
 
 def test_the_default_suite_uses_every_capability():
     used = {use for scene in scenes() for use in uses(scene)}
-    wanted: set[Any] = TERM_OF.keys() - {"load"}
+    wanted = TERM_OF.keys() - {"load"}
     wanted |= {
         f"command of {name}" for name in ("theta_2", "theta_3", "theta_4", "stroke")
     }

@@ -26,7 +26,7 @@ KINK = 1e-5
 h^2: measured 3e-6 here.
 """
 SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
-LAWS: dict[str, Law | Rise] = {
+LAWS = {
     "periodic": Law(
         (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 3.5, 2.0 * math.pi), 24, "periodic"
     ),

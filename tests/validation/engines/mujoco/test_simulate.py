@@ -50,13 +50,13 @@ def scene(lengths, sweep, omega, **parts):
         fourbar.Load(3, (2.0, 0.3), from_centre=(0.03, 0.2), frame="bar"),
         fourbar.Load(2, moment=-0.2),
     )
-    expected: dict[str, object] = {
+    expected = {
         "linkage": fourbar.FourBar(d, bars[0], bars[1], bars[2], 0.2),
         "motion": fourbar.Motion(sweep, omega, 0.0),
         "loads": loads,
         "effects": (fourbar.Gravity(),),
     }
-    return fourbar.Scene(**{**expected, **parts})  # type: ignore[arg-type]
+    return fourbar.Scene(**{**expected, **parts})
 
 
 DRAG, ROCKER, TRIPLE = (
@@ -217,7 +217,7 @@ def test_error_falls_with_the_fourth_power_of_the_timestep():
             np.abs(
                 answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43
             ).max()
-        )  # type: ignore[operator]
+        )
 
     coarse, fine, order = observe_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)

@@ -157,7 +157,7 @@ def compare(drive, case):
     # a window is read at as many steps as it has positions
     steps = max(trial.steps_per_revolution, case.steps)
     wheel = size_flywheel(scene, settings)
-    carrier = make_carrier(case, wheel, float(scene.motion.omega_2))  # type: ignore[arg-type]
+    carrier = make_carrier(case, wheel, float(scene.motion.omega_2))
     again = replace(
         case.again,
         steps_per_revolution=steps,

@@ -11,7 +11,6 @@ import pytest
 from fourbar.files import load, loads
 from fourbar.formulas.mobility import find_circuit
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
@@ -89,8 +88,8 @@ one speed through time; empty where they have one.
 
 
 def measured(drive):
-    scene: Scene = loads(f"{SCENE}[drive]\n{DRIVES[drive]}\n")
-    bare: Scene = loads(SCENE)
+    scene = loads(f"{SCENE}[drive]\n{DRIVES[drive]}\n")
+    bare = loads(SCENE)
     file = RobotFile(Path("bare.xml"), write_mjcf(bare, drive="none"))
     options = MeasureOptions(PoseOptions(), loop="B")
     (loop,) = measure_loops(file, options, scene).loops

@@ -6,7 +6,6 @@ import math
 import re
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -88,7 +87,7 @@ SOLVED = 1e-6
 
 def test_the_listing_of_the_guide_reads_what_the_harness_reads(monkeypatch):
     monkeypatch.chdir(ROOT)
-    names: dict[str, Any] = {}
+    names = {}
     with contextlib.redirect_stdout(io.StringIO()):
         exec(blocks("python", read("docs/guide-roboticist.md"))[0], names)
     model, data = names["model"], names["data"]

@@ -139,7 +139,7 @@ def test_the_loop_of_a_scene_is_found_by_its_lengths(name):
 
 
 def made_angles(made):
-    return [row.angle - made.turned for row in made.states.rows]  # type: ignore[attr-defined]
+    return [row.angle - made.turned for row in made.states.rows]
 
 
 def test_a_loop_that_is_not_there_is_refused():

@@ -165,7 +165,7 @@ class WholeRobot:
 
 
 def read(text, *, loop=None, speed=3.0, **pose):
-    options = PoseOptions(**pose)  # type: ignore[arg-type]
+    options = PoseOptions(**pose)
     return read_loop_scene(RobotFile(Path("robot.xml"), text), options, loop, speed)
 
 
