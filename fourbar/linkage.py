@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache
 from numbers import Integral
-from typing import Any, ClassVar, NamedTuple, TypeVar, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -332,12 +332,12 @@ class Described:
     """
 
     __slots__ = ()
-    section: ClassVar[str] = ""
+    stated_at: ClassVar[str] = ""
     """Key of the description, as errors name it; {0.name} stands for a field."""
     numbers: ClassVar[Any] = _Numbers()
 
     def __post_init__(self) -> None:
-        section = self.section.format(self)
+        section = self.stated_at.format(self)
         for one in list_declared(type(self)):
             value = getattr(self, one.name)
             if value is None and one.left_out is None:
@@ -359,16 +359,6 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     unit, second = by.units
     bound, of_second = by.bounds
     return require(key, size, unit, bound), require(key, other, second, of_second)
-
-
-def check_numbers(description: Any, key: str) -> None:
-    """Check the numbers that a frozen description declares, and convert their units."""
-    for name, stated in description.numbers.items():
-        value = getattr(description, name)
-        if value is None and stated.left_out is None:
-            continue
-        checked = stated.check(f"{key}.{name}".strip("."), value)
-        object.__setattr__(description, name, checked)
 
 
 class ListedNumber(NamedTuple):
@@ -428,7 +418,7 @@ def list_fields(kind: type) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Bar:
+class Bar(Described):
     """A moving bar; massless unless stated otherwise.
 
     Numbers may be texts with units instead, like "48 cm".
@@ -454,28 +444,19 @@ class Bar:
     0.314
     """
 
-    length: float
-    mass: float = 0.0
-    inertia: float | None = None
-    centre: tuple[float, float] | None = None
-    density: float | None = None
-    section: tuple[float, float] | None = None
-    diameter: float | None = None
-    mass_per_length: float | None = None
-    numbers: ClassVar[dict[str, Declared]] = {
-        "length": Declared("m", POSITIVE),
-        "mass": Declared("kg", AT_LEAST_ZERO, 0.0),
-        "mass_per_length": Declared("kg/m", POSITIVE, None),
-        "density": Declared("kg/m^3", POSITIVE, None),
-        "section": Declared("m", POSITIVE, None, pair="m"),
-        "diameter": Declared("m", POSITIVE, None),
-        "inertia": Declared("kg m^2", AT_LEAST_ZERO, None),
-        "centre": Declared("m", left_out=None, pair="rad"),
-    }
-    """In this order: what is left out follows from numbers before it."""
+    length: Annotated[float, Declared("m", POSITIVE)]
+    mass: Annotated[float, Declared("kg", AT_LEAST_ZERO)] = 0.0
+    inertia: Annotated[float | None, Declared("kg m^2", AT_LEAST_ZERO)] = None
+    centre: Annotated[tuple[float, float] | None, Declared("m", pair="rad")] = None
+    density: Annotated[float | None, Declared("kg/m^3", POSITIVE)] = None
+    section: Annotated[
+        tuple[float, float] | None, Declared("m", POSITIVE, pair="m")
+    ] = None
+    diameter: Annotated[float | None, Declared("m", POSITIVE)] = None
+    mass_per_length: Annotated[float | None, Declared("kg/m", POSITIVE)] = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, "")
+        Described.__post_init__(self)
         if self.section is not None and self.diameter is not None:
             raise InputError(
                 "diameter",
@@ -573,25 +554,22 @@ class Bar:
 
 
 @dataclass(frozen=True, slots=True)
-class FourBar:
+class FourBar(Described):
     """A four-bar linkage: ground length d and angle theta_1 (O2 to O4), three bars.
 
     Raises InputError where the four lengths cannot close anywhere (the longest exceeds
     the sum of the other three).
     """
 
-    ground: float
+    ground: Annotated[float, Declared("m", POSITIVE)]
     input: Bar
     coupler: Bar
     output: Bar
-    ground_angle: float = 0.0
-    numbers: ClassVar[dict[str, Declared]] = {
-        "ground": Declared("m", POSITIVE),
-        "ground_angle": Declared("rad", ANY_NUMBER, 0.0),
-    }
+    ground_angle: Annotated[float, Declared("rad")] = 0.0
+    stated_at: ClassVar[str] = "lengths"
 
     def __post_init__(self) -> None:
-        check_numbers(self, "lengths")
+        Described.__post_init__(self)
         for name, bar in zip(("input", "coupler", "output"), self.moving, strict=True):
             if not isinstance(bar, Bar):
                 raise InputError(

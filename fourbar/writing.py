@@ -73,7 +73,9 @@ def read_bytes(
         with open(source, "rb", closefd=source is path) as opened:
             data = opened.read(largest + 1)
     except FileNotFoundError:
-        raise refuse("file not found") from None
+        other = f"{path}.toml"
+        meant = f'; did you mean "{other}"?' if os.path.isfile(other) else ""
+        raise refuse(f"file not found{meant}") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise refuse(
             f"cannot be read: {getattr(error, 'strerror', None) or error}"

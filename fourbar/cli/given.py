@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from fourbar.errors import ELSEWHERE, InputError, state_messages_in
-from fourbar.linkage import ANY_NUMBER, POSITIVE, require
+from fourbar.linkage import ANY_NUMBER, BAR_NAMES, POSITIVE, require
 from fourbar.scene import Command, Scene
 from fourbar.solution import Conversion
 
@@ -22,6 +22,8 @@ _FILE_RADIANS = "fourbar.file_radians"
 MOST_PRINTED = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE_PATH = click.Path(path_type=Path)
+LENGTH_NAMES = tuple(BAR_NAMES.values())
+"""Names of four lengths, in the order in which commands take them."""
 _KEYS_OF_A_SCENE = (
     "motion",
     "lengths",
@@ -141,12 +143,13 @@ class LengthsCommand(click.Command):
             if re.search(r"unexpected extra arguments? \([\d.]", error.message):
                 message = f"{error.message}: {ELSEWHERE}"
                 raise click.UsageError(message, ctx) from None
-            scenes = [word for word in words if word.endswith(".toml")]
-            if scenes and error.message.endswith("takes 4 values."):
-                instead = f"for a scene file: fourbar analyze {scenes[0]}"
-                message = f"{error.message.removesuffix('.')}; {instead}"
-                raise click.UsageError(message, ctx) from None
-            raise
+            if not error.message.endswith("takes 4 values."):
+                raise
+            message = f"{error.message.removesuffix('.')}: {', '.join(LENGTH_NAMES)}"
+            for word in words:
+                if word.endswith(".toml"):
+                    message += f"; for a scene file: fourbar analyze {word}"
+            raise click.UsageError(message, ctx) from None
 
 
 @contextmanager
@@ -198,10 +201,9 @@ def show_waiting(scene: Scene) -> Iterator[None]:
 
 def read_lengths(texts: tuple[str, ...]) -> list[float]:
     """Read the lengths of ground, input, coupler and output, m."""
-    names = ("ground", "input", "coupler", "output")
     return [
         read_number(f"length of {name}", text, "m", POSITIVE)
-        for name, text in zip(names, texts, strict=True)
+        for name, text in zip(LENGTH_NAMES, texts, strict=True)
     ]
 
 
@@ -238,8 +240,9 @@ def read_positions(scene: Scene, text: str) -> Command:
     those that the linkage can have, any other column has its value in the scene's
     motion.
     """
+    from fourbar.quantities.units import half_unit_of_text
     from fourbar.show.located import EXTREMES, locate
-    from fourbar.studies.passing import STATED_POSITIONS, find_positions
+    from fourbar.studies.passing import STATED_POSITIONS, find_positions, meet_limit
 
     name, equals, value = (part.strip() for part in text.rpartition("="))
     if not equals:
@@ -258,7 +261,11 @@ def read_positions(scene: Scene, text: str) -> Command:
             text,
             f'the unit is missing; did you mean "{value} {likely}"?',
         )
-    return find_positions(scene, [(name, read_number("--at", value, unit))])
+    stated = read_number("--at", value, unit)
+    if unit == "rad" and name != scene.motion.commanded:
+        rounding = half_unit_of_text(value, unit)
+        stated = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
+    return find_positions(scene, [(name, stated)])
 
 
 _ANGLE_OF_SCENE = re.compile(r"(.+):\s*(theta_[234])\s*(?:([+-])\s*(.+))?")

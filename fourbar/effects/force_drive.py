@@ -29,7 +29,7 @@ class ForceDrive(Placed, ABC):
     """A drive that exerts a force, N; a subclass says where and in which direction."""
 
     __slots__ = ()
-    section: ClassVar[str] = "drive"
+    stated_at: ClassVar[str] = "drive"
     has_stroke: ClassVar[bool] = False
     """True if the drive is between two points, whose distance is its stroke."""
 

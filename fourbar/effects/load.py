@@ -55,13 +55,13 @@ class Table(Described):
 
     theta_2: Annotated[tuple[float, ...], Listed("rad")]
     factor: Annotated[tuple[float, ...], Listed("1")]
-    section: ClassVar[str] = "loads.table"
+    stated_at: ClassVar[str] = "loads.table"
     as_given: ClassVar[bool] = True
     """Error bars leave its numbers alone: they are looked up."""
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)
-        key = self.section
+        key = self.stated_at
         angles = self.theta_2
         factors = self.factor
         if len(angles) < 2 or len(angles) != len(factors):
@@ -169,7 +169,7 @@ class Load(Effect):
     moment: Annotated[float, Declared("N m")] = 0.0
     frame: Annotated[str, OneOf(FRAMES)] = "world"
     table: Annotated[Table | None, Part(Table)] = None
-    section: ClassVar[str] = "loads"
+    stated_at: ClassVar[str] = "loads"
     key: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:

@@ -257,7 +257,7 @@ class Line(Placed):
         Placed.__post_init__(self)
         if self.start.bar == self.end.bar:
             raise InputError(
-                f"{self.section}.to.bar",
+                f"{self.stated_at}.to.bar",
                 self.end.bar,
                 "must be another bar than that of `from`",
             )

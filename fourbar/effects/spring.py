@@ -65,7 +65,7 @@ class Spring(Line):
         default=None, compare=False, repr=False
     )
     acts: Annotated[str | None, OneOf(SENSES)] = None
-    section: ClassVar[str] = "effects.springs"
+    stated_at: ClassVar[str] = "effects.springs"
     forms: ClassVar[dict[str, dict[str, Declared]]] = {"gas": GAS}
 
     def __post_init__(self) -> None:

@@ -98,7 +98,7 @@ def read_described(
     try:
         return make(**stated)
     except InputError as error:  # which knows of one description alone
-        section = kind.section
+        section = kind.stated_at
         if error.file or "{" in section:
             raise
         inner = error.key.removeprefix(section).removeprefix(".")

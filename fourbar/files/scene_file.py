@@ -560,11 +560,8 @@ def _read_commanded(
             f'must be like "{like}", a list of such, {{ from, to, steps }}{from_limit}',
         )
     if from_limit and value.keys() & {"limit", "offset"}:
-        near = read.table(key, value, ("limit", "offset"))
-        offset = read.quantity(f"{key}.offset", near.get("offset"), "rad", default=0.0)
-        # four bars have at most four limit positions of a bar; how many these have is
-        # not known here
-        return FromLimit(read.whole(f"{key}.limit", near.get("limit"), 1, 4), offset)
+        from_limit_position: FromLimit = read_described(read, key, value, FromLimit, {})
+        return from_limit_position
     sweep = read.table(key, value, ("from", "to", "steps"))
     start, stop = (
         read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to")

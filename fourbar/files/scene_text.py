@@ -231,7 +231,7 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
         }
         angles = {**ends, "steps": stated.steps}
     elif isinstance(stated, FromLimit):
-        angles = {"limit": stated.limit, "offset": write_quantity(stated.offset, "rad")}
+        angles = write_described(stated)
     elif stated is not None:
         angles = _write_quantities(stated, unit)
     speed = motion.speed

@@ -30,11 +30,11 @@ from fourbar.linkage import (
     POSITIVE,
     Declared,
     Described,
+    Listed,
     OneOf,
     Whole,
     require,
     require_numbers,
-    require_whole,
 )
 from fourbar.quantities import Array
 
@@ -101,25 +101,15 @@ class Sweep:
 
 
 @dataclass(frozen=True, slots=True)
-class FromLimit:
+class FromLimit(Described):
     """Limit position number `limit` of the commanded bar, plus `offset` (rad).
 
     The numbers are 1, 2, ... from theta_1 on.
     """
 
-    limit: int
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        offset = require("motion.theta_2.offset", self.offset, "rad")
-        object.__setattr__(self, "offset", offset)
-        limit = require_whole(
-            "motion.theta_2.limit",
-            self.limit,
-            range(1, sys.maxsize),
-            "must be a whole number, 1 or more",
-        )
-        object.__setattr__(self, "limit", limit)
+    limit: Annotated[int, Whole(1, 4)]
+    offset: Annotated[float, Declared("rad")] = 0.0
+    stated_at: ClassVar[str] = "motion.theta_2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +121,7 @@ class Free(Described):
 
     duration: Annotated[float, Declared("s", POSITIVE)]
     steps: Annotated[int, STEPS]
-    section: ClassVar[str] = "motion.free"
+    stated_at: ClassVar[str] = "motion.free"
 
 
 def _find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
@@ -177,7 +167,7 @@ class _OverTime:
 
 
 @dataclass(frozen=True, slots=True)
-class Law(_OverTime):
+class Law(Described, _OverTime):
     """theta_2(t) through the points of a table.
 
     A law of angles alone is piecewise cubic, with a continuous acceleration. Speeds at
@@ -197,29 +187,21 @@ class Law(_OverTime):
         rad/s and rad/s^2; alpha needs omega.
     """
 
-    time: tuple[float, ...]
-    theta_2: tuple[float, ...] | None = None
-    steps: int = 360
-    ends: str = "free"
-    theta_3: tuple[float, ...] | None = None
-    theta_4: tuple[float, ...] | None = None
-    omega: tuple[float, ...] | None = None
-    alpha: tuple[float, ...] | None = None
+    time: Annotated[tuple[float, ...], Listed("s")]
+    theta_2: Annotated[tuple[float, ...] | None, Listed("rad")] = None
+    steps: Annotated[int, STEPS] = 360
+    ends: Annotated[str, OneOf((*SPLINES,))] = "free"
+    theta_3: Annotated[tuple[float, ...] | None, Listed("rad")] = None
+    theta_4: Annotated[tuple[float, ...] | None, Listed("rad")] = None
+    omega: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
+    alpha: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
+    stated_at: ClassVar[str] = "motion.law"
 
     def __post_init__(self) -> None:
-        key = "motion.law"
-        expect(f"{key}.ends", self.ends, str)
-        if self.ends not in SPLINES:
-            raise InputError(
-                f"{key}.ends",
-                self.ends,
-                "must be one of " + ", ".join(SPLINES),
-            )
-        theta = f"theta_{self.bar}"
-        stated_angles = getattr(self, theta)
-        time = require_numbers(f"{key}.time", self.time, unit="s").ravel()
-        angles = require_numbers(f"{key}.{theta}", stated_angles, unit="rad").ravel()
-        self._require_rates(len(time))
+        Described.__post_init__(self)
+        key = self.stated_at
+        time, angles = self.time, self.angle or ()
+        self._require_rates()
         fewest = FEWEST_POINTS[self.ends] if self.omega is None else 2
         may_be = range(fewest, MOST_LISTED_POSITIONS + 1)
         if len(time) != len(angles) or len(time) not in may_be:
@@ -228,31 +210,22 @@ class Law(_OverTime):
             )
             raise InputError(key, (len(time), len(angles)), allowed)
         if (np.diff(time) <= 0.0).any():
-            times = tuple(time.tolist())
-            raise InputError(f"{key}.time", times, "must rise", unit="s")
-        steps = STEPS.check(f"{key}.steps", self.steps)
-        object.__setattr__(self, "steps", steps)
-        object.__setattr__(self, "time", tuple(time.tolist()))
-        object.__setattr__(self, theta, tuple(angles.tolist()))
+            raise InputError(f"{key}.time", time, "must rise", unit="s")
 
-    def _require_rates(self, count: int) -> None:
-        """Check speeds and accelerations at so many points."""
-        key = "motion.law"
+    def _require_rates(self) -> None:
+        """Raise InputError for speeds and accelerations that do not fit the times."""
+        key = self.stated_at
         if self.alpha is not None and self.omega is None:
             allowed = f"needs the speeds omega_{self.bar} beside it"
             raise InputError(f"{key}.alpha_{self.bar}", None, allowed)
         if self.omega is not None and self.ends != "free":
             allowed = "must be left out: the speeds state what the ends do"
             raise InputError(f"{key}.ends", self.ends, allowed)
-        for name, unit in (("omega", "rad/s"), ("alpha", "rad/s^2")):
-            stated = getattr(self, name)
-            if stated is None:
-                continue
-            of_bar = f"{key}.{name}_{self.bar}"
-            rates = require_numbers(of_bar, stated, unit=unit).ravel()
-            if len(rates) != count:
+        count = len(self.time)
+        for name, rates in (("omega", self.omega), ("alpha", self.alpha)):
+            if rates is not None and len(rates) != count:
+                of_bar = f"{key}.{name}_{self.bar}"
                 raise InputError(of_bar, len(rates), f"needs {count}, one for a time")
-            object.__setattr__(self, name, tuple(rates.tolist()))
 
     @property
     def is_linear_in_acceleration(self) -> bool:
@@ -353,11 +326,11 @@ class Rise(Described, _OverTime):
     steps: Annotated[int, STEPS] = 360
     theta_3: Annotated[float | None, Declared("rad")] = None
     theta_4: Annotated[float | None, Declared("rad")] = None
-    section: ClassVar[str] = "motion.law"
+    stated_at: ClassVar[str] = "motion.law"
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)
-        key = self.section
+        key = self.stated_at
         if getattr(self, f"theta_{self.bar}") is None:
             raise InputError(f"{key}.theta_2", None, "the first angle is missing")
         if not self.rise[1] > 0.0:
@@ -416,7 +389,7 @@ class Sine(Described, _OverTime):
     duration: Annotated[float, Declared("s", POSITIVE)]
     phase: Annotated[float, Declared("rad")] = 0.0
     steps: Annotated[int, STEPS] = 360
-    section: ClassVar[str] = "motion.law"
+    stated_at: ClassVar[str] = "motion.law"
     kind: ClassVar[str] = SINE_LAW
     bar: ClassVar[int] = 2
 

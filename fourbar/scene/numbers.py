@@ -56,7 +56,7 @@ class Point(Placed):
     bar: Annotated[int, OfBar((1, *MOVING_BARS))]
     from_pin: Annotated[tuple[float, float] | None, STATED_PAIR] = None
     from_centre: Annotated[tuple[float, float] | None, STATED_PAIR] = None
-    section: ClassVar[str] = "points.{0.name}"
+    stated_at: ClassVar[str] = "points.{0.name}"
 
     def __post_init__(self) -> None:
         plain = (

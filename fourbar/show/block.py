@@ -69,10 +69,8 @@ _FEW_DIGITS = 1e-8
 """Error bar over the value from which on the block says where digits are lost. Half of
 the digits of a double are lost then.
 """
-OF_ONE_PREFIX = 1e-3
-"""Ratio of the smallest to the largest of several quantities that share a prefix. Below
-it each has a prefix of its own.
-"""
+OF_ONE_PREFIX = 1e-4
+"""Part of the largest of its kind below which a quantity has a prefix of its own."""
 _STATUS_WORDS = {"change_point": "at a change point"}
 """Words for the statuses of positions that are not the names alone."""
 _BESIDE_CHANGE_POINT = 1e-9
@@ -252,8 +250,11 @@ class _SceneBlock:
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
         """Write a quantity of an SI unit, with a prefix that suits it.
 
-        `largest`: of its kind, which then chooses the prefix; None: the quantity does.
+        `largest`: of its kind, which then chooses the prefix unless the quantity lies
+        far below it; None: the quantity does.
         """
+        if largest is not None and 0.0 < abs(value) < OF_ONE_PREFIX * abs(largest):
+            largest = None
         text = write_short(value, unit, self.units, largest, self.digits)
         return text.replace(" ", _NBSP)
 
@@ -551,7 +552,10 @@ class _SceneBlock:
         rms = facts.duty.rms_force if facts.linear else facts.duty.rms_torque
         if rms is None:
             return row
-        return f"{row}, RMS {self._value(self._without_rounding(rms), drive.unit)}"
+        mean = self._value(
+            self._without_rounding(rms), drive.unit, abs(facts.peak.value)
+        )
+        return f"{row}, RMS {mean}"
 
     def _write_growth(self, name: str) -> str:
         """Write where a quantity grows without bound."""
@@ -663,7 +667,8 @@ class _SceneBlock:
         speed = self._value(duty.peak_speed, "rad/s")
         mean = ""
         if duty.rms_torque is not None:
-            mean = f" (RMS {self._value(duty.rms_torque, 'N m')})"
+            rms = self._value(duty.rms_torque, "N m", duty.peak_torque)
+            mean = f" (RMS {rms})"
         power = self._value(duty.peak_power, "W")
         return f"at least {torque} at {speed}{mean}, {power}"
 
@@ -675,7 +680,8 @@ class _SceneBlock:
         swing = f"energy swings by {energy} about the mean"
         if duty.mean_torque is None:
             return [self._row("cycle", swing)]
-        mean = self._value(self._without_rounding(duty.mean_torque), "N m")
+        mean_torque = self._without_rounding(duty.mean_torque)
+        mean = self._value(mean_torque, "N m", duty.peak_torque)
         return [self._row("cycle", f"mean torque {mean}; {swing}")]
 
     def _write_drive_head(self) -> str:
@@ -846,17 +852,10 @@ class _SceneBlock:
     def _cells(
         self, values: list[float | None], unit: str, missing: str = "-"
     ) -> list[str]:
-        """Write quantities of one kind with the prefix of the largest.
-
-        Quantities that lie far apart have a prefix each. `missing`: stands for none.
-        """
-        sizes = [abs(value) for value in values if value]
-        largest = max(sizes, default=0.0)
-        alike = min(sizes, default=0.0) >= OF_ONE_PREFIX * largest
+        """Write quantities of one kind; `missing` stands for none."""
+        largest = max((abs(value) for value in values if value), default=0.0)
         return [
-            missing
-            if value is None
-            else self._value(value, unit, largest if alike or not value else None)
+            missing if value is None else self._value(value, unit, largest)
             for value in values
         ]
 

@@ -21,6 +21,10 @@ LABEL_WIDTH, _CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
 _NUMBER_LABEL = 22
 """Width of the label of a number that stands alone."""
+AT_INFINITY = 1e7
+"""Times the places of A and B beyond which an instant centre is at infinity. Where a
+bar turns back, which is located to some 1e-9 of its turn, I13 is 1e8 times as far away.
+"""
 _FORCE_HEADS = {pin: f"{name} at {pin}" for pin, name in PIN_FORCE.items()}
 
 
@@ -168,16 +172,12 @@ class PositionSheet:
         for name in ("I13", "I24"):
             centre = derive(self.solution, name)
             assert centre is not None
-            if np.isfinite(centre).all():
-                row = self._write_vector(
-                    f"centre {name}",
-                    centre[0],
-                    "m",
-                    self._find_largest("", ["A", "B"]),
-                )
-                rows.append(row)
+            label = f"centre {name}"
+            size = self._find_largest("", ["A", "B"])
+            if np.abs(centre).max() <= AT_INFINITY * size:
+                rows.append(self._write_vector(label, centre[0], "m", size))
             else:
-                rows.append(_write_row(f"centre {name}", ("at infinity",)))
+                rows.append(_write_row(label, ("at infinity",)))
         return rows
 
     def _write_advantage(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError, write_in_units
 from fourbar.formulas.mobility import TURN, find_intervals
+from fourbar.linkage import FourBar
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import (
@@ -187,6 +188,20 @@ def move_inside_limit(scene: Scene, bar: int, angle: float) -> tuple[float, bool
             if is_limit and high - low < TURN:
                 return end + inwards, True
     return angle, False
+
+
+def meet_limit(linkage: FourBar, bar: int, angle: float, rounding: float) -> float:
+    """Return the limit of a bar for an angle beyond it that may be its rounding, rad.
+
+    Any other angle stays.
+    """
+    ends = [end for ends in find_intervals(linkage, bar) for end in ends]
+    inside = any(
+        (angle - low) % TURN <= high - low for low, high in find_intervals(linkage, bar)
+    )
+    nearest = min(ends, key=lambda end: abs(math.remainder(angle - end, TURN)))
+    away = math.remainder(angle - nearest, TURN)
+    return angle if inside or abs(away) > rounding else angle - away
 
 
 def is_same_position(name: str, first: float, second: float) -> bool:

@@ -667,6 +667,8 @@ REFUSED = [  # arguments, words of the line that refuses them
     (("analyze", CRANK_ROCKER, "--columns", "omega_6/omega_2"), POINTS_ON),
     (("analyze", CRANK_ROCKER, "--columns", "F56_x"), POINTS_ON),
     (("classify", "scene.toml"), "for a scene file: fourbar analyze scene.toml\n"),
+    (("classify", 1, 2, 3), "4 values: ground, input, coupler, output\n"),
+    (("analyze", CRANK_ROCKER.with_suffix("")), 'did you mean "'),
     # positions of another scene
     *(
         (("analyze", MODELS / "drag_link.toml", "--positions", text), said)

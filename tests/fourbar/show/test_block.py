@@ -441,3 +441,15 @@ def test_a_cell_that_is_rounding_of_its_column_is_zero_without_a_sign():
     assert write_cells(np.array([12.0, -1e-5, 30.0]), ".4f")[1] == "0.0000"
     beside_a_pole = np.array([10.0] * 99 + [1e15])
     assert write_cells(beside_a_pole)[0] == "10"
+
+
+def test_a_torque_and_its_mean_have_one_prefix():
+    """1.1 N m and 0.6 N m are read side by side; 0.6 N m alone is 600 mN m."""
+    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 90), 12.5)
+    scene = crank_rocker(motion=motion)
+    duty = fourbar.motor_duty(fourbar.solve(scene))
+    assert duty.rms_torque < 1.0 < duty.peak_torque
+    torques = [line for line in block(scene).splitlines() if "RMS" in line][:2]
+    for line in torques:
+        assert "N m" in line
+        assert "mN m" not in line

@@ -13,6 +13,7 @@ import pytest
 import fourbar
 from fourbar import Motion, solve
 from fourbar.files import loads
+from fourbar.show.located import locate
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import COMMON, units
 from tests.support.scenes import crank_rocker
@@ -121,3 +122,14 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     held = fourbar.Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
     loaded = solve(replace(scene, loads=(held,)))
     assert 1.0 / loaded.drive_force[0] == pytest.approx(ratio, rel=SIX_DIGITS)
+
+
+@pytest.mark.parametrize("name", ["theta_3", "theta_4"])
+def test_the_centre_of_a_bar_that_turns_back_is_at_infinity(name):
+    """It lies 1e8 lengths away where the place has its last digits."""
+    scene = replace(ONE, motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 90), 10.0))
+    at = locate(scene, name, "max")
+    sheet = PositionSheet(scene, fourbar.solve(scene, at=at), COMMON)
+    rows = {line.split()[1]: line.split()[2:] for line in sheet.write_ratios()[-2:]}
+    is_far = {centre: cells[:2] == ["at", "infinity"] for centre, cells in rows.items()}
+    assert is_far == {"I13": name == "theta_3", "I24": False}

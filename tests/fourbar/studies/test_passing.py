@@ -19,7 +19,13 @@ from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
 from fourbar.show.block import write_block
 from fourbar.show.units import units
-from fourbar.studies.passing import INSIDE_LIMIT, find_positions, say_nowhere, say_range
+from fourbar.studies.passing import (
+    INSIDE_LIMIT,
+    find_positions,
+    meet_limit,
+    say_nowhere,
+    say_range,
+)
 from tests.support.scenes import bare, crank_rocker, thesis
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -232,3 +238,16 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     narrow = ROCKER_WITH_RAM.replace('"7 in"', '"10.3 in"').replace("-60 deg", "90 deg")
     none = loads(narrow.replace('"right"', '"left"'))
     assert say_range(none) == "this cylinder can have none with motion.side = left"
+
+
+@pytest.mark.parametrize(("beyond", "met"), [(4e-6, True), (6e-6, False)])
+def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
+    """Printed with six digits a limit may lie beyond itself."""
+    linkage = crank_rocker().linkage
+    (low, high), *_ = find_intervals(linkage, 4)
+    for limit, outwards in ((low, -1.0), (high, 1.0)):
+        angle = limit + 4.0 * math.pi + outwards * beyond
+        kept = meet_limit(linkage, 4, angle, rounding=5e-6)
+        assert abs(kept - angle) == pytest.approx(beyond if met else 0.0, rel=1e-6)
+        inside = limit - outwards * beyond
+        assert meet_limit(linkage, 4, inside, rounding=5e-6) == inside
