@@ -12,10 +12,9 @@ radius solutions are searched for from many starts: what is not found there is t
 to exist.
 """
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,6 +226,40 @@ def _find_regular(matrix: Array) -> NDArray[np.bool_]:
     return regular
 
 
+class _Problems(NamedTuple):
+    """Independent problems in p unknowns x_p = k_p |F_p + sum over q of C_pq x_q|."""
+
+    F: Array
+    """(n, p, 2), N."""
+    C: Array
+    """(n, p, p, 2), 1/m."""
+    k: Array
+    """(n, p), m."""
+
+    def part(self, index: Any) -> Self:
+        """Return some of the problems."""
+        return type(self)(*(array[index] for array in self))
+
+    def right_side(self, x: Array) -> tuple[Array, Array]:
+        """Compute k |F + C x| and its derivative, (n, p) and (n, p, p)."""
+        force = self.F + np.einsum("npqi,nq->npi", self.C, x)
+        size = np.hypot(force[..., 0], force[..., 1])
+        divisor = np.where(size == 0.0, 1.0, size)
+        direction = force / divisor[..., None]
+        slope = np.einsum("npi,npqi->npq", direction, self.C)
+        return self.k * size, self.k[..., None] * slope
+
+    def gap(self, x: Array) -> Array:
+        """Return by how much couples miss the equations, the largest of each, (n,)."""
+        right, _ = self.right_side(x)
+        return np.asarray(np.abs(right - x).max(axis=1))
+
+    def size(self) -> Array:
+        """Return the largest couple k |F| of each, N m, (n,)."""
+        forces = np.hypot(self.F[..., 0], self.F[..., 1])
+        return np.asarray(np.max(self.k * forces, axis=1))
+
+
 class _Sliding(NamedTuple):
     """Solutions of n independent problems."""
 
@@ -243,6 +276,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
 
     F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
     """
+    problems = _Problems(F, C, k)
     finite: NDArray[np.bool_] = np.logical_and(
         np.isfinite(F).all(axis=(1, 2)),
         np.isfinite(C).all(axis=(1, 2, 3)),
@@ -253,12 +287,12 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
         x = single[:, None]
         number[~finite] = ONE_SOLUTION
     else:
-        x, number = _solve_coupled(F, C, k, finite)
+        x, number = _solve_coupled(problems, finite)
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # removes the rounding of the search and of the quadratic
-            right, slope = _compute_right_side(F, C, k, x)
+            right, slope = problems.right_side(x)
             x = x + _compute_step(right - x, slope)
-        _, slope = _compute_right_side(F, C, k, x)
+        _, slope = problems.right_side(x)
     return _Sliding(x, number, _find_least_stretch(slope))
 
 
@@ -273,12 +307,10 @@ def _find_least_stretch(slope: Array) -> Array:
 
 
 def _solve_coupled(
-    F: Array,
-    C: Array,
-    k: Array,
-    finite: NDArray[np.bool_],
+    problems: _Problems, finite: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.uint8]]:
     """Solve problems of several pins: the least solution, and how many there are."""
+    _, C, k = problems
     n, p = k.shape
     x = np.full((n, p), np.nan)
     number = np.full(n, ONE_SOLUTION, dtype=np.uint8)
@@ -290,34 +322,22 @@ def _solve_coupled(
     radius[finite] = np.abs(eigenvalues).max(axis=1)
 
     contracts = np.flatnonzero(finite & (radius < 1.0))
-    zeros = np.zeros((len(contracts), p))
-    x[contracts] = _iterate(F[contracts], C[contracts], k[contracts], zeros)
+    x[contracts] = _iterate(problems.part(contracts))
 
     searched = np.flatnonzero(finite & ~(radius < 1.0))
     for start in range(0, len(searched), LEAST_SEARCHED):
         block = searched[start : start + LEAST_SEARCHED]
-        first, same = _find_equal_problems(F[block], C[block], k[block])
-        first = block[first]
-        solutions, numbers = _search(F[first], C[first], k[first])
-        x[block] = solutions[same]
-        number[block] = numbers[same]
+        flat = [array.reshape(len(block), -1) for array in problems.part(block)]
+        _, first, group = np.unique(
+            np.concatenate(flat, axis=1),
+            axis=0,
+            return_index=True,
+            return_inverse=True,
+        )
+        solutions, numbers = _search(problems.part(block[first]))
+        x[block] = solutions[group.ravel()]
+        number[block] = numbers[group.ravel()]
     return x, number
-
-
-def _find_equal_problems(
-    F: Array,
-    C: Array,
-    k: Array,
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first of each group of equal problems, and the group of each one."""
-    flat = [array.reshape(len(k), math.prod(array.shape[1:])) for array in (F, C, k)]
-    _, first, group = np.unique(
-        np.concatenate(flat, axis=1),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
-    return first, group.ravel()
 
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
@@ -349,16 +369,6 @@ def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.ui
     return x, number
 
 
-def _compute_right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
-    """Compute k |F + C x| and its derivative, (n, p) and (n, p, p)."""
-    force = F + np.einsum("npqi,nq->npi", C, x)
-    size = np.hypot(force[..., 0], force[..., 1])
-    divisor = np.where(size == 0.0, 1.0, size)
-    direction = force / divisor[..., None]
-    slope = np.einsum("npi,npqi->npq", direction, C)
-    return k * size, k[..., None] * slope
-
-
 def _compute_step(gap: Array, slope: Array) -> Array:
     """Solve (1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
     matrix = np.eye(gap.shape[1]) - slope
@@ -369,21 +379,15 @@ def _compute_step(gap: Array, slope: Array) -> Array:
     return step
 
 
-def _compute_gap(F: Array, C: Array, k: Array, x: Array) -> Array:
-    """Return by how much couples miss the equations, the largest of each problem."""
-    right, _ = _compute_right_side(F, C, k, x)
-    return np.asarray(np.abs(right - x).max(axis=1))
-
-
-def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
+def _iterate(problems: _Problems) -> Array:
     """Take Newton's step if it lessens the gap, otherwise that of the contraction."""
+    x = np.zeros_like(problems.k)
     done = np.zeros(len(x), dtype=bool)
     for _ in range(CONTRACTION_STEPS):
-        right, slope = _compute_right_side(F, C, k, x)
+        right, slope = problems.right_side(x)
         newton = np.maximum(x + _compute_step(right - x, slope), 0.0)
-        plain_gap = _compute_gap(F, C, k, right)
-        newton_gap = _compute_gap(F, C, k, newton)
-        new = np.where((newton_gap < plain_gap)[:, None], newton, right)
+        is_nearer = problems.gap(newton) < problems.gap(right)
+        new = np.where(is_nearer[:, None], newton, right)
         # solved problems keep their digits while others go on
         new = np.where(done[:, None], x, new)
         change = np.abs(new - x).max(axis=1, initial=0.0)
@@ -394,25 +398,20 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     return x
 
 
-def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
+def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
     """Find the least solution of each problem, and how many there are.
 
     The starts cover many magnitudes.
     """
-    n, p = k.shape
-    size = _measure_size(F, k)
-    starts = _list_starts(p)
-    problem = np.repeat(np.arange(n), len(starts))
-    ends = _follow_newton(
-        F,
-        C,
-        k,
-        problem,
-        (size[:, None, None] * starts).reshape(-1, p),
-    )
+    n, p = problems.k.shape
+    size = problems.size()
+    starts = size[:, None, None] * _list_starts(p)
+    of_starts = problems.part(np.repeat(np.arange(n), starts.shape[1]))
+    ends = _follow_newton(of_starts, starts.reshape(-1, p))
 
-    gap = _compute_gap(F[problem], C[problem], k[problem], ends)
-    solves = gap <= 1e-9 * np.maximum(ends.max(axis=1), size[problem])
+    solves = of_starts.gap(ends) <= 1e-9 * np.maximum(
+        ends.max(axis=1), of_starts.size()
+    )
     x = ends.reshape(n, -1, p)
     solves = solves.reshape(n, -1)
     sums = np.where(solves, x.sum(axis=2), np.inf)
@@ -426,12 +425,6 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     number[others.any(axis=1)] = MANY
     least[number == NO_SOLUTION] = np.nan
     return least, number
-
-
-def _measure_size(F: Array, k: Array) -> Array:
-    """Return the largest couple k |F| of each problem, N m, (n,)."""
-    forces = np.hypot(F[..., 0], F[..., 1])
-    return np.asarray(np.max(k * forces, axis=1))
 
 
 def _list_starts(p: int) -> Array:
@@ -449,26 +442,16 @@ def _list_starts(p: int) -> Array:
     return np.vstack([np.zeros((1, p)), scaled.reshape(-1, p)])
 
 
-def _follow_newton(
-    F: Array,
-    C: Array,
-    k: Array,
-    problem: NDArray[np.intp],
-    x: Array,
-) -> Array:
-    """Take Newton's steps from many starts until they stand still or alternate.
-
-    `problem` is the index of the problem of each start.
-    """
-    size = _measure_size(F, k)
+def _follow_newton(problems: _Problems, x: Array) -> Array:
+    """Take Newton's steps from a start each until they stand still or alternate."""
+    size = problems.size()
     moving = np.arange(len(x))
     before = np.full_like(x, np.inf)
     for _ in range(60):
-        members = problem[moving]
         last = x[moving]
-        right, slope = _compute_right_side(F[members], C[members], k[members], last)
+        right, slope = problems.part(moving).right_side(last)
         new = last + _compute_step(right - last, slope)
-        new = np.clip(new, 0.0, 1e12 * size[members, None])
+        new = np.clip(new, 0.0, 1e12 * size[moving, None])
         change = np.abs(new - last).max(axis=1)
         change_over_two = np.abs(new - before[moving]).max(axis=1)
         least_change = np.minimum(change, change_over_two)

@@ -170,7 +170,7 @@ def draw_mechanism(
                     shown.text,
                     shown.label,
                     away,
-                    symbols.SYMBOL_COLOURS.get(symbol.kind, symbols.PIN_COLOUR),
+                    shown.colour,
                     8.0,
                     ring=shown.ring,
                 )

@@ -268,18 +268,52 @@ class Pose(NamedTuple):
 
 @dataclass(slots=True)
 class _DrawnSymbol:
-    """Parts of a drawing that one symbol has added."""
+    """One symbol at one position, and the parts of a drawing that it has added."""
 
+    axes: "Axes"
+    symbol: Symbol
+    place: Pose
+    size: float
+    """Size of a support."""
+    text: str
     artists: list[Any] = field(default_factory=list)
     lines: list[list[DrawnPoint]] = field(default_factory=list)
     """Lines that labels avoid and that a window has to show."""
-    text: str = ""
     label: DrawnPoint | None = None
     """Place of the text; None: it is placed already."""
     away: complex = 0.0j
     """Direction from there outwards, of length 1."""
     ring: float = 0.0
     """Radius around the place of the text, next to which the text may stand."""
+
+    @property
+    def colour(self) -> str:
+        """Colour of the symbol."""
+        return SYMBOL_COLOURS.get(self.symbol.kind, PIN_COLOUR)
+
+    def draw_line(self, points: Any, width: float) -> None:
+        """Draw a line over the supports and under the bars."""
+        x = np.real(points)
+        y = np.imag(points)
+        self.artists += self.axes.plot(x, y, color=self.colour, lw=width, zorder=3.5)
+        self.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
+
+    def draw_arrow(self, tail: complex, tip: complex) -> None:
+        """Draw an arrow over the bars."""
+        from matplotlib.patches import FancyArrowPatch
+
+        ends = [split_complex(tail), split_complex(tip)]
+        arrow = FancyArrowPatch(
+            *ends, zorder=8, color=self.colour, mutation_scale=10.0, **HEADED
+        )
+        self.artists.append(self.axes.add_patch(arrow))
+        self.axes.update_datalim(ends)
+        self.lines.append(ends)
+
+    def shrink(self) -> float:
+        """Return the size of what stands around the pin, smaller at a short bar."""
+        pin = self.symbol.pin or FIRST_PIN[self.symbol.bar]
+        return self.place.small(pin, self.size)
 
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Pose:
@@ -308,60 +342,44 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
 
 def draw_symbol(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol:
     """Draw one symbol at one position; `size` is that of a support."""
-    drawn = _DrawnSymbol(text=symbol.name)
+    drawn = _DrawnSymbol(axes, symbol, place, size, symbol.name)
     if symbol.kind == "gravity":
-        _draw_gravity(axes, symbol, drawn)
+        _draw_gravity(drawn)
     elif symbol.end is not None:
-        _draw_between_ends(axes, symbol, place, size, drawn)
+        _draw_between_ends(drawn, symbol.end)
     elif symbol.kind in ("force", "push"):
-        _draw_force(axes, symbol, place, size, drawn)
+        _draw_force(drawn)
     elif symbol.kind in ("moment", "drive"):
-        _draw_couple(axes, symbol, place, size, drawn)
+        _draw_couple(drawn)
     else:
-        _draw_ring(axes, symbol, place, size, drawn)
+        _draw_ring(drawn)
     return drawn
 
 
-def _colour_of(symbol: Symbol) -> str:
-    return SYMBOL_COLOURS.get(symbol.kind, PIN_COLOUR)
-
-
-def _draw_between_ends(
-    axes: "Axes",
-    symbol: Symbol,
-    place: Pose,
-    size: float,
-    drawn: _DrawnSymbol,
-) -> None:
+def _draw_between_ends(drawn: _DrawnSymbol, other_end: tuple[int, complex]) -> None:
     """Draw a spring as a zigzag, a cylinder as its rod and barrel, and both ends."""
-    assert symbol.end is not None
-    colour = _colour_of(symbol)
+    symbol, place = drawn.symbol, drawn.place
     start = place.point(symbol.bar, symbol.at)
-    end = place.point(*symbol.end)
+    end = place.point(*other_end)
     if symbol.kind == "spring":
-        _draw_line(axes, drawn, _draw_zigzag(start, end, 0.6 * size), colour, 1.0)
+        drawn.draw_line(_draw_zigzag(start, end, 0.6 * drawn.size), 1.0)
     else:
         along = (end - start) / abs(end - start)
         rod = np.array([start, end])
         barrel = start + np.array([0.1, 1.0]) * place.barrel * along
-        _draw_line(axes, drawn, rod, colour, 1.2)
-        _draw_line(axes, drawn, barrel, colour, 4.5)
+        drawn.draw_line(rod, 1.2)
+        drawn.draw_line(barrel, 4.5)
         drawn.text = f"${symbol.name}$"
         drawn.away = 1j * along
         drawn.label = split_complex(start + 0.5 * place.barrel * along)
     x = (start.real, end.real)
     y = (start.imag, end.imag)
-    drawn.artists += axes.plot(x, y, "o", ms=3.5, color=colour, zorder=5.5)
+    drawn.artists += drawn.axes.plot(x, y, "o", ms=3.5, color=drawn.colour, zorder=5.5)
 
 
-def _draw_couple(
-    axes: "Axes",
-    symbol: Symbol,
-    place: Pose,
-    size: float,
-    drawn: _DrawnSymbol,
-) -> None:
+def _draw_couple(drawn: _DrawnSymbol) -> None:
     """Draw a moment, or the torque of the drive, as an arrow that turns."""
+    symbol, place = drawn.symbol, drawn.place
     if symbol.kind == "moment":
         centre = place.point(symbol.bar, symbol.at) + symbol.beyond
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
@@ -372,25 +390,26 @@ def _draw_couple(
             centre = place.pins[symbol.pin]
         turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
         drawn.text = f"$T_{symbol.bar}$"
-    size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
-    radius = SYMBOL_SIZES[symbol.kind] * size
-    _draw_turning_arrow(axes, centre, radius, turn, _colour_of(symbol), drawn)
+    if turn == 0.0:
+        return
+    radius = SYMBOL_SIZES[symbol.kind] * drawn.shrink()
+    angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
+    points = centre + radius * np.exp(1j * angles)
+    drawn.draw_line(points, 1.5)
+    before_last, last = points[-2:]
+    drawn.draw_arrow(before_last, last + 2.0 * (last - before_last))
+    drawn.label = split_complex(points[20])
+    drawn.away = (points[20] - centre) / radius
 
 
-def _draw_ring(
-    axes: "Axes",
-    symbol: Symbol,
-    place: Pose,
-    size: float,
-    drawn: _DrawnSymbol,
-) -> None:
+def _draw_ring(drawn: _DrawnSymbol) -> None:
     """Draw what acts at a pin or a place as a ring; a torsion spring is a spiral."""
+    symbol, place = drawn.symbol, drawn.place
     at_place = place.point(symbol.bar, symbol.at)
     centre = place.pins[symbol.pin] if symbol.pin else at_place
     kind = symbol.kind
-    size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
     relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
-    radius = size * relative
+    radius = drawn.shrink() * relative
     radii: Any = radius
     turns = 1.0
     if kind == "torsion":
@@ -398,8 +417,7 @@ def _draw_ring(
         turns = 2.5
     angles = np.linspace(0.0, turns * math.tau, 90)
     ring = centre + radii * np.exp(1j * angles)
-    width = 2.2 if kind == "flywheel" else 1.2
-    _draw_line(axes, drawn, ring, _colour_of(symbol), width)
+    drawn.draw_line(ring, 2.2 if kind == "flywheel" else 1.2)
     drawn.away = cmath.rect(1.0, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
     drawn.label = split_complex(centre)
     drawn.ring = radius
@@ -410,83 +428,17 @@ def split_complex(z: complex) -> DrawnPoint:
     return (z.real, z.imag)
 
 
-def _draw_line(
-    axes: "Axes",
-    drawn: _DrawnSymbol,
-    points: Any,
-    colour: str,
-    width: float,
-) -> None:
-    x = np.real(points)
-    y = np.imag(points)
-    over_supports = 3.5  # and under the bars
-    drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=over_supports)
-    drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
-
-
-def _draw_arrow(
-    axes: "Axes",
-    tail: complex,
-    tip: complex,
-    colour: str,
-    drawn: _DrawnSymbol,
-) -> None:
-    from matplotlib.patches import FancyArrowPatch
-
-    arrow = FancyArrowPatch(
-        split_complex(tail),
-        split_complex(tip),
-        zorder=8,
-        color=colour,
-        mutation_scale=10.0,
-        **HEADED,
-    )
-    drawn.artists.append(axes.add_patch(arrow))
-    axes.update_datalim([split_complex(tail), split_complex(tip)])
-    drawn.lines.append([split_complex(tail), split_complex(tip)])
-
-
-def _draw_force(
-    axes: "Axes",
-    symbol: Symbol,
-    place: Pose,
-    size: float,
-    drawn: _DrawnSymbol,
-) -> None:
+def _draw_force(drawn: _DrawnSymbol) -> None:
+    """Draw an arrow of one length at the place where a force acts."""
+    symbol, place = drawn.symbol, drawn.place
     tail = place.tail(symbol)
     sign = symbol.sign(place.theta_2)
     if sign == 0.0:
         return
-    tip = tail + sign * SYMBOL_SIZES["force"] * size * place.direction(
-        symbol
-    ) * symbol.vector / abs(symbol.vector)
-    _draw_arrow(axes, tail, tip, SYMBOL_COLOURS[symbol.kind], drawn)
+    towards = place.direction(symbol) * symbol.vector / abs(symbol.vector)
+    tip = tail + sign * SYMBOL_SIZES["force"] * drawn.size * towards
+    drawn.draw_arrow(tail, tip)
     drawn.label, drawn.away = split_complex(tip), (tip - tail) / abs(tip - tail)
-
-
-def _draw_turning_arrow(
-    axes: "Axes",
-    centre: complex,
-    radius: float,
-    turn: float,
-    colour: str,
-    drawn: _DrawnSymbol,
-) -> None:
-    """Draw an arc with a head, counter-clockwise where turn > 0.
-
-    Nothing is drawn where nothing turns.
-    """
-    if turn == 0.0:
-        return
-    angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
-    points = centre + radius * np.exp(1j * angles)
-    _draw_line(axes, drawn, points, colour, 1.5)
-    before_last, last = points[-2:]
-    tip = last + 2.0 * (last - before_last)
-    _draw_arrow(axes, complex(before_last), complex(tip), colour, drawn)
-    middle = points[20]
-    drawn.label = split_complex(complex(middle))
-    drawn.away = complex(middle - centre) / radius
 
 
 def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
@@ -502,27 +454,27 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     return np.array(points)
 
 
-def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: _DrawnSymbol) -> None:
+def _draw_gravity(drawn: _DrawnSymbol) -> None:
     """Draw an arrow in the corner, of no length in the plane."""
-    size = abs(symbol.vector)
-    if size == 0.0:
+    vector = drawn.symbol.vector
+    if vector == 0.0:
         return
-    x = 24.0 * symbol.vector.real / size
-    y = 24.0 * symbol.vector.imag / size
-    style = {**HEADED, "color": SYMBOL_COLOURS["gravity"], "lw": 1.3}
+    x, y = split_complex(24.0 * vector / abs(vector))
+    style = {**HEADED, "color": drawn.colour, "lw": 1.3}
     corner: dict[str, Any] = {
         "xycoords": "axes fraction",
         "textcoords": "offset points",
         "annotation_clip": False,
     }
     middle = (0.95, 0.9)
+    write = drawn.axes.annotate
     drawn.artists += [
-        axes.annotate("", xy=middle, xytext=(-x, -y), arrowprops=style, **corner),
-        axes.annotate(
+        write("", xy=middle, xytext=(-x, -y), arrowprops=style, **corner),
+        write(
             "$g$",
             xy=middle,
             xytext=(-x - 8.0, -y),
-            color=SYMBOL_COLOURS["gravity"],
+            color=drawn.colour,
             size=9.0,
             **corner,
         ),

@@ -209,7 +209,7 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch):
     monkeypatch.setattr(
         pin_friction,
         "_search",
-        lambda *problems: searched.extend(problems[0]) or search(*problems),
+        lambda problems: searched.extend(problems.F) or search(problems),
     )
     jammed = replace(
         sized(),

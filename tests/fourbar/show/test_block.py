@@ -93,7 +93,7 @@ def test_the_block_has_the_numbers_of_the_facts():
     needs = f"{write(duty.peak_torque)} mN m at 95.49 rpm (RMS {rms} mN m)"
     assert f"\nmotor: at least {needs}, {power} W\n" in text
     # weights and constant couples give back all that they take
-    assert f"cycle    mean torque 0 N m; energy swings by {swing} J about" in text
+    assert f"cycle    mean torque 0 mN m; energy swings by {swing} J about" in text
     loads = [*facts.pins.values()]
     cells = {line[2:11].strip(): line[11:].split("  ") for line in text.splitlines()}
     for label, numbers in (
