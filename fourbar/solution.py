@@ -87,17 +87,17 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """Velocities of the scene's points, m/s."""
     acceleration: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Accelerations of the scene's points, m/s^2."""
-    ground: tuple[Any, Any] | None = field(default=None, kw_only=True)
+    ground: tuple[Any, Any] = field(default=(), kw_only=True)  # type: ignore[assignment]
     """Length and angle of the ground bar, m and rad. Of a study (m, 1) each where they
     vary.
     """
-    scene: "Scene | None" = field(default=None, kw_only=True)
+    scene: Scene = field(default=None, kw_only=True)  # type: ignore[assignment]
     """Scene that was solved; None for a study."""
     origin: tuple[Any, Any] = field(default=(0.0, 0.0), kw_only=True)
     """Place of O2 in the coordinates of the scene's drawing, m. Of a study (m, 1) each
     where they vary.
     """
-    lengths: tuple[Any, Any, Any, Any] | None = field(default=None, kw_only=True)
+    lengths: Any = field(default=(), kw_only=True)
     """Lengths of ground, input, coupler and output, m. Of a study (m, 1) each where
     they vary.
     """

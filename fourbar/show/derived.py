@@ -6,6 +6,7 @@ declares of them.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from fourbar.solution import (
 from fourbar.studies.points import instant_centres
 
 
-def derive(solution: Solution, name: str) -> Array | None:
+def derive(solution: Solution, name: str) -> Any:
     """Compute a quantity of `DERIVED`, (n,) or (n, 2); None without its stage.
 
     NaN marks a position where the quantity has no value: a ratio at a dead centre of
@@ -63,7 +64,6 @@ def list_derived_names(solution: Solution) -> list[str]:
 
 def _measure_spring(solution: Solution, number: int, kind: str) -> Array:
     """Measure the length of a spring, m, or its pull, N."""
-    assert solution.scene is not None
     spring = list_springs(solution.scene)[number]
     distance = measure_end_distance(solution.scene, spring, solution.at)
     distance = np.where(solution.assembled, distance, np.nan)
@@ -87,7 +87,6 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
     omega_3/omega_2 = -[A x (B - O4)] / [(B - A) x (B - O4)],
     omega_4/omega_2 = [A x (B - A)] / [(B - O4) x (B - A)].
     """
-    assert solution.ground is not None
     length, angle = solution.ground
     A = solution.A[..., 0] + 1j * solution.A[..., 1]
     B = solution.B[..., 0] + 1j * solution.B[..., 1]

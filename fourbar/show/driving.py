@@ -72,7 +72,6 @@ def is_once_round(solution: Solution) -> Any:
     bar = solution.at.bar
     if angle.shape[-1] == 1:
         return np.zeros(angle.shape[:-1], dtype=bool)
-    assert solution.lengths is not None
     period = count_turns(solution.lengths, bar)
     if period.ndim > 1:  # of a study, a column
         period = period[:, 0]

@@ -114,7 +114,6 @@ def shaking_moment(solution: Solution) -> Array:
     O2, O4) are not part of it.
     """
     F14 = _require_quantity(solution, "F14")
-    assert solution.ground is not None
     length, ground_angle = solution.ground
 
     def moment(distance: Any, angle: Any, force: Array) -> Array:

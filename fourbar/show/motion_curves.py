@@ -160,7 +160,6 @@ def describe_motion(solution: Solution) -> MotionCurves:
 def _fit_curves(solution: Solution) -> MotionCurves:
     """Fit the curves of a motion, or take those of its positions."""
     scene = solution.scene
-    assert scene is not None
     if not goes_on_between(scene, solution):
         share = np.ones(len(solution))
         if is_once_round(solution):
@@ -439,7 +438,6 @@ def find_drive_rounding(solution: Solution) -> float:
     point an error bar is less, and where springs balance weights, as far as their
     numbers are rounded.
     """
-    assert solution.scene is not None
     inertial = 0.0
     for number, bar in zip(MOVING_BARS, solution.scene.linkage.moving, strict=True):
         a_G = getattr(solution, f"a_G{number}")

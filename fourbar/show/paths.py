@@ -15,7 +15,6 @@ _INDENT = " " * 4
 def write_paths(solution: Solution, units: Conversion) -> list[str]:
     """Write three lines for each point: its extent, and how straight its path is."""
     scene = solution.scene
-    assert scene is not None
     lines = []
     name = scene.motion.commanded
     unit = "rad" if scene.motion.stroke is None else "m"
@@ -47,7 +46,6 @@ def write_paths(solution: Solution, units: Conversion) -> list[str]:
 def collect_paths(solution: Solution, units: Conversion) -> dict[str, Any]:
     """Collect the paths as the JSON has them, by the name of the point."""
     scene = solution.scene
-    assert scene is not None
     length, angle = (find_unit_in(unit, units)[1] for unit in ("m", "rad"))
     over_time = scene.motion.law is not None or scene.motion.free is not None
     place = 1.0 if over_time else length if scene.motion.stroke is not None else angle

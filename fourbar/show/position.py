@@ -164,14 +164,12 @@ class PositionSheet:
         rows = []
         for name in ("transmission", "omega_3/omega_2", "omega_4/omega_2"):
             values = derive(self.solution, name)
-            assert values is not None
             label = "transmission angle" if name == "transmission" else name
             rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
         rows.append(self._write_advantage())
         rows += [*self._write_force_ratios(), *self._write_drive_ratios()]
         for name in ("I13", "I24"):
             centre = derive(self.solution, name)
-            assert centre is not None
             label = f"centre {name}"
             size = self._find_largest("", ["A", "B"])
             if np.abs(centre).max() <= AT_INFINITY * size:
@@ -182,7 +180,6 @@ class PositionSheet:
 
     def _write_advantage(self) -> str:
         values = derive(self.solution, "mechanical_advantage")
-        assert values is not None
         label = "mechanical advantage"
         if not np.isfinite(values[0]):
             return f"{label:<{_NUMBER_LABEL}}without a bound: bar 4 stands still"

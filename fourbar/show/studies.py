@@ -416,7 +416,6 @@ def _find_inertia_unit(units: Conversion) -> tuple[str, float]:
 def _name_assemblies(rest: Equilibria) -> Equilibria:
     """Return equilibria and ranges with the assembly in place of the sign."""
     scene = rest.positions.scene
-    assert scene is not None
     linkage = scene.linkage
 
     def name(place: RestPosition) -> RestPosition:
@@ -473,7 +472,6 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
 def _list_notes(rest: Equilibria, units: Conversion) -> list[str]:
     """List where gas springs of the scene are beyond their stroke."""
     scene = rest.positions.scene
-    assert scene is not None
     return list_spring_notes(scene, rest.positions, units)
 
 

@@ -50,7 +50,6 @@ def measure_paths(solution: Solution) -> dict[str, Path]:
     Nothing is measured of a scene that states single positions.
     """
     scene = solution.scene
-    assert scene is not None
     motion = scene.motion
     moves = motion.law is not None or motion.free is not None
     if not scene.points or not (moves or isinstance(motion.angle, Sweep | None)):

@@ -48,7 +48,6 @@ def instant_centres(
             raise InputError(name, value, "must be left out: the positions are stated")
     solution = solve(of, "position") if isinstance(of, Scene) else of
     A, B = (_as_complex(vector) for vector in (solution.A, solution.B))
-    assert solution.ground is not None
     length, angle = solution.ground
     O4 = length * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
     along = [_direction_of(vector) for vector in (O4, A, B - A, B - O4)]

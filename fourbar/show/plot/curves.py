@@ -31,6 +31,7 @@ from fourbar.show.plot.style import (
     MUTED,
     RING_MARK,
     choose_force_line,
+    draw_zero_line,
     find_peak_index,
     largest_magnitude,
     place_legend,
@@ -164,6 +165,14 @@ def choose_limit(values: list[Array]) -> float | None:
     return None
 
 
+def choose_scale(
+    values: list[Array], unit: str, view: View
+) -> tuple[float | None, float, str]:
+    """Choose the end of a clipped axis, the factor to its unit, and the unit."""
+    limit = choose_limit(values)
+    return limit, *choose_unit(limit or largest_magnitude(*values), unit, view.units)
+
+
 def clip(
     axes: "Axes",
     view: View,
@@ -273,7 +282,7 @@ def _draw_rates(
             ls=BAR_DASHES[bar],
             label=rf"$\{letter}_{bar}$",
         )
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    draw_zero_line(axes)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
     limit = choose_limit(
         [
@@ -319,12 +328,7 @@ def _draw_point_sizes(
             letter,
         ).items()
     }
-    limit = choose_limit(list(curves.values()))
-    factor, shown_unit = choose_unit(
-        limit or largest_magnitude(*curves.values()),
-        unit,
-        view.units,
-    )
+    limit, factor, shown_unit = choose_scale(list(curves.values()), unit, view)
     looks = {
         "A": BAR_COLOURS[2],
         "B": BAR_COLOURS[4],
@@ -379,12 +383,7 @@ def _draw_drive(
     poles = find_poles(view)
     values = getattr(view.sweep, name)
     everywhere = [getattr(branch.sweep, name) for branch in view.alike]
-    limit = choose_limit(everywhere)
-    factor, shown_unit = choose_unit(
-        limit or largest_magnitude(*everywhere),
-        unit,
-        view.units,
-    )
+    limit, factor, shown_unit = choose_scale(everywhere, unit, view)
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
     plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
     for index in poles:
@@ -400,7 +399,7 @@ def _draw_drive(
         else:
             poles_of = "drive's force (its line has no lever)"
         note(view, f"Dotted: poles of the {poles_of}.")
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    draw_zero_line(axes)
     axes.set(
         ylabel=f"{symbol} ({shown_unit})",
         title=f"{what} of the drive{f' on bar {bar}' if bar else ''}",
@@ -475,13 +474,9 @@ def _list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[
 def draw_forces(axes: "Axes", view: View) -> None:
     """Draw the magnitudes of the four pin forces."""
     over = draw_axes(axes, view)
-    sizes = {}
-    for name in FORCE_COLOURS:
-        x, y = getattr(view.sweep, name).T
-        sizes[name] = np.hypot(x, y)
+    sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
     everywhere = _list_force_sizes(view)
-    limit = choose_limit(everywhere)
-    factor, unit = choose_unit(limit or largest_magnitude(*everywhere), "N", view.units)
+    limit, factor, unit = choose_scale(everywhere, "N", view)
     poles = find_poles(view)
     for name, values in sizes.items():
         look = choose_force_line(name)
@@ -526,7 +521,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
             ls=dashes,
             label=name.replace("_", " "),
         )
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    draw_zero_line(axes)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
     place_legend(axes, 3)
     note(
@@ -553,7 +548,6 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     over = draw_axes(axes, view)
     sweep = view.sweep
     angle = derive(sweep, "transmission")
-    assert angle is not None
     mu = np.degrees(angle)
     axes.plot(over, mu, color=INK)
     axes.axhline(_RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))

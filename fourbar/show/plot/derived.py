@@ -12,6 +12,7 @@ from fourbar.quantities import Array
 from fourbar.show.derived import derive
 from fourbar.show.plot.curves import (
     choose_limit,
+    choose_scale,
     clip,
     draw_axes,
     find_poles,
@@ -26,11 +27,10 @@ from fourbar.show.plot.style import (
     INK,
     MUTED,
     POINT,
-    largest_magnitude,
+    draw_zero_line,
     place_legend,
 )
 from fourbar.show.plot.view import View
-from fourbar.show.units import choose_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,13 +62,12 @@ def draw_shaking_force(axes: "Axes", view: View) -> None:
     poles = find_poles(view)
     vectors = _list_values(view, "shaking_force")
     sizes = [np.hypot(vector[:, 0], vector[:, 1]) for vector in vectors]
-    limit = choose_limit(sizes)
-    factor, unit = choose_unit(limit or largest_magnitude(*sizes), "N", view.units)
+    limit, factor, unit = choose_scale(sizes, "N", view)
     curves = {"|F|": sizes[0], "F_x": vectors[0][:, 0], "F_y": vectors[0][:, 1]}
     for name, values in curves.items():
         look = {**_FORCE_LOOKS[name], "label": f"${name}$"}
         plot_between_poles(axes, over, factor * values, poles, **look)
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    draw_zero_line(axes)
     axes.set(ylabel=f"$F$ ({unit})", title="Shaking force on the frame")
     clip(axes, view, curves, limit, "Shaking force", "N")
     place_legend(axes)
@@ -79,10 +78,9 @@ def draw_shaking_moment(axes: "Axes", view: View) -> None:
     over = draw_axes(axes, view)
     poles = find_poles(view)
     moments = _list_values(view, "shaking_moment")
-    limit = choose_limit(moments)
-    factor, unit = choose_unit(limit or largest_magnitude(*moments), "N m", view.units)
+    limit, factor, unit = choose_scale(moments, "N m", view)
     plot_between_poles(axes, over, factor * moments[0], poles, color=INK)
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    draw_zero_line(axes)
     axes.set(ylabel=f"$M$ ({unit})", title="Shaking moment about $O_2$")
     clip(axes, view, {"M": moments[0]}, limit, "Shaking moment", "N m")
 
@@ -123,7 +121,7 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
             "label": _SYMBOLS[name],
         }
         plot_between_poles(axes, over, values, poles, **look)
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    draw_zero_line(axes)
     clip(axes, view, curves, limit, "Ratio", "1")
 
 
@@ -136,8 +134,6 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
         path = derive(view.sweep, name)
         here = derive(view.here, name)
-        assert path is not None
-        assert here is not None
         x, y = path.T
         is_near = np.hypot(x - middle[0], y - middle[1]) <= reach
         subscript = name[1:]

@@ -49,8 +49,10 @@ _ON_BAR = 1e-3
 """Part of a bar's length below which a point seems to lie on the bar's line."""
 
 
-def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
-    """Write round numbers of the drawing's coordinates at the axes."""
+def _label_plane(
+    axes: "Axes", view: View, title: str, factor: float, unit: str
+) -> None:
+    """Label the axes of a drawing to scale, with round numbers of its coordinates."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     class ShiftedLocator(MaxNLocator):
@@ -71,6 +73,8 @@ def _show_drawing_coordinates(axes: "Axes", view: View, factor: float) -> None:
         axis.set_major_locator(ShiftedLocator(shift))
         axis.set_major_formatter(FuncFormatter(write_tick))
 
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     x, y = view.scene.origin
     if x != 0.0:
         shift_axis(axes.xaxis, factor * x)
@@ -130,14 +134,7 @@ def draw_mechanism(
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
         here = split_complex(factor * complex(*path[index]))
-        drawn += axes.plot(
-            *[[v] for v in here],
-            "D",
-            ms=4.5,
-            mew=1.2,
-            zorder=8,
-            **{**RING_MARK, "mec": POINT},
-        )
+        drawn += _mark_point(axes, here)
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
     for carrier, corner in _list_off_bars(view, place):
@@ -234,6 +231,13 @@ def draw_plate(
     ]
 
 
+def _mark_point(axes: "Axes", point: DrawnPoint) -> "list[Line2D]":
+    """Mark a point of the scene by a diamond."""
+    x, y = point
+    look = {**RING_MARK, "mec": POINT}
+    return axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **look)
+
+
 def draw_mass_centre(
     axes: "Axes",
     point: DrawnPoint,
@@ -317,15 +321,9 @@ def choose_drawing_scale(view: View) -> tuple[float, str, float]:
     )
     factor, unit = choose_unit(most, "m", view.units)
     sweep = view.sweep
-    reached = np.concatenate(
-        [
-            sweep.A,
-            sweep.B,
-            sweep.G3,
-            *sweep.points.values(),
-            list(locate_pins(view).values()),
-        ]
-    )
+    pins = np.array([*locate_pins(view).values()])
+    places = [sweep.A, sweep.B, sweep.G3, *sweep.points.values(), pins]
+    reached = np.concatenate(places)
     extents = np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)
     size_of_support = 0.03 * factor * float(np.max(extents))
     return factor, unit, size_of_support
@@ -384,11 +382,9 @@ def draw_linkage(
     draw_mechanism(axes, view, view.here, 0, labels)
     if moving:
         draw_vectors(axes, view, view.here, factor, size)
-    axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     title = f"Linkage at {view.at}, {view.branch_name} branch"
-    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
-    _show_drawing_coordinates(axes, view, factor)
+    _label_plane(axes, view, title, factor, unit)
     write_path_legend(axes)
 
 
@@ -502,15 +498,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     for name in names:
         x, y = (factor * view.here.points[name][0]).tolist()
         axes.plot((x_A, x, x_B), (y_A, y, y_B), lw=0.8, ls=":", **faint)
-        axes.plot(
-            [x],
-            [y],
-            "D",
-            ms=4.5,
-            mew=1.2,
-            zorder=8,
-            **{**RING_MARK, "mec": POINT},
-        )
+        _mark_point(axes, (x, y))
         labels.keep_off(axes, pins["A"], (x, y), pins["B"])
         labels.add(Label(axes, name, (x, y), pins["A"], POINT, 8.5, 2.5))
     for name, (x, y) in pins.items():
@@ -518,12 +506,10 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
         if name in ("O2", "O4"):
             labels.add(Label(axes, pin_name(name), (x, y), (0.0, 1e9), INK, 8.5, 2.0))
     labels.keep_off(axes, *pins.values())
-    axes.set_aspect("equal", adjustable="datalim")
     title = f"Coupler curves, {view.branch_name} branch"
     if traced.circuit:
         title = "Coupler curves of the circuit"
-    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
-    _show_drawing_coordinates(axes, view, factor)
+    _label_plane(axes, view, title, factor, unit)
     if names:
         heading = "point of the coupler"
     else:

@@ -262,3 +262,8 @@ def place_legend(axes: "Axes", columns: int = 4) -> None:
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)
     rows = math.ceil(len(legend.get_texts()) / columns)
     axes.set_title(axes.get_title(loc="left"), pad=7.0 + 11.0 * rows)
+
+
+def draw_zero_line(axes: "Axes") -> None:
+    """Draw the line of zero under the curves."""
+    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)

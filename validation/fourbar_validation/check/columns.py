@@ -61,4 +61,5 @@ def compute_column(solution: Solution, name: str) -> Array | None:
     assert solution.scene is not None
     if of_spring and int(of_spring[1]) >= len(list_springs(solution.scene)):
         raise InputError("header", name, "does not exist in this scene")
-    return derive(solution, name)
+    values = derive(solution, name)
+    return values
