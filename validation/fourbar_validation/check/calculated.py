@@ -127,7 +127,7 @@ _GRAVITY_TURNED = {
 """Directions that gravity may be given, by their angle from the right one."""
 
 
-class _Change(NamedTuple):
+class Change(NamedTuple):
     """What a mistake changes of what acts on the bars."""
 
     text: str
@@ -184,7 +184,7 @@ class Calculation:
                 apply_effect(term, self.motion, wrenches)
         return wrenches
 
-    def solve(self, changes: list[_Change]) -> Iterator[Mistake]:
+    def solve(self, changes: list[Change]) -> Iterator[Mistake]:
         """Solve the free bodies under each change, all at once."""
         changes = [change for change in changes if self._is_wanted(change)]
         if not changes:
@@ -201,7 +201,7 @@ class Calculation:
                 shown = {name: numbers[name] for name in names if name in numbers}
                 yield _state(f"{change.text}{words}", shown)
 
-    def _is_wanted(self, change: _Change) -> bool:
+    def _is_wanted(self, change: Change) -> bool:
         return any(
             map(self.wanted, [f"{change.text}{words}" for words in ("", *change.where)])
         )
@@ -221,7 +221,7 @@ class Calculation:
             speed = right.stroke_speed
         return {**forces, self.driving: effort, "power": effort * speed}
 
-    def _follow_friction(self, unknowns: Array, changes: list[_Change]) -> Array:
+    def _follow_friction(self, unknowns: Array, changes: list[Change]) -> Array:
         """Add what the pins' friction changes with their load, (n, 13, k)."""
         pins = list_sliding_pins(self.scene)
         usual, loads, arms, _ = solve_unit_couples(self.scene, self.motion)
@@ -350,7 +350,7 @@ class Calculation:
                 yield _state(f"{name} = {other}", {name: values}, whole=False)
                 yield _state(f"{name} = -{other}", {name: -values}, whole=False)
 
-    def _scale_inertial(self) -> Iterator[_Change]:
+    def _scale_inertial(self) -> Iterator[Change]:
         """Scale the inertial forces against the loads."""
         every = self.none()
         turning = self.none()
@@ -362,7 +362,7 @@ class Calculation:
             more = (
                 self.none().plus(every, by_mass - 1.0).plus(turning, by_inertia - 1.0)
             )
-            yield _Change(text, more)
+            yield Change(text, more)
 
     def _accelerate(
         self,
@@ -378,12 +378,12 @@ class Calculation:
         a_G = getattr(self.right, f"a_G{bar}")
         return {f"a_G{bar}": a_G + stack_components(a)}
 
-    def _scale_actions(self) -> Iterator[_Change]:
+    def _scale_actions(self) -> Iterator[Change]:
         """Leave out, double or reverse each load and effect, and each part of one."""
         for name, acting, pins in self._list_acting():
             verb = "are" if name.endswith("s") else "is"
             for factor, done in _SCALED.items():
-                yield _Change(
+                yield Change(
                     f"{name} {verb} {done}",
                     self.none().plus(acting, factor - 1.0),
                     where=_WHERE,
@@ -394,10 +394,10 @@ class Calculation:
                 for text, angle in _GRAVITY_TURNED.items():
                     turned = self.apply(replace(effect, angle=effect.angle + angle))
                     more = turned.plus(self.apply(effect), -1.0)
-                    yield _Change(f"gravity is {text}", more)
+                    yield Change(f"gravity is {text}", more)
                 return
         text = "gravity along -y is included though the scene has none"
-        yield _Change(text, self.apply(Gravity()))
+        yield Change(text, self.apply(Gravity()))
 
     def _list_acting(self) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
         """List what acts besides inertia, with pins whose friction depends on loads."""
@@ -428,7 +428,7 @@ class Calculation:
                 without = self.apply(replace(effect, **{field: (relaxed,)}))
                 yield f"the {text} spring {i}", acting.plus(without, -1.0), []
 
-    def _velocity_terms(self) -> Iterator[_Change]:
+    def _velocity_terms(self) -> Iterator[Change]:
         """Leave out (dJ/dt) v.
 
         The accelerations of the other bars then follow that of the commanded one alone.
@@ -447,9 +447,9 @@ class Calculation:
                 moved[f"alpha_{bar}"] = alpha
                 moved |= self._accelerate(wrenches, bar, a, more)
         text = "(dJ/dt) v is missing in the accelerations of the loop"
-        yield _Change(text, wrenches, moved, _FOLLOWING)
+        yield Change(text, wrenches, moved, _FOLLOWING)
 
-    def _accelerations_of_centres(self) -> Iterator[_Change]:
+    def _accelerations_of_centres(self) -> Iterator[Change]:
         """Leave out a part of the acceleration of each G about its bar's first pin."""
         motion = self.motion
         arms = {bar: motion.to_centre(bar) for bar in MOVING_BARS}
@@ -463,15 +463,15 @@ class Calculation:
                 for bar, a in of_bars.items():
                     moved |= self._accelerate(wrenches, bar, factor * a)
                 text = f"{part} {done} in a_G {whose}"
-                yield _Change(text, wrenches, moved, _FOLLOWING)
+                yield Change(text, wrenches, moved, _FOLLOWING)
         for bar in MOVING_BARS:
             wrenches = self.none()
             a = -centripetal[bar] - tangential[bar]
             moved = self._accelerate(wrenches, bar, a)
             text = f"the acceleration of bar {bar}'s first pin is used as its a_G"
-            yield _Change(text, wrenches, moved, _FOLLOWING)
+            yield Change(text, wrenches, moved, _FOLLOWING)
 
-    def _change_bars(self) -> Iterator[_Change]:
+    def _change_bars(self) -> Iterator[Change]:
         """Give each bar, and every bar, another mass or moment of inertia."""
         fields = [one for one in self.scene.effects if isinstance(one, Gravity)]
         weights = self.apply(*fields).force
@@ -480,12 +480,12 @@ class Calculation:
             if fields:
                 less = self.none()
                 less.push(bar, -weights[bar], self.motion.to_centre(bar))
-                yield _Change(f"the weight of bar {bar} is missing", less)
+                yield Change(f"the weight of bar {bar} is missing", less)
             for text, wrenches in self._list_bar_mistakes(bar, weights[bar]):
-                yield _Change(f"{BAR_NAMES[bar]}: {text}", wrenches)
+                yield Change(f"{BAR_NAMES[bar]}: {text}", wrenches)
                 every[text] = every.get(text, self.none()).plus(wrenches)
         for text, wrenches in every.items():
-            yield _Change(f"every bar: {text}", wrenches)
+            yield Change(f"every bar: {text}", wrenches)
 
     def _list_bar_mistakes(
         self,
@@ -513,7 +513,7 @@ class Calculation:
                 both = massless.plus(pointlike)
                 yield "mass and moment of inertia left out", both
 
-    def _change_loads(self) -> Iterator[_Change]:
+    def _change_loads(self) -> Iterator[Change]:
         """Measure where a force acts from the wrong point, or turn it with its bar."""
         loads = zip(self.stated.loads, self.scene.loads, strict=True)
         for number, (stated, load) in enumerate(loads, 1):
@@ -538,7 +538,7 @@ class Calculation:
             for text, shift in moved.items():
                 couple = self.none()
                 couple.couple(bar, cross_products(shift, force))
-                yield _Change(f"{name}: {text}", couple)
+                yield Change(f"{name}: {text}", couple)
             turn = self.motion.unit[bar]
             how = "turns with the bar"
             if load.frame == "bar":
@@ -546,7 +546,7 @@ class Calculation:
                 how = "is kept"
             turned = self.none()
             turned.push(bar, force * turn - force, arm)
-            yield _Change(f"{name}: its direction {how}", turned)
+            yield Change(f"{name}: its direction {how}", turned)
 
     def _drive_other_bars(self) -> Iterator[Mistake]:
         for bar in MOVING_BARS:

@@ -102,8 +102,11 @@ class _Allowed(NamedTuple):
 class Judge:
     """Numbers of a table against the formulas at its positions.
 
-    `rows`: what was commanded at its rows; left out: what the scene and the table
-    state.
+    Parameters
+    ----------
+    rows : what was commanded at its rows; left out: what the scene and the table state.
+    slack : part of each quantity's size that is allowed besides, of an engine that
+        promises no more digits.
     """
 
     def __init__(
@@ -112,8 +115,9 @@ class Judge:
         table: TheirTable,
         tolerance: Allowance | None = None,
         rows: RowCommands | None = None,
+        slack: float = 0.0,
     ) -> None:
-        self.scene, self.tolerance = scene, tolerance
+        self.scene, self.tolerance, self.slack = scene, tolerance, slack
         command_names: tuple[str, ...] = ()
         if rows is None:
             rows = find_row_commands(scene, table)
@@ -194,6 +198,10 @@ class Judge:
             self._exact[key] = np.where(scale.size == 0.0, 0.0, allowed)
         return self._exact[key]
 
+    def hold(self, key: str, exact: Array) -> None:
+        """Allow a key another error at each position, (n,), in parts of its size."""
+        self._exact[key] = exact
+
     def size(self, key: str) -> Array:
         """Compute what the error of a key is divided by at each position, (n,)."""
         return self.scale(key).size
@@ -225,11 +233,11 @@ class Judge:
         apart = compute_difference(quantity, ours, theirs)
         # the number a mistake would have printed is rounded at its own size, however
         # much larger
-        larger: Array | float = 1.0
+        larger = 1.0
         if ours is not self.ours(key):
             usual = TURN if quantity.startswith("theta") else limits.size
-            largest = np.nanmax(magnitude(ours)[self.ok], initial=0.0)
-            larger = np.maximum(largest / usual, 1.0)
+            shares = (magnitude(ours) / usual)[self.ok]
+            larger = float(np.nanmax(shares, initial=1.0))
         allowed = limits.exact * larger + limits.rounding
         return divide(apart, limits.size), allowed, apart
 
@@ -247,7 +255,7 @@ class Judge:
             exact = self.find_exact(key)
             self._allowed[key] = _Allowed(
                 size,
-                np.where(exact <= MOST_ALLOWED, exact + spread, np.inf),
+                np.where(exact <= MOST_ALLOWED, exact + spread + self.slack, np.inf),
                 divide(self.table.rounding[key], size),
                 not np.isnan(self.table.values[key]).any(),
             )

@@ -19,7 +19,11 @@ from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from fourbar_validation.compare.scales import has_angles
 from fourbar_validation.compare.tolerance import compute_difference
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.registry import Engine, make_demands
+from fourbar_validation.engines.registry import (
+    Engine,
+    make_demands,
+    make_prediction,
+)
 from fourbar_validation.run.causes import find_causes
 from fourbar_validation.run.question import Question
 
@@ -108,7 +112,8 @@ def _note_causes(
     answer: Answer,
 ) -> None:
     """Look for the mistakes behind an answer; nothing is noted if none can be."""
-    causes = find_causes(asked, answer, engine.tolerance)
+    predicted = make_prediction(engine, asked.scene, asked.at, answer)
+    causes = find_causes(asked, answer, engine.tolerance, predicted)
     if causes is not None:
         question.causes[engine.name] = causes
 

@@ -10,8 +10,15 @@ from fourbar_validation.check.rows import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.check.variants import Wanted, always
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Predicted
 from fourbar_validation.compare.pins import state_from_pins
-from fourbar_validation.compare.tolerance import ErrorBound, Mask, magnitude
+from fourbar_validation.compare.tolerance import (
+    MOST_ALLOWED,
+    TIMES_PREDICTED,
+    ErrorBound,
+    Mask,
+    divide,
+)
 from fourbar_validation.run.question import Question
 
 MOST_POSITIONS_SEARCHED = 400
@@ -35,6 +42,7 @@ def find_causes(
     question: Question,
     answer: Answer,
     tolerance: ErrorBound,
+    predicted: Predicted | None = None,
 ) -> list[str] | None:
     """List the mistakes that explain all that differs in an answer, the simplest first.
 
@@ -47,8 +55,14 @@ def find_causes(
     scene = state_from_pins(question.scene)
     try:
         regular = question.solution.status_code == OK
-        table = make_answer_table(answer, tolerance, regular)
-        judge = Judge(scene, table, rows=RowCommands(at.part(slice(len(table.places)))))
+        table = make_answer_table(answer, regular)
+        slack = SAME_NUMBERS
+        if not tolerance.conditioned:
+            slack = max(tolerance.factor, slack)
+        rows = RowCommands(at.part(slice(len(table.places))))
+        judge = Judge(scene, table, rows=rows, slack=slack)
+        if predicted is not None:
+            hold_to_prediction(judge, predicted, len(at.angle))
         wrong = {key: find_wrong(judge, key) for key in judge.table.values}
         differing = [key for key, rows in wrong.items() if rows.any()]
         if not differing:
@@ -58,9 +72,12 @@ def find_causes(
         if any(effect.loaded_pins for effect in scene.effects):
             most = FIRST_ROWS_OF_FRICTION
         if len(table.places) > most:
-            rows = choose_rows(np.logical_or.reduce(list(wrong.values())), most)
-            few = Judge(scene, table.part(rows), rows=RowCommands(judge.at.part(rows)))
-            differing_there = [key for key in differing if wrong[key][rows].any()]
+            part = choose_rows(np.logical_or.reduce(list(wrong.values())), most)
+            rows = RowCommands(judge.at.part(part))
+            few = Judge(scene, table.part(part), rows=rows, slack=slack)
+            for key in table.values:
+                few.hold(key, judge.find_exact(key)[part])
+            differing_there = [key for key in differing if wrong[key][part].any()]
             tried = explain(few, differing_there)
             if not tried:
                 return []
@@ -82,15 +99,23 @@ def choose_rows(wrong: Mask, most: int) -> slice:
     return slice(start, start + most)
 
 
-def make_answer_table(
-    answer: Answer,
-    tolerance: ErrorBound,
-    regular: Mask,
-) -> TheirTable:
-    """Return a table of an engine's numbers, as if they had been read from a file.
+def hold_to_prediction(judge: Judge, predicted: Predicted, n: int) -> None:
+    """Allow the predicted error at those of n positions where the law leaves no digit.
 
-    Numbers are taken to be rounded to what the engine is held to, so that a mistake
-    need not explain more of it.
+    A run fails an answer by the same prediction.
+    """
+    for key in judge.table.values:
+        exact = judge.find_exact(key)
+        beyond = np.zeros(n, dtype=bool)
+        beyond[: len(exact)] = ~(exact <= MOST_ALLOWED)
+        if beyond.any():
+            errors = TIMES_PREDICTED * predicted(key, beyond)[: len(exact)]
+            share = divide(errors, judge.size(key))
+            judge.hold(key, np.where(beyond[: len(exact)], share, exact))
+
+
+def make_answer_table(answer: Answer, regular: Mask) -> TheirTable:
+    """Return a table of an engine's numbers, as if they had been read from a file.
 
     `regular`: positions that are looked at; beside a change point numbers are anything.
     """
@@ -98,40 +123,16 @@ def make_answer_table(
     rows = slice(MOST_POSITIONS_SEARCHED)
     angle = np.asarray(answer.at.angle[rows], dtype=float)
     blank = ~(answer.assembled & regular)[rows]
-    if not tolerance.conditioned:
-        slack = tolerance.factor
-    else:
-        slack = SAME_NUMBERS
     values: dict[str, Array] = {}
-    rounding: dict[str, Array] = {}
     for name, numbers in answer.quantities.items():
-        if name not in UNITS or name in {*_NO_CAUSE, answer.at.commanded}:
-            continue
-        kept = np.array(numbers[rows], dtype=float)
-        kept[blank] = np.nan
-        size = magnitude(kept)
-        if len(size):
-            largest = float(np.nanmax(size, initial=0.0))
-        else:
-            largest = 0.0
-        if UNITS[name] in ("rad", "1"):
-            scale = 1.0
-        else:
-            scale = largest
-        values[name] = kept
-        rounding[name] = np.full(len(angle), max(slack, SAME_NUMBERS) * scale)
+        if name in UNITS and name not in {*_NO_CAUSE, answer.at.commanded}:
+            values[name] = np.array(numbers[rows], dtype=float)
+            values[name][blank] = np.nan
+    exact = np.zeros(len(angle))
     units = {name: Unit(UNITS[name], 1.0) for name in values}
     lines = list(range(1, len(angle) + 1))
-    exact = np.zeros(len(angle))
-    return TheirTable(
-        angle,
-        values,
-        rounding,
-        units,
-        lines,
-        exact,
-        {},
-    )
+    rounding = dict.fromkeys(values, exact)
+    return TheirTable(angle, values, rounding, units, lines, exact, {})
 
 
 def find_wrong(judge: Judge, key: str) -> Mask:
