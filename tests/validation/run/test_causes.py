@@ -114,6 +114,14 @@ NO_VELOCITY_TERMS = (
     "k = alpha * r2",
 )
 CUT_AT_B = "    F32 = F43 - forces[1]", "    F43 = 0j\n    F32 = F43 - forces[1]"
+CARRIED = "moments[0] += cross(r2, forces[1])\n    "
+DRIVEN_BY_OUTPUT = (
+    (
+        LOOP_FORCE,
+        f"{CARRIED}F43 = (moments[1] * r2 - moments[0] * r3) / cross(r3, r2)",
+    ),
+    (TORQUE, '"torque": moments[2] + cross(r4, F43)'),
+)
 CENTRIPETAL, TANGENTIAL = "-omega^2 r", "alpha x r"
 IN_EVERY_BAR = "in a_G of every bar, r from its first pin to G"
 TURNED = {
@@ -125,7 +133,28 @@ TURNED = {
     f"{TANGENTIAL} is doubled": "(2j * turning - w * w) * arm",
     f"{TANGENTIAL} has the wrong sign": "(-1j * turning - w * w) * arm",
 }
+
+
+def keep_loop_force(numbers, at):
+    """The force at B is that of the position before; pins and torque follow from it."""
+    stale = np.concatenate((numbers["F43"][:1], numbers["F43"][:-1])) - numbers["F43"]
+    numbers["F12"] = numbers["F12"] - stale
+    for name in ("F32", "F43", "F14"):
+        numbers[name] = numbers[name] + stale
+    x, y = SCENE.linkage.input.length * np.stack((np.cos(at.angle), np.sin(at.angle)))
+    numbers["torque"] = numbers["torque"] - (x * stale[:, 1] - y * stale[:, 0])
+
+
+def shift_torque(numbers, at):
+    torque = numbers["torque"]
+    numbers["torque"] = np.concatenate((torque[:1], torque[:-1]))
+
+
 CHANGED = {
+    "the force at B is that of the position before: a constraint one step old": (
+        keep_loop_force
+    ),
+    "one step late: numbers of the position before: torque": shift_torque,
     "one step late: numbers of the position before": shift,
     "each force is in the frame of the bar on which it acts, not in world axes": (
         turn_into_bars
@@ -185,6 +214,37 @@ REPLACED = {
     "the acceleration of bar 3's first pin is used as its a_G": [
         (IN_ARM, f"{IN_ARM} * (name != 'coupler')")
     ],
+    # an adversary's: what issue lists of engines report, and no case above has
+    "alpha_2 in deg/s^2 taken for rad/s^2": [
+        (FIRST, f"    alpha = math.degrees(alpha)\n{FIRST}")
+    ],
+    "alpha_2 in rad/s^2 taken for deg/s^2": [
+        (FIRST, f"    alpha = math.radians(alpha)\n{FIRST}")
+    ],
+    "omega_2 in rad/s taken for deg/s": [
+        (FIRST, f"    omega = math.radians(omega)\n{FIRST}")
+    ],
+    "F32 is in the frame of bar 3, not in world axes: F32": [
+        ('"F32": F32, ', '"F32": F32 / (r3 / b), ')
+    ],
+    "gravity is doubled": [(" - field)", " - 2.0 * field)")],
+    "y reversed: F12, F32, F43, F14": [("force.imag)", "-force.imag)")],
+    "relative to bar 3 instead of the ground: theta_4": [
+        ("cmath.phase(r4)", "cmath.phase(r4 / r3)")
+    ],
+    "coupler: mass centre measured from the wrong pin": [
+        (
+            'cmath.rect(*bar["centre"])',
+            '(abs(r) - cmath.rect(*bar["centre"]).conjugate())',
+        )
+    ],
+    "every number is 0.5 times ours: torque": [
+        (TORQUE, '"torque": 0.5 * (moments[0] - cross(r2, F32))')
+    ],
+    "coupler: moment of inertia doubled": [
+        (") * turning", ") * turning * (1.0 + (name == 'coupler'))")
+    ],
+    "the torque acts on bar 4 instead of bar 2": list(DRIVEN_BY_OUTPUT),
     "no inertial forces (statics)": [(FIRST, f"    omega = alpha = 0.0\n{FIRST}")],
     **{f"{done} {IN_EVERY_BAR}": [(IN_ARM, term)] for done, term in TURNED.items()},
 }
@@ -193,7 +253,6 @@ BUGS = {
     **{text: {"change": change} for text, change in CHANGED.items()},
     **{text: {"replacements": pairs} for text, pairs in REPLACED.items()},
 }
-CARRIED = "moments[0] += cross(r2, forces[1])\n    "
 DRIVEN = {
     3: (
         (
@@ -202,13 +261,7 @@ DRIVEN = {
         ),
         (TORQUE, '"torque": moments[1] - cross(r3, F43)'),
     ),
-    4: (
-        (
-            LOOP_FORCE,
-            f"{CARRIED}F43 = (moments[1] * r2 - moments[0] * r3) / cross(r3, r2)",
-        ),
-        (TORQUE, '"torque": moments[2] + cross(r4, F43)'),
-    ),
+    4: DRIVEN_BY_OUTPUT,
 }
 """The engine's text where the drive is on bar 3 or 4."""
 
@@ -501,6 +554,59 @@ def test_what_acts_may_be_left_out_doubled_or_reversed(name, word):
     verb = "are" if name.endswith("s") else "is"
     causes = find_causes(partial(Scaled, without, DONE[word]), scene)
     assert f"{name} {verb} {word}" in causes
+
+
+def with_bars(**bars):
+    return replace(SCENE, linkage=replace(SCENE.linkage, **bars))
+
+
+def weigh(name, of_mass, of_inertia):
+    """Return a bar with the mass and the moment of inertia of other ones."""
+    bar, mass, inertia = (
+        getattr(SCENE.linkage, one) for one in (name, of_mass, of_inertia)
+    )
+    stated = {"inertia": inertia.moment_of_inertia, "centre": bar.mass_centre}
+    return replace(bar, mass=mass.mass, **stated)
+
+
+def with_load(*from_pin):
+    load = fourbar.Load(3, (3.0, 0.7), from_pin=from_pin)
+    return replace(SCENE, loads=(load,))
+
+
+DAMPED = replace(SCENE, effects=(fourbar.Gravity(), fourbar.Viscous((("O4", 0.2),))))
+OTHER_SCENES = {
+    "coupler: mass of the input": (
+        SCENE,
+        with_bars(coupler=weigh("coupler", "input", "coupler")),
+        0.0,
+    ),
+    "input and output: mass and inertia are exchanged": (
+        SCENE,
+        with_bars(
+            input=weigh("input", "output", "output"),
+            output=weigh("output", "input", "input"),
+        ),
+        0.0,
+    ),
+    "load 1 (bar 3): its force acts at the second pin of the bar": (
+        with_load(0.05, 1.0),
+        with_load(SCENE.linkage.coupler.length, 0.0),
+        0.0,
+    ),
+    "the viscous damping is taken of degrees: 57.2958 times": (
+        DAMPED,
+        SCENE,
+        np.degrees(1.0),
+    ),
+}
+"""Scene, the one that is solved in its place, and the factor on what differs."""
+
+
+@pytest.mark.parametrize("words", OTHER_SCENES)
+def test_another_scene_of_an_adversary_is_named_first(words):
+    scene, other, factor = OTHER_SCENES[words]
+    assert find_causes(partial(Scaled, other, factor), scene)[0] == words
 
 
 @pytest.mark.parametrize("word", DONE)

@@ -9,14 +9,14 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array, ComplexArray
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -114,6 +114,11 @@ _PART_FIELDS = {
 """Field with the parts of an effect, by its key."""
 _SCALED = {0.0: "missing", 2.0: "doubled", -1.0: "reversed"}
 """Factors on what acts besides inertia, and what was done to it."""
+_IN_DEGREES = {
+    np.degrees(1.0): "is taken of degrees: 57.2958 times",
+    np.radians(1.0): "is taken per degree: 0.0174533 times",
+}
+"""Factors on what follows an angle or its rate, and what was done to it."""
 _WHERE = {
     "": FORCE_NAMES,
     " in the pin forces alone": PIN_FORCES,
@@ -382,9 +387,12 @@ class Calculation:
         """Leave out, double or reverse each load and effect, and each part of one."""
         for name, acting, pins in self._list_acting():
             verb = "are" if name.endswith("s") else "is"
-            for factor, done in _SCALED.items():
+            ways = {factor: f"{verb} {done}" for factor, done in _SCALED.items()}
+            if name in (_EFFECT_NAMES["viscous"], _EFFECT_NAMES["torsion"]):
+                ways |= _IN_DEGREES
+            for factor, done in ways.items():
                 yield Change(
-                    f"{name} {verb} {done}",
+                    f"{name} {done}",
                     self.none().plus(acting, factor - 1.0),
                     where=_WHERE,
                     friction=dict.fromkeys(pins, factor),
@@ -486,6 +494,39 @@ class Calculation:
                 every[text] = every.get(text, self.none()).plus(wrenches)
         for text, wrenches in every.items():
             yield Change(f"every bar: {text}", wrenches)
+        yield from self._exchange_bars(weights)
+
+    def _exchange_bars(self, weights: Mapping[int, ComplexArray]) -> Iterator[Change]:
+        """Give a bar the mass of another one; exchange mass and inertia of two."""
+        bodies = {bar: self.motion.linkage.bar(bar) for bar in MOVING_BARS}
+        for bar, other in permutations(MOVING_BARS, 2):
+            names = BAR_NAMES[bar], BAR_NAMES[other]
+            of_mass = self._give_mass(bar, bodies[other], weights)
+            yield Change(f"{names[0]}: mass of the {names[1]}", of_mass)
+            if bar < other:
+                both = of_mass.plus(self._give_mass(other, bodies[bar], weights))
+                less = find_inertia(bodies[other]) - find_inertia(bodies[bar])
+                both.couple(bar, -less * self.motion.alpha[bar])
+                both.couple(other, less * self.motion.alpha[other])
+                text = f"{names[0]} and {names[1]}: mass and inertia are exchanged"
+                yield Change(text, both)
+
+    def _give_mass(
+        self,
+        bar: int,
+        body: Bar,
+        weights: Mapping[int, ComplexArray],
+    ) -> BodyWrenches:
+        """Return what acts besides on a bar of another one's mass."""
+        mass = find_mass(self.motion.linkage.bar(bar))
+        more = find_mass(body) - mass
+        wrenches = self.none()
+        a_G = join(getattr(self.right, f"a_G{bar}"))
+        to_centre = self.motion.to_centre(bar)
+        wrenches.push(bar, -more * a_G, to_centre)
+        if mass:
+            wrenches.push(bar, more / mass * weights[bar], to_centre)
+        return wrenches
 
     def _list_bar_mistakes(
         self,
@@ -525,9 +566,11 @@ class Calculation:
             force = self.apply(load).force[bar]
             arm = find_arm(load, self.motion)
             to_centre = self.motion.to_centre(bar)
+            to_end = self.motion.linkage.bar(bar).length * self.motion.unit[bar]
             moved = {
                 "its force acts at G of the bar": to_centre - arm,
                 "its force acts at the first pin of the bar": -arm,
+                "its force acts at the second pin of the bar": to_end - arm,
             }
             if stated.from_pin is None:
                 from_pin = f"{what} is measured from the bar's first pin, not from G"
@@ -595,6 +638,7 @@ def find_miscalculated(judge: Judge, wanted: Wanted = always) -> Iterator[Mistak
     if judge.stage == "force":
         yield from Calculation(judge.scene, judge.right, wanted).mistakes()
         yield from _find_impulses(judge)
+        yield from _find_stale(judge)
     yield from _find_late(judge)
     yield from _find_other_branch(judge)
 
@@ -683,27 +727,47 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
     for text, step in _LATE.items():
         rows = np.clip(np.arange(n) - step, 0, n - 1)
         edge = 0 if step == 1 else n - 1
-        for what, applies in (("", bool), (" (forces alone)", of_forces)):
+        moved = {}
+        for key in judge.table.values:
+            quantity = name_quantity(key)
+            if quantity != judge.right.commanded:
+                moved[quantity] = _take_edge(judge, quantity, rows, edge)
+        forces = {name: values for name, values in moved.items() if of_forces(name)}
+        yield _state(text, moved)
+        yield _state(f"{text} (forces alone)", forces)
+        yield _state(text, moved, whole=False)
 
-            def predict(
-                quantity: str,
-                right: Solution,
-                rows: NDArray[np.intp] = rows,
-                edge: int = edge,
-                applies: Callable[[str], bool] = applies,
-            ) -> Array | None:
-                if quantity == right.commanded or not applies(quantity):
-                    return None
-                values = getattr(right, quantity, None)
-                if values is None:
-                    return None
-                moved = np.array(values[rows])
-                theirs = judge.table.values.get(quantity)
-                if theirs is not None and theirs.shape == moved.shape:
-                    moved[edge] = theirs[edge]  # it may be anything
-                return moved
 
-            yield Mistake(text + what, predict)
+def _take_edge(judge: Judge, quantity: str, rows: Array, edge: int) -> Array:
+    """Return the numbers of other rows, and at the edge theirs: it may be anything."""
+    moved = np.array(judge.ours(quantity)[rows])
+    theirs = judge.table.values.get(quantity)
+    if theirs is not None and theirs.shape == moved.shape:
+        moved[edge] = theirs[edge]
+    return moved
+
+
+def _find_stale(judge: Judge) -> Iterator[Mistake]:
+    """Balance each position with the force at B of the one before."""
+    scene = judge.scene
+    if scene.drive is not None or len(judge.at.angle) <= ENOUGH_POSITIONS:
+        return
+    right = judge.right
+    stale = join(np.roll(right.F43, 1, axis=0) - right.F43)
+    linkage = scene.linkage
+    unit = np.exp(1j * getattr(right, f"theta_{scene.drive_bar}"))
+    arm = linkage.bar(scene.drive_bar).length * unit
+    sense = 1.0 if scene.drive_bar == 4 else -1.0
+    numbers = {"torque": right.torque + sense * cross_products(arm, stale)}
+    for name in PIN_FORCES:
+        less = -1.0 if name == "F12" else 1.0
+        numbers[name] = getattr(right, name) + less * stack_components(stale)
+    for name, values in numbers.items():
+        theirs = judge.table.values.get(name)
+        if theirs is not None:
+            values[0] = theirs[0]
+    text = "the force at B is that of the position before: a constraint one step old"
+    yield _state(text, numbers)
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:

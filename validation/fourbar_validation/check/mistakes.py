@@ -33,8 +33,19 @@ from fourbar_validation.check.variants import (
 )
 from fourbar_validation.scenes.bars import list_moving
 
-RPM = np.pi / 30.0
+_RPM = np.pi / 30.0
 """rad/s of one rev/min."""
+_DEGREES_TAKEN = {
+    "deg/{0} taken for rad/{0}": float(np.degrees(1.0)),
+    "rad/{0} taken for deg/{0}": float(np.radians(1.0)),
+}
+"""Factors on the speed or acceleration that is commanded, by the unit mistaken."""
+_OF_SPEEDS = {
+    "rev/min taken for rad/s": 1.0 / _RPM,
+    "rad/s taken for rev/min": _RPM,
+    **_DEGREES_TAKEN,
+}
+"""The same of a speed."""
 MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
 _BETWEEN = {
@@ -186,15 +197,15 @@ def _list_other_commands(command: Command) -> Iterator[Variant]:
         at_rest = command._replace(speed=0.0, acceleration=0.0)
         yield Variant("no inertial forces (statics)", at=at_rest)
         bar = command.bar
+        for words, factor in _OF_SPEEDS.items():
+            other = command._replace(speed=command.speed * factor)
+            yield Variant(f"omega_{bar} in {words.format('s')}", at=other)
         if np.any(command.acceleration):
             steady = command._replace(acceleration=0.0)
             yield Variant(f"alpha_{bar} is left out", at=steady)
-        for words, factor in (
-            ("rev/min taken for rad/s", 1.0 / RPM),
-            ("rad/s taken for rev/min", RPM),
-        ):
-            other = command._replace(speed=command.speed * factor)
-            yield Variant(f"omega_{bar} in {words}", at=other)
+            for words, factor in _DEGREES_TAKEN.items():
+                other = command._replace(acceleration=command.acceleration * factor)
+                yield Variant(f"alpha_{bar} in {words.format('s^2')}", at=other)
     if len(angle) <= ENOUGH_POSITIONS:
         return
     for text, step in _BETWEEN.items():
@@ -340,7 +351,7 @@ def explain(
     if len(together) < least:
         of_columns.clear()
     explanations = [*of_columns, *whole]
-    explanations.sort(key=lambda explanation: -len(explanation.quantities))
+    explanations.sort(key=lambda one: (-len(one.quantities), not one.whole))
     return explanations[:MOST_EXPLANATIONS]
 
 
