@@ -738,7 +738,12 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
         yield _state(text, moved, whole=False)
 
 
-def _take_edge(judge: Judge, quantity: str, rows: Array, edge: int) -> Array:
+def _take_edge(
+    judge: Judge,
+    quantity: str,
+    rows: NDArray[np.intp],
+    edge: int,
+) -> Array:
     """Return the numbers of other rows, and at the edge theirs: it may be anything."""
     moved = np.array(judge.ours(quantity)[rows])
     theirs = judge.table.values.get(quantity)
