@@ -13,6 +13,7 @@ from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
