@@ -413,6 +413,8 @@ IN_CRANK_ROCKER = {
     "statics": solved(speed=0.0, acceleration=0.0),
     "rev/min taken for rad/s": solved(speed=10.0 / RPM),
     "rad/s taken for rev/min": solved(speed=10.0 * RPM),
+    "omega_2 in deg/s taken for rad/s": solved(speed=math.degrees(10.0)),
+    "omega_2 in rad/s taken for deg/s": solved(speed=math.radians(10.0)),
     "coupler: mass centre measured from the wrong pin": bars(OTHER_PIN, "coupler"),
     "every bar: mass centre measured from the": bars(OTHER_PIN),
     "coupler: mass centre taken at mid-bar": bars(MID_BAR, "coupler"),
@@ -472,7 +474,11 @@ IN_CRANK_ROCKER = {
 MISTAKES = {
     "thesis": IN_THESIS,
     "crank_rocker": IN_CRANK_ROCKER,
-    "accelerating": {"alpha_2 is left out": solved(acceleration=0.0)},
+    "accelerating": {
+        "alpha_2 is left out": solved(acceleration=0.0),
+        "alpha_2 in deg/s^2 taken for": solved(acceleration=math.degrees(30.0)),
+        "alpha_2 in rad/s^2 taken for": solved(acceleration=math.radians(30.0)),
+    },
     "load_in_the_world": {
         "load 2 (bar 3): its direction turns with": solved(in_other_frame)
     },

@@ -36,7 +36,7 @@ from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import MODELS
-from fourbar_validation.regression import record, render, rules
+from fourbar_validation.regression import accept, record, render, rules
 from fourbar_validation.regression.changes import Kind, compare_runs
 from fourbar_validation.regression.history import (
     HISTORY,
@@ -825,6 +825,26 @@ def test_a_failure_is_looked_up_in_the_accepted_runs(
         run = open_run(folder)
         since = find_since(read_history(run), run, [key])[key]
         assert since == words.format(before=run.describe(), runs=RUNS)
+
+
+def test_the_history_is_read_once(tmp_path, monkeypatch, saved, call, nights):
+    """What the page says since when, and what it draws, is of one table."""
+    read, drawn = [], []
+
+    def read_and_count(before):
+        read.append(read_history(before))
+        return read[-1]
+
+    monkeypatch.setattr(accept, "read_history", read_and_count)
+    monkeypatch.setattr(
+        accept, "draw_row", lambda history, row: drawn.append(history) or ""
+    )
+    kept = nights([HELD])
+    about, rows = made([FAILED], {"scene": SCENE})
+    latest = saved("latest", *rows, about=replace(about, date="2026-01-04"))
+    call("compare", kept, latest, "--html", tmp_path / "page.html")
+    (history,) = read
+    assert drawn[0] is history
 
 
 @pytest.mark.slow
