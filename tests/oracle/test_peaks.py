@@ -87,9 +87,9 @@ SPIKE = Load(
     [
         pytest.param(CRANK_ROCKER, id="turn"),
         pytest.param(replace(CRANK_ROCKER, loads=(SPIKE,)), id="load with corners"),
-        pytest.param(fall(0.4, 90), id="slow fall"),
+        pytest.param(fall(0.4, 90), id="slow fall", marks=pytest.mark.slow),
         pytest.param(fall(0.005, 24), id="fall in 5 ms"),
-        pytest.param(fall(0.02, 24), id="fall in 20 ms"),
+        pytest.param(fall(0.02, 24), id="fall in 20 ms", marks=pytest.mark.slow),
     ],
 )
 def test_no_position_exceeds_a_printed_peak(scene):

@@ -269,6 +269,7 @@ for row in rows:
 """
 
 
+@pytest.mark.slow
 def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(tmp_path):
     """The lines of the page stand in a copy of both packages, and nothing else."""
     for package in (ROOT / "fourbar", ROOT / "validation" / "fourbar_validation"):

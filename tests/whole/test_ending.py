@@ -152,6 +152,7 @@ def test_processor_time_is_bounded_by_the_process_itself():
     assert ended.returncode == -signal.SIGXCPU
 
 
+@pytest.mark.slow
 def test_a_worker_loads_no_library_of_windows():
     """The library starts a program, which outlives the worker or complains."""
     looking = (

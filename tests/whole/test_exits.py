@@ -242,7 +242,6 @@ FIGURES = "fourbar_validation.published.comparison.list_figures"
 
 
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch):
-    assert VALIDATION(["published"]) == HOLDS
     wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
     monkeypatch.setattr(FIGURES, lambda: iter([wrong]))
     assert VALIDATION(["published"]) == FAILED

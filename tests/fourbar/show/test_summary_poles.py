@@ -170,6 +170,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
         assert ("none is enough, as the" in text) == sized
 
 
+@pytest.mark.slow
 def test_a_torque_is_largest_where_pin_forces_have_a_pole():
     """T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at change points."""
     for start, stop in ((-1.0, 1.0), (1.0, -1.0), (2.0, 4.0)):
@@ -180,6 +181,7 @@ def test_a_torque_is_largest_where_pin_forces_have_a_pole():
         assert facts.motion.panels.growing == {*PIN_FORCE.values()}
 
 
+@pytest.mark.slow
 def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
     """Whichever bar is driven, it gives the same power."""
     scene, _ = POLES["torque on the output"]
@@ -209,6 +211,7 @@ def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed
     assert "bore none is enough" in text and "peak unbounded" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", ((0.37, 0.09, 0.09, 0.37), (0.2, 0.25, 0.21, 0.22)))
 def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
     """Both circuits are one for the last lengths.

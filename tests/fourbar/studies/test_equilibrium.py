@@ -40,6 +40,7 @@ from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar.studies.equilibrium import equilibrium
 from tests.support.scenes import CYLINDER, bare, crank_rocker
+from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
 MODELS = ROOT / "models"
@@ -299,6 +300,7 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     assert len(angles) == np.sum(signs[1:] != signs[:-1]) > 0
 
 
+@pytest.mark.slow
 def test_friction_holds_on_past_the_one_change_point():
     """Bars in line hold on both sides of it, in one range of the assembly."""
     linkage = FourBar(1.0, Bar(1.0, 10.0), Bar(2.0, 20.0), Bar(2.0, 20.0))
@@ -367,10 +369,8 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 """
 
 
-@pytest.mark.parametrize(
-    "start, count",
-    [pytest.param("60 deg", 0, marks=pytest.mark.slow), ("160 deg", 1)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("start, count", [("60 deg", 0), ("160 deg", 1)])
 def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
     """Two circles close the loop at 5000 angles, along which the pins are followed.
 
@@ -417,7 +417,7 @@ def springy_table(**motion):
 SWEPT = Sweep(radians(20.0), radians(140.0), 60)
 
 
-@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("branch", slow_but({1}, [1, -1]))
 def test_what_a_sweep_does_not_reach_is_told_apart(branch):
     """The other assembly has the same angles and an equilibrium among them."""
     (rest,) = equilibrium(springy_table(theta_2=SWEPT, branch=branch)).found
@@ -469,6 +469,7 @@ def test_equilibria_are_printed_in_the_units_of_the_file(run):
         assert words in printed
 
 
+@pytest.mark.slow
 def test_released_ones_begin_to_move_as_stated():
     scene = load(MODELS / "crank_rocker.toml")
     scene = replace(scene, effects=(*scene.effects, Friction.at(O2=0.2)))

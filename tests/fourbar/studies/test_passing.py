@@ -110,6 +110,7 @@ def test_a_release_has_a_state_at_its_start():
     assert start.omega_2[0] == 0.0
 
 
+@pytest.mark.slow
 def test_a_place_out_of_range_is_refused_with_the_range():
     with pytest.raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
         find_positions(thesis(), [("theta_2", radians(30.0))])

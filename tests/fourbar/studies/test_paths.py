@@ -13,6 +13,7 @@ from fourbar.show.paths import write_paths
 from fourbar.show.units import units
 from fourbar.solving import solve
 from fourbar.studies.paths import measure_paths
+from tests.support.shares import slow_but
 
 LENGTHS = (22.114772314, 4.188803, 12.010892, 18.925111)
 """mm: a Stirling engine's drive, whose piston goes 10 mm within 0.1 mm."""
@@ -56,7 +57,9 @@ def scan(path, directions):
     return widths[least], np.ptp(turned.real[:, least]), directions[least]
 
 
-@pytest.mark.parametrize("turned, steps", [(0.0, 36), (20.0, 360)])
+@pytest.mark.parametrize(
+    "turned, steps", slow_but({(20.0, 360)}, [(0.0, 36), (20.0, 360)])
+)
 def test_straightness_is_the_distance_of_the_nearest_two_lines(turned, steps):
     """Whatever the ground's angle, and however coarse the steps are."""
     sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'
@@ -117,7 +120,9 @@ TRAINER = ((50.0, 8.0, 33.0, 34.0), 12.0, 167.0)
 """The same of an elliptical trainer and its pedal."""
 
 
-@pytest.mark.parametrize("lengths, distance, angle", [CUTTER, TRAINER])
+@pytest.mark.parametrize(
+    "lengths, distance, angle", slow_but({TRAINER}, [CUTTER, TRAINER])
+)
 def test_a_wide_curve_is_no_narrower_than_by_a_scan(lengths, distance, angle):
     """Of an oval the width turns slowly, and every side of it decides."""
     ground, crank, coupler, output = lengths
@@ -165,6 +170,7 @@ def test_the_rounding_of_a_path_is_printed_as_zero():
     assert first.startswith("path of P: x from -13.8919 to 0.00000 mm, ")
 
 
+@pytest.mark.slow
 def test_a_release_is_integrated_once_for_its_path(monkeypatch):
     """The crank swings as far beyond the rest of its spring as it is let go before."""
     runs = []

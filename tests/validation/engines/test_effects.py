@@ -30,6 +30,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run import question
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
+from tests.support.shares import slow_but
 
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
 ACTING = {
@@ -128,7 +129,15 @@ SIMULABLE = tuple(
 )
 
 
-@pytest.mark.parametrize("names", [*ALONE, SIMULABLE, tuple(ACTING)], ids="+".join)
+@pytest.mark.parametrize(
+    "names",
+    [
+        *ALONE,
+        SIMULABLE,
+        pytest.param(tuple(ACTING), marks=pytest.mark.slow),
+    ],
+    ids="+".join,
+)
 def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names):
     missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
     refusing = {"mujoco-simulated"} if missing else set()
@@ -243,7 +252,9 @@ class FaultyTree:
         self.tree.gravity((MORE * vector[0], MORE * vector[1]))
 
 
-@pytest.mark.parametrize("name", [name for name in ACTING if name != "pin_friction"])
+@pytest.mark.parametrize(
+    "name", slow_but({"viscous", "load"}, [*ACTING.keys() - {"pin_friction"}])
+)
 def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(name, monkeypatch):
     def faulty(right):
         def act(effect, motion, wrenches):
@@ -270,7 +281,7 @@ def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypat
     assert fail_with("springs", ON_TREES)[0] >= ON_TREES
 
 
-@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("name", slow_but({"viscous", "load", "gravity"}, ACTING))
 def test_a_fault_in_the_engine_term_fails_the_run(name, monkeypatch):
     key = ACTING[name].key
     right = TERM_OF[key]

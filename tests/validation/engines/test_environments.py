@@ -164,6 +164,7 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
     assert filled[-2:] == ["install", "x"]
 
 
+@pytest.mark.slow
 def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here():
     (ours,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     guest = start_engine(Entry("mine", adapter="mujoco-simulated"), like=ours)

@@ -151,6 +151,7 @@ def test_noise_is_of_the_last_digits_alone():
     assert compare_figure("308.8044071267012", 308.8044071267027, 1e-12) == "differs"
 
 
+@pytest.mark.slow
 def test_every_figure_is_compared():
     tables = Counter(figure.table for figure in list_all())
     assert tables == {
@@ -175,6 +176,7 @@ def test_every_figure_is_compared():
     assert verdicts == {"rounded": 1233, "truncated": 28, "differs": 60}
 
 
+@pytest.mark.slow
 def test_every_difference_is_what_its_errata_make_of_ours():
     """Save three misprints, for which no computation is known.
 
@@ -196,6 +198,7 @@ def test_every_difference_is_what_its_errata_make_of_ours():
     assert sum(set(figure.errata) <= {"1", "2", "3"} for figure in differ) == 10
 
 
+@pytest.mark.slow
 def test_each_erratum_named_is_needed():
     """No figure names an erratum and yet is right before it is made.
 
@@ -368,6 +371,7 @@ def test_inputs_are_those_of_the_model(scene):
     assert numbers == pytest.approx(their_numbers, rel=TYPED)
 
 
+@pytest.mark.slow
 def test_the_command_explains_every_difference():
     process = CliRunner().invoke(published, standalone_mode=False)
     assert process.return_value == 0

@@ -79,6 +79,7 @@ def test_a_state_after_a_turn_is_that_of_the_same_motion():
     assert abs(theta_4[-1] - theta_4[0]) > 0.1
 
 
+@pytest.mark.slow
 def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage():
     loop = measured(SINGLE, -1.0, j2="10deg")
     through = loop.through_time

@@ -186,6 +186,7 @@ def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(fi
     assert all(math.isfinite(error.part) for error in errors)
 
 
+@pytest.mark.slow
 def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar():
     """A parallelogram of equal cranks that turns uniformly needs no torque."""
     file = make_parallelogram(0.5, 0.4, "0 0 0")

@@ -91,6 +91,7 @@ def test_a_pose_of_the_other_assembly_is_refused_for_another_size_of_gravity():
         measure_loops(FILE, options, make_scene("crossed", NEAR_G))
 
 
+@pytest.mark.slow
 def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes():
     scene = make_scene("crossed")
     options = MeasureOptions(PoseOptions(OPEN_POSE))

@@ -162,6 +162,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     assert search(0, 8).find_range(stiff, 1e-12) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sense", slow_but({-1}, [1, -1]))
 def test_a_range_is_that_of_the_driven_joint(sense):
     span = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
