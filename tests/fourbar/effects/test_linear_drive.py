@@ -12,17 +12,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import fourbar
-from fourbar import InputError, LinearDrive, Motion, Scene, solve, uniform
+from fourbar import FourBar, InputError, LinearDrive, Motion, Scene, solve, uniform
 from fourbar.effects import Place
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.quantities import PIN_FORCES
+from fourbar.scene import command_at
 from fourbar.show.block import write_motor
 from fourbar.show.duty import motor_duty
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import crank_rocker, draw_linkage
+from tests.support.texts import LENGTHS
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
 BARS = 10.0
@@ -42,42 +44,39 @@ KITE = (0.2, 0.3, 0.24, 0.33)
 
 
 def ends(start_bar, end_bar):
-    return LinearDrive(Place(start_bar, (0.17, -1.1)), Place(end_bar, (0.09, 0.7)))
+    start = Place(start_bar, (0.17, -1.1))
+    return LinearDrive(start, Place(end_bar, (0.09, 0.7)))
 
 
 def driven(start_bar, end_bar, **changes):
     return crank_rocker(drive=ends(start_bar, end_bar), **changes)
 
 
+@pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("lengths", [WIDE, SHORT, KITE])
 @pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars(
-    start_bar, end_bar, lengths
+    start_bar, end_bar, lengths, branch
 ):
     d, *moving = lengths
-    scene = driven(start_bar, end_bar)
-    bars = [
-        replace(bar, length=length)
-        for bar, length in zip(scene.linkage.moving, moving, strict=True)
-    ]
-    scene = replace(scene, linkage=fourbar.FourBar(d, *bars, 0.2))
-    for branch in (1, -1):
-        scene = replace(
-            scene,
-            motion=Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch),
-        )
-        s = solve(scene, "error")
-        ok = s.status_code == 0
-        assert ok.sum() >= 3 and set(s.status) <= {"ok", "not_assembled"}
-        exact = compare_with_balls(scene, s, ok)
-        for name in ("stroke", "stroke_speed", "power"):
-            ours = getattr(s, name)[ok]
-            assert (
-                np.abs(ours - exact[name][ok]).max() <= ROUND_OFF * np.abs(ours).max()
-            ), name
-        assert (
-            np.nanmax(s.drive_force_error / np.abs(s.drive_force)) < 1e-9
-        )  # no bar is wide enough to hide anything
+    motion = Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch)
+    scene = driven(start_bar, end_bar, motion=motion)
+    bars = map(with_length, scene.linkage.moving, moving)
+    scene = replace(scene, linkage=FourBar(d, *bars, 0.2))
+    s = solve(scene, "error")
+    ok = s.status_code == 0
+    assert ok.sum() >= 3 and set(s.status) <= {"ok", "not_assembled"}
+    exact = compare_with_balls(scene, s, ok)
+    for name in ("stroke", "stroke_speed", "power"):
+        ours = getattr(s, name)[ok]
+        size = ROUND_OFF * np.abs(ours).max()
+        assert np.abs(ours - exact[name][ok]).max() <= size, name
+    # no bar is wide enough to hide anything
+    assert np.nanmax(s.drive_force_error / np.abs(s.drive_force)) < 1e-9
+
+
+def with_length(bar, length):
+    return replace(bar, length=length)
 
 
 def compare_with_balls(scene, s, ok):
@@ -86,13 +85,11 @@ def compare_with_balls(scene, s, ok):
     Return all that the balls give.
     """
     exact = answer_in_balls(scene)
-    assert (np.abs(s.drive_force - exact["drive_force"]) <= BARS * s.drive_force_error)[
-        ok
-    ].all()
+    missed = np.abs(s.drive_force - exact["drive_force"])
+    assert (missed <= BARS * s.drive_force_error)[ok].all()
     for name in PIN_FORCES:
-        assert (np.hypot(*(getattr(s, name) - exact[name]).T) <= BARS * s.force_error)[
-            ok
-        ].all(), name
+        missed = np.hypot(*(getattr(s, name) - exact[name]).T)
+        assert (missed <= BARS * s.force_error)[ok].all(), name
     return exact
 
 
@@ -101,23 +98,17 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar, end_bar
 ):
     """At rest forces grow without end only for a line to bar 2, without lever there."""
-    link = uniform(0.2, 0.48, 0.55, 0.2)
-    near = Motion(fourbar.FromLimit(1, 1e-10), 0.0)
-    scene = Scene(
-        link,
-        near,
-        effects=(fourbar.Gravity(),),
-        drive=ends(start_bar, end_bar),
-    )
+    link, near = uniform(0.2, 0.48, 0.55, 0.2), fourbar.FromLimit(1, 1e-10)
+    drive, gravity = ends(start_bar, end_bar), (fourbar.Gravity(),)
+    scene = Scene(link, Motion(near, 0.0), effects=gravity, drive=drive)
     s = solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
     compare_with_balls(scene, s, s.status_code == 0)
     if (start_bar, end_bar) != (1, 2):
-        assert s.drive_force_error[0] < 1e-13 * abs(s.drive_force[0])
+        # of bars 3 and 4, so nearly in line, 1e-11 would be left
         largest = max(np.hypot(*getattr(s, name)[0]) for name in PIN_FORCES)
-        assert (
-            s.force_error[0] < 1e-13 * largest
-        )  # of bars 3 and 4, so nearly in line, 1e-11 would be left
+        assert s.drive_force_error[0] < 1e-13 * abs(s.drive_force[0])
+        assert s.force_error[0] < 1e-13 * largest
 
 
 @pytest.mark.parametrize("bar, pin", [(2, "F12"), (4, "F14")])
@@ -135,28 +126,12 @@ def test_from_the_ground_to_a_bar_only_the_pin_there_bears_the_push(bar, pin):
 
 @pytest.mark.parametrize("start_bar, end_bar", PAIRS)
 def test_its_line_has_no_sense(start_bar, end_bar):
-    s = solve(driven(start_bar, end_bar))
-    back = solve(
-        crank_rocker(
-            drive=LinearDrive(
-                ends(start_bar, end_bar).end, ends(start_bar, end_bar).start
-            )
-        )
-    )
-    for name in (
-        "drive_force",
-        "stroke",
-        "stroke_speed",
-        "drive_condition",
-        "F12",
-        "F43",
-    ):
-        assert_allclose(
-            getattr(back, name),
-            getattr(s, name),
-            rtol=1e-12,
-            atol=1e-12,
-        )
+    drive = ends(start_bar, end_bar)
+    s = solve(crank_rocker(drive=drive))
+    back = solve(crank_rocker(drive=LinearDrive(drive.end, drive.start)))
+    alike = ("drive_force", "stroke", "stroke_speed", "drive_condition", "F12", "F43")
+    for name in alike:
+        assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-12, atol=1e-12)
     assert_array_equal(back.drive_line, -s.drive_line)
     assert s.torque is None and s.drive_bar is None
     torque = solve(crank_rocker())
@@ -171,75 +146,60 @@ def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(
 
     ds/dtheta_2 here from differences of the stroke.
     """
-    rng = np.random.default_rng(start_bar + 10 * end_bar)
-    seen = 0
-    for _ in range(40):
-        d, a, b, c = rng.uniform(0.1, 1.0, 4)
-        if max(d, a, b, c) * 2 >= d + a + b + c:
-            continue
-        polar = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
-        drive = LinearDrive(
-            Place(start_bar, (polar[0][0], polar[1][0])),
-            Place(end_bar, (polar[0][1], polar[1][1])),
-        )
-        theta_2 = rng.uniform(0.0, 6.0)
-        motion = Motion(
-            theta_2 + STEP * np.array([0.0, 1.0, -1.0]),
-            1.0,
-            branch=int(rng.choice([1, -1])),
-        )
-        s = solve(Scene(uniform(d, a, b, c), motion, drive=drive))
+    rng, seen = np.random.default_rng(start_bar + 10 * end_bar), 0
+    while seen < 5:
+        link = draw_linkage(rng)
+        a, b, c = (bar.length for bar in link.moving)
+        distances, angles = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
+        polar = zip((start_bar, end_bar), distances, angles, strict=True)
+        drive = LinearDrive(*(Place(bar, (r, phi)) for bar, r, phi in polar))
+        theta_2 = rng.uniform(0.0, 6.0) + STEP * np.array([0.0, 1.0, -1.0])
+        motion = Motion(theta_2, 1.0, branch=int(rng.choice([1, -1])))
+        s = solve(Scene(link, motion, drive=drive))
         if s.status != ["ok"] * 3 or s.condition[0] < 0.1:
             continue
         most = sum(
             {1: 0.0, 2: r, 3: a + r * a / b, 4: r * a / c}[bar]
-            for bar, r in zip((start_bar, end_bar), polar[0], strict=True)
+            for bar, r in zip((start_bar, end_bar), distances, strict=True)
         )
         slope = (s.stroke[1] - s.stroke[2]) / (2.0 * STEP)
-        assert abs(s.stroke_speed[0] - slope) < DIFFERENCES * most / s.condition[0] ** 3
-        assert (
-            abs(s.drive_condition[0] - abs(slope * s.sin_mu[0]) / most)
-            < DIFFERENCES / s.condition[0] ** 3
-        )
+        missed = DIFFERENCES / s.condition[0] ** 3
+        assert abs(s.stroke_speed[0] - slope) < missed * most
+        assert abs(s.drive_condition[0] - abs(slope * s.sin_mu[0]) / most) < missed
         assert 0.0 <= s.drive_condition[0] <= 1.0
         seen += 1
-    assert seen >= 5
 
 
-def test_where_it_has_no_lever_or_no_direction_there_are_no_forces():
-    link = uniform(0.3, 0.1, 0.25, 0.22)
-    motion = Motion(np.array([0.0, 0.5, math.pi]), 1.0)
-    s = solve(
-        Scene(
-            link,
-            motion,
-            drive=LinearDrive(Place(1, (0.2, 0.0)), Place(2, (0.1, 0.0))),
-        ),
-        "error",
-    )
-    assert s.status == ["no_lever", "ok", "no_lever"]
-    assert np.isnan(s.drive_force[[0, 2]]).all()
-    assert np.isnan(s.F12[0]).all()
-    assert s.drive_condition[0] < 1e-15
-    assert s.stroke[0] == pytest.approx(0.1) and abs(s.stroke_speed[0]) < 1e-15
-    one = solve(Scene(link, Motion(0.0, 1.0), drive=s.drive))
-    assert one.status == ["no_lever"] and np.isnan(one.power).all()
-    meet = LinearDrive(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)))
-    assert solve(Scene(link, motion, drive=meet)).status == [
-        "ok",
-        "no_direction",
-        "ok",
-    ]
-    # the parallelogram's cranks keep their distance while they are parallel, and only
-    # then
-    parallel = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
-    for branch, status in ((1, "no_lever"), (-1, "ok")):
-        scene = Scene(
-            uniform(0.3, 0.1, 0.3, 0.1),
-            Motion(1.0, 1.0, branch=branch),
-            drive=parallel,
-        )
-        assert solve(scene).status == [status]
+CROSSES_O2 = LinearDrive(Place(1, (0.2, 0.0)), Place(2, (0.1, 0.0)))
+MEETS = LinearDrive(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)))
+# the cranks of a parallelogram keep their distance while they are parallel, and only
+# then
+PARALLEL = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
+
+
+@pytest.mark.parametrize(
+    "lengths, drive, branch, status",
+    [
+        (WIDE, CROSSES_O2, 1, ["no_lever", "ok", "no_lever"]),
+        (WIDE, MEETS, 1, ["ok", "no_direction", "ok"]),
+        ((0.3, 0.1, 0.3, 0.1), PARALLEL, 1, ["no_lever"] * 3),
+        ((0.3, 0.1, 0.3, 0.1), PARALLEL, -1, ["ok"] * 3),
+    ],
+)
+def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
+    lengths, drive, branch, status
+):
+    angles = [0.0, 0.5, math.pi] if lengths == WIDE else [0.4, 0.5, 1.0]
+    scene = Scene(uniform(*lengths), Motion(angles, 1.0, branch=branch), drive=drive)
+    s = solve(scene, "error")
+    assert s.status == status
+    lost = s.status_code != 0
+    for name in ("drive_force", "F12", "power"):
+        assert np.isnan(getattr(s, name)[lost]).all(), name
+    if drive is CROSSES_O2:
+        assert s.drive_condition[0] < 1e-15 and abs(s.stroke_speed[0]) < 1e-15
+        assert s.stroke[0] == pytest.approx(0.1)
+        assert solve(scene, at=command_at(scene, np.zeros(1))).status == ["no_lever"]
 
 
 @pytest.mark.parametrize(
@@ -264,16 +224,7 @@ def test_ends_that_keep_their_distance_are_refused_in_one_line(start, end):
         Scene(uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
 
 
-TEXT = """[lengths]
-ground = "30 cm"
-input = "10 cm"
-coupler = "25 cm"
-output = "22 cm"
-[motion]
-theta_2 = "1 rad"
-omega_2 = "2 rad/s"
-[drive]
-"""
+TEXT = LENGTHS + '[motion]\ntheta_2 = "1 rad"\nomega_2 = "2 rad/s"\n[drive]\n'
 FROM = 'from = { bar = 1, from_pin = ["21 cm", "-60 deg"] }\n'
 TO = 'to = { bar = 4, from_pin = ["9 cm", "0 deg"] }\n'
 
@@ -352,19 +303,9 @@ def test_files_of_simulators_refuse_it_by_name():
 
 
 def test_a_released_linkage_has_a_stroke_and_no_force():
-    scene = driven(
-        1,
-        4,
-        loads=(),
-        motion=Motion(1.0, 0.0, free=fourbar.Free(0.05, 50)),
-    )
-    s = solve(scene, "error")
-    assert not s.drive_force.any()
-    assert not s.power.any()
-    assert np.isfinite(s.stroke_speed).all()
-    assert s.torque is None
-    slope = np.gradient(s.stroke, s.time)
-    assert (
-        np.abs(slope[1:-1] - s.stroke_speed[1:-1]).max()
-        < 1e-3 * np.abs(s.stroke_speed).max()
-    )
+    motion = Motion(1.0, 0.0, free=fourbar.Free(0.05, 50))
+    s = solve(driven(1, 4, loads=(), motion=motion), "error")
+    assert not s.drive_force.any() and not s.power.any()
+    assert np.isfinite(s.stroke_speed).all() and s.torque is None
+    missed = np.abs(np.gradient(s.stroke, s.time) - s.stroke_speed)[1:-1]
+    assert missed.max() < 1e-3 * np.abs(s.stroke_speed).max()
