@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 import subprocess
 import sys
 from base64 import b64decode
@@ -10,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 import fourbar
 from fourbar import Tolerance, sensitivity, solve, tolerances, vary
@@ -19,6 +21,7 @@ from fourbar.files import scene_file as files
 from fourbar.files.scene_text import write_new_scene
 from tests.support.scenes import crank_rocker, thesis
 
+LENGTH_NAMES = ("ground", "input", "coupler", "output")
 HOSTILE = "<script>alert(1)</script>&"
 
 
@@ -97,24 +100,15 @@ def test_showing_needs_numpy_alone():
     assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
 
 
-def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path):
+def test_a_new_scene_is_a_scene_and_its_comments_are_entries():
     text = write_new_scene(("20 cm", "0.48 m", "55 cm", "20 cm"))
     scene = files.loads(text)
     assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
-    assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
+    assert [bar.mass for bar in scene.linkage.moving] == [0.48, 0.55, 0.2]
     assert np.isfinite(solve(scene).torque).all()
-    opened = []
-    for (
-        line
-    ) in text.splitlines():  # every commented entry is one that a scene file may have
-        entry = line.removeprefix("# ")
-        opened.append(
-            entry
-            if line != entry and ("=" in entry.split("#")[0] or entry.startswith("["))
-            else line
-        )
-    uncommented = "\n".join(line for line in opened if not line.startswith("As many"))
-    full = files.loads(uncommented.replace("# As many loads", "#"))
+    # every commented entry is one that a scene file may have
+    entries = re.sub(r"^# (?=\[|[^#\n]*=)", "", text, flags=re.MULTILINE)
+    full = files.loads(re.sub("^As many", "#", entries, flags=re.MULTILINE))
     assert len(full.loads) == 2 and len(full.effects) == 2 and full.motion.branch == -1
 
 
@@ -134,101 +128,94 @@ def test_a_new_scene_of_bad_lengths_is_refused(lengths, words):
 
 def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):
     file = tmp_path / "mine.toml"
-    assert (
-        status(["new", str(file), "--lengths", "4", "2", "5", "5", "--unit", "m"]) == 0
-    )
+    command = ["new", str(file), "--unit", "m", "--lengths", "4", "2", "5"]
+    assert status([*command, "5"]) == 0
     before = file.read_text()
-    assert (
-        status(["new", str(file), "--lengths", "4", "2", "5", "6", "--unit", "m"]) == 2
-    )
+    assert status([*command, "6"]) == 2
     assert "file exists" in capsys.readouterr().err
     assert file.read_text() == before
 
 
-def test_results_say_in_ten_lines_what_they_hold():
-    scene = crank_rocker(tolerances=(Tolerance("lengths.input", 1e-4),))
-    solution = solve(scene)
-    slopes = sensitivity(scene)
-    spread = tolerances(scene, 64)
-    study = vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
-    for shown in (
-        solution,
-        slopes,
-        spread,
-        study,
-        solve(study),
-        solve(scene, "position"),
-    ):
-        text = repr(shown)
-        assert (
-            2 <= len(text.splitlines()) <= 10
-            and max(map(len, text.splitlines())) <= 150
-        ), text
-        assert scene.title in text and "61" in text
-    assert (
-        f"torque: {solution.torque.min():.6g} to {solution.torque.max():.6g} N m"
-        in repr(solution)
-    )
-    assert "status: 122 ok, 61 not_assembled" in repr(solve(study))
-    one = solve(
-        vary(fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1})
-    )
-    assert "1 linkage, 1 position each" in repr(one)
-    assert "1 linkage, 1 position each" in one._repr_html_()
-    lengths = {
-        key: number
-        for key, number in zip(slopes.keys, slopes.numbers, strict=True)
-        if key.startswith("lengths")
+LOOSE = crank_rocker(tolerances=(Tolerance("lengths.input", 1e-4),))
+STUDY = vary(LOOSE, {"lengths.input": np.array([0.1, 0.11, 3.0])})
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        lambda: solve(LOOSE),
+        lambda: sensitivity(LOOSE),
+        lambda: tolerances(LOOSE, 64),
+        lambda: STUDY,
+        lambda: solve(STUDY),
+        lambda: solve(LOOSE, "position"),
+    ],
+    ids=["solution", "slopes", "spread", "study", "solved study", "positions"],
+)
+def test_results_say_in_ten_lines_what_they_hold(result):
+    text = repr(result())
+    lines = text.splitlines()
+    assert 2 <= len(lines) <= 10 and max(map(len, lines)) <= 150
+    assert LOOSE.title in text and "61" in text
+
+
+def test_a_solution_says_its_range_and_how_many_positions_have_which_status():
+    solution = solve(LOOSE)
+    low, high = (f"{x:.6g}" for x in (solution.torque.min(), solution.torque.max()))
+    assert f"torque: {low} to {high} N m" in repr(solution)
+    assert "status: 122 ok, 61 not_assembled" in repr(solve(STUDY))
+    scene = fourbar.Scene(LOOSE.linkage, fourbar.Motion(1.0))
+    one = solve(vary(scene, {"lengths.input": 0.1}))
+    for shown in (repr(one), one._repr_html_()):
+        assert "1 linkage, 1 position each" in shown
+
+
+def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
+    """By 1 % of a length, and by 1 deg."""
+    slopes, spread = sensitivity(LOOSE), tolerances(LOOSE, 64)
+    steps = {
+        f"lengths.{name}": 0.01 * length
+        for name, length in zip(LENGTH_NAMES, LOOSE.linkage.lengths, strict=True)
     }
-    changes = {
-        key: np.abs(slopes.of("torque", key)).max() * 0.01 * number
-        for key, number in lengths.items()
-    }
-    changes["lengths.ground_angle"] *= math.radians(1.0) / (
-        0.01 * lengths["lengths.ground_angle"]
+    steps["lengths.ground_angle"] = math.radians(1.0)
+    change, most = max(
+        (np.abs(slopes.of("torque", key)).max() * step, key)
+        for key, step in steps.items()
     )
-    most = max(changes, key=lambda key: changes[key])
-    line = next(line for line in repr(slopes).splitlines() if line.startswith("torque"))
-    assert f"{most} {changes[most]:.3g}" in line
+    (line,) = (row for row in repr(slopes).splitlines() if row.startswith("torque"))
+    assert f"{most} {change:.3g}" in line
     assert f"sigma up to {spread.spreads['torque'].deviation.max():.3g}" in repr(spread)
     for outcome in (slopes, spread):
-        shown = outcome._repr_html_()
-        assert shown.count("<tr>") == 8
-        assert (
-            HOSTILE
-            not in replace(outcome, scene=replace(scene, title=HOSTILE))._repr_html_()
-        )
+        hostile = replace(outcome, scene=replace(LOOSE, title=HOSTILE))
+        assert outcome._repr_html_().count("<tr>") == 8
+        assert HOSTILE not in hostile._repr_html_()
 
 
 def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
-    scene = crank_rocker(tolerances=(Tolerance("lengths.input", 1e-4),))
-    slopes, spread = sensitivity(scene), tolerances(scene, 64)
+    slopes, spread = sensitivity(LOOSE), tolerances(LOOSE, 64)
     table = slopes.to_pandas()
     assert len(table) == len(slopes.keys) * 61
     rows = table[table["key"] == "lengths.input"]
     for name in ("torque", "F12_x", "|F12|", "|F14|", "A_y"):
-        assert np.array_equal(rows[name].to_numpy(), slopes.of(name, "lengths.input"))
+        assert_array_equal(rows[name], slopes.of(name, "lengths.input"))
     assert set(spread.spreads) <= set(table.columns)
     assert all(np.isfinite(slopes.value(name)).all() for name in spread.spreads)
-    step = 1e-6
-    sides = [
-        solve(vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[0]
-        for sign in (1, -1)
-    ]
-    slope = (np.hypot(*sides[0].T) - np.hypot(*sides[1].T)) / (2.0 * step)
-    assert slopes.of("|F12|", "lengths.input") == pytest.approx(
-        slope, abs=1e-6 * np.abs(slope).max()
-    )
     wide = spread.to_pandas()
-    of_F43 = wide[wide["quantity"] == "|F43|"]
+    of_F43, size = wide[wide["quantity"] == "|F43|"], spread.spreads["|F43|"]
     assert len(wide) == 61 * len(spread.spreads)
-    assert np.array_equal(
-        of_F43["deviation"].to_numpy(), spread.spreads["|F43|"].deviation
-    )
-    assert np.array_equal(
-        of_F43["share of lengths.input"].to_numpy(), spread.spreads["|F43|"].shares[0]
-    )
+    assert_array_equal(of_F43["deviation"], size.deviation)
+    assert_array_equal(of_F43["share of lengths.input"], size.shares[0])
+
+
+def test_the_slope_of_a_size_is_its_difference():
+    step = 1e-6
+    around = vary(LOOSE, {"lengths.input": 0.1 + step * np.array([1.0, -1.0])})
+    ahead, back = np.hypot(*np.moveaxis(solve(around).F12, -1, 0))
+    slope = (ahead - back) / (2.0 * step)
+    slopes = sensitivity(LOOSE)
+    close = 1e-6 * np.abs(slope).max()
+    assert slopes.of("|F12|", "lengths.input") == pytest.approx(slope, abs=close)
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
         with pytest.raises(InputError, match="is not known here"):
             slopes.of(wrong, "lengths.input")
