@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from math import acos, degrees, pi
+from math import acos, degrees, pi, tau
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,9 @@ from fourbar.cli import group, status
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.evaluation.case import Case
 from fourbar.files import load, save
+from fourbar.mjcf import list_defaults, make_scene
+from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar.mjcf.document import write_mjcf_for
 from fourbar.quantities import UNITS, VECTORS
 from fourbar.show import tables
 from tests.support.scenes import balance, crank_rocker, thesis
@@ -44,6 +47,9 @@ CONTRACT = KEYS.split()
 """The keys that programs which read the JSON rely on."""
 OF_THE_INPUT = {"theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"}
 LENGTHS = ("0.3", "0.1", "0.25", "0.22")
+ALL = ((), ("--all",))
+BARE = ("--lengths", "300 mm", "10 cm", "0.25", "0.22", "--omega", "60 rpm")
+MADE = make_scene(0.3, 0.1, 0.25, 0.22, omega=tau)
 Ended = tuple[int, str, str]
 Fourbar = Callable[..., Ended]
 
@@ -63,13 +69,10 @@ def run(capsys, tmp_path, monkeypatch):
 
 def strict(ended):
     """JSON without the NaN and Infinity that Python would let pass."""
-
-    def refuse(name):
-        raise AssertionError(name)
-
     code, out, err = ended
     assert (code, err, out.count("\n")) == (HOLDS, "", 1)
-    return json.loads(out, parse_constant=refuse)
+    assert not re.search("NaN|Infinity", out)
+    return json.loads(out)
 
 
 def read_csv(ended):
@@ -157,41 +160,33 @@ def test_every_command_can_write_what_it_prints():
         assert any(wanted in option.opts for option in command.params), name
 
 
-@pytest.mark.parametrize("command, ending", [("sdf", "sdf"), ("usd", "usda")])
+@pytest.mark.parametrize("command, write", [("sdf", write_sdf), ("usd", write_usd)])
 def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
-    command, ending, run
+    command, write, run
 ):
-    lengths = ("300 mm", "10 cm", 0.25, 0.22)
-    target = Path(f"bars.{ending}")
-    asked = ("--lengths", *lengths, "--omega", "60 rpm", "-o", target)
-    code, out, err = run(command, *asked)
-    assert (code, err) == (0, "") and "1 kg/m" in out
-    made = import_module("fourbar.mjcf").make_scene(
-        0.3, 0.1, 0.25, 0.22, omega=2.0 * pi
-    )
-    write = getattr(import_module("fourbar.mjcf.assembly"), f"write_{command}")
-    assert target.read_text(encoding="utf-8") == write(made)
+    target = Path(f"bars.{command}")
+    code, out, err = run(command, *BARE, "-o", target)
+    assert (code, err) == (HOLDS, "") and "1 kg/m" in out
+    assert target.read_text(encoding="utf-8") == write(MADE)
     code, _, err = run(command, CRANK_ROCKER, "-o", "a")
     assert code == BAD_INPUT and "loads (here on bar 3, bar 4)" in err
     assert "--without-loads" in err
     assert run(command, CRANK_ROCKER, "--without-loads", "-o", "a")[0] == HOLDS
 
 
-def test_mjcf_of_a_scene_and_of_bare_lengths(run):
-    from fourbar.mjcf import list_defaults, make_scene
-    from fourbar.mjcf.document import write_mjcf_for
-
-    made = make_scene(0.3, 0.1, 0.25, 0.22, omega=2.0 * pi)
-    lengths = ("--lengths", 0.3, "10 cm", "250 mm", 0.22, "--omega", "60 rpm")
-    told = "".join(f"{line}\n" for line in list_defaults(made))
-    motor = write_mjcf_for(load(THESIS), drive="motor")
-    for asked, printed, text in (
-        ((CRANK_ROCKER,), "", write_mjcf_for(load(CRANK_ROCKER))),
-        (lengths, told, write_mjcf_for(made)),
-        ((THESIS, "--drive", "motor"), "", motor),
-    ):
-        assert run("mjcf", *asked, "-o", "a.xml") == (HOLDS, printed, "")
-        assert Path("a.xml").read_text() == text
+@pytest.mark.parametrize(
+    "asked, printed, text",
+    [
+        ((CRANK_ROCKER,), [], write_mjcf_for(load(CRANK_ROCKER))),
+        (BARE, list_defaults(MADE), write_mjcf_for(MADE)),
+        ((THESIS, "--drive", "motor"), [], write_mjcf_for(load(THESIS), drive="motor")),
+    ],
+    ids=["scene", "lengths", "motor"],
+)
+def test_mjcf_of_a_scene_and_of_bare_lengths(asked, printed, text, run):
+    code, out, err = run("mjcf", *asked, "-o", "a.xml")
+    assert (code, out.splitlines(), err) == (HOLDS, printed, "")
+    assert Path("a.xml").read_text() == text
 
 
 def test_what_rests_at_every_angle_is_no_range_of_one(run):
@@ -331,38 +326,44 @@ def test_classify_says_what_turns_and_how_far(run):
 
     def angle(opposite, first, second):
         cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
-        return degrees(acos(cosine))
+        return math.degrees(math.acos(cosine))
 
     d, a, b, c = map(float, LENGTHS)
-    lines = run("classify", *LENGTHS)[1].splitlines()
-    stretched, folded = angle(c, d, b + a), 180.0 + angle(c, d, b - a)
-    for word, right in (
-        ("stretched", [stretched, stretched, 180.0 - angle(a + b, d, c)]),
-        ("folded", [folded, folded - 180.0]),
-    ):
-        start = f"  output: input, coupler {word}"
-        row = next(x for x in lines if x.startswith(start) and "open" in x).split()
-        cells = [float(cell) for cell in row[4 : 4 + len(right)]]
-        assert cells == pytest.approx(right, abs=6e-5)
-    least, greatest = angle(d - a, b, c), angle(d + a, b, c)
-    swung = angle(b - a, d, c) - angle(b + a, d, c)
+    text = run("classify", *LENGTHS)[1]
+    stretched = angle(c, d, b + a)
+    folded = 180.0 + angle(c, d, b - a)
+    row = re.search(r"  output: input, coupler stretched +(.*) +open", text)[1]
+    cells = [stretched, stretched, 180.0 - angle(a + b, d, c)]
+    assert [float(cell) for cell in row.split()] == pytest.approx(cells, abs=6e-5)
+    row = re.search(r"  output: input, coupler folded +(.*) +open", text)[1]
+    cells = [folded, folded - 180.0]
+    assert [float(cell) for cell in row.split()[:2]] == pytest.approx(cells, abs=6e-5)
+    least = angle(d - a, b, c)
     ratio = (folded - stretched) / (360.0 - folded + stretched)
-    for line in (
-        f"angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg",
-        f"    to {greatest:.4f} deg at 180.0000 deg",
-        "input: no limits, coupler and output are never in line:",
-        "    ground + input = 0.4 < coupler + output = 0.47",
-        "    |ground - input| = 0.2 > |coupler - output| = 0.03",
-        f"smallest transmission angle: {least:.4f} deg",
-        f"time ratio of the output strokes at constant omega_2: {ratio:.4f}",
-    ):
-        assert line in lines
-    assert f"output {abs(swung):.4f} deg" in lines[3]
-    every = run("classify", *LENGTHS, "--all")[1].splitlines()
-    of_coupler = [line for line in every if line.startswith("  coupler:")]
-    assert len(of_coupler) == 4 and not set(of_coupler) & set(lines)
-    assert set(lines) <= set(every)
-    # a structure does not move
+    assert (
+        f"""
+angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg
+    to {angle(d + a, b, c):.4f} deg at 180.0000 deg
+"""
+        in text
+    )
+    assert f"\nsmallest transmission angle: {least:.4f} deg\n" in text
+    assert f"strokes at constant omega_2: {ratio:.4f}\n" in text
+    assert f"output {angle(a + b, d, c) - angle(b - a, d, c):.4f} deg" in text
+    assert (
+        """
+input: no limits, coupler and output are never in line:
+    ground + input = 0.4 < coupler + output = 0.47
+    |ground - input| = 0.2 > |coupler - output| = 0.03
+"""
+        in text
+    )
+    lines, every = ({*run("classify", *LENGTHS, *x)[1].splitlines()} for x in ALL)
+    of_coupler = {line for line in every if line.startswith("  coupler:")}
+    assert len(of_coupler) == 4 and not of_coupler & lines and lines <= every
+
+
+def test_a_structure_does_not_move(run):
     assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3
 
 
@@ -453,7 +454,6 @@ def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch)
             run("analyze", THESIS)
 
 
-@pytest.mark.slow
 def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     def full(_):
         raise OSError(28, "No space left on device")
@@ -462,9 +462,7 @@ def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     monkeypatch.setattr("os.fsync", full)
     code, _, err = run("analyze", THESIS, "--json", "-o", "out")
     assert code == BROKEN and "No space left" in err and err.count("\n") == 1
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
-        "out": "old"
-    }
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
 
 @pytest.mark.posix
@@ -694,7 +692,7 @@ def test_arguments_are_refused_in_one_line_and_nothing_is_written(
     "arguments",
     [
         ("mjcf", "a.toml", "b.toml", "-o", "f.xml"),
-        ("mjcf", "a.toml", "--lengths", "3", "1", "2.5", "2.2", "-o", "f.xml"),
+        ("mjcf", "a.toml", *BARE[:5], "-o", "f.xml"),
         ("analyze", CRANK_ROCKER, "--columns", "theta_44"),
     ],
 )
@@ -720,15 +718,6 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
     Path("a").write_text(text)
     refuses(run(command, "a", "-o", out), why)
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": text}
-
-
-def test_an_output_angle_out_of_range_is_refused_with_the_range(run):
-    """The crank is in line with the coupler: sides 5, 4.5 and 2 or 6."""
-    Path("scene.toml").write_text(INCHES)
-    cosines = ((5**2 + 4.5**2 - side**2) / (2 * 5 * 4.5) for side in (2, 6))
-    high, low = (180.0 - degrees(acos(cosine)) for cosine in cosines)
-    said = f"theta_4 goes from {low:.4g} deg to {high:.4g} deg"
-    refuses(run("analyze", "scene.toml", "--at", "theta_4=200 deg"), said)
 
 
 def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
