@@ -15,7 +15,6 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -82,7 +81,7 @@ def bench(path, monkeypatch, capsys):
     def run(what):
         session = Session(path, path.parent / "exports")
 
-        async def both() -> None:
+        async def both():
             made = Workbench(session)
             serving = asyncio.create_task(made.serve(0))
             try:
@@ -109,7 +108,7 @@ def port_of(address):
     return address.split("/")[2].rpartition(":")[2]
 
 
-async def status(address: str, **options) -> int:
+async def status(address, **options):
     answer = await AsyncHTTPClient(force_instance=True).fetch(
         HTTPRequest(address, **options),
         raise_error=False,
@@ -117,7 +116,7 @@ async def status(address: str, **options) -> int:
     return answer.code
 
 
-async def page(address: str):
+async def page(address):
     origin = "/".join(address.split("/")[:3])
     line = address.replace("http:", "ws:") + "live"
     OPEN.append(
@@ -129,7 +128,7 @@ async def page(address: str):
     return OPEN[-1]
 
 
-async def heard(line, wanted: Callable[[dict], object]) -> dict:
+async def heard(line, wanted):
     """The next answer of the kind wanted."""
     while True:
         data = await asyncio.wait_for(line.read_message(), 10.0)
@@ -138,11 +137,11 @@ async def heard(line, wanted: Callable[[dict], object]) -> dict:
             return about
 
 
-async def settled(line) -> dict:
+async def settled(line):
     return await heard(line, lambda about: about.get("settled"))
 
 
-async def told(line, request: dict | None = None) -> dict:
+async def told(line, request=None):
     """The answer to a request."""
     if request is not None:
         await line.write_message(json.dumps({"id": "mine"} | request))
@@ -150,7 +149,7 @@ async def told(line, request: dict | None = None) -> dict:
 
 
 def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         root, port = address[: address.rindex("/", 0, -1) + 1], port_of(address)
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
         fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
@@ -206,7 +205,7 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
 
 @pytest.mark.slow
 def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         host, port = address.split("/")[2].split(":")
         reader, writer = await asyncio.open_connection(host, int(port))
         path = "/" + address.split("/", 3)[3]
@@ -232,7 +231,7 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
 
 @pytest.mark.slow
 def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(bench):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         assert await asyncio.gather(*(status(address) for _ in range(30))) == [200] * 30
         line = await page(address)
         solved = []
@@ -268,7 +267,7 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(b
 
 @pytest.mark.slow
 def test_error_bars_follow_and_every_page_sees_the_change(bench):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         first_page, second_page = await page(address), await page(address)
         await told(first_page, {"do": "hello"})
         about = await told(
@@ -298,7 +297,7 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
         finished.append(collect(*arguments))
         return finished[-1]
 
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         text = made.session.now.text + '[tolerances]\n"lengths.input" = "0.1 mm"\n'
         data = made.session.do({"do": "text", "text": text})["data"]
         sampled = asyncio.create_task(made._sample(made.session.now, data))
@@ -316,7 +315,7 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
 
 @pytest.mark.slow
 def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         one = await page(address)
         await told(one, {"do": "hello"})
         one.close()
@@ -345,7 +344,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     )
     monkeypatch.setattr(exports, "TICK", 0.05)
 
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         folder = made.session.exports.folder
         folder.mkdir()
         line = await page(address)
@@ -386,7 +385,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
             summaries.append(scene.linkage.input.length)
         return evaluate(scene, units, settled=settled, **options)
 
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         line = await page(address)
         await told(line, {"do": "hello"})
         await asyncio.to_thread(
@@ -413,7 +412,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
 
 @pytest.mark.slow
 def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         line = await page(address)
         reading = asyncio.create_task(
             heard(line, lambda about: about.get("for") == "last")
@@ -459,7 +458,7 @@ def test_the_line_of_a_page_that_does_not_read_is_dropped(bench, caplog, monkeyp
     monkeypatch.setattr(server, "MOST_UNREAD", 100_000)
     frame = {"note": "x" * 60_000}
 
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         reading = await page(address)
         silent = await page(address)
         silent.stream.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -482,7 +481,7 @@ def test_the_line_of_a_page_that_does_not_read_is_dropped(bench, caplog, monkeyp
 def test_the_picture_is_served_as_an_image_alone(bench, path):
     """An SVG opened by its address runs no script and reaches nothing here."""
 
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         assert await status(address + "picture") == 404
         path.write_text(path.read_text() + '[picture]\nfile = "a.svg"\n')
         line = await page(address)
@@ -555,7 +554,7 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
         time.sleep(2.0)
         assert processor_time(process) - before < 1.0  # it was all of it
 
-        async def save() -> None:
+        async def save():
             line = await page(address)
             await told(
                 line, {"do": "set", "path": ["lengths", "input"], "value": "105 mm"}
@@ -576,7 +575,7 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
 
 @pytest.mark.slow
 def test_the_oldest_connection_gives_way_and_a_page_stays(bench):
-    async def ask(made: Workbench, address: str) -> None:
+    async def ask(made, address):
         line = await page(address)
         await told(line, {"do": "hello"})
         idle = await asyncio.to_thread(half_open, address, 2 * MOST_CONNECTIONS)

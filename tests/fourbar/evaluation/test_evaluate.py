@@ -165,7 +165,6 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
     seen = []
     true = solve
     question = Question("", scene, command(scene))
-    assert question.solution is not None
     monkeypatch.setattr(
         printed,
         "solve",

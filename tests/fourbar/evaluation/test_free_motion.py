@@ -229,8 +229,6 @@ def integrate_to_line(scene):
 
     The search is a bisection.
     """
-    free = scene.motion.free
-    assert free is not None
     coarse = solve(scene, "position")
     row = int(np.argmax(coarse.branch != coarse.branch[0]))
     low, high = coarse.time[row - 1], coarse.time[row]

@@ -11,9 +11,11 @@ import fourbar
 from fourbar import Motion, Scene, from_pins, solve
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
+from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
 from fourbar.scene.motion import COMMAND_NAMES
+from tests.support.texts import LENGTHS
 
 EPS = 2.0**-52
 K = 8.0
@@ -262,41 +264,23 @@ def test_a_drawing_on_a_change_point_is_refused():
 
 
 def test_the_word_needs_a_drawing():
-    lengths = (
-        '[lengths]\nground = "3 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "2 m"\n'
-    )
     with pytest.raises(InputError, match=r"the scene has no \[pins\]"):
-        loads(lengths + '[motion]\ntheta_2 = "drawn"\n')
+        loads(LENGTHS + '[motion]\ntheta_2 = "drawn"\n')
 
 
-def test_a_number_without_a_unit_is_refused_with_the_likely_one():
-    lengths = (
-        '[lengths]\nground = "3 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "2 m"\n'
-    )
-    with pytest.raises(InputError, match='the unit is missing; did you mean "45 deg"'):
-        loads(lengths + "[motion]\ntheta_2 = 45\n")
-
-
-def test_mjcf_stands_where_the_drawing_has_it(tmp_path):
+def test_mjcf_stands_where_the_drawing_has_it():
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is optional")
-    masses = "".join(
-        f'[bars.{bar}]\nmass = "1 kg"\n' for bar in ("input", "coupler", "output")
-    )
+    bars = ("input", "coupler", "output")
+    masses = "".join(f'[bars.{bar}]\nmass = "1 kg"\n' for bar in bars)
     pins = DRAWN.replace('"0 mm", "0 mm"', '"-20 mm", "7 mm"')
     motion = '[motion]\ntheta_2 = "drawn"\nomega_2 = "1 rad/s"\n'
-    from fourbar.mjcf import write_mjcf_for
-
-    model = mujoco.MjModel.from_xml_string(
-        write_mjcf_for(loads(pins + masses + motion))
-    )
+    text = write_mjcf_for(loads(pins + masses + motion))
+    model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    for name, place in {
-        "O2": (-0.02, 0.007),
-        "A": (0.0, 0.1),
-        "O4": (0.25, 0.05),
-    }.items():
+    places = {"O2": (-0.02, 0.007), "A": (0.0, 0.1), "O4": (0.25, 0.05)}
+    for name, place in places.items():
         assert data.site(name).xpos[:2] == pytest.approx(place, abs=1e-9)
 
 
@@ -342,7 +326,6 @@ O4 = ["300.0 mm", "30.0 mm"]
 """
     scene = loads(text)
     pins = scene.drawing
-    assert pins is not None
     d, a, b, c = drawn = tuple(pins.length(bar) for bar in (1, 2, 3, 4))
     assert 1e-5 < abs(d + a - b - c) < 5e-5
     assert scene.linkage.lengths == drawn

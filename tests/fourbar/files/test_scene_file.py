@@ -716,7 +716,6 @@ gravity = { x = "1.5 m/s^2", y = "-9.81 m/s^2" }
     scene = loads(text)
     assert scene.loads[0].force == pytest.approx((5.0, np.arctan2(-4.0, 3.0)))
     (gravity,) = scene.effects
-    assert isinstance(gravity, fourbar.Gravity)
     assert gravity.magnitude == pytest.approx(np.hypot(1.5, 9.81))
     written = fourbar.dump(scene)
     assert 'force = { x = "3.0 N", y = "-4.0 N" }' in written

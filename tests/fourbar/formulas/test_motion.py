@@ -210,27 +210,3 @@ def test_short_ground_and_input_leave_no_digit_of_mu():
         assert np.array_equal(np.isnan(moving.omega(3)), singular)
         status = solve(Scene(link, Motion(psi, 2.0))).status
         assert [word == "singular" for word in status] == singular.tolist()
-
-
-@pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])
-@pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize(
-    "lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.25, 0.1, 0.22), (0.3, 0.3, 0.2, 0.2)]
-)
-def test_angles_alone_are_those_of_the_whole_position(lengths, branch, theta_1):
-    """The same angles, statuses and gaps, a limit and A on O4 among them.
-
-    To the roundings of an angle.
-    """
-    angles = np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
-    motion = Motion(theta_1 + angles, branch=branch)
-    scene = Scene(bare(*lengths, theta_1), motion)
-    positions = solve(scene, "position")
-    out = {name: np.empty(angles.shape) for name in ("theta_3", "theta_4")}
-    alone = solve(scene, out=out)
-    assert alone.status == positions.status
-    for name, ours in out.items():
-        apart = ours - getattr(positions, name)
-        assert np.array_equal(np.isnan(ours), np.isnan(getattr(positions, name)))
-        turned = np.remainder(apart + np.pi, math.tau) - np.pi
-        assert np.nanmax(np.abs(turned)) <= 32 * 1e-15

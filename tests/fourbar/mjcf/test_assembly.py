@@ -409,8 +409,6 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write):
             np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0
         )
         s = solve(scene, "velocity", at=command)
-        assert s.omega_3 is not None
-        assert s.omega_4 is not None
         assert omega_2 == scene.motion.omega_2
         expected = [s.theta_3[0], s.theta_4[0], s.omega_3[0] - omega_2, s.omega_4[0]]
         written = [*stated[1:3], *stated[4:]]

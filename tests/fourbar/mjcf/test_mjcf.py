@@ -83,8 +83,6 @@ def run_alone(scene):
 
     Worst gap, worst speed, angle still missing at the end.
     """
-    assert isinstance(scene.motion.theta_2, Sweep)
-    assert scene.motion.omega_2 is not None
     model, data = at_keyframe(scene)
     start = scene.motion.theta_2.start
     stop = scene.motion.theta_2.stop
@@ -228,7 +226,7 @@ def test_a_released_linkage_falls_by_itself(scale):
     model, data = opened(scene)
     assert gap(data) < OPEN and model.nu == 0 and model.dof_armature[0] == 0.0
     expected = fourbar.solve(scene)
-    assert expected.time is not None and np.ptp(expected.theta_2) > 0.5
+    assert np.ptp(expected.theta_2) > 0.5
     for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
         mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
         assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(

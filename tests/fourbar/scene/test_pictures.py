@@ -164,7 +164,6 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
     file.write_text(LENGTHS + TRACED)
     scene = load(file)
     picture = scene.picture
-    assert picture is not None
     assert (picture.origin, picture.scale) == ((120.0, 80.5), 5e-4)
     assert (picture.angle, picture.opacity) == (pytest.approx(-0.0523598776), 0.25)
     assert loads(dump(scene), str(file)).picture == picture

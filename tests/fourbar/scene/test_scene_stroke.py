@@ -118,13 +118,10 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
     angles = by_stroke.linkage.ground_angle + np.linspace(0.0, 3.0, 100)
     s = solve(vary(by_stroke, {"lengths.ground_angle": angles}), "error")
     assert (s.status_code == 0).all()
-    assert s.drive_force is not None
-    assert s.drive_force_error is not None
     for place, stroke in enumerate(strokes):
         reference = compute_reference(
             replace(by_stroke, motion=by_stroke.motion.replace(angle=stroke)), 1, stroke
         )
-        assert reference is not None
         exact = reference[0]["drive_force"]
         error = np.array(
             [

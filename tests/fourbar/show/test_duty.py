@@ -59,7 +59,7 @@ def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn():
     sweep = Motion(Sweep(0.0, tau, 360), 10.0)
     s = solve(crank_rocker(motion=sweep, loads=(), effects=damped))
     duty = motor_duty(s)
-    assert duty is not None and duty.closed
+    assert duty.closed
     losses = pins["O2"] * 10.0**2 + pins["B"] * (s.omega_3 - s.omega_4) ** 2
     heat = losses[:-1].mean() * tau / 10.0
     # the rule is exact on periods
@@ -70,7 +70,7 @@ def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn():
 
 def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
     still = motor_duty(solve(crank_rocker(motion=Motion(1.0, 0.0))))
-    assert still is not None and still.peak_power == 0.0 and not still.closed
+    assert still.peak_power == 0.0 and not still.closed
     assert still.energy_in is still.mean_torque is still.energy_swing is None
     assert motor_duty(solve(crank_rocker(), "position")) is None
 
@@ -132,7 +132,7 @@ def test_a_study_has_what_each_of_its_members_has():
     moment = shaking_moment(s)
     duty = motor_duty(s)
     load = bearing_load(s, "A")
-    assert force.shape == (4, 61, 2) and moment.shape == (4, 61) and duty is not None
+    assert force.shape == (4, 61, 2) and moment.shape == (4, 61)
     for member in range(3):
         d, angle = (float(array[member]) for array in values.values())
         linkage = replace(scene.linkage, ground=d, ground_angle=angle)
@@ -165,7 +165,7 @@ def test_a_study_has_what_each_of_its_members_has():
     assert duty.closed.tolist()[:3] == [True, True, False]
     speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}
     rest = motor_duty(solve(vary(scene, speeds)))
-    assert rest is not None and np.isfinite(rest.energy_in).tolist() == [False, True]
+    assert np.isfinite(rest.energy_in).tolist() == [False, True]
 
 
 def test_a_study_of_a_motion_law_keeps_its_time():
@@ -183,7 +183,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
     by_hand = np.trapezoid(np.maximum(alone.power, 0.0), alone.time)
     assert duty.energy_in == pytest.approx([by_hand] * 2, rel=1e-12)
     rows = study.to_csv()
-    assert rows is not None and len(rows.splitlines()) == 1 + 2 * 21
+    assert len(rows.splitlines()) == 1 + 2 * 21
     assert rows.splitlines()[0].split(",").count("time") == 1
 
 
@@ -247,7 +247,7 @@ def test_a_position_without_forces_is_not_where_a_light_load_is_largest():
         effects=(Gravity(),),
     )
     s = solve(scene)
-    assert s.F12 is not None and not s.assembled[0] and s.assembled.any()
+    assert not s.assembled[0] and s.assembled.any()
     size = np.hypot(*s.F12.T)
     assert np.nanmax(size) < 1.0
     listed = Motion(s.theta_2, 1.0)
@@ -263,5 +263,5 @@ def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     turn = Sweep(0.0, tau, 120)
     scene = crank_rocker(motion=Motion(turn, 1.0), effects=(torsion,))
     duty = motor_duty(solve(scene))
-    assert duty.peak_torque is not None and duty.closed
+    assert duty.closed
     assert (duty.energy_in, duty.energy_out, duty.energy_swing) == (None, None, None)

@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-import re
 import subprocess
 import sys
 from base64 import b64decode
@@ -17,7 +16,6 @@ import fourbar
 from fourbar import Tolerance, sensitivity, solve, tolerances, vary
 from fourbar.cli import status
 from fourbar.errors import DependencyError, InputError
-from fourbar.files import scene_file as files
 from fourbar.files.scene_text import write_new_scene
 from tests.support.scenes import crank_rocker, thesis
 
@@ -98,18 +96,6 @@ def test_showing_needs_numpy_alone():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
-
-
-def test_a_new_scene_is_a_scene_and_its_comments_are_entries():
-    text = write_new_scene(("20 cm", "0.48 m", "55 cm", "20 cm"))
-    scene = files.loads(text)
-    assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
-    assert [bar.mass for bar in scene.linkage.moving] == [0.48, 0.55, 0.2]
-    assert np.isfinite(solve(scene).torque).all()
-    # every commented entry is one that a scene file may have
-    entries = re.sub(r"^# (?=\[|[^#\n]*=)", "", text, flags=re.MULTILINE)
-    full = files.loads(re.sub("^As many", "#", entries, flags=re.MULTILINE))
-    assert len(full.loads) == 2 and len(full.effects) == 2 and full.motion.branch == -1
 
 
 @pytest.mark.parametrize(
