@@ -12,6 +12,9 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
+    RobotSettings,
+    SettingsAdvice,
+    TriedSettings,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
@@ -20,6 +23,7 @@ from fourbar_validation.robots.report import (
     STATES_FILE,
     TextTable,
     Typed,
+    describe_advice,
     describe_measurement,
     list_measured_rows,
     write_markdown,
@@ -80,6 +84,14 @@ def test_the_states_are_those_that_were_asked_at():
 )
 def test_percentages_have_one_notation(part, written):
     assert write_percent(part) == written
+
+
+def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
+    settings = RobotSettings((0.02, 1.0), (0.9,), 1e-6, "Euler", "Newton", 100, 1e-8)
+    tried = TriedSettings(settings, {}, 0.1, math.inf, math.inf, math.inf)
+    advice = SettingsAdvice(0.2, 9, tried, (), tried, False, 1, (), None)
+    *_, table = describe_advice(None, advice)
+    assert table.rows == [("nothing", "0.1", "-", "-")]
 
 
 def test_a_page_holds_sentences_tables_and_elements():

@@ -392,12 +392,13 @@ def _describe_deciding(
 
 
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
+    """Write a row of settings; what was not simulated, in too many steps, is a dash."""
     changes = " ".join(f'{name}="{value}"' for name, value in tried.changes.items())
+    simulated = (f"{tried.through_time:.2g}", f"{1e3 * tried.cost:.3g} ms/s")
     return (
         changes or "nothing",
         f"{tried.states:.2g}",
-        f"{tried.through_time:.2g}",
-        f"{1e3 * tried.cost:.3g} ms/s",
+        *(simulated if math.isfinite(tried.cost) else ("-", "-")),
     )
 
 
