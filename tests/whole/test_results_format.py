@@ -112,6 +112,7 @@ def test_every_engine_is_described():
     assert names | {FORMULAS} == set(WORK)
 
 
+@pytest.mark.slow
 def test_every_quantity_of_a_scene_is_described(results):
     table = PAGE.partition("## Quantities of a scene")[2].partition("## Queries")[0]
     described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)

@@ -152,6 +152,7 @@ def test_what_the_judge_writes_is_what_the_schema_says():
     assert seen > 100
 
 
+@pytest.mark.slow
 def test_what_an_engine_writes_is_what_the_schema_says(engine):
     scene = replace(crank_rocker(), loads=())
     commanded = list_positions(scene)

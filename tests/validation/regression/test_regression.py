@@ -60,6 +60,7 @@ from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.another_machine import CORES, ROOT, environment, why_not
 from tests.support.here import judge_here
 from tests.support.runs import HERE, compare_rows, read_run, save_run
+from tests.support.shares import slow_but
 
 ROW = Row(
     "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
@@ -173,6 +174,7 @@ DAMAGE = (
 """File of a run, what it then holds, if anything, and words of the message."""
 
 
+@pytest.mark.slow
 def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path, saved, call):
     rows = [changed(engine=f"engine {k}") for k in range(4)]
     good, run = (saved(name, *rows, times=TIMES) for name in ("good", "run"))
@@ -236,6 +238,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path, saved, cal
         assert read_files(kept) == before
 
 
+@pytest.mark.slow
 def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
     tmp_path, saved, call
 ):
@@ -457,6 +460,7 @@ def weighted(inertia, **changes):
     return replace(SCENE, linkage=replace(linkage, output=output), **changes)
 
 
+@pytest.mark.slow
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared():
     before, heavier = weighted(0.048), weighted(0.05, title="another title")
     other, wrong = changed(scene="other"), changed(error=1e-9, allowed=1e-8)
@@ -604,6 +608,7 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(tmp_path, saved, call
     assert call("compare", accepted, first)[0] == 0
 
 
+@pytest.mark.slow
 def test_a_run_of_another_suite_is_never_called_no_regression(saved, call):
     """Two of eight rows stand in both: the verdict says so before anything else."""
     both = [ROW, changed(quantity="F12")]
@@ -619,7 +624,7 @@ def test_a_run_of_another_suite_is_never_called_no_regression(saved, call):
     ("old", "new", "what"),
     [
         (widen(1e-6), widen(1e-6, "because"), ["reason"]),
-        (widen(1e-6), widen(1e-8, "because"), []),
+        pytest.param(widen(1e-6), widen(1e-8, "because"), [], marks=pytest.mark.slow),
         (widen(1e-6), replace(widen(1e-6), residuals=True), ["prediction"]),
         (widen(1e-6), replace(widen(1e-6), answers=("torque",)), ["answers"]),
         (
@@ -672,6 +677,7 @@ def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression():
     assert not compare_rows((HERE, [ROW]), (HERE, [replace(hard, allowed=9e-14)])).grown
 
 
+@pytest.mark.slow
 def test_every_form_keeps_the_reason_of_a_crash():
     """Its rows are gone, and the one in their place is new."""
     died = "Cannot find module 'x'"
@@ -681,6 +687,7 @@ def test_every_form_keeps_the_reason_of_a_crash():
         assert died in html.unescape(form(found)), form
 
 
+@pytest.mark.slow
 def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone():
     """Without a record its rows say so."""
     rows = [changed(scene=s, engine=e) for s in "ab" for e in ("engine", "formulas")]
@@ -696,7 +703,10 @@ def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone():
 
 @pytest.mark.parametrize(
     ("options", "code"),
-    [((), 1), (("--quantity", "torque"), 0), (("--only", "scene"), 1)],
+    slow_but(
+        {(("--quantity", "torque"), 0)},
+        [((), 1), (("--quantity", "torque"), 0), (("--only", "scene"), 1)],
+    ),
 )
 def test_what_is_compared_can_be_chosen(options, code, saved, call):
     bad = changed(quantity="F12")

@@ -82,6 +82,7 @@ def refusal(line, capsys):
     return " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_named_by_its_part(parts, tmp_path, capsys):
     out = ["-o", str(tmp_path / "all")]
     said = refusal(["collect", parts[0], parts[2], *out], capsys)
