@@ -26,7 +26,6 @@ from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, say_install
 from fourbar.files import save
 from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
-from fourbar_validation.places import import_path
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import imported
 
@@ -119,19 +118,6 @@ def test_extras_of_extras_are_named_one_by_one(monkeypatch):
         assert "fourbar" not in line and all(
             name in line for name in ("mujoco>=", "pin>=", "python-flint>=")
         )
-
-
-def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(
-    monkeypatch,
-):
-    monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
-    monkeypatch.delenv("PYTHONPATH", raising=False)
-    with import_path() as path:
-        assert sorted(entry.name for entry in Path(path).iterdir()) == [
-            "fourbar",
-            "fourbar_validation",
-        ]
-    assert not Path(path).exists()
 
 
 def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_path):

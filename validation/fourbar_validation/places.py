@@ -3,13 +3,8 @@
 CHECKOUT is None where the package is installed without one.
 """
 
-import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from shutil import copytree, ignore_patterns
-from tempfile import TemporaryDirectory
 
 import fourbar
 from fourbar.errors import FourBarError
@@ -47,25 +42,3 @@ def find_checkout(what: str) -> Path:
             f"{what} needs a checkout of the repository; this is the installed package"
         )
     return CHECKOUT
-
-
-@contextmanager
-def import_path() -> Iterator[str]:
-    """Yield a PYTHONPATH by which another interpreter finds this code.
-
-    No library of this environment is on it.
-    """
-    rest = filter(None, [os.environ.get("PYTHONPATH")])
-    if CHECKOUT is not None:
-        yield os.pathsep.join(
-            [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab"), *rest]
-        )
-        return
-    with TemporaryDirectory(prefix="fourbar-") as folder:
-        for package in (FORMULAS_FOLDER, PACKAGE):
-            copytree(
-                package,
-                Path(folder) / package.name,
-                ignore=ignore_patterns("__pycache__"),
-            )
-        yield os.pathsep.join([folder, *rest])

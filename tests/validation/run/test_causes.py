@@ -599,6 +599,7 @@ OTHER_SCENES = {
         SCENE,
         np.degrees(1.0),
     ),
+    "the viscous damping 1.3 times ours (fitted)": (DAMPED, SCENE, 1.3),
 }
 """Scene, the one that is solved in its place, and the factor on what differs."""
 
@@ -691,8 +692,11 @@ def test_what_differs_is_what_the_engine_itself_has_wrong():
         replace(closure, quantity=name, verdict=AGREES, error=0.0)
         for name in ("theta_3", "F12")
     ]
+    assembled = replace(closure, quantity="assembled", error=9.0, allowed=0.0)
+    loop = "positions at which the loop closes differ, pin forces and motion agree"
     for row, words in (
         (closure, "closure differs, pin forces and motion agree"),
+        (assembled, loop),
         (inertia, "inertial part of the torque differs, pin forces and motion agree"),
     ):
         overview = Overview()

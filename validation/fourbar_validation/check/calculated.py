@@ -529,6 +529,23 @@ class Calculation:
             wrenches.push(bar, more / mass * weights[bar], to_centre)
         return wrenches
 
+    def list_factors(self) -> Iterator[tuple[str, BodyWrenches]]:
+        """List what may have a factor, with what it lets act on the bars."""
+        every: dict[str, BodyWrenches] = {}
+        fields = [one for one in self.scene.effects if isinstance(one, Gravity)]
+        weights = self.apply(*fields).force
+        for bar in MOVING_BARS:
+            for text, less in self._list_bar_mistakes(bar, weights[bar]):
+                what = text.removesuffix(_LEFT_OUT)
+                if what != text:
+                    wrenches = self.none().plus(less, -1.0)
+                    every[what] = every.get(what, self.none()).plus(wrenches)
+                    yield f"{BAR_NAMES[bar]}: {what}", wrenches
+        for what, wrenches in every.items():
+            yield f"every bar: {what}", wrenches
+        for name, wrenches, _ in self._list_acting():
+            yield name, wrenches
+
     def _list_bar_mistakes(
         self,
         bar: int,
@@ -548,12 +565,12 @@ class Calculation:
             yield "inertia about the pin used as the inertia about G", about_pin
             text = "inertia about G used as the inertia about the pin"
             yield text, self.none().plus(about_pin, -1.0)
-            yield "mass left out", massless
+            yield f"mass{_LEFT_OUT}", massless
         if inertia:
-            yield "moment of inertia left out", pointlike
+            yield f"moment of inertia{_LEFT_OUT}", pointlike
             if mass:
                 both = massless.plus(pointlike)
-                yield "mass and moment of inertia left out", both
+                yield f"mass and moment of inertia{_LEFT_OUT}", both
 
     def _change_loads(self) -> Iterator[Change]:
         """Measure where a force acts from the wrong point, or turn it with its bar."""
@@ -606,6 +623,7 @@ class Calculation:
                 yield _state(text, numbers)
 
 
+_LEFT_OUT = " left out"
 _FOLLOWING = {", from which the forces follow": FORCE_NAMES}
 _PART_OF_ACCELERATION = {
     -1.0: "is missing",

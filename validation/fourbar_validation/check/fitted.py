@@ -5,18 +5,18 @@ The number is a ratio, a factor, an offset or another order.
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
-from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar_validation.check.calculated import Calculation, Change
 from fourbar_validation.check.judge import Judge
 from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
 from fourbar_validation.check.variants import (
@@ -216,7 +216,7 @@ def _compute_residual(
 
 
 def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Try a moment of inertia, a mass, gravity or a load times a factor.
+    """Try a moment of inertia, a mass, a load or an effect times a factor.
 
     Forces and torque are linear in each, so that the doubled number tells the factor.
     """
@@ -232,72 +232,40 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     )
     if np.count_nonzero(theirs) < ENOUGH_NUMBERS:
         return
-    scene = state_all(judge.scene)
-    parts = dict(_list_factors(scene))
-    doubled = predict_variants(
-        scene,
-        judge.at,
-        [Variant(name, _scale(numbers, 2.0)) for name, numbers in parts.items()],
-    )
-    fitted = []
-    for (name, numbers), predict in zip(parts.items(), doubled, strict=True):
+    calculation = Calculation(judge.scene, judge.right)
+    parts = dict(calculation.list_factors())
+    fitted: list[tuple[str, float, Change]] = []
+    for doubled in calculation.solve([Change(*part) for part in parts.items()]):
         moves = np.concatenate(
             [
                 _compute_residual(judge, key, predicted, judge.ours(key))
                 for key in keys
-                if (predicted := _predict_key(predict, key, judge)) is not None
+                if (predicted := doubled.prediction(key, judge.right)) is not None
             ]
         )
         squares = float(moves @ moves)
         factor = 1.0 + float(moves @ theirs) / squares if squares else math.nan
         if LEAST_FACTOR < factor < math.inf and factor != 1.0:
+            name = doubled.text
             for f, what, times in _name_factors(name, factor):
-                fitted.append((times, Variant(f"{name} {what}", _scale(numbers, f))))
-    if not fitted:
-        return
-    variants = [variant for _, variant in fitted]
-    predictions = predict_variants(scene, judge.at, variants)
+                more = calculation.none().plus(parts[name], f - 1.0)
+                fitted.append((name, times, Change(f"{name} {what}", more)))
     explained = set()
-    for (times, variant), predict in zip(fitted, predictions, strict=True):
-        changed = frozenset(variant.numbers)
-        if changed in explained:
+    solved = calculation.solve([change for _, _, change in fitted])
+    for (name, times, _), mistake in zip(fitted, solved, strict=True):
+        if name in explained:
             continue  # by a plain factor
-        yield Mistake(variant.text, predict, times=times)
+        yield replace(mistake, times=times)
         if times == 1.0 and all(
-            (predicted := _predict_key(predict, key, judge)) is not None
+            (predicted := mistake.prediction(key, judge.right)) is not None
             and judge.explained(key, predicted)
             for key in keys
         ):
-            explained.add(changed)
+            explained.add(name)
 
 
 def _predict_key(predict: Predict, key: str, judge: Judge) -> Array | None:
     return Mistake("", predict).prediction(key, judge.right)
-
-
-def _scale(numbers: dict[str, float], factor: float) -> dict[str, float]:
-    return {key: factor * x for key, x in numbers.items()}
-
-
-def _list_factors(scene: Scene) -> Iterator[tuple[str, dict[str, float]]]:
-    """List what may have a factor, with its numbers by their keys."""
-    inertias: dict[str, float] = {}
-    for name, bar in list_moving(scene):
-        inertia = {f"bars.{name}.inertia": bar.moment_of_inertia}
-        inertias |= inertia
-        mass = {f"bars.{name}.mass": bar.mass}
-        yield f"{name}: {_INERTIA}", inertia
-        yield f"{name}: mass", mass
-        yield f"{name}: mass and {_INERTIA}", mass | inertia
-    yield f"every bar: {_INERTIA}", inertias
-    for effect in scene.effects:
-        if isinstance(effect, Gravity):
-            yield "gravity", {"effects.gravity.0": effect.magnitude}
-    for number, load in enumerate(scene.loads):
-        numbers = {f"loads.{number}.moment": load.moment}
-        if load.force is not None:
-            numbers[f"loads.{number}.force.0"] = load.force[0]
-        yield f"load {number + 1} (bar {load.bar})", numbers
 
 
 def _name_factors(name: str, factor: float) -> Iterator[tuple[float, str, float]]:

@@ -455,6 +455,8 @@ def _name_group(row: Row) -> str:
         return f"inertial part of the {_name_whole(row)}"
     if row.quantity == "closure":  # an identity of the engine's own angles
         return row.quantity
+    if row.quantity == "assembled":
+        return "positions at which the loop closes"
     return _find_group(row) or row.quantity
 
 
