@@ -308,13 +308,19 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch, tmp_path):
     assert all(svg.choose_style(name).variable in svg.LIGHT_COLOURS for name in names)
 
 
-def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("error", "allowed", "cell"),
+    [(2.5e-7, 1e-5, "2.5e-07 of 1e-05"), (1.16e-9, 1.28e-9, "1.2e-09 of 1.3e-09")],
+)
+def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
+    tmp_path, capsys, error, allowed, cell
+):
     """Beside the error what is allowed to it; a share of undecided numbers is no error.
 
     Our own rows are one.
     """
     simulated = ("first", "mujoco-simulated", "RK4", "F12")
-    row = Row(*simulated, 2.5e-7, 1e-5, AGREES, "", math.radians(40.0), 1.0)
+    row = Row(*simulated, error, allowed, AGREES, "", math.radians(40.0), 1.0)
     share = replace(row, quantity="undecided", error=0.4, allowed=0.5, theta_2=math.nan)
     identity = replace(row, engine="formulas", quantity="torque", error=0.0)
     rows, left_out = [row, share, identity], ["equilibria: too near"]
@@ -327,7 +333,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(tmp_path, capsys)
     printed = capsys.readouterr().out
     words = " ".join(printed.split())
     version = summary.versions["mujoco"]
-    row_of_table = r"MuJoCo \S+ (simulated )?- 2\.5e-07 of 1e-05 - \d"
+    row_of_table = rf"MuJoCo \S+ (simulated )?- {re.escape(cell)} - \d"
     assert re.search(row_of_table, words), words
     # the numbers say what they are
     assert "error of allowed torque pin forces motion compared" in words
@@ -345,7 +351,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(tmp_path, capsys)
     table = text[text.index("| largest") :].splitlines()
     head = "| largest error of allowed | torque | pin forces | motion | compared |"
     assert table[0] == head
-    assert table[2].startswith(f"| MuJoCo {version}, simulated | - | 2.5e-07 of 1e-05")
+    assert table[2].startswith(f"| MuJoCo {version}, simulated | - | {cell}")
 
 
 @pytest.mark.slow

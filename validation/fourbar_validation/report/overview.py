@@ -91,7 +91,11 @@ class _OverviewCell:
             return ("-",)
         if math.isnan(self.row.error):
             return ("no number",)
-        return f"{self.row.error:.1e}", f"of {self.row.allowed:.0e}"
+        error = f"{self.row.error:.1e}"
+        allowed = f"{self.row.allowed:.0e}"
+        if float(error) > float(allowed):  # with as many digits they are in order
+            allowed = f"{self.row.allowed:.1e}"
+        return error, f"of {allowed}"
 
     def __str__(self) -> str:
         return " ".join(self.parts)
