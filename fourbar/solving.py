@@ -43,7 +43,7 @@ from fourbar.scene import (
     Scene,
     StrokeOrigin,
     command,
-    with_signs,
+    find_signs,
 )
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.scene.numbers import POINT_STAGES
@@ -506,7 +506,8 @@ def _read_signs(scene: Scene, commanded: Command, sine: Array | None) -> Any:
     not evaluated.
     """
     if sine is None:
-        return with_signs(scene.linkage, commanded).branch
+        angle, branch, *_ = commanded
+        return find_signs(scene.linkage, angle, branch, commanded.bar)
     return np.where(np.abs(sine) > 0.0, np.sign(sine), commanded.branch)
 
 

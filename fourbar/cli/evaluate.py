@@ -516,7 +516,10 @@ def tolerance(
     from fourbar.show.tables import show_running
     from fourbar.studies.spread import SAMPLES, tolerances
 
-    _refuse_units_of_json(as_json, units)
+    if as_json and units:
+        raise click.UsageError(
+            "--json has SI units and radians; --units changes the table only"
+        )
     if out is not None:
         format_of(out)
     with (
@@ -540,13 +543,6 @@ def tolerance(
         width = given.find_width()
         text = shown.write_spreads(spreads, {**DEGREES, **named}, width)
     given.print_to(text, None)
-
-
-def _refuse_units_of_json(as_json: bool, units: Conversion | None) -> None:
-    if as_json and units:
-        raise click.UsageError(
-            "--json has SI units and radians; --units changes the table only"
-        )
 
 
 @click.command("equilibrium")

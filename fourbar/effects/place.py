@@ -178,20 +178,11 @@ def require_place(key: str, place: object) -> Place:
             raise InputError(f"{key}.point", place.point, "must be a point's name")
         return Place(bar, point=place.point)
     ((name, pair),) = forms.items()
-    if name == "from_centre":
-        _require_mass_centre(key, bar)
+    if name == "from_centre" and bar == 1:
+        allowed = "the ground has no mass centre: state from_pin"
+        raise InputError(f"{key}.from_centre", bar, allowed)
     checked: Any = {name: require_pair(f"{key}.{name}", pair, STATED_PLACES[name])}
     return Place(bar, **checked)
-
-
-def _require_mass_centre(key: str, bar: int) -> None:
-    """Raise InputError for a place from the mass centre of the ground."""
-    if bar == 1:
-        raise InputError(
-            f"{key}.from_centre",
-            bar,
-            "the ground has no mass centre: state from_pin",
-        )
 
 
 class At(NamedTuple):

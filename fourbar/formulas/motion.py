@@ -293,13 +293,6 @@ class State(NamedTuple):
         """
         return self.foot(bar) + z * self.direction(bar)
 
-    def point_coefficient(self, bar: int, z: Number) -> Number:
-        """Compute the derivative of a bar's point z by the independent angle, m/rad."""
-        turned = (1j * self.coefficient(bar)) * (z * self.direction(bar))
-        if bar == 3:
-            return turned + (1j * self.k.h2) * self.foot(3)
-        return turned
-
     def velocity(self, bar: int, z: Number) -> Number:
         """Compute the velocity of a bar's point z, m/s."""
         frame = self.frame(bar)

@@ -92,7 +92,8 @@ def driving_torque(gain: Number, inertial: Number, Q: Number) -> Number:
     >>> bars = two, Body(0.020, 1.5, G3), four
     >>> inertial = sum(inertia(5, bars, s.position, s.k)) * -40
     >>> inertial += half_slope(5, bars, s.position, s.k) * 25**2
-    >>> Q = dot(P, s.point_coefficient(3, G3 + polar(3, 100 * deg))) + 120 * s.k.h4
+    >>> v = s.velocity(3, G3 + polar(3, 100 * deg))
+    >>> Q = dot(P, v) / 25 + 120 * s.k.h4
     >>> f"{driving_torque(s.k.h2, inertial, Q):.2f}"
     '243.23'
     """

@@ -2,7 +2,7 @@
 
 import math
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from itertools import cycle
 from operator import add
@@ -437,6 +437,7 @@ FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 """rad; a sweep over 0..360 deg may miss the turn by its rounding."""
 
 
+@dataclass
 class WindowMotion:
     """The input's motion through a window of theta_2, in time.
 
@@ -445,13 +446,14 @@ class WindowMotion:
     from `start` to `stop`, at the speed `omega` at the start.
     """
 
-    def __init__(self, start: float, stop: float, omega: float, alpha: float) -> None:
-        if (stop - start) * omega < 0.0:
+    start: float
+    stop: float
+    omega: float
+    alpha: float
+
+    def __post_init__(self) -> None:
+        if (self.stop - self.start) * self.omega < 0.0:
             raise ValueError("the input turns away from the end of its window")
-        self.start = start
-        self.stop = stop
-        self.omega = omega
-        self.alpha = alpha
 
     @property
     def fastest(self) -> float:

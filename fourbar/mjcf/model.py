@@ -14,7 +14,6 @@ from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
     from fourbar.effects.effect import Joints
-    from fourbar.effects.place import Place
     from fourbar.effects.spring import Spring
     from fourbar.scene import Scene
 
@@ -392,13 +391,7 @@ class Model:
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
-        ET.SubElement(
-            ground,
-            "site",
-            name="O2",
-            pos="0 0 0",
-            size=write_six_digits(self.radius),
-        )
+        self._add_site(ground, "O2", 0.0)
         self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
         self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
@@ -527,13 +520,7 @@ class Model:
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
-            tendon = self._add_line(
-                root,
-                tendons,
-                f"spring_{index}",
-                spring.start,
-                spring.end,
-            )
+            tendon = self._add_line(root, tendons, f"spring_{index}", spring)
             if _is_slack_somewhere(spring):
                 tendon.set("stiffness", write_exactly(spring.stiffness))
                 free = write_exactly(-spring.slack / spring.stiffness)
@@ -541,25 +528,18 @@ class Model:
                 dead_band = {"push": f"{free} {_NEVER_REACHED}", "pull": f"0 {free}"}
                 tendon.set("springlength", dead_band.get(spring.acts or "", free))
         if self.cylinder is not None:
-            self._add_line(
-                root,
-                tendons,
-                CYLINDER,
-                self.cylinder.start,
-                self.cylinder.end,
-            )
+            self._add_line(root, tendons, CYLINDER, self.cylinder)
 
     def _add_line(
         self,
         root: ET.Element,
         tendons: ET.Element,
         name: str,
-        start: "Place",
-        end: "Place",
+        line: "Spring | LinearDrive",
     ) -> ET.Element:
         """Add a tendon between two points of bars, with a site at each."""
         tendon = ET.SubElement(tendons, "spatial", name=name)
-        for which, point in (("start", start), ("end", end)):
+        for which, point in (("start", line.start), ("end", line.end)):
             ET.SubElement(tendon, "site", site=f"{name}_{which}")
             x, y = point.in_bar.real, point.in_bar.imag
             if point.bar == 1:  # the ground's body keeps world axes

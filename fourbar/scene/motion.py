@@ -683,13 +683,6 @@ def is_length(*values: object) -> bool:
     return False
 
 
-def _require_unit(name: str, angle: Any, unit: str) -> None:
-    """Raise InputError for a sweep whose ends were stated in another unit."""
-    if isinstance(angle, Sweep) and angle.unit not in (None, unit):
-        stated = f"from {angle.start:g} to {angle.stop:g} {angle.unit}"
-        raise InputError(f"motion.{name}", stated, f"must be in {unit}")
-
-
 def _require_strokes(stroke: Any) -> Any:
     """Return the strokes, checked; InputError for what is no length above zero."""
     if not isinstance(stroke, Sweep):
@@ -714,7 +707,9 @@ def _require_command(
     (theta, unit), (omega, per_second), (alpha, growth) = (
         (name, Motion.numbers[name].unit) for name in names
     )
-    _require_unit(theta, angle, unit)
+    if isinstance(angle, Sweep) and angle.unit not in (None, unit):
+        stated = f"from {angle.start:g} to {angle.stop:g} {angle.unit}"
+        raise InputError(f"motion.{theta}", stated, f"must be in {unit}")
     if angle is not None and not isinstance(angle, (Sweep, FromLimit)):
         angles = require_numbers(
             f"motion.{theta}",

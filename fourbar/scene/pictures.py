@@ -10,6 +10,7 @@ import math
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
+from typing import Any, Self
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import BAR_NAMES, require_bar
@@ -30,49 +31,57 @@ ALLOWED_PICTURE = (
 )
 
 
-def _require_name(key: str, name: object) -> None:
-    """Refuse a name that leads out of the scene's folder."""
-    parts = name.split("/") if isinstance(name, str) else []
-    plain = all(
-        part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
-        for part in parts
-    )
-    if (
-        not isinstance(name, str)
-        or not plain
-        or not name.isprintable()
-        or len(name) > LONGEST_FILE_NAME
-    ):
-        raise InputError(key, name, ALLOWED_PICTURE)
+class _PictureFile:
+    """A picture by its name in the folder of a scene file."""
 
+    __slots__ = ()
+    key: Any = "picture.file"
+    """Key of the picture in a scene file."""
+    name: str
+    folder: str
 
-def _find_file(key: str, folder: str, name: str) -> Path:
-    """Return the path of a picture; InputError where a link leads out of the folder."""
-    root = Path(folder).resolve()
-    file = (root / name).resolve()
-    if not file.is_relative_to(root):
-        raise InputError(
-            key,
-            name,
-            f"leads out of the scene's folder; {ALLOWED_PICTURE}",
+    def __post_init__(self) -> None:
+        expect("picture.folder", self.folder, str, Path)
+        parts = self.name.split("/") if isinstance(self.name, str) else ["."]
+        plain = all(
+            part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
+            for part in parts
         )
-    return file
+        if (
+            not plain
+            or not self.name.isprintable()
+            or len(self.name) > LONGEST_FILE_NAME
+        ):
+            raise InputError(self.key, self.name, ALLOWED_PICTURE)
 
+    def find_file(self) -> Path:
+        """Return the path; InputError where a link leads out of the folder."""
+        root = Path(self.folder).resolve()
+        file = root.joinpath(self.name).resolve()
+        if not file.is_relative_to(root):
+            allowed = f"leads out of the scene's folder; {ALLOWED_PICTURE}"
+            raise InputError(self.key, self.name, allowed)
+        return file
 
-def _name_from(key: str, folder: str, name: str, target: Path) -> str:
-    """Return the name that a scene file in another folder has for a picture."""
-    file = Path(folder).resolve() / name
-    if not file.is_relative_to(target.resolve()):
-        raise InputError(
-            key,
-            os.fspath(file),
-            f"does not lie in {os.fspath(target.resolve())}: copy it there first",
-        )
-    return PurePosixPath(file.relative_to(target.resolve())).as_posix()
+    def moved(self, folder: Path) -> Self:
+        """Return the same file as a scene file in another folder names it.
+
+        Raises InputError where it does not lie in that folder.
+        """
+        file = Path(self.folder).resolve() / self.name
+        target = folder.resolve()
+        if not file.is_relative_to(target):
+            raise InputError(
+                self.key,
+                os.fspath(file),
+                f"does not lie in {os.fspath(target)}: copy it there first",
+            )
+        name = PurePosixPath(file.relative_to(target)).as_posix()
+        return replace(self, name=name, folder=os.fspath(folder))  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, slots=True)
-class TracedPicture:
+class TracedPicture(_PictureFile):
     """The picture that lies under the drawing in the workbench.
 
     Parameters
@@ -94,8 +103,7 @@ class TracedPicture:
     folder: str = "."
 
     def __post_init__(self) -> None:
-        _require_name("picture.file", self.name)
-        expect("picture.folder", self.folder, str, Path)
+        _PictureFile.__post_init__(self)
         numbers = (*(self.origin or ()), self.scale or 1.0, self.angle, self.opacity)
         if not all(map(math.isfinite, numbers)):
             raise InputError("picture", numbers, "must be finite numbers")
@@ -106,24 +114,18 @@ class TracedPicture:
 
     def read(self) -> tuple[bytes, str]:
         """Return the content of the file and its type, as a browser names it."""
-        key = "picture.file"
-        file = _find_file(key, self.folder, self.name)
-        content = read_bytes(file, key, LARGEST_PICTURE, shown=self.name)
+        file = self.find_file()
+        content = read_bytes(file, self.key, LARGEST_PICTURE, shown=self.name)
         kind = find_kind(content)
         if kind is None and b"<svg" in content[:LONGEST_SVG_HEAD]:
             kind = "image/svg+xml"
         if kind is None:
-            raise InputError(key, self.name, "must be a PNG, JPEG or SVG picture")
+            raise InputError(self.key, self.name, "must be a PNG, JPEG or SVG picture")
         return content, kind
-
-    def moved(self, folder: Path) -> "TracedPicture":
-        """Return the same file as a scene file in another folder names it."""
-        name = _name_from("picture.file", self.folder, self.name, folder)
-        return replace(self, name=name, folder=os.fspath(folder))
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class Picture(_PictureFile):
     """The picture of a moving bar.
 
     Parameters
@@ -142,8 +144,7 @@ class Picture:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bar", require_bar("picture.bar", self.bar))
-        expect("picture.folder", self.folder, str, Path)
-        _require_name(self.key, self.name)
+        _PictureFile.__post_init__(self)
 
     @property
     def key(self) -> str:
@@ -156,16 +157,7 @@ class Picture:
         Raises InputError where a link leads out of the folder, and as `encode_picture`
         does.
         """
-        file = _find_file(self.key, self.folder, self.name)
-        return encode_picture(self.key, file, self.name)
-
-    def moved(self, folder: Path) -> "Picture":
-        """Return the same file as a scene file in another folder names it.
-
-        Raises InputError where it does not lie in that folder.
-        """
-        name = _name_from(self.key, self.folder, self.name, folder)
-        return Picture(self.bar, name, os.fspath(folder))
+        return encode_picture(self.key, self.find_file(), self.name)
 
 
 def find_kind(content: bytes) -> str | None:

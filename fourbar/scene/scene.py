@@ -350,9 +350,7 @@ class Command(NamedTuple):
     angle: Array
     """(n,), rad."""
     branch: NDArray[np.int8]
-    """(n,), +1 or -1: the assembly, as `Motion` has it. A result of `with_signs` has
-    the sign at each position.
-    """
+    """Assembly, +1 or -1, (n,), as `Motion` has it."""
     speed: float | Array | None
     """rad/s; None: positions only."""
     acceleration: float | Array
@@ -750,10 +748,10 @@ def command_at(scene: Scene, places: Array) -> Command:
 
 
 def with_signs(linkage: FourBar, commanded: Command) -> Command:
-    """Return a command whose branch is the sign of the bar's sine at each position.
+    """Return a command as engines are told it, with signs in the place of assemblies.
 
-    Engines are told this one. It follows from the lengths and the angle alone. The
-    function is its own inverse: of signs it makes assemblies.
+    The sign is that of the bar's own sine at each position. It follows from the lengths
+    and the angle alone. The function is its own inverse: of signs it makes assemblies.
     """
     signs = find_signs(linkage, commanded.angle, commanded.branch, commanded.bar)
     return commanded._replace(branch=signs)

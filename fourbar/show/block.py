@@ -97,22 +97,13 @@ def write_block(
     scene: Scene,
     solution: Solution,
     units: Conversion = COMMON,
-    *,
-    pressure: float | None = None,
-    headed: bool = True,
-    width: int | None = None,
+    **options: Any,
 ) -> list[str]:
     """Write the summary of a solved scene line by line; of one position, everything.
 
-    Parameters
-    ----------
-    units : units of the numbers; one that is left out is the SI unit with a prefix.
-    pressure : pressure of a cylinder, Pa; adds the bore that it needs.
-    headed : begin with the linkage.
-    width : that of a terminal.
+    The options are those of `write_facts`.
     """
-    facts = summarize(scene, solution)
-    return write_facts(facts, units, pressure=pressure, headed=headed, width=width)
+    return write_facts(summarize(scene, solution), units, **options)
 
 
 def write_facts(
@@ -123,7 +114,15 @@ def write_facts(
     headed: bool = True,
     width: int | None = None,
 ) -> list[str]:
-    """Write facts that are collected already, as `write_block` does."""
+    """Write facts that are collected already.
+
+    Parameters
+    ----------
+    units : units of the numbers; one that is left out is the SI unit with a prefix.
+    pressure : pressure of a cylinder, Pa; adds the bore that it needs.
+    headed : begin with the linkage.
+    width : that of a terminal.
+    """
     return _SceneBlock(facts, units, width).write(pressure, headed=headed)
 
 
@@ -821,6 +820,10 @@ class _SceneBlock:
                 stresses.append(bending.peak.value / modulus)
         return self._cells(stresses, "Pa")
 
+    def _list_sizes(self, peaks: list[Peak | None]) -> list[float | None]:
+        """List the values of peaks of one kind; None: without a bound."""
+        return self._without_small([peak and peak.value for peak in peaks])
+
     @staticmethod
     def _without_small(values: list[float | None]) -> list[float | None]:
         """Return zero for what is rounding of the largest of their kind."""
@@ -830,8 +833,7 @@ class _SceneBlock:
 
     def _cells_of_peaks(self, peaks: list[Peak | None], unit: str) -> list[str]:
         """Write largest values of one kind, and which have no bound."""
-        sizes = self._without_small([peak and peak.value for peak in peaks])
-        return self._cells(sizes, unit, _NO_LARGEST)
+        return self._cells(self._list_sizes(peaks), unit, _NO_LARGEST)
 
     def _places_of_peaks(
         self,
@@ -839,10 +841,9 @@ class _SceneBlock:
         names: list[str],
     ) -> list[str]:
         """Write where largest values of one kind are taken, or grow without bound."""
-        sizes = self._without_small([peak and peak.value for peak in peaks])
         panels = self.facts.motion.panels
         places = []
-        for peak, size, name in zip(peaks, sizes, names, strict=True):
+        for peak, size, name in zip(peaks, self._list_sizes(peaks), names, strict=True):
             if peak is None:
                 places.append(self._place(panels.list_poles(name)[0], named=False))
             else:

@@ -16,7 +16,7 @@ import numpy as np
 
 from fourbar.errors import ELSEWHERE, InputError, names_other_mechanism
 from fourbar.quantities import STAGE_OF, Array, find_derived
-from fourbar.scene import Command, ReleaseOrigin, Scene, command_at, with_signs
+from fourbar.scene import Command, ReleaseOrigin, Scene, command_at, find_signs
 from fourbar.show.derived import derive, list_derived_names
 from fourbar.solution import (
     Conversion,
@@ -281,8 +281,8 @@ def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:
         motion = scene.motion.replace(speed=1.0, acceleration=0.0)
         at = command_at(replace(scene, motion=motion), solution.at.stated[0])
     elif isinstance(solution.at.origin, ReleaseOrigin):
-        of_input = Command(solution.theta_2, solution.branch, 1.0, 0.0)
-        at = with_signs(scene.linkage, of_input)
+        assembly = find_signs(scene.linkage, solution.theta_2, solution.branch)
+        at = Command(solution.theta_2, assembly, 1.0, 0.0)
     else:
         at = solution.at._replace(speed=1.0, acceleration=0.0)
     return solve(scene, "velocity", at=at)

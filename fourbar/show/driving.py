@@ -81,11 +81,8 @@ def is_once_round(solution: Solution) -> Any:
     once_round = (turns > 0.5) & is_whole
     for rate in (solution.at.speed, solution.at.acceleration):
         if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
-            once_round = once_round & _repeats(np.asarray(rate))
+            rates = np.asarray(rate)
+            gap = np.abs(rates[..., -1] - rates[..., 0])
+            repeats = gap <= _SAME_RATE * np.max(np.abs(rates), axis=-1)
+            once_round = once_round & repeats
     return once_round
-
-
-def _repeats(rate: Array) -> Any:
-    """Return True if a speed or an acceleration ends as it begins."""
-    gap = np.abs(rate[..., -1] - rate[..., 0])
-    return gap <= _SAME_RATE * np.max(np.abs(rate), axis=-1)

@@ -14,7 +14,7 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import dot
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import JAMMED, WOUND, Array
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene, find_signs
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
 from fourbar.show.motion_curves import describe_motion
 from fourbar.solution import Solution
@@ -218,7 +218,6 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
     motion = describe_motion(solution)
     panels = motion.panels
     name = drive.keys.value
-    linear = solution.drive is not None
     # over a stretch without forces the energies would be those of a part, unsaid
     whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
 
@@ -230,16 +229,13 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
     peak = find_largest(name)
     rms = motion.find_rms(name)
     duty = MotorDuty(
-        peak_torque=None if linear else peak,
-        rms_torque=None if linear else rms,
+        **_name_effort(solution, peak, rms),
         peak_speed=find_largest("speed"),
         peak_power=find_largest("power"),
         rms_power=motion.find_rms("power"),
         energy_in=None,
         energy_out=None,
         closed=bool(is_once_round(solution)) and not motion.stretches,
-        peak_force=peak if linear else None,
-        rms_force=rms if linear else None,
     )
     second = motion.places_of_second
     if not second or not whole or not panels.has_value("power"):
@@ -254,7 +250,7 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
     given = panels.integrate("power")
     surplus = panels.accumulate("power", given / panels.length)
     mean_torque = None
-    if not linear and solution.drive_bar == solution.at.bar:
+    if solution.drive_bar == solution.at.bar:  # none of a drive that exerts a force
         mean_torque = _find_mean_torque(solution, given / second)
     return duty._replace(
         energy_swing=float(np.ptp(surplus)) / second,
@@ -267,30 +263,33 @@ def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
     values = getattr(solution, drive.keys.value)
     power = _require_quantity(solution, "power")
     closed = is_once_round(solution)
-    linear = solution.drive is not None
     peak = _find_peak_value(values)
     rms = _find_rms(solution, values)
     spans = _compute_spans(solution, power)
     energy_in, energy_out = _integrate_power(spans, power)
     mean_power, swing = _find_swing(spans, power, closed)
     mean_torque = None
-    if mean_power is not None and not linear and solution.drive_bar == solution.at.bar:
+    if mean_power is not None and solution.drive_bar == solution.at.bar:
         work = np.asarray(mean_power) * spans.sum(axis=-1)
         mean_torque = _find_mean_torque(solution, work)
     return MotorDuty(
-        peak_torque=None if linear else peak,
-        rms_torque=None if linear else rms,
+        **_name_effort(solution, peak, rms),
         peak_speed=_find_peak_value(_require_quantity(solution, drive.speed_key)),
         peak_power=_find_peak_value(power),
         rms_power=_find_rms(solution, power),
         energy_in=energy_in,
         energy_out=energy_out,
         closed=bool(closed) if np.ndim(closed) == 0 else closed,
-        peak_force=peak if linear else None,
-        rms_force=rms if linear else None,
         mean_torque=mean_torque,
         energy_swing=swing,
     )
+
+
+def _name_effort(solution: Solution, peak: Any, rms: Any) -> dict[str, Any]:
+    """Name peak and RMS of the drive as `MotorDuty` has them."""
+    effort = {"peak_torque": None, "rms_torque": None}
+    kind = "torque" if solution.drive is None else "force"
+    return effort | {f"peak_{kind}": peak, f"rms_{kind}": rms}
 
 
 def _require_quantity(solution: Solution, name: str) -> Array:
@@ -428,8 +427,9 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
             f"SciPy is needed for free motion: {say_install('studies')}"
         ) from None
     scene = scene.settled()
-    of_input = Command(motion.theta_2, motion.branch, motion.omega_2, 0.0)
-    state = compute_shown_state(scene, with_signs(scene.linkage, of_input))
+    assembly = find_signs(scene.linkage, motion.theta_2, motion.branch)
+    of_input = Command(motion.theta_2, assembly, motion.omega_2, 0.0)
+    state = compute_shown_state(scene, of_input)
     groups = {
         "loads": scene.loads,
         **{effect.key: (effect,) for effect in scene.effects},

@@ -35,7 +35,7 @@ from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import count_turns
 from fourbar.formulas.position import Loop, Position, half_angle, loop
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, command, with_signs
+from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solving import solve
 from fourbar.studies.passing import say_nowhere
@@ -114,13 +114,10 @@ def of_input(scene: Scene) -> Command:
     if commanded.commanded == "theta_2":
         return commanded
     solution = solve(scene, "position", at=commanded)
-    of_result = Command(
-        solution.theta_2[solution.assembled],
-        solution.branch[solution.assembled],
-        None,
-        0.0,
-    )
-    return with_signs(scene.linkage, of_result)
+    closes = solution.assembled
+    theta_2 = solution.theta_2[closes]
+    assembly = find_signs(scene.linkage, theta_2, solution.branch[closes])
+    return Command(theta_2, assembly, None, 0.0)
 
 
 class CircuitCurve:
@@ -216,7 +213,9 @@ class CircuitCurve:
         The sign changes at a limit or a change point between two positions.
         """
         places = self.commanded.theta_2 - self.theta_1
-        signs = with_signs(self.scene.linkage, self.commanded).branch
+        signs = find_signs(
+            self.scene.linkage, self.commanded.angle, self.commanded.branch
+        )
         between = np.array([self.low, self.high, *(psi for psi, _ in self.singular)])
         changes = np.flatnonzero(np.diff(signs)) + 1
         bounds = [0, *changes.tolist(), len(signs)]

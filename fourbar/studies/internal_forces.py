@@ -269,7 +269,9 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 gravity = gravity + term.field
                 continue
             if term.key == "load" and term.bar == bar:
-                recorder.place = _couple_place(term, described.to_centre, back)
+                recorder.place = term.foot(described.to_centre)
+                if term.arm is not None:
+                    recorder.place = recorder.place + polar(*term.arm) * back
             term.act(recorder, state)
             recorder.place = 0.0j
             term.act_known(
@@ -351,13 +353,6 @@ def _sum_by_foot(
             couples = [*couples, zero]
         forces[k], couples[k] = forces[k] + force, couples[k] + beside
     return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
-
-
-def _couple_place(load: Any, G: Any, back: Any) -> Any:
-    """Return where the couple of a load acts, in the bar's axes."""
-    if load.arm is not None:
-        return G + polar(*load.arm) * back
-    return load.foot(G)
 
 
 def _support(

@@ -270,7 +270,9 @@ def _suggest(key: str, keys: list[str]) -> str:
     """
     stem, _, last = key.rpartition(".")
     axis = "xy".find(last)
-    if axis >= 0 and _is_coordinate_key(coordinate := f"{stem}.{axis}"):
+    coordinate = f"{stem}.{axis}"
+    of_drawing = stem.startswith("pins.") or f".{DRAWN_WORD}." in coordinate
+    if axis >= 0 and of_drawing:
         if coordinate in keys:
             return f'did you mean "{coordinate}"?'
         key = coordinate
@@ -319,11 +321,6 @@ def _describe_pairs(start: str, keys: list[str]) -> str:
     of_place = form in (*STATED_PLACES, "arm", _MASS_CENTRE)
     size = "the distance" if of_place else "the magnitude"
     return f"{pair[0]} ({size}) and {pair[1]} (the angle)"
-
-
-def _is_coordinate_key(key: str) -> bool:
-    """Return True for the form of a key of a coordinate in the drawing."""
-    return key.startswith("pins.") or f".{DRAWN_WORD}." in key
 
 
 def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:

@@ -1,7 +1,6 @@
 """Instant centres and coupler curves of a linkage, of a scene, or of a solution."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.formulas import points
@@ -47,19 +46,11 @@ def instant_centres(
         if value is not None:
             raise InputError(name, value, "must be left out: the positions are stated")
     solution = solve(of, "position") if isinstance(of, Scene) else of
-    A, B = (_as_complex(vector) for vector in (solution.A, solution.B))
+    A, B = (v[..., 0] + 1j * v[..., 1] for v in (solution.A, solution.B))
     length, angle = solution.ground
     O4 = length * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
-    along = [_direction_of(vector) for vector in (O4, A, B - A, B - O4)]
+    along = [vector / np.abs(vector) for vector in (O4, A, B - A, B - O4)]
     return points.locate_centres(O4, A, B, *along)
-
-
-def _as_complex(vector: Array) -> NDArray[np.complex128]:
-    return np.asarray(vector[..., 0] + 1j * vector[..., 1])
-
-
-def _direction_of(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    return np.asarray(vector / np.abs(vector))
 
 
 def coupler_curve(

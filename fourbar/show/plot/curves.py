@@ -17,7 +17,7 @@ from fourbar.evaluation.case import Case, compute_shown_state
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES, Array
-from fourbar.scene import with_signs
+from fourbar.scene import find_signs
 from fourbar.show.derived import derive
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import compute_energies
@@ -613,7 +613,8 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     if len(degrees) > 1:
         margin = 1.5 * float(np.median(np.abs(np.diff(degrees))))
     one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
-    signs = with_signs(view.scene.linkage, positions).branch
+    linkage = view.scene.linkage
+    signs = find_signs(linkage, positions.angle, positions.branch, positions.bar)
 
     marked = list[tuple[list[float], list[float], str, str]]()
     for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):

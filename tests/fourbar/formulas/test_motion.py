@@ -87,8 +87,6 @@ def test_points_move_as_their_positions_do(bar, alpha):
     bend = (ahead - 2.0 * here + back) / STEP**2
     assert moving.velocity(bar, z) == pytest.approx(speed, abs=BY_DIFFERENCES)
     assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
-    by_coefficient = moving.point_coefficient(bar, z) * omega
-    assert by_coefficient == pytest.approx(moving.velocity(bar, z), abs=CLOSURE * omega)
     assert moving.coefficient(1) == moving.omega(1) == moving.alpha(1) == 0.0
 
 
