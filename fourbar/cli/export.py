@@ -27,15 +27,16 @@ if TYPE_CHECKING:
     from fourbar.mjcf.plane import Plane
 
 
-def _plane_options(command: Callable[..., None]) -> Callable[..., None]:
+def _plane_options(command: Callable[..., str]) -> Callable[..., str]:
     """Add --axis and --origin, given to the command as `plane`."""
 
     @wraps(command)
-    def placed(axis: str, origin: str, **others: Any) -> None:
+    def placed(scene: Scene, axis: str, origin: str, **others: Any) -> str:
         from fourbar.mjcf.plane import Plane
 
         direction = given.read_three("--axis", axis, "1")
-        command(plane=Plane(direction, given.read_three("--origin", origin)), **others)
+        plane = Plane(direction, given.read_three("--origin", origin))
+        return command(scene, plane=plane, **others)
 
     for name, default, text in (
         (
@@ -59,8 +60,23 @@ _A_LENGTH = re.compile(r"[\d.]+\w*")
 """Name of a scene that is a fifth length."""
 
 
-def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
-    """Add SCENE, --lengths and --omega, one of the first two to be given."""
+def _export_command(command: Callable[..., str]) -> Callable[..., None]:
+    """Add SCENE, --lengths and --omega; what the command makes of a scene is written.
+
+    One of the first two is given.
+    """
+
+    @wraps(command)
+    def written(
+        scene: Path | None,
+        lengths: tuple[str, ...] | None,
+        omega: str | None,
+        out: Path,
+        **options: Any,
+    ) -> None:
+        with _open_or_make_scene(scene, lengths, omega, out) as described:
+            given.print_to(command(described, **options), out)
+
     for add in (
         click.option(
             "--omega",
@@ -75,8 +91,8 @@ def _scene_or_lengths(command: Callable[..., None]) -> Callable[..., None]:
         ),
         click.argument("scene", type=given.FILE_PATH, required=False),
     ):
-        command = add(command)
-    return command
+        written = add(written)
+    return written
 
 
 @contextmanager
@@ -244,7 +260,7 @@ def animate(
 
 
 @click.command(cls=given.LengthsCommand)
-@_scene_or_lengths
+@_export_command
 @click.option(
     "--for",
     "simulator",
@@ -265,25 +281,15 @@ def animate(
 )
 @_plane_options
 @given.text_option(".xml", ".mjcf", required=True)
-def mjcf(
-    scene: Path | None,
-    lengths: tuple[str, ...] | None,
-    omega: str | None,
-    simulator: str,
-    drive: "Drive",
-    plane: "Plane",
-    out: Path,
-) -> None:
+def mjcf(scene: Scene, simulator: str, drive: "Drive", plane: "Plane") -> str:
     """Write a scene, or four lengths, as MJCF for MuJoCo and its kin."""
     from fourbar import mjcf as writer
 
-    with _open_or_make_scene(scene, lengths, omega, out) as described:
-        text = writer.write_mjcf_for(described, simulator, drive, plane)
-        given.print_to(text, out)
+    return writer.write_mjcf_for(scene, simulator, drive, plane)
 
 
 @click.command("sdf", cls=given.LengthsCommand)
-@_scene_or_lengths
+@_export_command
 @click.option(
     "--for",
     "reader",
@@ -295,42 +301,23 @@ def mjcf(
 @_without_loads_option
 @_plane_options
 @given.text_option(".sdf", ".world", ".xml", required=True)
-def sdf_command(
-    scene: Path | None,
-    lengths: tuple[str, ...] | None,
-    omega: str | None,
-    reader: str,
-    without_loads: bool,
-    plane: "Plane",
-    out: Path,
-) -> None:
+def sdf_command(scene: Scene, reader: str, without_loads: bool, plane: "Plane") -> str:
     """Write a scene, or four lengths, as SDF for Gazebo or Drake."""
     from fourbar.mjcf.assembly import write_sdf as written
 
-    with _open_or_make_scene(scene, lengths, omega, out) as described:
-        text = written(described, reader, without_loads=without_loads, plane=plane)
-        given.print_to(text, out)
+    return written(scene, reader, without_loads=without_loads, plane=plane)
 
 
 @click.command("usd", cls=given.LengthsCommand)
-@_scene_or_lengths
+@_export_command
 @_without_loads_option
 @_plane_options
 @given.text_option(".usda", ".usd", required=True)
-def usd_command(
-    scene: Path | None,
-    lengths: tuple[str, ...] | None,
-    omega: str | None,
-    without_loads: bool,
-    plane: "Plane",
-    out: Path,
-) -> None:
+def usd_command(scene: Scene, without_loads: bool, plane: "Plane") -> str:
     """Write a scene, or four lengths, as USD text (.usda) for Newton."""
     from fourbar.mjcf.assembly import write_usd as written
 
-    with _open_or_make_scene(scene, lengths, omega, out) as described:
-        text = written(described, without_loads=without_loads, plane=plane)
-        given.print_to(text, out)
+    return written(scene, without_loads=without_loads, plane=plane)
 
 
 @click.command("edit")
