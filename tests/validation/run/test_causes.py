@@ -16,6 +16,7 @@ import pytest
 import fourbar
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.check.calculated import Calculation
+from fourbar_validation.check.mistakes import Explanation
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
@@ -25,7 +26,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.overview import Overview
 from fourbar_validation.report.record import Record
-from fourbar_validation.run.causes import find_causes as find_causes_of
+from fourbar_validation.run import causes as search
 from fourbar_validation.run.judge import judge, make_question
 from tests.support.guests import PLAIN
 from tests.support.scenes import crank_rocker
@@ -733,6 +734,22 @@ def test_what_nobody_knows_is_no_known_mistake():
     assert find_causes(make_guest(replacements=[strange])) == []
 
 
+def test_what_explains_the_first_rows_alone_hides_no_mistake(monkeypatch):
+    """Mistakes are tried first by 30 of these 60 rows, which may mislead."""
+    tried = search.explain
+
+    def mislead(judge, *others):
+        if len(judge.at.angle) < 60:
+            return [Explanation("I = 0", ("torque",), complete=True)]
+        return tried(judge, *others)
+
+    monkeypatch.setattr(search, "explain", mislead)
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 5.0)
+    scene = replace(SCENE, motion=motion)
+    guest = make_guest(replacements=REPLACED["gravity is missing"])
+    assert find_causes(guest, scene) == ["gravity is missing"]
+
+
 def test_a_search_that_finds_nothing_costs_few_solutions():
     """Every number is wrong by itself, so that every mistake is tried.
 
@@ -742,7 +759,7 @@ def test_a_search_that_finds_nothing_costs_few_solutions():
     scene = fourbar.load(CAPABILITIES.parent / "thesis.toml")
     question = make_question("thesis", scene, [])
     answer = Altered(disturb).answer(scene, question.at)
-    assert find_causes_of(question, answer, EQUIVALENCE) == []
+    assert search.find_causes(question, answer, EQUIVALENCE) == []
 
     def least_seconds(function):
         seconds = []
@@ -752,8 +769,8 @@ def test_a_search_that_finds_nothing_costs_few_solutions():
             seconds.append(time.process_time() - begin)
         return min(seconds)
 
-    search = least_seconds(lambda: find_causes_of(question, answer, EQUIVALENCE))
-    assert search < 300.0 * least_seconds(lambda: fourbar.solve(SCENE))
+    seconds = least_seconds(lambda: search.find_causes(question, answer, EQUIVALENCE))
+    assert seconds < 300.0 * least_seconds(lambda: fourbar.solve(SCENE))
 
 
 def disturb(numbers, at):

@@ -82,14 +82,17 @@ def find_causes(
             if not tried:
                 return []
             wanted = {explanation.text for explanation in tried}.__contains__
-        return [
-            explanation.text
-            if explanation.whole
-            else f"{explanation.text}: {', '.join(explanation.quantities)}"
-            for explanation in explain(judge, differing, wanted)
-        ]
+        found = explain(judge, differing, wanted)
+        if not found and wanted is not always:  # what explained some rows misled
+            found = explain(judge, differing)
     except FourBarError:
         return None
+    return [
+        explanation.text
+        if explanation.whole
+        else f"{explanation.text}: {', '.join(explanation.quantities)}"
+        for explanation in found
+    ]
 
 
 def choose_rows(wrong: Mask, most: int) -> slice:
