@@ -66,6 +66,20 @@ def balance(left, omega_2=0.01):
     return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
 
 
+def balanced_lamp(omega_2: float | None = None) -> fourbar.Scene:
+    """Make a parallelogram lamp that a spring of no free length balances.
+
+    Its stiffness is k = m g l/(r h).
+    """
+    arms = fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3)
+    linkage = fourbar.FourBar(0.06, *arms, 0.5 * math.pi)
+    ends = fourbar.Place(1, (0.1, 0.0)), fourbar.Place(2, (0.08, 0.0))
+    spring = fourbar.Spring(*ends, 2.0 * 9.81 * 0.3 / (0.08 * 0.1))
+    swept = fourbar.Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    effects = (fourbar.Gravity(), fourbar.Springs((spring,)))
+    return fourbar.Scene(linkage, fourbar.Motion(swept, omega_2), effects=effects)
+
+
 TURN = crank_rocker(
     motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
     points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),

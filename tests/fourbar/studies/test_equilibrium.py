@@ -39,7 +39,7 @@ from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar.studies.equilibrium import equilibrium
-from tests.support.scenes import CYLINDER, bare, crank_rocker
+from tests.support.scenes import CYLINDER, balanced_lamp, bare, crank_rocker
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
@@ -263,11 +263,11 @@ BACK = Sweep(radians(500.0), radians(-100.0), 300)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("motion", [None, FULL, HALF, BACK])
+@pytest.mark.parametrize("swept", [FULL, HALF, BACK, None])
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("lengths", ONE_CHANGE_POINT)
 def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
-    lengths, branch, motion
+    lengths, branch, swept
 ):
     """An assembly repeats after two turns of the input.
 
@@ -275,27 +275,21 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     torque at no others.
     """
     d, a, b, c = lengths
-    bars = Bar(a, 10.0), Bar(b, 20.0), Bar(c, 20.0)
+    linkage = FourBar(d, Bar(a, 10.0), Bar(b, 20.0), Bar(c, 20.0), 0.5 * pi)
     load = Load(4, force=(0.0, 200.0), from_pin=(c, 0.0))
-    scene = Scene(
-        FourBar(d, *bars, 0.5 * pi),
-        Motion(theta_2=motion, omega_2=0.0, alpha_2=0.0, branch=branch),
-        loads=(load,),
-        effects=(Gravity(9.81, 0.1),),
-    )
-    found = equilibrium(scene).found
+
+    def moving(angles):
+        motion = Motion(angles, 0.0, branch=branch)
+        return Scene(linkage, motion, loads=(load,), effects=(Gravity(9.81, 0.1),))
+
+    found = equilibrium(moving(swept)).found
     assert all(rest.reached for rest in found)
     angles = np.array([rest.place.theta_2 for rest in found])
     assert (np.diff(angles) > 0.0).all()
-    swept = FULL if motion is None else motion
-
-    def solve_at(angles):
-        at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0, branch=branch)
-        return np.asarray(solve(replace(scene, motion=at)).torque)
-
-    torques = solve_at(np.linspace(swept.start, swept.stop, 3000))
+    ends = (swept or FULL).start, (swept or FULL).stop
+    torques = solve(moving(np.linspace(*ends, 3000))).torque
     nothing = 1e-9 * np.nanmax(np.abs(torques))
-    assert np.abs(solve_at(angles)).max() < nothing
+    assert np.abs(solve(moving(angles)).torque).max() < nothing
     signs = np.sign(torques[np.abs(torques) > nothing])
     assert len(angles) == np.sum(signs[1:] != signs[:-1]) > 0
 
@@ -318,15 +312,7 @@ def test_friction_holds_on_past_the_one_change_point():
 
 
 def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated():
-    """A parallelogram lamp and a spring of no free length: k = m g l/(r h)."""
-    arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
-    linkage = FourBar(0.06, *arms, 0.5 * pi)
-    post = Place(1, (0.1, 0.0))
-    stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
-    spring = Springs((Spring(post, Place(2, (0.08, 0.0)), stiffness),))
-    swept = Sweep(radians(-40.0), radians(60.0), 10)
-    scene = Scene(linkage, Motion(swept), effects=(DOWN, spring))
-    rest = equilibrium(scene)
+    rest = equilibrium(balanced_lamp())
     # what rounding leaves of the torque is no torque
     assert not re.search(r"\de-|largest", write_equilibria("lamp", rest))
     ((first, last),) = rest.indifferent
@@ -369,41 +355,43 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("start, count", [("60 deg", 0), ("160 deg", 1)])
-def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, count):
+@pytest.mark.parametrize(
+    "start, turned, angles", [(60.0, 254.5, []), (160.0, 105.5, [167.7867])]
+)
+def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
+    start, turned, angles
+):
     """Two circles close the loop at 5000 angles, along which the pins are followed.
 
     From the first that closes the spring at B is wound by 254.5 deg where the work of
     both would vanish; a sweep that begins beside it has it within half a turn.
     """
-    scene = loads(ROBOT.replace("START", start))
-    theta = np.radians(np.linspace(float(start.split(maxsplit=1)[0]), 170.0, 5000))
+    theta = np.radians(np.linspace(start, 170.0, 5000))
     to_O4 = -6.0 - 4.0 * np.exp(1j * theta)
     theta, to_O4 = theta[np.abs(to_O4) < 8.0], to_O4[np.abs(to_O4) < 8.0]
     d = np.abs(to_O4)
     along = (5.0**2 - 3.0**2 + d**2) / (2.0 * d)
     coupler = (along + 1j * np.sqrt(5.0**2 - along**2)) * to_O4 / d
     theta_3, theta_4 = (np.unwrap(np.angle(u)) for u in (coupler, coupler - to_O4))
-    from_rest = np.array([theta_3 - theta - pi / 2, theta_4 - theta_3 + pi / 2])
-    from_rest -= TURN * np.rint(from_rest[:, :1] / TURN)
-    near = np.argmin(np.abs(theta - radians(167.7867)))
-    wound = float(np.degrees(np.abs(from_rest[1, near])))
-    assert wound == pytest.approx(254.5 if count == 0 else 105.5, abs=0.05)
-    rows = write_equilibria("robot", equilibrium(scene)).splitlines()
-    half_a_turn = theta[np.argmax(np.abs(from_rest[1]) >= pi)]
-    for row in rows:
-        if row.endswith(("wound", "falls", "grows", "stays")):
-            degrees = float(row.split()[0])
-            is_wound = count == 0 and degrees >= math.degrees(half_a_turn)
-            assert row.endswith("wound") == is_wound
-    found = [one for one in equilibrium(scene).found if one.reached]
-    assert len(found) == count
-    if count:
-        assert math.degrees(found[0].place.theta_2) == pytest.approx(167.7867, abs=1e-4)
-    within = np.all(np.abs(from_rest) < pi, axis=0)
-    energy = sum(5.0 * angle**2 for angle in from_rest)
-    assert np.any(np.diff(np.sign(np.diff(energy[within])))) == bool(count)
+    wound = np.array([theta_3 - theta - pi / 2, theta_4 - theta_3 + pi / 2])
+    wound -= TURN * np.rint(wound[:, :1] / TURN)
+    near = np.argmin(np.abs(theta - math.radians(167.7867)))
+    assert math.degrees(abs(wound[1, near])) == pytest.approx(turned, abs=0.05)
+    within = np.all(np.abs(wound) < pi, axis=0)
+    energy = 5.0 * np.sum(wound**2, axis=0)[within]
+    assert np.any(np.diff(np.sign(np.diff(energy)))) == bool(angles)
+
+    found = equilibrium(loads(ROBOT.replace("START", f"{start} deg")))
+    reached = [math.degrees(r.place.theta_2) for r in found.found if r.reached]
+    assert reached == pytest.approx(angles, abs=1e-4)
+    from_here = math.degrees(theta[np.argmax(np.abs(wound[1]) >= pi)])
+    rows = [row.split() for row in write_equilibria("robot", found).splitlines()]
+    ends = [
+        row for row in rows if row and row[-1] in ("wound", "falls", "grows", "stays")
+    ]
+    assert ends
+    for angle, *_, word in ends:
+        assert (word == "wound") == (not angles and float(angle) >= from_here)
 
 
 def springy_table(**motion):
@@ -490,12 +478,12 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     arm = Bar(0.5, 21.0)
     scene = Scene(FourBar(0.6, arm, Bar(0.6, 25.0), arm), Motion(0.0), effects=(DOWN,))
     equilibria = equilibrium(scene)
-    angle = equilibria.positions.theta_2
-    at_change_point = np.abs(np.sin(angle)) < CLOSE
-    falls = -np.sign(np.cos(angle)) * (np.abs(np.cos(angle)) > CLOSE)
-    assert_array_equal(equilibria.moves, np.where(at_change_point, 0, falls))
-    rows = write_equilibria("", equilibria).splitlines()
-    words = {row.split()[0]: row.split()[-1] for row in rows if row.split()}
+    slope = np.cos(equilibria.positions.theta_2)
+    falls = np.where(np.abs(slope) > CLOSE, -np.sign(slope), 0.0)
+    falls[np.abs(np.sin(equilibria.positions.theta_2)) < CLOSE] = 0.0
+    assert_array_equal(equilibria.moves, falls)
+    rows = [row.split() for row in write_equilibria("", equilibria).splitlines()]
+    words = {row[0]: row[-1] for row in rows if row}
     assert [words[angle] for angle in ("0", "180", "360")] == ["change_point"] * 3
 
 
@@ -539,37 +527,38 @@ def test_no_unit_of_length_changes_an_equilibrium(unit):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name, swept, side",
+    "name, start, stop, side",
     [
-        ("theta_3", (1.0, 1.25), {"branch": -1}),
-        ("theta_4", (1.95, 2.4), {"branch": -1}),
-        ("stroke", (0.17, 0.3), {"side": "left"}),
+        ("theta_3", 1.0, 1.25, {"branch": -1}),
+        ("theta_4", 1.95, 2.4, {"branch": -1}),
+        ("stroke", 0.17, 0.3, {"side": "left"}),
     ],
 )
 def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
-    name, swept, side
+    name, start, stop, side
 ):
     """Those of the input swept over the same.
 
     A single position has those of its circuit.
     """
-    motion = Motion(**{name: Sweep(*swept, 90)}, **side)
-    commanded = crank_rocker(motion=motion, effects=(DOWN,), drive=CYLINDER)
+    swept = Motion(**{name: Sweep(start, stop, 90)}, **side)
+    commanded = crank_rocker(motion=swept, effects=(DOWN,), drive=CYLINDER)
     theta_2 = solve(commanded).theta_2
     same = Sweep(float(theta_2.min()), float(theta_2.max()), 90)
-
-    def compare(by_name, by_input):
+    for by_name, by_input in (
+        (swept, Motion(same)),
+        (Motion(**{name: start}, **side), Motion(float(theta_2[0]))),
+    ):
         one, other = (
-            equilibrium(replace(commanded, motion=motion)).found
-            for motion in (by_name, by_input)
+            [(*rest.place, rest.frequency) for rest in equilibrium(scene).found]
+            for scene in (
+                replace(commanded, motion=by_name),
+                replace(commanded, motion=by_input),
+            )
         )
         assert len(one) == len(other) > 0
         for rest, same_rest in zip(one, other, strict=True):
-            assert rest.place == pytest.approx(same_rest.place)
-            assert rest.frequency == pytest.approx(same_rest.frequency)
-
-    compare(motion, Motion(same))
-    compare(Motion(**{name: swept[0]}, **side), Motion(float(theta_2[0])))
+            assert rest == pytest.approx(same_rest)
 
 
 def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency():
