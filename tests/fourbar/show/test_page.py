@@ -174,13 +174,13 @@ def test_an_input_that_turns_fully_goes_round(browse):
 
 @pytest.mark.slow
 def test_an_input_that_does_not_turn_fully_swings(browse):
-    scene = thesis(Sweep(0.0, 2 * pi, 360))
+    scene = thesis(Sweep(0.0, 2 * pi, 180))
     driver = browse(animate.write_page(scene))
     # less than a row per frame
-    slow = "go(200); document.getElementById('speed').value = '0.25'"
+    slow = "go(100); document.getElementById('speed').value = '0.5'"
     driver.execute_script(slow)
-    rows = clockwork(driver, 1200)
-    closes = np.flatnonzero(solve(scene).assembled[20:]) + 20
+    rows = clockwork(driver, 600)
+    closes = np.flatnonzero(solve(scene).assembled[10:]) + 10
     assert (min(rows), max(rows)) == (closes[0], closes[-1])
     assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
 
