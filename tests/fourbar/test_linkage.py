@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Bar, InputError, solve, vary
@@ -29,10 +30,10 @@ def make_scene(stated=ROD):
 def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
     round_bar = Bar("0.4 m", density="7850 kg/m^3", diameter="20 mm")
     flat = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
-    assert round_bar.mass == pytest.approx(STEEL * math.pi * 0.01**2 * 0.4, rel=1e-15)
-    assert flat.mass == pytest.approx(0.314, rel=1e-15)
-    assert Bar("0.66 m", mass_per_length="4.2 kg/m").mass == pytest.approx(2.772)
-    assert flat.moment_of_inertia == pytest.approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
+    assert round_bar.mass == approx(STEEL * math.pi * 0.01**2 * 0.4, rel=1e-15)
+    assert flat.mass == approx(0.314, rel=1e-15)
+    assert Bar("0.66 m", mass_per_length="4.2 kg/m").mass == approx(2.772)
+    assert flat.moment_of_inertia == approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
 
 
 def test_the_section_modulus_is_that_of_the_second_moment_of_area():
@@ -48,8 +49,8 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area():
     }
     for bar, widths in sections.items():
         second_moment = np.trapezoid(widths * y * y, y)
-        assert bar.section_modulus == pytest.approx(second_moment / 0.01, rel=1e-6)
-        assert bar.area == pytest.approx(np.trapezoid(widths, y), rel=1e-6)
+        assert bar.section_modulus == approx(second_moment / 0.01, rel=1e-6)
+        assert bar.area == approx(np.trapezoid(widths, y), rel=1e-6)
     assert Bar(1.0).section_modulus is None
 
 
@@ -71,7 +72,7 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area():
     ],
 )
 def test_a_material_that_states_no_mass_is_refused(stated, key):
-    with pytest.raises(InputError) as error:
+    with raises(InputError) as error:
         Bar(0.4, **stated)
     assert error.value.key == key
 
@@ -86,10 +87,10 @@ output = "0.8 m"
 [bars.coupler]
 density = "7850 kg/m^3"
 """
-    with pytest.raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
+    with raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
         loads(text)
     per_length = text.replace('density = "7850 kg/m^3"', 'mass = "0.25 lb/in"')
-    with pytest.raises(InputError, match=r'mass_per_length = "0\.25 lb'):
+    with raises(InputError, match=r'mass_per_length = "0\.25 lb'):
         loads(per_length)
 
 
@@ -124,7 +125,7 @@ def test_the_sensitivity_to_a_length_counts_the_mass_that_follows(key, stated):
     beside = [nominal * (1.0 - step), nominal * (1.0 + step)]
     low, high = solve(vary(scene, {key: beside})).torque
     quotient = (high - low) / (2.0 * step * nominal)
-    assert derived.by["torque"][row] == pytest.approx(quotient, rel=CLOSE)
+    assert derived.by["torque"][row] == approx(quotient, rel=CLOSE)
 
 
 @pytest.mark.parametrize("stated", [ROD, PER_LENGTH])

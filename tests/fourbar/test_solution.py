@@ -8,6 +8,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import raises
 
 import fourbar
 from fourbar import Point, solve
@@ -27,12 +28,12 @@ def test_a_quantity_is_found_by_its_name():
     assert solution["P"] is solution.points["P"]
     assert solution["v_P"] is solution.velocity["P"]
     for name in ("tork", 0, "F12_x"):
-        with pytest.raises(InputError, match="must be among theta_2, "):
+        with raises(InputError, match="must be among theta_2, "):
             solution[name]
     positions = solve(crank_rocker(), "position")
-    with pytest.raises(InputError, match="'torque': was not evaluated"):
+    with raises(InputError, match="'torque': was not evaluated"):
         positions["torque"]
-    with pytest.raises(TypeError, match="not iterable"):
+    with raises(TypeError, match="not iterable"):
         iter(solution)
 
 
@@ -48,7 +49,7 @@ def test_a_scene_without_a_title_leaves_no_empty_quotes():
 def test_a_solution_is_frozen():
     solution = solve(crank_rocker())
     for name in ("torque", "scene", "title"):
-        with pytest.raises(FrozenInstanceError):
+        with raises(FrozenInstanceError):
             setattr(solution, name, None)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Bar, FourBar, uniform
@@ -207,7 +208,7 @@ def test_a_bar_that_does_not_turn_takes_no_torque(linkage, branch, drive_bar):
     for effects in ((), (Gravity(),), rubbing):
         solution = solved(Scene(linkage, motion, drive_bar, effects=effects))
         assert solution.status == ["no_torque"] * 5
-        assert getattr(solution, f"omega_{drive_bar}") == pytest.approx(np.zeros(5))
+        assert getattr(solution, f"omega_{drive_bar}") == approx(np.zeros(5))
         assert lost(solution, *FORCES) and finite(solution, "alpha_4")
         assert not solution.drive_condition.any()
     for drive, stage in ((drive_bar, "acceleration"), (2, "error")):
@@ -261,16 +262,16 @@ def test_where_it_depends_on_the_position_only_those_positions_are_lost():
 @pytest.mark.parametrize("omega", [1.4e154, -1e200, 1.7e308])
 def test_a_speed_whose_square_is_no_number_is_refused_in_one_line(omega):
     below = r"motion\.omega_2 = [^\n]*: must be below 1\.34078e\+154 rad/s"
-    with pytest.raises(InputError, match=below):
+    with raises(InputError, match=below):
         Motion(0.3, omega)
 
 
 def test_lengths_and_sweeps_beyond_the_range_of_doubles_are_refused():
-    with pytest.raises(InputError, match="lengths = "):
+    with raises(InputError, match="lengths = "):
         FourBar(1e308, *[Bar(1e308, inertia=0.0)] * 3)
     large = FourBar(4e307, *[Bar(4e307)] * 3)
     assert solved(Scene(large, Motion(1.0, 1e-200))).status == ["ok"]
-    with pytest.raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
+    with raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
         Sweep(-1e308, 1e308, 3)
 
 
@@ -373,7 +374,7 @@ def test_figures_without_a_single_force_are_drawn_without_a_word(figure, tmp_pat
 def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path):
     scene = Scene(PARALLELOGRAM, Motion(np.array([0.3]), 1.0), 3)
     said = r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque"
-    with pytest.raises(InputError, match=said):
+    with raises(InputError, match=said):
         draw(scene, tmp_path / "figure.svg", "freebody")
     assert list(tmp_path.iterdir()) == []
 
@@ -406,9 +407,9 @@ def test_a_payload_is_part_of_its_bar_by_the_sums_of_the_page(theta_2):
     )
     loaded = solve(replace(scene, loads=(*scene.loads, load)))
     whole = solve(replace(scene, linkage=replace(scene.linkage, output=carrying)))
-    assert whole.torque == pytest.approx(loaded.torque, rel=1e-12)
+    assert whole.torque == approx(loaded.torque, rel=1e-12)
     for name in ("F12", "F32", "F43", "F14"):
-        assert getattr(whole, name) == pytest.approx(getattr(loaded, name), rel=1e-12)
+        assert getattr(whole, name) == approx(getattr(loaded, name), rel=1e-12)
 
 
 def test_friction_beyond_the_range_of_doubles_is_no_crash():

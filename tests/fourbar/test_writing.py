@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar import InputError
@@ -49,10 +50,10 @@ def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path):
     assert (real.read_bytes(), mode(real)) == (b"through two", 0o600)
     assert [file.name for file in (tmp_path / "far").iterdir()] == ["real"]
     (tmp_path / "round").symlink_to("round")
-    with pytest.raises((OSError, InputError)):
+    with raises((OSError, InputError)):
         write_bytes(tmp_path / "round", b"")
     (tmp_path / "nowhere").symlink_to("no/such/folder")
-    with pytest.raises(InputError, match="no such folder"):
+    with raises(InputError, match="no such folder"):
         write_bytes(tmp_path / "nowhere", b"")
 
 

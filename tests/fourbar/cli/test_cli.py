@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Motion, solve
@@ -222,7 +223,7 @@ def test_degrees_are_of_angles_alone_and_named(run):
         expected = np.degrees(plain[key]) if in_degrees else plain[key]
         assert np.all(np.asarray(turned[key]) == expected), key
     rows = read_csv(run("analyze", CRANK_ROCKER, "--csv", "--units", "SI", "--degrees"))
-    assert float(rows[90]["theta_2 [deg]"]) == pytest.approx(90.0, rel=1e-15)
+    assert float(rows[90]["theta_2 [deg]"]) == approx(90.0, rel=1e-15)
     assert "theta_2" not in rows[0]
 
 
@@ -334,10 +335,10 @@ def test_classify_says_what_turns_and_how_far(run):
     folded = 180.0 + angle(c, d, b - a)
     row = re.search(r"  output: input, coupler stretched +(.*) +open", text)[1]
     cells = [stretched, stretched, 180.0 - angle(a + b, d, c)]
-    assert [float(cell) for cell in row.split()] == pytest.approx(cells, abs=6e-5)
+    assert [float(cell) for cell in row.split()] == approx(cells, abs=6e-5)
     row = re.search(r"  output: input, coupler folded +(.*) +open", text)[1]
     cells = [folded, folded - 180.0]
-    assert [float(cell) for cell in row.split()[:2]] == pytest.approx(cells, abs=6e-5)
+    assert [float(cell) for cell in row.split()[:2]] == approx(cells, abs=6e-5)
     least = angle(d - a, b, c)
     ratio = (folded - stretched) / (360.0 - folded + stretched)
     assert (
@@ -380,7 +381,7 @@ def test_new_writes_a_file_and_names_the_command_that_reads_it(texts, lengths, r
     code, out, _ = run("new", "my wiper.toml", "--lengths", *texts)
     assert code == HOLDS
     assert shlex.split(out.strip())[-3:] == ["fourbar", "analyze", "my wiper.toml"]
-    assert load("my wiper.toml").linkage.lengths == pytest.approx(lengths, rel=1e-15)
+    assert load("my wiper.toml").linkage.lengths == approx(lengths, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -764,7 +765,7 @@ def test_one_position_has_the_angles_that_the_sweep_has_there(run):
     at = [f"--at={theta!r} rad" for theta in sweep.theta_2[rows].tolist()]
     table = strict(run("analyze", scene, "--json", *at))
     for name in ("theta_3", "theta_4"):
-        assert table[name] == pytest.approx(getattr(sweep, name)[rows]), name
+        assert table[name] == approx(getattr(sweep, name)[rows]), name
     block = run("analyze", scene, at[2])[1]
     assert f"{math.degrees(sweep.theta_4[300]):.4f}" in block
     assert abs(sweep.theta_4[300]) > pi

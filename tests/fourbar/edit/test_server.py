@@ -19,6 +19,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from pytest import raises
 
 pytest.importorskip(
     "tornado",
@@ -195,7 +196,7 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
         )  # as it should be, but no WebSocket
         assert await status(address, method="POST", body="x") == 405
         assert not made.pages
-        with pytest.raises(
+        with raises(
             ConnectionRefusedError
         ):  # as is every other address of this machine
             socket.create_connection(("127.0.0.2", int(port)), timeout=1.0)
@@ -649,7 +650,7 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
     monkeypatch.setattr(redirect, "PATIENCE", 0.1)
     first, second = Redirect(tmp_path / "a.toml"), Redirect(tmp_path / "a.toml")
     assert first.claim() and not second.claim()
-    with pytest.raises(InputError, match="has no address"):
+    with raises(InputError, match="has no address"):
         second.read()
     first.remove()
     assert second.claim()
@@ -670,7 +671,7 @@ def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
         os.link(page, tmp_path / "precious")
     if how == "another's":
         monkeypatch.setattr(os, "geteuid", lambda: page.stat().st_uid + 1)
-    with pytest.raises(InputError, match="is another file: move it away"):
+    with raises(InputError, match="is another file: move it away"):
         Redirect(tmp_path / "a.toml").claim()
     assert (page.read_text(), page.stat().st_mode & 0o777) == (content, 0o644)
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx
 
 import fourbar
 from fourbar import load, solve
@@ -196,7 +197,7 @@ class Page:
         chain.move_by_offset(12, -9).move_by_offset(8, -11).release().perform()
         self.wait("!inFlight && !waiting.length && plain.lengths.output !== '220 mm'")
         moved = np.subtract(self.value("at(row).B"), before) * scale
-        assert moved == pytest.approx([20.0, 20.0], abs=PIXELS)
+        assert moved == approx([20.0, 20.0], abs=PIXELS)
 
 
 @pytest.fixture
@@ -279,7 +280,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(page, path):
             page.text(name).replace("−", "-") for name in ("torque", "F12_x", "alpha_4")
         ]
         expected = [solution.torque[row], solution.F12[row, 0], solution.alpha_4[row]]
-        assert [float(text) for text in shown] == pytest.approx(expected, rel=PRINTED)
+        assert [float(text) for text in shown] == approx(expected, rel=PRINTED)
     held = json.loads(page.value("JSON.stringify(table().torque)"))
     assert_array_equal(held, solution.torque)
     cells = page.all("#positions tbody tr:nth-child(4) td")
@@ -322,9 +323,9 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, 
     }
     for name, pin in pins.items():
         vector = stated[name] - stated["O2"]
-        assert vector == pytest.approx(pin, abs=PIXELS * scale)
+        assert vector == approx(pin, abs=PIXELS * scale)
     lengths = page.value("data.lengths")
-    assert [length / 0.0254 for length in lengths] == pytest.approx(
+    assert [length / 0.0254 for length in lengths] == approx(
         [abs(bar) for bar in bars],
         abs=PIXELS * scale,
     )
@@ -332,7 +333,7 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, 
         "const p = at(row); return [p.A, p.B]"
     )  # the position shown is the one drawn
     for place, pin in zip(shown, ("A", "B"), strict=True):
-        assert complex(*place) / 0.0254 == pytest.approx(
+        assert complex(*place) / 0.0254 == approx(
             pins[pin],
             abs=2 * PIXELS * scale,
         )
@@ -368,7 +369,7 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, 
         hypot(1.5, 0.375),
         hypot(0.25, 0.75),
     ]
-    assert page.value("data.lengths") == pytest.approx(
+    assert page.value("data.lengths") == approx(
         expected,
         abs=2e-6,
     )
@@ -408,7 +409,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(page, path
     assert 'from_pin = {x = "300 mm", y = "-250 mm"}' in path.read_text()
     solution = solve(scene)
     stroke = page.value("data.over.values[17]")
-    assert force == pytest.approx(
+    assert force == approx(
         solution.drive_force[np.abs(solution.stroke - stroke).argmin()],
         rel=PRINTED,
     )
@@ -677,7 +678,7 @@ def test_choosing_another_commanded_angle_keeps_the_position(page, path):
     page.wait("plain.motion.theta_4 && data.over.commanded === 'theta_4'")
     speed = page.value("plain.motion.omega_4")
     assert speed.endswith(" rpm")  # as the file stated it
-    assert page.value("grid[row]") == pytest.approx(2.0, abs=0.03)
+    assert page.value("grid[row]") == approx(2.0, abs=0.03)
 
 
 @pytest.mark.slow
@@ -747,7 +748,7 @@ def test_a_photo_is_traced_to_a_scene(page, path):
     page.driver.switch_to.alert.accept()
     page.wait("data.traced.scale && sketch")  # the drawing goes on
     scale = page.value("data.traced.scale") * share
-    assert scale == pytest.approx(0.25e-3, rel=CLICKS / apart)
+    assert scale == approx(0.25e-3, rel=CLICKS / apart)
     for pin in PHOTO:
         click(pin)
     page.wait("plain.pins?.O4[0].endsWith(' cm') && at(row)")
@@ -757,7 +758,7 @@ def test_a_photo_is_traced_to_a_scene(page, path):
     ):
         true = 0.25e-3 * math.dist(PHOTO[one], PHOTO[other])
         off = CLICKS * page.value("1 / view.k") + true * CLICKS / apart
-        assert length == pytest.approx(true, abs=off), (one, other)
+        assert length == approx(true, abs=off), (one, other)
     place("a new point of the coupler", "P")
     off = page.run(
         "const {bar, at: place} = data.points[0], p = toScreen(framed(at(row), bar,"

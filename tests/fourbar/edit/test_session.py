@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from pytest import approx, raises
 
 import fourbar
 from fourbar import InputError, solve
@@ -165,8 +166,8 @@ def test_each_field_that_is_offered_is_one_that_the_file_takes(stated):
     for bar in scene.linkage.moving:
         per_metre = MASS_PER_METRE[stated]
         expected = 0.2 if per_metre is None else per_metre * bar.length
-        assert bar.inertia == pytest.approx(2e-4)
-        assert bar.mass == pytest.approx(expected)
+        assert bar.inertia == approx(2e-4)
+        assert bar.mass == approx(expected)
 
 
 def test_what_a_pair_consists_of_is_read_from_the_declarations():
@@ -224,7 +225,7 @@ def test_a_gesture_is_one_step_back(session):
     heavy = session.now.text
     assert len(session.texts) == 3
     ask(session, "undo")
-    assert session.now.scene.linkage.input.length == pytest.approx(0.13)
+    assert session.now.scene.linkage.input.length == approx(0.13)
     assert 'mass = "0.4 kg"' in session.now.text
     ask(session, "undo")
     assert session.now.text == before
@@ -321,7 +322,7 @@ DRAGGED = {
 def test_what_is_dragged_stands_where_it_was_dragged_to(loaded, name):
     what, place_of = DRAGGED[name]
     to = {"B": 0.2 + 0.25j, "O4": 0.33 + 0.05j}.get(name, TO)
-    assert place_of(drag(loaded, what, to)) == pytest.approx(to, abs=3 * PIXEL)
+    assert place_of(drag(loaded, what, to)) == approx(to, abs=3 * PIXEL)
     if name == "P":
         assert loaded.now.plain["points"]["P"]["from_pin"][0].endswith(" in")
     if name == "by coordinates":
@@ -333,7 +334,7 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(loaded, name):
 def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session):
     """O2 cannot be dragged."""
     length = abs(complex(*drag(session, "A", 0.08 + 0.09j).A[0]))
-    assert length == pytest.approx(abs(0.08 + 0.09j), abs=PIXEL)
+    assert length == approx(abs(0.08 + 0.09j), abs=PIXEL)
     shown = {"grain": 1.0, "theta_2": 0.0, "branch": 1}
     assert "refused" in ask(session, "drag", what="O2", to=[0, 0], **shown)
 
@@ -351,10 +352,10 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays
     arrow = 0.05 * np.exp(0.7j)
     s = drag(loaded, [*path, "force"], TO + arrow, stretch=2.0)
     pull, angle = loaded.now.scene.loads[3].force
-    assert pull == pytest.approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
+    assert pull == approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
     turned = angle + (float(s.theta_3[0]) if frame == "bar" else 0.0)
     acts = pull * np.exp(1j * turned)
-    assert np.angle(acts / arrow) == pytest.approx(0.0, abs=0.02)
+    assert np.angle(acts / arrow) == approx(0.0, abs=0.02)
 
 
 def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
@@ -364,7 +365,7 @@ def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
         accepted(ask(loaded, "restate", path=path, by=by))
         assert isinstance(loaded.now.plain["loads"][3]["from_pin"], kind)
         point = loaded.now.scene.loads[3].from_pin
-        assert point == pytest.approx(stated, rel=1e-5)
+        assert point == approx(stated, rel=1e-5)
     for wrong, by in ((path, "z"), (["lengths"], "xy"), (["no"], "xy")):
         assert "refused" in ask(loaded, "restate", path=wrong, by=by)
 
@@ -381,7 +382,7 @@ def test_another_command_goes_over_the_same_motion(tmp_path, command):
     assert after.assembled.all() and np.isfinite(after.drive_force).all()
     values, places = getattr(before, command), getattr(after, command)
     close = 3e-3 * np.ptp(values)
-    assert sorted(places[[0, -1]]) == pytest.approx(sorted(values[[0, -1]]), abs=close)
+    assert sorted(places[[0, -1]]) == approx(sorted(values[[0, -1]]), abs=close)
     order = np.argsort(values)
     for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
         poses = np.unwrap(getattr(before, name))[order]
@@ -409,7 +410,7 @@ def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(tmp_path):
     assert re.fullmatch(words, refused), refused
     far = session.now.scene.motion.replace(angle=7.0)
     state = session.now._replace(scene=replace(session.now.scene, motion=far))
-    with pytest.raises(InputError, match=r"stroke = 7000 mm: .* mm$"):
+    with raises(InputError, match=r"stroke = 7000 mm: .* mm$"):
         state.evaluate(session.now.units, settled=True)
 
 
@@ -417,7 +418,7 @@ def test_a_state_that_assembles_nowhere_names_what_it_commands(session):
     """The output of this linkage rocks, and does not come to 0 deg."""
     scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))
     words = r"^motion\.theta_4: .*; theta_4 goes from"
-    with pytest.raises(fourbar.NotAssembledError, match=words):
+    with raises(fourbar.NotAssembledError, match=words):
         evaluate_scene(scene, {})
 
 
@@ -450,7 +451,7 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(new, side):
     A, B, O4 = (INCH * complex(x, side * y) for x, y in PINS_DRAWN[1:])
     s = solve_at(new.now.scene, np.angle(A), "position")
     stands = [complex(*s.A[0]), complex(*s.B[0]), on_bar(s, 4, 0.0)]
-    assert stands == pytest.approx([A, B, O4], abs=1e-6)
+    assert stands == approx([A, B, O4], abs=1e-6)
     assert solve(new.now.scene).assembled.any()
     before = new.now.plain["pins"]
     to = INCH * (0.5 + 0.25j)
@@ -464,7 +465,7 @@ def test_what_was_typed_stays_when_another_linkage_is_drawn(new):
     draw(new, [[0, 0], [3, 4], [14, 12], [12, -5]], grain=0.01)
     assert new.now.plain["bars"]["coupler"]["mass"] == "3 lb"
     drawn = INCH * math.hypot(11, 8)
-    assert new.now.scene.linkage.coupler.length == pytest.approx(drawn, abs=INCH * 0.01)
+    assert new.now.scene.linkage.coupler.length == approx(drawn, abs=INCH * 0.01)
 
 
 @pytest.mark.parametrize(
@@ -615,7 +616,7 @@ def test_a_session_goes_on_where_it_stopped(session):
     assert again.token != session.token
     assert (again.now.text, again.kept) == (session.now.text, session.kept)
     assert again.compared()["compared"] == "state 1"
-    assert again.pressure == pytest.approx(210e5)
+    assert again.pressure == approx(210e5)
     assert again.answer()["pressure"] == "210 bar"
     assert '"105 mm"' in ask(again, "undo")["text"]
     ask(again, "save")
@@ -650,7 +651,7 @@ def test_a_damaged_state_file_is_one_line(session, name):
     assert replaced
     session.state_file.write_text(damaged)
     words = r"cannot be read as a state of the workbench .* remove it"
-    with pytest.raises(InputError, match=words) as caught:
+    with raises(InputError, match=words) as caught:
         Session(session.path, session.exports.folder)
     said = str(caught.value)
     assert "\n" not in said and str(session.state_file) in said
@@ -668,7 +669,7 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
     monkeypatch.setattr("fourbar.edit.session.LARGEST_STATE", largest)
     monkeypatch.setattr("fourbar.edit.session.MOST_CHARACTERS", MOST_CHARACTERS // 10)
     large = session.now.text + "".join(f"# {'µ' * 100} {n}\n" for n in range(190))
-    assert len(large) == pytest.approx(20_500, rel=0.05)
+    assert len(large) == approx(20_500, rel=0.05)
     ask(session, "text", text=large)
     for size in range(1, 531):
         put(session, "lengths/input", f"{100 + 0.01 * size:.2f} mm", gesture=size)
@@ -788,7 +789,7 @@ def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
     draw(session, grain=0.01)
     traced = session.answer()["data"]["traced"]
     assert traced["file"] == name
-    assert traced["shift"] == pytest.approx((0.0, 0.0))
+    assert traced["shift"] == approx((0.0, 0.0))
 
 
 def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(new):
@@ -798,7 +799,7 @@ def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(new):
     assert not first["fresh"] and not first["changed"] and first["refer"]
     assert first["plain"]["picture"] == picture["plain"]["picture"]
     per_length = [bar.mass / bar.length for bar in new.now.scene.linkage.moving]
-    assert per_length == pytest.approx(per_length[:1] * 3, rel=FOUR_DIGITS)
+    assert per_length == approx(per_length[:1] * 3, rel=FOUR_DIGITS)
     again = draw(new, [*PINS_DRAWN[:3], [12, -6]])
     assert again["changed"] and not again["refer"]
 

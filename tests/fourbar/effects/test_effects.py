@@ -6,6 +6,7 @@ from math import pi, tau
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar.effects import (
@@ -106,7 +107,7 @@ def test_the_torque_is_the_slope_of_the_energy(effect, energy):
         for step in (STEP, -STEP)
     )
     slope = (ahead - behind) / (2.0 * STEP)
-    assert solve(scene).torque == pytest.approx(slope, abs=SECOND_ORDER, rel=0)
+    assert solve(scene).torque == approx(slope, abs=SECOND_ORDER, rel=0)
 
 
 def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
@@ -125,7 +126,7 @@ def test_a_flywheel_is_inertia_of_the_bar(bar, name):
     for quantity in ("torque", "F12", "F32", "F43", "F14"):
         right = getattr(by_bar, quantity)
         allowed = LAST_DIGITS * np.abs(right).max()
-        assert getattr(by_wheel, quantity) == pytest.approx(right, abs=allowed)
+        assert getattr(by_wheel, quantity) == approx(right, abs=allowed)
 
 
 JAMS = math.nan, math.nan
@@ -151,9 +152,9 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     """
     sliding = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
     assert sliding.number[0] == number
-    assert sliding.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True)
+    assert sliding.x[0, 0] == approx(x, rel=1e-15, nan_ok=True)
     if number != NO_SOLUTION:
-        assert sliding.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS)
+        assert sliding.from_jamming[0] == approx(far, rel=LAST_DIGITS)
 
 
 @pytest.mark.parametrize(
@@ -171,13 +172,13 @@ def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(c1, c2, number
     sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
     assert [*sliding.number] == [number, ONE_SOLUTION]
     slight = 0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)
-    assert sliding.x[1] == pytest.approx(slight, rel=1e-12)
+    assert sliding.x[1] == approx(slight, rel=1e-12)
     if number != NO_SOLUTION:
         right = 1.0 / (1.0 - c1), 2.0 / (1.0 - c2)
-        assert sliding.x[0] == pytest.approx(right, rel=1e-12)
+        assert sliding.x[0] == approx(right, rel=1e-12)
         # both slopes are 1 - k c where F + C x keeps the sense of F
         far = min(1.0, 1.0 - c1, 1.0 - c2)
-        assert sliding.from_jamming[0] == pytest.approx(far, rel=1e-12)
+        assert sliding.from_jamming[0] == approx(far, rel=1e-12)
 
 
 def test_jamming_is_a_status_and_leaves_no_force():
@@ -203,12 +204,12 @@ def test_at_rest_the_interval_is_that_of_beginning_to_move(friction):
         solve(replace(scene, motion=scene.motion.replace(speed=speed))).torque
         for speed in (1e-9, -1e-9)
     ]
-    assert rest.torque_high == pytest.approx(np.maximum(*slow), rel=1e-13)
-    assert rest.torque_low == pytest.approx(np.minimum(*slow), rel=1e-13)
+    assert rest.torque_high == approx(np.maximum(*slow), rel=1e-13)
+    assert rest.torque_low == approx(np.minimum(*slow), rel=1e-13)
     assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()
     for side, beginning in zip((1, -1), slow, strict=True):
         begun = solve(scene, "force", side=side).torque
-        assert begun == pytest.approx(beginning, rel=1e-13)
+        assert begun == approx(beginning, rel=1e-13)
     bare = solve(crank_rocker())
     assert bare.torque_low is bare.torque_high is bare.friction_residual is None
 
@@ -216,7 +217,7 @@ def test_at_rest_the_interval_is_that_of_beginning_to_move(friction):
 def test_pin_load_friction_needs_the_pin_forces():
     motion = Motion(1.0, 0.0, free=fourbar.Free(1.0, 10))
     friction = PinFriction.at(A=(0.1, 0.01))
-    with pytest.raises(LimitError, match="pin forces"):
+    with raises(LimitError, match="pin forces"):
         solve(crank_rocker(motion=motion, effects=(friction,)))
 
 
@@ -224,12 +225,12 @@ def test_a_table_is_linear_between_its_points_and_periodic():
     table = Table((1.0, 2.0, 1.0 + tau), (0.0, 4.0, 0.0))
     angles = np.array([1.0, 1.25, 2.0, 1.5 - tau, 1.25 + 3 * tau])
     right = [0.0, 1.0, 4.0, 2.0, 1.0]
-    assert table.at(angles) == pytest.approx(right, abs=1e-14)
+    assert table.at(angles) == approx(right, abs=1e-14)
     looked_up = [look_up(table, angle) for angle in angles.tolist()]
-    assert looked_up == pytest.approx(right, abs=1e-14)
+    assert looked_up == approx(right, abs=1e-14)
     quarter = Table(("0 deg", "90 deg"), (0.0, 1.0))
     covered = "covers 0 to 90 deg; the position at 120 deg lies outside"
-    with pytest.raises(InputError, match=covered):
+    with raises(InputError, match=covered):
         quarter.at(np.radians([45.0, 120.0]))
 
 
@@ -239,7 +240,7 @@ def test_a_load_over_theta_2_is_the_load_times_its_factor():
     base = alone(theta_2=[pi / 2])
     tabled = replace(base, loads=(replace(load, table=table),))
     twice = replace(base, loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
-    assert solve(tabled).torque == pytest.approx(solve(twice).torque, rel=1e-14)
+    assert solve(tabled).torque == approx(solve(twice).torque, rel=1e-14)
 
 
 def test_breaks_change_their_sign_where_forces_jump_or_bend():
@@ -292,6 +293,6 @@ SAME_BAR = Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0))
     ],
 )
 def test_bad_input_names_its_key(make, key):
-    with pytest.raises(InputError) as error:
+    with raises(InputError) as error:
         make()
     assert error.value.key == key

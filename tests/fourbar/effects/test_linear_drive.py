@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx, raises
 
 import fourbar
 from fourbar import FourBar, InputError, LinearDrive, Motion, Scene, solve, uniform
@@ -198,7 +199,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
         assert np.isnan(getattr(s, name)[lost]).all(), name
     if drive is CROSSES_O2:
         assert s.drive_condition[0] < 1e-15 and abs(s.stroke_speed[0]) < 1e-15
-        assert s.stroke[0] == pytest.approx(0.1)
+        assert s.stroke[0] == approx(0.1)
         assert solve(scene, at=command_at(scene, np.zeros(1))).status == ["no_lever"]
 
 
@@ -217,7 +218,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
 )
 def test_ends_that_keep_their_distance_are_refused_in_one_line(start, end):
     drive = LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
-    with pytest.raises(
+    with raises(
         InputError,
         match=r"^drive\.to = .*keeps its distance from `from`",
     ):
@@ -247,7 +248,7 @@ TO = 'to = { bar = 4, from_pin = ["9 cm", "0 deg"] }\n'
     ],
 )
 def test_a_file_with_a_wrong_drive_is_refused_in_one_line(drive, says):
-    with pytest.raises(InputError, match=says) as caught:
+    with raises(InputError, match=says) as caught:
         loads(TEXT + drive, "scene.toml")
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("scene.toml: ")
@@ -258,17 +259,17 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
     again = loads(dump(scene))
     assert again.drive == scene.drive
     assert again.drive.start.bar == 1 and again.drive.end == Place(4, (0.09, 0.0))
-    assert again.drive.start.from_pin == pytest.approx((0.21, math.radians(-60)))
+    assert again.drive.start.from_pin == approx((0.21, math.radians(-60)))
     assert again.drive_bar is None
     assert '"drive_bar": null' in write_json(solve(again))
-    with pytest.raises(
+    with raises(
         InputError,
         match="a drive is a couple on a bar or a force",
     ):
         replace(scene, drive_bar=3)
-    with pytest.raises(InputError, match="out = 'torque'"):
+    with raises(InputError, match="out = 'torque'"):
         solve(scene, out={"torque": np.empty(1)})
-    with pytest.raises(
+    with raises(
         InputError,
         match=r"drive\.from\.bar = .*same for every member",
     ):
@@ -298,7 +299,7 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
 def test_files_of_simulators_refuse_it_by_name():
     scene = driven(1, 4, loads=())
     for write in (write_sdf, write_usd):
-        with pytest.raises(fourbar.FourBarError, match="a drive that exerts a force"):
+        with raises(fourbar.FourBarError, match="a drive that exerts a force"):
             write(scene)
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Motion, Point, Spring, solve
@@ -34,7 +35,7 @@ def test_a_weight_hung_at_the_tip_of_the_rocker():
 
 def test_a_pull_at_the_tip_of_massless_bars():
     torque = solve(loads(PULL)).torque
-    assert torque[0] == pytest.approx(1.656231, abs=PRINTED)
+    assert torque[0] == approx(1.656231, abs=PRINTED)
 
 
 PLACES = {
@@ -146,7 +147,7 @@ def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder():
         torques = solve(loaded).torque, solve(sprung).torque
         drives.append([*torques, pushing])
         settled = loaded.settled().loads[0].place
-        assert settled.vector() == pytest.approx(place)
+        assert settled.vector() == approx(place)
     assert_allclose(drives[1], drives[0], rtol=1e-9)
     assert_array_equal(drives[2], drives[0])
 
@@ -215,7 +216,7 @@ def test_every_form_reads_back_as_it_was_written():
     ],
 )
 def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(old, new, words):
-    with pytest.raises(InputError) as refused:
+    with raises(InputError) as refused:
         loads(EVERY_FORM.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)
 
@@ -238,12 +239,12 @@ def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(old, new, 
     ],
 )
 def test_python_refuses_what_is_no_place(make):
-    with pytest.raises(InputError):
+    with raises(InputError):
         make()
 
 
 def test_places_of_loads_are_given_by_keyword():
-    with pytest.raises(TypeError):
+    with raises(TypeError):
         Load(3, (1.0, 0.0), (0.1, 0.0))
 
 

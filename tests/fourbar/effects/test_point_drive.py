@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Motion, Point, solve
@@ -40,13 +41,13 @@ frame = "bar"
 def test_pliers_multiply_the_force_of_the_hand():
     """Right: omega_4/omega_2 0.1332544 and a force ratio of 4.26/0.1332544 = 31.969."""
     s = solve(loads(HELD))
-    assert s.omega_4[0] / s.omega_2[0] == pytest.approx(0.1332544, abs=5e-8)
+    assert s.omega_4[0] / s.omega_2[0] == approx(0.1332544, abs=5e-8)
     grip = 4.4482216152605
-    assert grip / s.drive_force[0] == pytest.approx(31.969, abs=5e-4)
+    assert grip / s.drive_force[0] == approx(31.969, abs=5e-4)
     # the same by the speeds of the two points
     handle, jaw = s.velocity["handle"][0], s.velocity["jaw"][0]
     ratio = np.hypot(*handle) / np.hypot(*jaw)
-    assert grip / s.drive_force[0] == pytest.approx(ratio, rel=1e-12)
+    assert grip / s.drive_force[0] == approx(ratio, rel=1e-12)
 
 
 def driven(bar, frame, **changes):
@@ -137,12 +138,12 @@ def test_a_study_and_a_file_carry_it():
     ],
 )
 def test_a_drive_that_is_stated_wrongly_is_refused_in_one_line(old, new, words):
-    with pytest.raises(InputError) as refused:
+    with raises(InputError) as refused:
         loads(HELD.replace(old, new, 1))
     assert words in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_stroke_is_of_a_cylinder_alone():
     motion = Motion(stroke=0.3, stroke_speed=0.1, side="left")
-    with pytest.raises(InputError, match="no cylinder"):
+    with raises(InputError, match="no cylinder"):
         crank_rocker(drive=PointDrive(Place(2, (0.1, 0.0)), 1.0), motion=motion)

@@ -11,6 +11,7 @@ from math import radians, sqrt
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx
 from scipy.integrate import quad
 
 import fourbar
@@ -107,21 +108,21 @@ def test_the_door_is_held_by_what_its_energy_asks():
     ]
     assert_allclose(s.torque, right, rtol=SLOPES)
     fastened = solve(make_door('theta_2 = "40 deg"\nomega_2 = "0 rad/s"', ""))
-    assert s.torque[0] - fastened.torque[0] == pytest.approx(0.0265373, abs=6e-8)
+    assert s.torque[0] - fastened.torque[0] == approx(0.0265373, abs=6e-8)
 
 
 def test_a_door_without_other_forces_is_free_beyond_the_springs_length():
     scene = make_door('theta_2 = ["40 deg", "120 deg"]\nomega_2 = "0 rad/s"')
     alone = replace(scene, loads=(), effects=scene.effects[-1:])
     torque = solve(alone).torque
-    assert torque[0] == 0.0 and torque[1] == pytest.approx(0.0506291, abs=6e-8)
+    assert torque[0] == 0.0 and torque[1] == approx(0.0506291, abs=6e-8)
 
 
 @pytest.mark.slow
 def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
     found = equilibrium(make_door(sweep, "")).found
-    assert [math.degrees(one.place.theta_2) for one in found] == pytest.approx(
+    assert [math.degrees(one.place.theta_2) for one in found] == approx(
         [80.88], abs=5e-3
     )
     assert equilibrium(make_door(sweep)).found == ()
@@ -142,9 +143,9 @@ def test_a_released_door_arrives_as_its_energy_says():
     end = float(s.theta_2[row])
     # with theta = start - x^2 the integrand has a value where the door is let go
     time, _ = quad(lambda x: 2.0 * x / speed(start - x * x), 1e-6, sqrt(start - end))
-    assert s.omega_2[row] == pytest.approx(-speed(end), rel=1e-6)
-    assert s.time[row] == pytest.approx(time, rel=1e-4)
-    assert (time, speed(end)) == pytest.approx((31.83e-3, 139.4), rel=1e-3)
+    assert s.omega_2[row] == approx(-speed(end), rel=1e-6)
+    assert s.time[row] == approx(time, rel=1e-4)
+    assert (time, speed(end)) == approx((31.83e-3, 139.4), rel=1e-3)
 
 
 ENDS = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))

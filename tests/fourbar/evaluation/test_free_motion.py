@@ -11,6 +11,7 @@ from math import pi
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx, raises
 
 import fourbar
 from fourbar import (
@@ -101,7 +102,7 @@ def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar):
     start = solve(Scene(linkage, Motion(0.3, 1.0)), "velocity")
     angle, speed = {2: (s.theta_2, 1.0), 4: (s.theta_4, start.omega_4[0])}[bar]
     turned = speed * times + 0.2 * times**2
-    assert angle - angle[0] == pytest.approx(turned, abs=1e-11)
+    assert angle - angle[0] == approx(turned, abs=1e-11)
 
 
 def test_dry_friction_holds():
@@ -220,7 +221,7 @@ def test_a_release_is_computed_once_and_solved_as_any_command():
     ],
 )
 def test_what_is_not_released_is_refused(motion, says):
-    with pytest.raises(fourbar.InputError, match=says):
+    with raises(fourbar.InputError, match=says):
         release(replace(SWING, motion=motion))
 
 
@@ -292,7 +293,7 @@ def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin, 
     assert not s.alpha_2.any()
     for force in PINS:
         held = np.broadcast_to(getattr(driven, force), (5, 2))
-        assert getattr(s, force) == pytest.approx(held, rel=0.0, abs=1e-12)
+        assert getattr(s, force) == approx(held, rel=0.0, abs=1e-12)
 
 
 def test_what_begins_to_move_against_friction_does_so_at_once():
@@ -313,7 +314,7 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
     """
     ends = Place(3, (0.25, 0.0)), Place(4, (0.22, 0.0))
     on_B = fourbar.Spring(*ends, 200.0, 0.05, preload)
-    with pytest.raises(LimitError, match="springs: two points coincide"):
+    with raises(LimitError, match="springs: two points coincide"):
         release(let_go(0.5, 0.0, 1.0, 50, DOWN, Springs((on_B,))))
     proportional = replace(on_B, length=0.0, preload=0.0)  # pulls with 0 there
     alone = let_go(0.5, 0.0, 1.0, 50, DOWN)
@@ -334,7 +335,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
         turned = 0.5 - 0.2 if speed < 0.0 else pi - (0.5 - 0.2)
         right = [(turned + k * pi) / 10.0 for k in range(5)]
         right = [t for t in right if t < 1.5]
-        assert released.change_points == pytest.approx(right, abs=1e-9)
+        assert released.change_points == approx(right, abs=1e-9)
         assert np.abs(released.omega_2 - speed).max() < 1e-9
 
 
@@ -344,7 +345,7 @@ def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)
     assert len(release(still).time) == 5
     wound = r"effects\.torsion: at 0.*more than half a turn"
-    with pytest.raises(LimitError, match=wound):
+    with raises(LimitError, match=wound):
         release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))
 
 
@@ -376,4 +377,4 @@ def test_the_drift_is_a_part_of_the_largest_energy_or_work(
             for bar, v, w in zip(HANGING.moving, velocities, speeds, strict=True)
         )
         drift = power * times[-1] / energy
-    assert released.energy_drift == pytest.approx(drift, rel=1e-6)
+    assert released.energy_drift == approx(drift, rel=1e-6)

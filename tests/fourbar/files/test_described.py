@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Place, effects, solve
@@ -182,7 +183,7 @@ def test_its_numbers_vary_by_their_keys(scene):
     study = fourbar.vary(scene, {key: [3.0, 4.0, 6.0]})
     three, four, six = solve(study).torque.ravel()
     assert three == solve(scene).torque != four
-    assert six - four == pytest.approx(2.0 * (four - three), rel=1e-12)
+    assert six - four == approx(2.0 * (four - three), rel=1e-12)
 
 
 def test_its_places_are_handles_and_symbols(scene):
@@ -221,7 +222,7 @@ def test_a_drag_changes_the_numbers_of_an_entry(scene):
     dragged = Dragged([*end.path], to, 1e-6, theta_2, 1)
     drag(document, scene, {}, dragged)
     second = loads(document.text()).effects[0].rows[1]
-    assert cmath.rect(*second.end.from_centre) == pytest.approx(wanted, abs=1e-6)
+    assert cmath.rect(*second.end.from_centre) == approx(wanted, abs=1e-6)
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Motion, Scene, from_pins, solve
@@ -97,18 +98,18 @@ def test_lengths_angles_and_assembly_are_those_of_the_pins():
     scene = loads(DRAWN + '[motion]\ntheta_2 = "drawn"\n')
     d, a, b, c = scene.linkage.lengths
     assert (d, a) == (hypot(0.25, 0.05), 0.1)
-    assert b == pytest.approx(hypot(0.175, 0.05), rel=4 * EPS)
-    assert c == pytest.approx(0.075, rel=4 * EPS)
+    assert b == approx(hypot(0.175, 0.05), rel=4 * EPS)
+    assert c == approx(0.075, rel=4 * EPS)
     assert scene.linkage.ground_angle == math.atan2(0.05, 0.25)
-    assert scene.motion.theta_2 == pytest.approx(0.5 * pi, abs=4 * EPS)
+    assert scene.motion.theta_2 == approx(0.5 * pi, abs=4 * EPS)
 
 
 @pytest.mark.parametrize("bar", (2, 3, 4))
 def test_every_command_is_on_the_assembly_that_is_drawn(bar):
     scene = loads(f'{DRAWN}[motion]\n{COMMAND_NAMES[bar][0]} = "drawn"\n')
     here = solve(scene)
-    assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-15)
-    assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-14)
+    assert here.A[0] == approx([0.0, 0.1], abs=1e-15)
+    assert here.B[0] == approx([0.175, 0.05], abs=1e-14)
 
 
 def test_places_of_the_drawing_are_where_they_are_drawn():
@@ -128,9 +129,9 @@ def test_places_of_the_drawing_are_where_they_are_drawn():
     table = solve(scene).to_pandas()
     for bar, place in places.items():
         shown = [table[f"P{bar}_{axis}"][0] * 1e3 for axis in "xy"]
-        assert shown == pytest.approx(place, abs=1e-10)
-    assert table["G3_x"][0] == pytest.approx(0.1, abs=1e-14)
-    assert [table["A_x"][0], table["A_y"][0]] == pytest.approx([0.0, 0.1], abs=1e-14)
+        assert shown == approx(place, abs=1e-10)
+    assert table["G3_x"][0] == approx(0.1, abs=1e-14)
+    assert [table["A_x"][0], table["A_y"][0]] == approx([0.0, 0.1], abs=1e-14)
     assert loads(dump(scene)) == scene and "[pins]" in dump(scene)
 
 
@@ -159,7 +160,7 @@ PLACE ["120 mm", "80 mm"] CLOSED
         (short.replace("bar = 3, ", ""), "must name the bar it is of"),
         (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "left out"),
     ):
-        with pytest.raises(InputError, match=said):
+        with raises(InputError, match=said):
             loads(DRAWN + text)
 
 
@@ -176,9 +177,9 @@ side = "drawn"
 def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
     scene = loads(DRAWN + CYLINDER)
     here = solve(scene)
-    assert scene.motion.stroke == pytest.approx(hypot(0.09, 0.11), rel=4 * EPS)
-    assert here.A[0] == pytest.approx([0.0, 0.1], abs=1e-14)
-    assert here.B[0] == pytest.approx([0.175, 0.05], abs=1e-13)
+    assert scene.motion.stroke == approx(hypot(0.09, 0.11), rel=4 * EPS)
+    assert here.A[0] == approx([0.0, 0.1], abs=1e-14)
+    assert here.B[0] == approx([0.175, 0.05], abs=1e-13)
 
 
 def test_a_side_that_is_left_out_is_the_drawn_one():
@@ -202,7 +203,7 @@ to = { bar = 4, from_pin = { drawn = ["200 mm", "50 mm"] } }
 @pytest.mark.parametrize("side", ["", 'side = "drawn"\n'])
 def test_a_drawn_stroke_without_its_cylinder_is_refused(drive, side):
     """The drive is wrong, and not a side that the file need not state."""
-    with pytest.raises(InputError, match=r"is of a cylinder \(\[drive\]\)") as raised:
+    with raises(InputError, match=r"is of a cylinder \(\[drive\]\)") as raised:
         loads(DRAWN + drive + '[motion]\nstroke = "drawn"\n' + side)
     assert raised.value.key == "motion.stroke"
 
@@ -254,17 +255,17 @@ def test_the_default_sweep_holds_the_drawn_position():
     ],
 )
 def test_a_drawing_that_is_none_is_refused(change, says):
-    with pytest.raises(InputError, match=says):
+    with raises(InputError, match=says):
         loads(DRAWN.replace(*change))
 
 
 def test_a_drawing_on_a_change_point_is_refused():
-    with pytest.raises(InputError, match="lie in one line: at a change point"):
+    with raises(InputError, match="lie in one line: at a change point"):
         from_pins((0, 0), (1, 0), (4, 0), (3, 0))
 
 
 def test_the_word_needs_a_drawing():
-    with pytest.raises(InputError, match=r"the scene has no \[pins\]"):
+    with raises(InputError, match=r"the scene has no \[pins\]"):
         loads(LENGTHS + '[motion]\ntheta_2 = "drawn"\n')
 
 
@@ -281,7 +282,7 @@ def test_mjcf_stands_where_the_drawing_has_it():
     mujoco.mj_forward(model, data)
     places = {"O2": (-0.02, 0.007), "A": (0.0, 0.1), "O4": (0.25, 0.05)}
     for name, place in places.items():
-        assert data.site(name).xpos[:2] == pytest.approx(place, abs=1e-9)
+        assert data.site(name).xpos[:2] == approx(place, abs=1e-9)
 
 
 @pytest.mark.slow
@@ -303,7 +304,7 @@ def test_a_parallelogram_drawn_on_a_grid_is_one():
         pins = (O2, O2 + arm, O2 + arm + base, O2 + base)
         scene = loads(write_pins(pins))
         tried += 1
-        recognised += scene.linkage.ground == pytest.approx(
+        recognised += scene.linkage.ground == approx(
             scene.linkage.coupler.length,
             rel=1e-14,
         )
@@ -356,7 +357,7 @@ def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar):
     folded = {2: (0, 300, 300 + 200j, 300), 4: (0, 150 + 80j, 0, 300)}[bar]
     motion = f'[motion]\ntheta_{bar} = "drawn"\nomega_{bar} = "1 rad/s"\n'
     text = write_pins(folded) + motion
-    with pytest.raises(InputError, match="stands still: command another bar"):
+    with raises(InputError, match="stands still: command another bar"):
         loads(text)
     other = 6 - bar
     scene = loads(text.replace(f"_{bar} =", f"_{other} ="))

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar.cli import status
@@ -518,7 +519,7 @@ def test_an_open_file_is_read(encode, tmp_path):
 
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"x" * (LARGEST_SCENE_FILE + 1)])
 def test_a_stream_that_holds_no_scene_is_refused(content):
-    with pytest.raises(InputError, match="scene file = 'stream'"):
+    with raises(InputError, match="scene file = 'stream'"):
         load(io.BytesIO(content))
 
 
@@ -528,7 +529,7 @@ def test_hostile_names(name, tmp_path, capsys):
 
 
 def test_a_name_that_no_file_can_have():
-    with pytest.raises(InputError, match="cannot be read"):
+    with raises(InputError, match="cannot be read"):
         read_scene_text("nul\0.toml")
 
 
@@ -632,7 +633,7 @@ def test_bad_arguments(arguments, words, tmp_path, capsys):
 def test_large_nonsense_is_answered_soon(pattern):
     text = pattern * (LARGEST_SCENE_FILE // len(pattern))
     started = time.process_time()
-    with pytest.raises(FourBarError):
+    with raises(FourBarError):
         loads(text, "nonsense")
     assert time.process_time() - started < PATIENCE
 
@@ -646,7 +647,7 @@ def test_large_files_without_a_repeated_key_are_answered_soon(pattern):
         pattern.format(n=n) for n in range(LARGEST_SCENE_FILE // (len(pattern) + 3))
     )
     started = time.process_time()
-    with pytest.raises(FourBarError):
+    with raises(FourBarError):
         loads(text, "nonsense")
     assert time.process_time() - started < PATIENCE
 
@@ -714,9 +715,9 @@ force = { x = "3 N", y = "-4 N" }
 gravity = { x = "1.5 m/s^2", y = "-9.81 m/s^2" }
 """
     scene = loads(text)
-    assert scene.loads[0].force == pytest.approx((5.0, np.arctan2(-4.0, 3.0)))
+    assert scene.loads[0].force == approx((5.0, np.arctan2(-4.0, 3.0)))
     (gravity,) = scene.effects
-    assert gravity.magnitude == pytest.approx(np.hypot(1.5, 9.81))
+    assert gravity.magnitude == approx(np.hypot(1.5, 9.81))
     written = fourbar.dump(scene)
     assert 'force = { x = "3.0 N", y = "-4.0 N" }' in written
     assert loads(written).loads == scene.loads
@@ -781,11 +782,11 @@ def test_a_number_without_a_unit_is_suggested_in_that_of_its_neighbours(
 ):
     assert IN_OTHER_UNITS.count(old) == 1
     loads(IN_OTHER_UNITS)
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         loads(IN_OTHER_UNITS.replace(old, new))
     assert f'the unit is missing; did you mean "{meant}"?' in str(caught.value)
 
 
 def test_lengths_of_a_new_scene_without_a_unit_are_suggested_alike():
-    with pytest.raises(InputError, match='did you mean "4 in"'):
+    with raises(InputError, match='did you mean "4 in"'):
         write_new_scene(["12 in", "4", "10 in", "9 in"])

@@ -8,6 +8,7 @@ from math import pi
 import mpmath as mp
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Motion, Scene, solve
@@ -157,7 +158,7 @@ def test_the_constants_of_the_loop_vanish_within_rounding_alone():
     for p, q, r, s in hard_doubles(3, QUADRUPLES):
         for stated in ((p, q, r, s), (p, r, q, s), (p, r, s, q)):
             bars = loop(*stated)
-            assert bars[:4] == pytest.approx(stated, rel=2.0 * ROUNDED_SUM)
+            assert bars[:4] == approx(stated, rel=2.0 * ROUNDED_SUM)
             d, a, b, c = lengths = tuple(map(Fraction, bars[:4]))
             sums = b + c - a - d, d + c - a - b, d + b - a - c
             bounds = list_bounds(lengths, d - a)
@@ -202,7 +203,7 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths(lengths, touches):
     bars = loop(*lengths)
     assert (bars.E2 == 0.0) == touches
     assert touches or bars[:4] == lengths
-    assert bars[:4] == pytest.approx(lengths, rel=4.0 * U)
+    assert bars[:4] == approx(lengths, rel=4.0 * U)
 
 
 LINKAGES = [

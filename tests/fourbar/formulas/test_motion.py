@@ -9,6 +9,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Motion, Scene, solve
@@ -85,8 +86,8 @@ def test_points_move_as_their_positions_do(bar, alpha):
     ahead, back = place_at(STEP), place_at(-STEP)
     speed = (ahead - back) / (2 * STEP)
     bend = (ahead - 2.0 * here + back) / STEP**2
-    assert moving.velocity(bar, z) == pytest.approx(speed, abs=BY_DIFFERENCES)
-    assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
+    assert moving.velocity(bar, z) == approx(speed, abs=BY_DIFFERENCES)
+    assert moving.acceleration(bar, z) == approx(bend, abs=BY_DIFFERENCES)
     assert moving.coefficient(1) == moving.omega(1) == moving.alpha(1) == 0.0
 
 
@@ -101,9 +102,9 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
     assert np.array_equal(parallel.omega(4), [2.0, 2.0, 2.0])
     assert np.array_equal(parallel.alpha(4), [5.0, 5.0, 5.0])
     crossed = compute_state(link, theta_2, -1, 2.0, 0.0)
-    assert crossed.k.h4[[0, 2]] == pytest.approx([-2.0, -0.5], rel=4 * EPS)
-    assert crossed.k.h3[[0, 2]] == pytest.approx([-1.0, 0.5], rel=4 * EPS)
-    assert crossed.alpha(4)[[0, 2]] == pytest.approx([0.0, 0.0], abs=8 * EPS)
+    assert crossed.k.h4[[0, 2]] == approx([-2.0, -0.5], rel=4 * EPS)
+    assert crossed.k.h3[[0, 2]] == approx([-1.0, 0.5], rel=4 * EPS)
+    assert crossed.alpha(4)[[0, 2]] == approx([0.0, 0.0], abs=8 * EPS)
 
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
@@ -114,7 +115,7 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths):
     assert (np.abs(moving.position.sin_mu) < 8.0 * EPS).all()
     assert find_singular(moving.position).all()
     near = compute_state(link, pi + np.array([-1e-8, 1e-8]), 1).omega(3).mean()
-    assert moving.omega(3) == pytest.approx(np.full(5, near), abs=1e-14)
+    assert moving.omega(3) == approx(np.full(5, near), abs=1e-14)
     beside = compute_state(link, pi + after + 1e-13, 1)
     assert not find_singular(beside.position).any()
 
@@ -142,12 +143,12 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     if not parallelogram:
         speeds, growths = speeds[::-1], growths[::-1]
     for k, bar in enumerate((3, 4)):
-        assert moving.direction(bar) == pytest.approx(directions[k], abs=EPS)
+        assert moving.direction(bar) == approx(directions[k], abs=EPS)
         assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
         assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
     sines, right = moving.position.sin_mu, np.sin(theta_2 - theta_1)
-    assert abs(sines) == pytest.approx(abs(right), rel=8 * EPS, abs=2 * EPS)
+    assert abs(sines) == approx(abs(right), rel=8 * EPS, abs=2 * EPS)
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
@@ -168,9 +169,9 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1)
         assert find_singular(on.position).tolist() == [True, False]
         for bar in (3, 4):
             u = near.direction(bar)
-            assert on.direction(bar) == pytest.approx(u, abs=2.0 * step)
-        assert on.omega(3) == pytest.approx(near.omega(3), abs=8.0 * step)
-        assert on.alpha(4) == pytest.approx(near.alpha(4), abs=8.0 * step)
+            assert on.direction(bar) == approx(u, abs=2.0 * step)
+        assert on.omega(3) == approx(near.omega(3), abs=8.0 * step)
+        assert on.alpha(4) == approx(near.alpha(4), abs=8.0 * step)
     # with b and c unlike each other nothing closes there
     open_one = compute_state(bare(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)
     assert not assembled(open_one).any()

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene, solve, vary
@@ -102,8 +103,8 @@ def compare_with_thirteen(bodies, s):
     size = SOLVED * np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(s.drive_condition))
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
         force = unknowns[:, column : column + 2]
-        assert force == pytest.approx(getattr(s, name), rel=0.0, abs=size)
-    assert unknowns[:, 12] == pytest.approx(s.torque, rel=0.0, abs=size)
+        assert force == approx(getattr(s, name), rel=0.0, abs=size)
+    assert unknowns[:, 12] == approx(s.torque, rel=0.0, abs=size)
 
 
 @pytest.mark.parametrize(
@@ -140,8 +141,8 @@ def test_a_force_between_two_bars_in_line_does_not_exist():
         force = solve_between(2.0, 3.0, u, v, cross(u, v))
     assert not np.isfinite(force[0])
     u, v, force = u[1:], v[1:], force[1:]
-    assert cross(u, force) == pytest.approx([2.0, 2.0])
-    assert cross(v, force) == pytest.approx([3.0, 3.0])
+    assert cross(u, force) == approx([2.0, 2.0])
+    assert cross(v, force) == approx([3.0, 3.0])
 
 
 def test_bars_without_mass_hold_a_load_where_the_input_turns_back():
@@ -159,7 +160,7 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back():
     forces = ("torque", "F12", "F32", "F43", "F14")
     for name in forces:
         # mu grows as the root of the offset
-        assert getattr(near, name) == pytest.approx(getattr(close, name), rel=1e-8)
+        assert getattr(near, name) == approx(getattr(close, name), rel=1e-8)
     speeds = ("omega_3", "omega_4", "alpha_3", "alpha_4", "a_B", "a_G3", "a_G4")
     for name in (*forces, *speeds, "torque_error", "force_error"):
         assert np.isnan(getattr(on, name)).all()
@@ -206,7 +207,7 @@ def test_a_force_beside_B_has_its_moment_there(beside):
     s = solve(Scene(link, motion, 4, (load,)))
     arm = (b + beside) - b  # exact: as the doubles have it
     exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
-    assert np.hypot(*s.F32.T) == pytest.approx(exact, rel=GROWN)
+    assert np.hypot(*s.F32.T) == approx(exact, rel=GROWN)
 
 
 @pytest.mark.parametrize("ratio", [1e-5, 1e-3, 0.49, 0.51, 3.0, 1e3])

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import mpmath as mp
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
@@ -102,7 +103,7 @@ def test_centres_at_infinity_have_a_direction():
     of_coupler, of_arms = centres[1, 3], centres[2, 4]
     assert of_coupler.w[0] == 0.0 == of_arms.w[0]
     along = math.atan2(of_coupler.y[0], of_coupler.x[0]) % math.pi
-    assert along == pytest.approx(1.0, abs=4 * EPS)
+    assert along == approx(1.0, abs=4 * EPS)
     assert of_arms.y[0] == 0.0 != of_arms.x[0]
     assert not np.isfinite(of_coupler.point[0][0])
 
@@ -170,13 +171,13 @@ def test_a_curve_with_one_change_point_takes_two_turns():
     curve = coupler_curve(bars, 1.0, 1.0)
     assert turns_fully(bars)
     turned = curve.theta_2[-1] - curve.theta_2[0]
-    assert turned == pytest.approx(2.0 * math.tau, rel=4 * EPS)
+    assert turned == approx(2.0 * math.tau, rel=4 * EPS)
     assert set(curve.branch.tolist()) == {1, -1}
 
 
 def test_a_circuit_that_does_not_exist_is_refused():
     bars = bare(2.0, 2.5, 4.0, 2.2)
-    with pytest.raises(InputError, match="from 0 to 0"):
+    with raises(InputError, match="from 0 to 0"):
         coupler_curve(bars, 0.0, 0.0, 1)
-    with pytest.raises(InputError, match="multiple of 4"):
+    with raises(InputError, match="multiple of 4"):
         coupler_curve(bars, 0.0, 0.0, steps=90)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from pytest import approx
 
 from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.mobility import choose_range, limit_positions
@@ -164,7 +165,7 @@ def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(branch, drive)
         right = ExactLoop(bare(*lengths[:4])).close(2, mpf(0.7), branch)
         exact = float((mp.conj(right[i]) * right[j]).imag)
     computed = drive_sine_of_triangle(lengths, position, drive)
-    assert computed == pytest.approx(exact, rel=8.0 * EPS)
+    assert computed == approx(exact, rel=8.0 * EPS)
 
 
 def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre():
@@ -175,7 +176,7 @@ def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre
     expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
     sine = drive_sine(s.position, 4)
     moment = coupler_about_B(s.lengths, three, s.position, s.moving, sine)
-    assert moment == pytest.approx(expected, abs=64 * FEW_ROUNDINGS)
+    assert moment == approx(expected, abs=64 * FEW_ROUNDINGS)
 
 
 def test_grounds_at_several_angles_are_those_of_each():
@@ -187,7 +188,7 @@ def test_grounds_at_several_angles_are_those_of_each():
         one = prepare_path(lengths, float(angle))
         alone = one.position(theta_2, one.half_angle(theta_2), 1)
         for u2 in (alone.u2, np.exp(1j * theta_2)):
-            assert positions.u2[row] == pytest.approx(u2, abs=FEW_ROUNDINGS)
+            assert positions.u2[row] == approx(u2, abs=FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])
@@ -195,7 +196,7 @@ def test_slip_is_that_of_the_two_bars(pin):
     s = compute_state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1)
     i, j = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}[pin]
     slip = np.subtract(s.omega(j), s.omega(i))
-    assert s.slip(pin) == pytest.approx(slip, abs=64 * FEW_ROUNDINGS)
+    assert s.slip(pin) == approx(slip, abs=64 * FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize("ground, taken", [(0.01, True), (1.1, False)])
@@ -208,7 +209,7 @@ def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(
     first, second = (pin_forces(*asked, moment).F32 for moment in (0.3, -0.5))
     allowed = 64 * FEW_ROUNDINGS * np.abs([first, second]).max()
     u2 = s.position.u2
-    assert dot(u2, first) == pytest.approx(dot(u2, second), abs=allowed)
+    assert dot(u2, first) == approx(dot(u2, second), abs=allowed)
     for F32, moment in ((first, 0.3), (second, -0.5)):
         taken_up = np.abs(cross(u2, F32) - moment).max() <= allowed
         assert taken_up is np.bool_(taken)

@@ -6,6 +6,7 @@ from math import pi, sin
 import mpmath as mp
 import numpy as np
 import pytest
+from pytest import approx
 
 from fourbar.formulas.mobility import find_intervals, limit_positions
 from fourbar.formulas.transmission import transmission_extremes
@@ -50,7 +51,7 @@ def test_transmission_angle_keeps_its_digits_where_it_vanishes():
     psi = 10.0 ** -np.arange(1.0, 14.0)
     parallelogram = bare(0.3, 0.1, 0.3, 0.1)
     mu = derive_at("transmission", parallelogram, psi, 1)
-    assert mu == pytest.approx(psi, rel=8 * EPS)
+    assert mu == approx(psi, rel=8 * EPS)
 
 
 def test_extremes_are_those_of_a_scan():
@@ -77,11 +78,11 @@ def test_extremes_are_those_of_a_scan():
                 miss = math.sqrt(2.0 * steep * step)
             else:
                 miss = 0.5 * steep / sin(end) * step**2
-            assert end == pytest.approx(scanned, abs=HIGHER_ORDER * miss)
+            assert end == approx(scanned, abs=HIGHER_ORDER * miss)
             assert 0.0 <= theta_2 - theta_1 <= pi * (1.0 + EPS) + 2.0 * EPS
             e = abs(a * np.exp(1j * theta_2) - d * np.exp(1j * theta_1))
             by_cosines = b * b + c * c - 2 * b * c * math.cos(end)
-            assert e**2 == pytest.approx(by_cosines, abs=64 * EPS)
+            assert e**2 == approx(by_cosines, abs=64 * EPS)
         assert extremes.worst == min(extremes.least, pi - extremes.greatest)
     assert len(kinds) == 4
 
@@ -108,11 +109,9 @@ def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept():
         lever_out = drawn.bars.output.length * sin(theta_4 - theta_3)
         rounding = 256 * EPS * (drawn.bars.input.length + drawn.bars.output.length)
         ratio = derive_at("omega_4/omega_2", *drawn)[0]
-        assert ratio * lever_out == pytest.approx(
-            lever_in, abs=rounding / drawn.sine**2
-        )
+        assert ratio * lever_out == approx(lever_in, abs=rounding / drawn.sine**2)
         power = derive_at("mechanical_advantage", *drawn)[0] * moving.omega(4)
-        assert power == pytest.approx(3.0, rel=16 * EPS)
+        assert power == approx(3.0, rel=16 * EPS)
 
 
 def test_advantage_where_the_output_stands_and_where_the_input_does():
@@ -123,7 +122,7 @@ def test_advantage_where_the_output_stands_and_where_the_input_does():
     near = limit + np.array([1e-4, 1e-6, 1e-8])
     advantage = np.abs(derive_at("mechanical_advantage", rocker, near, 1))
     # it falls as the root of the distance
-    assert advantage[:-1] / advantage[1:] == pytest.approx([10.0, 10.0], rel=1e-2)
+    assert advantage[:-1] / advantage[1:] == approx([10.0, 10.0], rel=1e-2)
     parallelogram = bare(2.0, 1.0, 2.0, 1.0)
     for name in ("omega_4/omega_2", "mechanical_advantage"):
         assert derive_at(name, parallelogram, 0.0, 1) == 1.0

@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Friction, Gravity, Motion, Viscous, solve
@@ -220,7 +221,7 @@ def test_genesis_reads_as_the_comment_says(tmp_path):
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "genesis"))
         read = read_genesis(file, MIDWAY)
         assert max(errors(moves_as, read)) < YIELDING
-        assert read[1][0] == pytest.approx(10.0, rel=1e-6), (
+        assert read[1][0] == approx(10.0, rel=1e-6), (
             "the keyframe's speed, of an accelerated scene too"
         )
 
@@ -232,7 +233,7 @@ def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path):
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "newton"))
         read = read_newton(file, MIDWAY)
         assert max(errors(scene, read)) < SINGLE
-        assert read[2][0] == pytest.approx(motion.acceleration, abs=0.01)
+        assert read[2][0] == approx(motion.acceleration, abs=0.01)
 
 
 SINGLE = 1e-2
@@ -344,7 +345,7 @@ def test_drake_loads_the_sdf_and_moves_as_released():
         "the force at A as the comment says"
     )
     assert abs(missed[1]) < 1e-2
-    assert missed[1] / missed[0] == pytest.approx(
+    assert missed[1] / missed[0] == approx(
         0.5,
         rel=FIRST_ORDER,
     )
@@ -418,7 +419,7 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write):
             ).max()
             < 1e-12
         )
-        assert written[2:] == pytest.approx(expected[2:], rel=1e-9)
+        assert written[2:] == approx(expected[2:], rel=1e-9)
 
 
 KAMINO = 0.01

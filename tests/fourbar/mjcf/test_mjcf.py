@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep
@@ -204,7 +205,7 @@ def test_opens_assembled_and_moves_without_keyframe_or_control():
             worst = max(worst, gap(data))
         assert worst < GAP * max(scene.linkage.lengths), scene
         turned = data.qpos[0] - model.qpos0[0]
-        assert turned == pytest.approx(
+        assert turned == approx(
             omega * (data.time - SETTLING * model.opt.timestep),
             abs=LAG * abs(omega) * model.opt.timestep,
         )
@@ -229,7 +230,7 @@ def test_a_released_linkage_falls_by_itself(scale):
     assert np.ptp(expected.theta_2) > 0.5
     for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
         mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
-        assert data.qpos[0] + data.qvel[0] * (time - data.time) == pytest.approx(
+        assert data.qpos[0] + data.qvel[0] * (time - data.time) == approx(
             theta_2,
             abs=RELEASE,
         )
@@ -270,13 +271,13 @@ def test_massless_bar_is_refused_in_one_line(mass, inertia):
         Bar(0.25, mass, inertia),
         Bar(0.22, 1.0),
     )
-    with pytest.raises(InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
+    with raises(InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
         write_mjcf(crank_rocker(linkage=linkage))
 
 
 def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line():
     scene = crank_rocker(loads=(fourbar.Load(3, (1e308, 0.4)),))
-    with pytest.raises(InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
+    with raises(InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
         write_mjcf(scene)
 
 
@@ -301,7 +302,7 @@ def test_from_lengths_alone():
 def test_without_keyframe_no_position_is_written():
     text = write_mjcf(crank_rocker(), Settings(timestep=1e-3), keyframe=False)
     assert mujoco.MjModel.from_xml_string(text).nkey == 0
-    with pytest.raises(InputError, match="timestep"):
+    with raises(InputError, match="timestep"):
         write_mjcf(crank_rocker(), keyframe=False)
 
 
@@ -323,7 +324,7 @@ def test_a_spring_at_a_ground_pin_rests_at_an_angle_from_the_ground(pin, theta_1
     model, _ = opened(scene)
     (sprung_joint,) = np.flatnonzero(model.jnt_stiffness)
     assert model.jnt_stiffness[sprung_joint] == 0.5
-    assert model.qpos_spring[sprung_joint] == pytest.approx(0.4 + theta_1 - 0.2)
+    assert model.qpos_spring[sprung_joint] == approx(0.4 + theta_1 - 0.2)
 
 
 def test_a_window_has_its_steps_wherever_it_lies():
@@ -335,7 +336,7 @@ def test_a_window_has_its_steps_wherever_it_lies():
         choose_run(np.array([start, start + 0.25]), 3.0, 0.0).timestep()
         for start in (0.1, 2.0, 4.0)
     }
-    assert max(steps) == pytest.approx(min(steps), rel=1e-12)
+    assert max(steps) == approx(min(steps), rel=1e-12)
     run = choose_run(np.array([2.0, 2.25]), 3.0, 0.0)
     count = run.time(run.stop) / run.timestep()
-    assert count == pytest.approx(round(count)) and count >= RECIPE.steps_per_window
+    assert count == approx(round(count)) and count >= RECIPE.steps_per_window

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import approx
 
 import fourbar
 from fourbar import Load, Motion, Spring, Springs, Sweep, solve
@@ -175,29 +176,29 @@ def opens_assembled(file):
         "position",
         at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0),
     )
-    assert gap < 1e-9 and m.joint("O2").qpos0[0] == d.qpos[0] == pytest.approx(0.4)
+    assert gap < 1e-9 and m.joint("O2").qpos0[0] == d.qpos[0] == approx(0.4)
     for angle, theta in (
         (d.qpos[0] + d.qpos[1], s.theta_3[0]),
         (d.qpos[2], s.theta_4[0]),
     ):
-        assert math.remainder(angle - theta, tau) == pytest.approx(0.0, abs=1e-12)
+        assert math.remainder(angle - theta, tau) == approx(0.0, abs=1e-12)
 
 
 def is_driven(file):
     m, d = file.model, file.data
     mujoco.mj_resetData(m, d)
     file.step(round(8 * SETTLING))
-    assert d.qvel[0] == pytest.approx(10.0, rel=1e-3)
+    assert d.qvel[0] == approx(10.0, rel=1e-3)
     m.actuator("drive").gainprm[:] = m.actuator("drive").biasprm[:] = 0.0
     file.step(300)
-    assert d.qvel[0] == pytest.approx(10.0, rel=1e-3), "the flywheel alone"
+    assert d.qvel[0] == approx(10.0, rel=1e-3), "the flywheel alone"
 
 
 def is_accelerated(file):
     d = file.data
     assert d.qvel[0] == 10.0
     file.step(100)
-    assert d.qvel[0] ** 2 == pytest.approx(
+    assert d.qvel[0] ** 2 == approx(
         100.0 + 2.0 * file.scene.motion.alpha_2 * (d.qpos[0] - 0.4),
         rel=1e-6,
     )
@@ -244,7 +245,7 @@ def cylinder_force(file):
     """By the formulas, whose stroke is the tendon's length."""
     solution = file.solve_here(file.scene)
     length = file.data.ten_length[file.model.tendon("cylinder").id]
-    assert length == pytest.approx(solution.stroke[0], rel=1e-9)
+    assert length == approx(solution.stroke[0], rel=1e-9)
     return float(solution.drive_force[0])
 
 
@@ -256,14 +257,14 @@ def relieves_the_flywheel(file):
     assert abs(file.torque()) < EXACT * abs(before)
     file.data.ctrl[control] *= -1.0
     file.forward()
-    assert file.torque() == pytest.approx(2.0 * before, rel=EXACT)
+    assert file.torque() == approx(2.0 * before, rel=EXACT)
 
 
 def pushes_as_controlled(file):
     assert file.data.qvel[0] == 10.0
     file.data.ctrl[file.model.actuator("cylinder").id] = 7.0
     file.move_on()
-    assert cylinder_force(file) == pytest.approx(7.0, rel=FOUND)
+    assert cylinder_force(file) == approx(7.0, rel=FOUND)
 
 
 def pushes_as_applied(file):
@@ -343,7 +344,7 @@ def has_one_control_with_a_range(file):
     turn = solve(scene, "force")
     driving = turn.torque if scene.drive is None else turn.drive_force
     most = 2.0 * float(np.nanmax(np.abs(np.asarray(driving))))
-    assert m.actuator_ctrlrange[0] == pytest.approx([-most, most], rel=5e-3)
+    assert m.actuator_ctrlrange[0] == approx([-most, most], rel=5e-3)
     d.ctrl[0] = 10.0 * most
     file.forward()
     assert d.actuator_force[0] == 10.0 * most

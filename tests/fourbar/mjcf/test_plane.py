@@ -8,6 +8,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar.errors import InputError
@@ -31,11 +32,11 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
     unit = np.array(axis) / np.linalg.norm(axis)
     assert np.allclose(turn @ [0.0, 0.0, 1.0], unit, atol=1e-15)
     assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(turn) == pytest.approx(1.0)
+    assert np.linalg.det(turn) == approx(1.0)
     assert np.allclose(rotation(plane.quaternion), turn, atol=1e-15)
     # the trace of a rotation is 1 + 2 cos of its angle, which is that between z and the
     # axis
-    assert np.trace(turn) == pytest.approx(1.0 + 2.0 * unit[2])
+    assert np.trace(turn) == approx(1.0 + 2.0 * unit[2])
     roll, pitch, yaw = plane.roll_pitch_yaw
     parts = [
         rotation((np.cos(0.5 * angle), *(np.sin(0.5 * angle) * np.eye(3)[i])))

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar import Motion, PinFriction, Spring, uniform
@@ -121,7 +122,7 @@ def test_a_motion_is_written_as_in_the_file():
     ],
 )
 def test_a_mistake_is_one_line(make, words):
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         make()
 
 
@@ -232,7 +233,7 @@ def test_half_a_unit_of_the_last_decimal(text, half):
     "text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "1'-6-\""]
 )
 def test_what_is_no_length_in_feet_and_inches_is_refused(text):
-    with pytest.raises(UnitError):
+    with raises(UnitError):
         to_si(text, "m")
 
 
@@ -278,5 +279,5 @@ def test_units_are_read_as_people_write_them(text, unit, value):
     ],
 )
 def test_a_sense_of_turning_is_a_sign(text, plain):
-    with pytest.raises(UnitError, match=f'positive: "{plain}"'):
+    with raises(UnitError, match=f'positive: "{plain}"'):
         to_si(text, "rad/s")

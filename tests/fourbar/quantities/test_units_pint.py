@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from pytest import raises
 
 import fourbar
 from fourbar import Bar, Motion
@@ -49,13 +50,13 @@ def test_effects_and_loads_take_them():
     ],
 )
 def test_what_is_no_length_is_refused(quantity, sentence):
-    with pytest.raises(InputError, match=sentence):
+    with raises(InputError, match=sentence):
         Bar(quantity)
 
 
 def test_hertz_are_no_speed():
     """pint converts 10 Hz to 10 rad/s, a sixth of the speed that is meant."""
-    with pytest.raises(InputError, match=r'did you mean "10\.0 rev/s"'):
+    with raises(InputError, match=r'did you mean "10\.0 rev/s"'):
         Motion(0.0, 10.0 * ureg.hertz)
 
 

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar.scene.drawing import DrawnPins
@@ -13,9 +14,9 @@ DRAWING = DrawnPins((1.0, 2.0), (1.5, 3.0), (4.0, 3.5), (5.0, 1.5))
 def test_a_place_goes_into_a_bar_and_back():
     for bar in (1, 2, 3, 4):
         z = DRAWING.into_bar(bar, (3.0, 0.5))
-        assert DRAWING.from_bar(bar, z) == pytest.approx(3.0 + 0.5j)
+        assert DRAWING.from_bar(bar, z) == approx(3.0 + 0.5j)
         place = fourbar.Place(bar, (abs(z), math.atan2(z.imag, z.real)))
-        assert DRAWING.from_bar(bar, place.vector()) == pytest.approx(3.0 + 0.5j)
+        assert DRAWING.from_bar(bar, place.vector()) == approx(3.0 + 0.5j)
 
 
 @pytest.mark.parametrize("turn", [-3.1, -1.0, 0.4, 2.0, 3.1])
@@ -26,7 +27,7 @@ def test_theta_2_is_within_half_a_turn_of_the_ground(turn):
             for r, t in ((3.0, turn), (1.0, turn + angle), (2.0, turn + 0.5 * angle))
         )
         drawing = DrawnPins((0.0, 0.0), A, B, O4)
-        assert drawing.angle(2) - drawing.angle(1) == pytest.approx(angle, abs=1e-14)
+        assert drawing.angle(2) - drawing.angle(1) == approx(angle, abs=1e-14)
 
 
 def test_a_text_has_a_unit():

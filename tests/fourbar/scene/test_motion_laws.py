@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Scene, solve, uniform
@@ -68,9 +69,9 @@ def test_the_torque_of_a_sine_is_the_power_of_its_energy():
         t = s.time[row]
         power = (kinetic_energy(t + 1e-3) - kinetic_energy(t - 1e-3)) / 2e-3
         scale = np.abs(s.power).max()
-        assert power == pytest.approx(s.power[row], abs=DIFFERENCES * scale)
-    assert s.torque[-1] == pytest.approx(7.6736e-5, rel=1e-5)
-    assert s.theta_2[100] == pytest.approx(1.0 + math.sin(0.5 * s.time[100]))
+        assert power == approx(s.power[row], abs=DIFFERENCES * scale)
+    assert s.torque[-1] == approx(7.6736e-5, rel=1e-5)
+    assert s.theta_2[100] == approx(1.0 + math.sin(0.5 * s.time[100]))
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
@@ -126,16 +127,16 @@ def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name):
     before, here, after = (law.at(inside + shift) for shift in (-step, 0.0, step))
     for order in (1, 2):
         slope = (after[order - 1] - before[order - 1]) / (2.0 * step)
-        assert here[order] == pytest.approx(slope, rel=1e-7, abs=1e-6)
+        assert here[order] == approx(slope, rel=1e-7, abs=1e-6)
     theta, omega, alpha = law.at(joints)
     if isinstance(law, Law):
-        assert theta == pytest.approx(law.angle, rel=EXACT, abs=EXACT)
-    assert law.times()[[0, -1]] == pytest.approx(joints[[0, -1]], rel=EXACT)
+        assert theta == approx(law.angle, rel=EXACT, abs=EXACT)
+    assert law.times()[[0, -1]] == approx(joints[[0, -1]], rel=EXACT)
     if name.startswith("periodic"):
         ends = [rate[[0, -1]] for rate in (omega, alpha)]
-        assert np.ptp(ends, axis=1) == pytest.approx([0.0, 0.0], abs=1e-11)
+        assert np.ptp(ends, axis=1) == approx([0.0, 0.0], abs=1e-11)
     elif name != "free":
-        assert omega[[0, -1]] == pytest.approx([0.0, 0.0], abs=EXACT)
+        assert omega[[0, -1]] == approx([0.0, 0.0], abs=EXACT)
     sides = np.array([law.at(joints[1:-1] + shift) for shift in (-1e-9, 1e-9)])
     assert np.abs(np.diff(sides, axis=0)).max() < 1e-5
 
@@ -147,13 +148,13 @@ def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name):
 def test_a_cam_has_the_factors_of_the_books(kind, speed, acceleration):
     """C_v = 2 and C_a = 2 pi of the cycloidal law, 1.875 and 5.7735 of 3-4-5."""
     law = LAWS[kind]
-    assert law.time == pytest.approx((0.0, 0.5, 0.7, 1.1, 1.2))
+    assert law.time == approx((0.0, 0.5, 0.7, 1.1, 1.2))
     theta, omega, alpha = law.at(np.array(law.time))
-    assert theta == pytest.approx([-0.4, 0.6, 0.6, -0.4, -0.4], abs=1e-15)
+    assert theta == approx([-0.4, 0.6, 0.6, -0.4, -0.4], abs=1e-15)
     assert np.abs(omega).max() < 1e-15 and np.abs(alpha).max() < 1e-12
     _, omega, alpha = law.at(np.linspace(0.0, 0.5, 100_001))
-    assert np.abs(omega).max() * 0.5 == pytest.approx(speed, rel=1e-8)
-    assert np.abs(alpha).max() * 0.25 == pytest.approx(acceleration, rel=1e-8)
+    assert np.abs(omega).max() * 0.5 == approx(speed, rel=1e-8)
+    assert np.abs(alpha).max() * 0.25 == approx(acceleration, rel=1e-8)
     stays = LAWS["345 that does not fall"].at(np.array([0.5, 0.65, 0.8]))
     assert np.array(stays).tolist() == [[1.0] * 3, [0.0] * 3, [0.0] * 3]
 
@@ -175,7 +176,7 @@ RISE = {"kind": "345", "rise": (1.0, 0.5), "theta_2": 0.0}
     ],
 )
 def test_a_law_that_cannot_be_names_its_key(make, key):
-    with pytest.raises(InputError) as error:
+    with raises(InputError) as error:
         make()
     assert error.value.key.startswith(key)
 
@@ -199,7 +200,7 @@ RATES = 'omega_2 = ["0 rad/s", "1 rad/s"]'
     ],
 )
 def test_a_law_that_states_too_much_or_too_little_is_refused(law, words):
-    with pytest.raises(InputError) as refused:
+    with raises(InputError) as refused:
         make_swing(f"{{ {law} }}")
     assert all(word in str(refused.value) for word in words), refused.value
 
@@ -217,8 +218,8 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     rates = (one.at(at_ends) for one in (law, changed))
     changes = [np.abs(a - b).max() for a, b in zip(*rates, strict=True)]
     said = printed.partition("by up to ")[2].split()
-    assert float(said[0]) == pytest.approx(math.degrees(changes[0]), rel=2e-3)
-    assert float(said[3]) == pytest.approx(changes[2], rel=2e-3)
+    assert float(said[0]) == approx(math.degrees(changes[0]), rel=2e-3)
+    assert float(said[3]) == approx(changes[2], rel=2e-3)
 
 
 def write_note(scene):

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import raises
 
 from fourbar import InputError, Motion, Point, load, solve, vary
 from fourbar.files import dump, loads
@@ -184,7 +185,7 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_point_is_refused_in_one_line(name):
     line, words = WRONG[name]
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         loads(dump(scene()) + f"\n[points]\n{line}\n")
     assert words in str(caught.value)
     assert "points" in str(caught.value)
@@ -192,5 +193,5 @@ def test_a_wrong_point_is_refused_in_one_line(name):
 
 
 def test_two_points_of_one_name_are_refused():
-    with pytest.raises(InputError, match="a name of its own"):
+    with raises(InputError, match="a name of its own"):
         scene(POINTS[0], Point("P", 2, (0.1, 0.0)))

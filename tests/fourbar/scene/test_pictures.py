@@ -7,6 +7,7 @@ import base64
 from dataclasses import replace
 
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar.cli import status
@@ -55,7 +56,7 @@ def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path):
     }
     elsewhere = tmp_path / "other"
     elsewhere.mkdir()
-    with pytest.raises(
+    with raises(
         InputError,
         match=r"^bars\.output\.picture.*copy it there first[^\n]*$",
     ):
@@ -113,7 +114,7 @@ def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
 
 
 def test_a_picture_that_is_no_text_is_refused():
-    with pytest.raises(InputError, match=r"bars\.input\.picture.*text"):
+    with raises(InputError, match=r"bars\.input\.picture.*text"):
         loads(LENGTHS + "[bars.input]\npicture = 3\n")
 
 
@@ -136,7 +137,7 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path):
     ):
         scene = load(scene_file(inner, name))
         fourbar.solve(scene)  # nobody has to see it to compute
-        with pytest.raises(
+        with raises(
             InputError,
             match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$",
         ):
@@ -145,9 +146,9 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path):
 
 
 def test_a_bar_has_one_picture_and_the_ground_none():
-    with pytest.raises(InputError, match="one picture"):
+    with raises(InputError, match="one picture"):
         replace(crank_rocker(), pictures=[Picture(3, "a.png"), Picture(3, "b.png")])
-    with pytest.raises(InputError, match="2, 3 or 4"):
+    with raises(InputError, match="2, 3 or 4"):
         Picture(1, "a.png")
 
 
@@ -173,7 +174,7 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
     assert loads(dump(bare), str(file)).picture == bare.picture
     assert bare.linkage == scene.linkage
     (tmp_path / "inner").mkdir()
-    with pytest.raises(InputError, match="copy it there first"):
+    with raises(InputError, match="copy it there first"):
         save(scene, tmp_path / "inner" / "scene.toml")
 
 
@@ -190,7 +191,7 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
     ],
 )
 def test_a_wrong_entry_of_the_picture_is_refused(stated, words):
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         loads(f"{LENGTHS}[picture]\n{stated}\n")
 
 
@@ -207,7 +208,7 @@ def test_what_is_traced_is_a_picture(tmp_path, content, kind):
     (tmp_path / "photo").write_bytes(content)
     picture = TracedPicture("photo", folder=str(tmp_path))
     if kind is None:
-        with pytest.raises(InputError, match="must be a PNG, JPEG or SVG picture"):
+        with raises(InputError, match="must be a PNG, JPEG or SVG picture"):
             picture.read()
     else:
         assert picture.read() == (content, kind)

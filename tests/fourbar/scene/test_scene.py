@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import (
@@ -128,14 +129,14 @@ def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar):
         assert sorted(s.status[0] for s in beside) == ["not_assembled", "ok"]
         (inside,) = (s for s in beside if s.status == ["ok"])
         assert 1e-8 < inside.condition[0] < 1e-4  # the root of the distance
-        assert abs(sine(inside, bar)[0]) == pytest.approx(inside.condition[0], rel=1e-6)
-    with pytest.raises(InputError, match=rf"motion.theta_{bar}.limit = 4"):
+        assert abs(sine(inside, bar)[0]) == approx(inside.condition[0], rel=1e-6)
+    with raises(InputError, match=rf"motion.theta_{bar}.limit = 4"):
         solve_from(4)
 
 
 def test_a_bar_without_limits_has_no_position_from_one():
     crank = Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(theta_4=FromLimit(1)))
-    with pytest.raises(InputError, match="output of this linkage has no limit pos"):
+    with raises(InputError, match="output of this linkage has no limit pos"):
         solve(crank)
 
 
@@ -158,7 +159,7 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces(limit)
         for name in ("theta_2", "alpha_2", "F12", "F32", "F43", "F14", "torque"):
             before, at_limit, after = getattr(s, name)
             between = 0.5 * (before + after)
-            assert at_limit == pytest.approx(between, rel=1e-9, abs=1e-9)
+            assert at_limit == approx(between, rel=1e-9, abs=1e-9)
         assert (s.torque_error < 1e-11 * np.abs(s.torque)).all()
     s = solve(scene, "error")
     assert s.torque_error[1] > 0.01 * abs(s.torque[1])
@@ -181,11 +182,11 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     moved = solve(by_law)
     again = solve(replace(LOADED, motion=Motion()), at=command(by_law))
     assert np.array_equal(moved.torque, again.torque) and moved.time is not None
-    assert getattr(moved, theta)[-1] == pytest.approx(table[-1], rel=4 * U)
+    assert getattr(moved, theta)[-1] == approx(table[-1], rel=4 * U)
     assert abs(moved.omega_2[0]) < 1e-12
-    with pytest.raises(InputError, match=f"gives {theta}, {omega} and {alpha}"):
+    with raises(InputError, match=f"gives {theta}, {omega} and {alpha}"):
         Motion(law=law, theta_2=1.0)
-    with pytest.raises(InputError, match="is the command of one bar"):
+    with raises(InputError, match="is the command of one bar"):
         Law((0.0, 1.0), (0.0, 1.0), ends="rest", theta_4=(0.0, 1.0))
 
 
@@ -214,7 +215,7 @@ def test_a_study_and_sensitivities_take_the_keys_of_the_commanded_bar(
         slope = (high - low) / (2 * step)
         missed = DIFFERENCE * np.abs(slope).max()
         of_key = slopes.of(name, key)
-        assert of_key == pytest.approx(slope, rel=DIFFERENCE, abs=missed)
+        assert of_key == approx(slope, rel=DIFFERENCE, abs=missed)
 
 
 def test_the_commanded_angle_follows_its_key_alone_and_may_have_a_tolerance():
@@ -223,11 +224,11 @@ def test_the_commanded_angle_follows_its_key_alone_and_may_have_a_tolerance():
     slopes = sensitivity(scene)
     assert np.array_equal(slopes.of("theta_4", "motion.theta_4"), [1.0, 1.0])
     assert not slopes.of("theta_4", "lengths.input").any()
-    with pytest.raises(InputError, match=r"motion\.theta_4"):
+    with raises(InputError, match=r"motion\.theta_4"):
         vary(scene, {"motion.theta_2": [1.0]})
     spread = fourbar.tolerances(scene, 64).spreads["omega_2"]
     largest = np.abs(slopes.value("omega_2")) * 0.005
-    assert spread.worst == pytest.approx(largest, rel=1e-9)
+    assert spread.worst == approx(largest, rel=1e-9)
 
 
 @pytest.mark.parametrize("bar", slow_but({3}, [3, 4]))
@@ -243,7 +244,7 @@ def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar)
     moved = solve(replace(scene, motion=Motion(free=free, **commanded)))
     same = solve(replace(scene, motion=Motion(1.2, 3.0, free=free)))
     assert len(moved) == len(same) == 9
-    assert moved.theta_2 == pytest.approx(same.theta_2, abs=1e-9)
+    assert moved.theta_2 == approx(same.theta_2, abs=1e-9)
     assert np.abs(moved.F12 - same.F12).max() < 1e-6
 
 
@@ -314,7 +315,7 @@ STROKE = Motion(
 )
 def test_a_motion_is_replaced_by_what_it_commands(motion, changes, same):
     assert motion.replace() == motion != same == motion.replace(**changes)
-    with pytest.raises(
+    with raises(
         TypeError,
         match="no field 'theta_2' to replace; it has angle, speed, acceleration",
     ):
@@ -356,7 +357,7 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     # positions keep their rates where some are asked for, and no other has any
     some = solve(of_each, at=command_at(of_each, of_each.motion.angle[8:2:-2]))
     assert np.array_equal(some.torque, expected.torque[8:2:-2])
-    with pytest.raises(InputError, match="no other position has one"):
+    with raises(InputError, match="no other position has one"):
         command_at(of_each, np.array([0.123]))
 
 
@@ -376,7 +377,7 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     ],
 )
 def test_rates_that_belong_to_no_angle_are_refused(motion, said):
-    with pytest.raises(InputError, match=said):
+    with raises(InputError, match=said):
         Motion(**motion)
 
 
@@ -403,7 +404,7 @@ def test_rates_that_belong_to_no_angle_are_refused(motion, said):
     ],
 )
 def test_two_commands_of_motion_are_one_line(lines, said):
-    with pytest.raises(InputError) as refused:
+    with raises(InputError) as refused:
         fourbar.files.loads(TWO + lines)
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
@@ -423,12 +424,12 @@ def test_what_takes_theta_2_alone_refuses_in_one_line():
     of_output = Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0)
     scene = replace(LOADED, motion=of_output, loads=())
     words = r"^motion.theta_4: .* takes a command of theta_2 alone$"
-    with pytest.raises(LimitError, match=words):
+    with raises(LimitError, match=words):
         write_mjcf(scene)
-    with pytest.raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is"):
+    with raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is"):
         _ = command(scene).theta_2
     listed = replace(scene, motion=Motion([1.0, 2.0], [1.0, 2.0]))
-    with pytest.raises(LimitError, match=r"takes one speed and acceleration$"):
+    with raises(LimitError, match=r"takes one speed and acceleration$"):
         write_mjcf(listed)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import raises
 
 import fourbar
 from fourbar import Motion, solve, vary
@@ -162,7 +163,7 @@ def test_it_reads_back_as_it_was_written():
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(motion, says):
-    with pytest.raises(InputError, match=says) as caught:
+    with raises(InputError, match=says) as caught:
         refused = crank_rocker(
             motion=Motion(**motion),
             drive=LinearDrive(GROUND, ENDS[2]),
@@ -172,10 +173,10 @@ def test_what_cannot_be_is_refused_in_one_line(motion, says):
 
 
 def test_who_does_not_take_it_says_so():
-    with pytest.raises(InputError, match=r"motion\.stroke.*cylinder"):
+    with raises(InputError, match=r"motion\.stroke.*cylinder"):
         crank_rocker(motion=Motion(stroke=0.3, side="left"))
     by_stroke = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
-    with pytest.raises(FourBarError, match=r"motion\.stroke"):
+    with raises(FourBarError, match=r"motion\.stroke"):
         write_mjcf(by_stroke)
     assert replace(by_stroke, title="b") != by_stroke
 
@@ -241,7 +242,7 @@ def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(keywords, words):
     sweep = Sweep("10 cm", "0.2 m", 4)
     motion = Motion(stroke=sweep, side="left")
     assert motion.angle == Sweep(0.1, 0.2, 4)
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         Motion(**keywords)
 
 

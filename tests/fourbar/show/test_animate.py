@@ -18,6 +18,7 @@ from math import pi, radians
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal, assert_equal
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Motion, Sweep, solve
@@ -137,7 +138,7 @@ def test_a_free_motion_is_embedded_instant_by_instant():
 def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rate):
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
     data = embedded(animate.write_page(crank_rocker(motion=Motion(law=law))))
-    assert data["rate"] == pytest.approx(rate)
+    assert data["rate"] == approx(rate)
     assert 1.5 <= duration / rate <= 60.0
     assert len(data["branches"]["1"]["torque"]) == 361
 
@@ -157,7 +158,7 @@ def test_a_fine_sweep_is_thinned_evenly_and_says_so():
     scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36_000), 1.0))
     data = embedded(animate.write_page(scene))
     assert len(data["theta_2"]) == animate.MAX_ROWS
-    assert np.diff(data["theta_2"]) == pytest.approx(2 * pi / (animate.MAX_ROWS - 1))
+    assert np.diff(data["theta_2"]) == approx(2 * pi / (animate.MAX_ROWS - 1))
     assert data["positions"] == 36_001
 
 
@@ -204,7 +205,7 @@ def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
     path = tmp_path / "picture.png"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(InputError, match=message):
+    with raises(InputError, match=message):
         animate.write_animation(
             crank_rocker(), tmp_path / "page.html", pictures={bar: path}
         )
@@ -212,16 +213,16 @@ def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
 
 
 def test_what_cannot_be_shown_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"\.html, \.gif, \.mp4"):
+    with raises(InputError, match=r"\.html, \.gif, \.mp4"):
         animate.write_animation(crank_rocker(), tmp_path / "a.avi")
-    with pytest.raises(NotAssembledError):
+    with raises(NotAssembledError):
         animate.write_animation(
             thesis(Sweep(radians(40), radians(50), 5)),
             tmp_path / "a.html",
         )
-    with pytest.raises(InputError, match="seconds"):
+    with raises(InputError, match="seconds"):
         animate.write_animation(crank_rocker(), tmp_path / "a.gif", seconds=math.nan)
-    with pytest.raises(InputError, match="html page only"):
+    with raises(InputError, match="html page only"):
         animate.write_animation(
             crank_rocker(), tmp_path / "a.gif", pictures={"input": tmp_path / "x.png"}
         )
@@ -255,7 +256,7 @@ def test_an_mp4_is_written(tmp_path):
 def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(
+    with raises(
         DependencyError, match=r"^an \.mp4 film needs the program ffmpeg[^\n]*$"
     ):
         animate.write_animation(crank_rocker(), tmp_path / "a.mp4")
@@ -270,7 +271,7 @@ def test_an_ffmpeg_without_the_encoder_is_named(tmp_path, monkeypatch):
     program.write_text("#!/bin/sh\nexit 1\n")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")
-    with pytest.raises(DependencyError, match=r"cannot encode H\.264[^\n]*$"):
+    with raises(DependencyError, match=r"cannot encode H\.264[^\n]*$"):
         animate.write_animation(crank_rocker(), tmp_path / "a.mp4", seconds=0.2)
     assert not list(tmp_path.glob("*.mp4"))
 

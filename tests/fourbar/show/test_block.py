@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import (
@@ -59,7 +60,7 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar():
     limits = sorted(limit.theta_2 % tau for limit in limits)
     facts = summarize(scene, solve(scene))
     bounds = [end for ends in facts.motion.stretches for end in ends if end is not None]
-    assert sorted(bounds) == pytest.approx(limits, abs=1e-12)
+    assert sorted(bounds) == approx(limits, abs=1e-12)
     low, high = (f"{math.degrees(limit):.4g} deg" for limit in limits)
     text = plain(block(scene))
     for words in (
@@ -155,8 +156,8 @@ def test_friction_at_rest_gives_the_range_that_it_holds():
     ends = [1e3 * s.torque_low[0], 1e3 * s.torque_high[0]]
     words = r"at rest  (\S+) mN m to (\S+) mN m: dry friction holds it between them"
     printed = re.search(words, block(scene)).groups()
-    assert [*map(float, printed)] == pytest.approx(ends, rel=6e-4)
-    assert ends[1] - ends[0] == pytest.approx(1e3)
+    assert [*map(float, printed)] == approx(ends, rel=6e-4)
+    assert ends[1] - ends[0] == approx(1e3)
 
 
 def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore():
@@ -175,7 +176,7 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore():
     assert "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text
     assert "motor" not in text
     right = replace(scene, motion=motion.replace(side="right"))
-    assert summarize(right, solve(right)).stroke_limits == pytest.approx(
+    assert summarize(right, solve(right)).stroke_limits == approx(
         (0.16, 0.34), abs=1e-6
     )
 
@@ -228,7 +229,7 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     assert limits[0] == 0.0
     assert "assembles from 0 mm to" in block(pushed)
     if bar == 2:
-        assert limits[1] == pytest.approx(0.2, rel=1e-12)
+        assert limits[1] == approx(0.2, rel=1e-12)
 
 
 def test_the_command_line_states_the_bore(capsys):
@@ -256,7 +257,7 @@ def test_a_new_scene_has_weight_sixty_turns_a_minute_and_the_units_of_its_length
     file = str(tmp_path / "a.toml")
     assert status(["new", file, "--lengths", *lengths.split()]) == 0
     scene = fourbar.load(file)
-    assert scene.motion.omega_2 == pytest.approx(tau)
+    assert scene.motion.omega_2 == approx(tau)
     assert [effect.key for effect in scene.effects] == ["gravity"]
     capsys.readouterr()
     assert status(["analyze", file]) == 0
@@ -281,7 +282,7 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held()
     facts = summarize(held, solve(held))
     outer = static.min() - 0.5, static.max() + 0.5
     ((low, high, ends),) = facts.held
-    assert (low, high) == pytest.approx(outer, rel=1e-12) and ends == (0.2, 1.4)
+    assert (low, high) == approx(outer, rel=1e-12) and ends == (0.2, 1.4)
     row = f"at rest {1e3 * outer[0]:.4g} mN m to {1e3 * outer[1]:.4g} mN m over"
     text = plain(block(held))
     assert f"{row} theta_2 = 11.46 deg to 80.21 deg, a part of it at each" in text
@@ -307,7 +308,7 @@ def test_each_position_at_rest_has_its_own_range():
         beside = held.ends[0] + np.array([-1e-9, 1e-9])
         motion = Motion(beside, tau)
         torque = solve(replace(scene, motion=motion)).torque
-        assert sorted(torque) == pytest.approx([held.low, held.high], rel=1e-6)
+        assert sorted(torque) == approx([held.low, held.high], rel=1e-6)
     text = plain(block(scene))
     first, second = ([f"{held.low:.4g}", f"{held.high:.4g}"] for held in facts.held)
     assert (
@@ -330,7 +331,7 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_angle():
     scene = crank_rocker(motion=Motion(law=law), effects=(Friction.at(O2=0.05),))
     facts = summarize(scene, solve(scene))
     ((place, pin),) = facts.motion.reversals
-    assert pin == "O2" and place == pytest.approx(2.0, abs=1e-6)
+    assert pin == "O2" and place == approx(2.0, abs=1e-6)
     assert "reverses, and the pin forces jump, at theta_2 = 114.6 deg (O2)" in plain(
         block(scene)
     )
@@ -392,7 +393,7 @@ def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
     )
     force = solve(scene).drive_force
     stroke = solve(scene).stroke
-    assert force == pytest.approx(1e5 * (stroke - 0.5), rel=1e-12)
+    assert force == approx(1e5 * (stroke - 0.5), rel=1e-12)
     text = block(scene)
     assert text.count("0 N ") > 4 and "e-1" not in text.split("rounding")[0]
     assert "bending" not in text and "rounding changes none" in text

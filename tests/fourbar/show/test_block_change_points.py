@@ -11,6 +11,7 @@ from math import radians
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pytest import approx
 
 import fourbar
 from fourbar import (
@@ -136,7 +137,7 @@ def test_a_scene_without_a_range_covers_both_turns_of_a_single_change_point():
     assert solution.theta_2[[0, -1]].tolist() == [0.0, 2.0 * math.tau]
     duty = motor_duty(solution)
     assert duty.closed
-    assert duty.energy_in == pytest.approx(duty.energy_out, rel=1e-6)
+    assert duty.energy_in == approx(duty.energy_out, rel=1e-6)
     text = " ".join(write_block(scene, solution))
     assert "in 2 turns given" in text
     with_both = uniform(0.3, 0.1, 0.3, 0.1)
@@ -160,7 +161,7 @@ def test_lengths_are_equal_within_the_rounding_of_what_is_stated(tmp_path):
     assert 0.0 < np.abs(off).max() <= 5e-8 * (1.0 + 1e-6)
     beyond = ("22.3607 mm", "44.9998 mm", "22.3605 mm", "45.0002 mm")
     scene = read(tmp_path, state(beyond, motion))
-    assert find_miss(scene.linkage) == (pytest.approx(6e-7, rel=1e-6), "parallelogram")
+    assert find_miss(scene.linkage) == (approx(6e-7, rel=1e-6), "parallelogram")
     lines = write_block(scene, solve(scene))
     assert any("misses a parallelogram by 600 nm" in line for line in lines)
     # whole numbers and coarse decimals are meant as they stand
@@ -258,7 +259,7 @@ def test_one_equality_is_met_by_the_least_change():
     assert met == (4.0, 1.0, 2.0, 3.0)
     lengths = (4.0, 1.0, 2.0, 3.0 + 4e-6)
     met = meet_change_points(lengths, (1e-5,) * 4)
-    assert met == pytest.approx((4 + 1e-6, 1 + 1e-6, 2 - 1e-6, 3 + 3e-6), abs=1e-12)
+    assert met == approx((4 + 1e-6, 1 + 1e-6, 2 - 1e-6, 3 + 3e-6), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ("open", "crossed"))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Bar, Free, Gravity, Motion, Scene, solve
@@ -39,13 +40,13 @@ def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2,
     # of G2 and G4 half of the acceleration of the coupler
     mass_times_acceleration = -sense * 0.1 * 36.0 * (0.1 * 0.5 + 0.3 + 0.1 * 0.5)
     along = 0.5 * 9.81 - mass_times_acceleration
-    assert numbers(rows[5]) == pytest.approx([along, 0.0, along], rel=SIX_DIGITS)
+    assert numbers(rows[5]) == approx([along, 0.0, along], rel=SIX_DIGITS)
     assert numbers(rows[6]) == [0.0]
     beside = Motion(theta_2 + np.array([-1e-5, 1e-5]), 6.0)
     two = solve(replace(scene, motion=beside))
     for row, name in zip(rows[1:5], ("F12", "F32", "F43", "F14"), strict=True):
         mean = getattr(two, name).mean(axis=0)
-        assert numbers(row)[:2] == pytest.approx(mean, rel=SIX_DIGITS, abs=1e-8)
+        assert numbers(row)[:2] == approx(mean, rel=SIX_DIGITS, abs=1e-8)
 
 
 def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value():
@@ -106,8 +107,8 @@ def test_a_release_has_the_limits_of_its_own_motion(direction):
     lost = of_the_arms @ np.array(accelerations)
     weight = 9.81 * 0.5 * np.array([np.cos(direction), np.sin(direction)])
     shaking = numbers(rows[5])[:2]
-    assert shaking == pytest.approx(weight - lost, rel=SIX_DIGITS, abs=1e-6)
-    assert numbers(rows[1])[:2] == pytest.approx(
+    assert shaking == approx(weight - lost, rel=SIX_DIGITS, abs=1e-6)
+    assert numbers(rows[1])[:2] == approx(
         [-0.5 * x for x in shaking], rel=SIX_DIGITS, abs=1e-6
     )
 

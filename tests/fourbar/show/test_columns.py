@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Motion, Sweep, solve
@@ -41,14 +42,14 @@ def test_a_ratio_of_speeds_does_not_ask_for_a_speed():
     for speed in (None, 0.0, -3.0):
         still = replace(TURN, motion=TURN.motion.replace(speed=speed))
         for name, values in columns(still, ",".join(moving)).items():
-            assert values == pytest.approx(moving[name], rel=1e-12, abs=1e-13), name
+            assert values == approx(moving[name], rel=1e-12, abs=1e-13), name
 
 
 def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     torque, ratio = choose_columns(TURN, solve(TURN), "torque/F12,F12/F14")
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     shown = torque.shown({"N m": ("N mm", 1e3)})
-    assert shown == pytest.approx(1e3 * torque.values)
+    assert shown == approx(1e3 * torque.values)
 
 
 @pytest.mark.parametrize(
@@ -62,37 +63,37 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     ],
 )
 def test_an_unknown_column_is_refused_with_those_there_are(name, says):
-    with pytest.raises(InputError, match=says):
+    with raises(InputError, match=says):
         columns(TURN, name)
 
 
 def test_a_column_that_needs_a_speed_says_so():
     still = replace(TURN, motion=TURN.motion.replace(speed=None))
     for name in ("shaking_moment", "torque", "omega_4", "a_P_y", "F12/F14"):
-        with pytest.raises(InputError, match='"0 rad/s" gives the static torque'):
+        with raises(InputError, match='"0 rad/s" gives the static torque'):
             columns(still, name)
-    with pytest.raises(InputError, match="no one speed"):
+    with raises(InputError, match="no one speed"):
         columns(still, "time")
     law = Motion(law=fourbar.Sine(1.0, 0.5, 2.0, duration=3.0))
     for scene in (still, replace(TURN, motion=law)):
-        with pytest.raises(InputError, match='unknown; did you mean "torque"'):
+        with raises(InputError, match='unknown; did you mean "torque"'):
             columns(scene, "tork")
 
 
 def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     rocker = replace(TURN, motion=Motion(theta_4=Sweep(2.0, 1.7, 3), omega_4=-2.0))
-    assert columns(rocker, "time")["time"] == pytest.approx([0.0, 0.05, 0.1, 0.15])
+    assert columns(rocker, "time")["time"] == approx([0.0, 0.05, 0.1, 0.15])
     growing = Motion(Sweep(0.0, 1.0, 3), 1.0, 0.5)
-    with pytest.raises(InputError, match="no one speed"):
+    with raises(InputError, match="no one speed"):
         columns(replace(TURN, motion=growing), "time")
     cylinder = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
     steady = replace(cylinder, motion=cylinder.motion.replace(acceleration=0.0))
-    with pytest.raises(InputError, match="no one speed"):
+    with raises(InputError, match="no one speed"):
         columns(cylinder, "time")
     time = columns(steady, "time")["time"]
     stroke = solve(cylinder).stroke
     passed = np.abs(stroke - stroke[0]) / abs(cylinder.motion.speed)
-    assert time == pytest.approx(passed, rel=1e-9, abs=1e-9)
+    assert time == approx(passed, rel=1e-9, abs=1e-9)
 
 
 def test_a_difference_of_angles_goes_on_from_its_first_position():
@@ -106,7 +107,7 @@ def test_a_difference_of_angles_goes_on_from_its_first_position():
     solution = solve(scene)
     difference = columns(scene, "theta_2 - theta_4")["theta_2 - theta_4"]
     assert -np.pi < difference[0] <= np.pi
-    assert difference - difference[0] == pytest.approx(
+    assert difference - difference[0] == approx(
         solution.theta_2 - solution.theta_4 - (start - solution.theta_4[0]), abs=1e-12
     )
     assert columns(scene, "F12-F14,F12_x/F14-F12_y/F14").keys() == {

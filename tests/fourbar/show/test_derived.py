@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import solve
@@ -31,11 +31,11 @@ def test_ratios_and_centres_are_those_of_the_formulas():
             "omega_3/omega_2": state.k.h3,
         }
         for name, values in expected.items():
-            assert derive(s, name) == pytest.approx(values, rel=ROUND_OFF), name
+            assert derive(s, name) == approx(values, rel=ROUND_OFF), name
         by_formula = fourbar.instant_centres(scene.linkage, s.theta_2, s.branch)
         for bars, name in {(1, 3): "I13", (2, 4): "I24"}.items():
             centre = np.stack(by_formula[bars].point, axis=-1)
-            assert derive(s, name) == pytest.approx(centre, rel=1e-11), name
+            assert derive(s, name) == approx(centre, rel=1e-11), name
 
 
 def test_what_has_no_value_is_a_dash_and_no_number():
@@ -47,7 +47,7 @@ def test_what_has_no_value_is_a_dash_and_no_number():
         fourbar.uniform(3.0, 1.0, 3.0, 1.0), fourbar.Motion(np.array([1.0, 2.0]))
     )
     assert np.isnan(derive(solve(half_turn), "I13")).all()
-    assert derive(solve(half_turn), "omega_4/omega_2") == pytest.approx(1.0)
+    assert derive(solve(half_turn), "omega_4/omega_2") == approx(1.0)
     assert " - " in print_positions(solve(half_turn), None, DEGREES)
 
 

@@ -9,6 +9,7 @@ from math import tau
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, uniform, vary
@@ -65,7 +66,7 @@ def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn():
     # the rule is exact on periods
     given = duty.energy_in - duty.energy_out
     assert abs(given - heat) < 1e-9 * duty.energy_in
-    assert duty.mean_torque == pytest.approx(heat / tau, rel=1e-9)
+    assert duty.mean_torque == approx(heat / tau, rel=1e-9)
 
 
 def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
@@ -88,8 +89,8 @@ def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand():
         turn = Motion(Sweep(0.3, 0.3 + tau, 720), speed)
         scene = Scene(linkage, turn, loads=(couple,), effects=(Gravity(),))
         duty = motor_duty(solve(scene))
-        assert duty.mean_torque == pytest.approx(0.7, rel=1e-9)
-        assert duty.energy_swing == pytest.approx(2.0 * 2.0 * 9.81 * 0.1, rel=1e-9)
+        assert duty.mean_torque == approx(0.7, rel=1e-9)
+        assert duty.energy_swing == approx(2.0 * 2.0 * 9.81 * 0.1, rel=1e-9)
 
 
 def test_the_json_holds_the_duty():
@@ -143,12 +144,8 @@ def test_a_study_has_what_each_of_its_members_has():
                 motion=scene.motion.replace(angle=theta_2[member]),
             )
         )
-        assert moment[member] == pytest.approx(
-            shaking_moment(alone), rel=1e-12, abs=1e-12
-        )
-        assert force[member] == pytest.approx(
-            shaking_force(alone), rel=1e-12, abs=1e-12
-        )
+        assert moment[member] == approx(shaking_moment(alone), rel=1e-12, abs=1e-12)
+        assert force[member] == approx(shaking_force(alone), rel=1e-12, abs=1e-12)
         for of_study, one in (
             (duty, motor_duty(alone)),
             (load, bearing_load(alone, "A")),
@@ -157,7 +154,7 @@ def test_a_study_has_what_each_of_its_members_has():
                 if number is None:  # a member of a study without a number has NaN
                     assert array is None or np.isnan(array[member])
                 else:
-                    assert number == pytest.approx(array[member], rel=1e-12)
+                    assert number == approx(array[member], rel=1e-12)
     assert np.isnan(load.largest[3])
     assert np.isnan(duty.rms_power[3])
     assert np.isnan(moment[3]).all()
@@ -181,7 +178,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
     assert np.array_equal(study.time, [alone.time, alone.time])
     assert np.round(duty.energy_in, 4).tolist() == [0.4655, 0.4655]
     by_hand = np.trapezoid(np.maximum(alone.power, 0.0), alone.time)
-    assert duty.energy_in == pytest.approx([by_hand] * 2, rel=1e-12)
+    assert duty.energy_in == approx([by_hand] * 2, rel=1e-12)
     rows = study.to_csv()
     assert len(rows.splitlines()) == 1 + 2 * 21
     assert rows.splitlines()[0].split(",").count("time") == 1
@@ -235,7 +232,7 @@ def test_the_energy_of_a_backward_sweep_is_that_of_the_work_of_the_loads(speed):
     gained = np.sign(-speed) * (energy[-1] - energy[0])
     assert duty.energy_in >= 0.0 and duty.energy_out >= 0.0
     assert duty.energy_in + duty.energy_out > 0.1 * abs(gained)
-    assert duty.energy_in - duty.energy_out == pytest.approx(gained, rel=1e-5)
+    assert duty.energy_in - duty.energy_out == approx(gained, rel=1e-5)
 
 
 def test_a_position_without_forces_is_not_where_a_light_load_is_largest():

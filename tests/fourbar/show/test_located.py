@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import solve
@@ -80,7 +81,7 @@ def parallelogram(motion=SWEEP):
 def test_every_position_with_a_value_is_located(name, value, places, motion):
     """By cosines; two of one step of the sweep too, in the order of the motion."""
     found = locate(parallelogram(motion), name, value).places
-    assert found == pytest.approx(
+    assert found == approx(
         places if '"0 deg", to' in motion else places[::-1], abs=LOCATED
     )
 
@@ -90,7 +91,7 @@ def test_an_extreme_that_touches_the_value_is_a_position():
     sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
     for name, value in (("B_y", "0.5 m"), ("transmission", "90 deg")):
         found = locate(parallelogram(sweep), name, value).places
-        assert found == pytest.approx([pi / 2], abs=TOUCHED)
+        assert found == approx([pi / 2], abs=TOUCHED)
 
 
 @pytest.mark.parametrize(
@@ -107,15 +108,15 @@ def test_the_least_and_the_greatest_value_are_located(name, side, place):
     """Between the steps by sines, and at the end of what grows all the way."""
     sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
     found = locate(parallelogram(sweep), name, side).places
-    assert found == pytest.approx([place], abs=TOUCHED)
+    assert found == approx([place], abs=TOUCHED)
 
 
 def test_the_ends_of_a_motion_are_positions_and_one_position_is_one():
     """B_y is 0.25 m at 30 deg and at 150 deg, B_x 1.3 m at 0 and again at 360 deg."""
     scene = parallelogram('{ from = "10 deg", to = "150 deg", steps = 20 }')
-    assert np.degrees(locate(scene, "B_y", "0.25 m").places) == pytest.approx([30, 150])
+    assert np.degrees(locate(scene, "B_y", "0.25 m").places) == approx([30, 150])
     turn = loads(STILL + '[motion]\ntheta_2 = "90 deg"\n')
-    assert locate(turn, "B_x", "1.3 m").places == pytest.approx([0.0], abs=TOUCHED)
+    assert locate(turn, "B_x", "1.3 m").places == approx([0.0], abs=TOUCHED)
 
 
 def test_a_scene_of_single_positions_is_searched_over_its_range():
@@ -126,15 +127,15 @@ def test_a_scene_of_single_positions_is_searched_over_its_range():
         )
         found = np.degrees(locate(scene, "B_x", "0.4 m").places)
         first = math.degrees(acos(-0.8))
-        assert found == pytest.approx([first, 360.0 - first])
+        assert found == approx([first, 360.0 - first])
 
 
 def test_a_law_has_a_value_at_times_and_none_while_it_dwells():
     scene = loads(DWELL)
     at = locate(scene, "B_x", "1.05 m")
-    assert at.time == pytest.approx([0.5, 2.5], abs=LOCATED)
+    assert at.time == approx([0.5, 2.5], abs=LOCATED)
     assert list_positions("B_x=1.05 m", at)[0] == "B_x=1.05 m at 2 positions:"
-    with pytest.raises(NotAssembledError, match="it is constant there; B_x goes"):
+    with raises(NotAssembledError, match="it is constant there; B_x goes"):
         locate(scene, "B_x", "0.8 m")
 
 
@@ -152,7 +153,7 @@ def test_a_release_has_a_value_at_times():
     )
     speed = math.sqrt(2.0 * 9.81 * (math.sin(radians(50.0)) - 0.5) / 0.5)
     at = locate(scene, "omega_2", f"{-speed!r} rad/s")
-    assert np.degrees(at.angle) == pytest.approx([-50.0, -130.0], abs=1e-6)
+    assert np.degrees(at.angle) == approx([-50.0, -130.0], abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +170,7 @@ def test_a_release_has_a_value_at_times():
     ],
 )
 def test_what_no_position_has_is_refused_with_the_range(name, value, kind, words):
-    with pytest.raises(kind, match=words):
+    with raises(kind, match=words):
         locate(parallelogram(), name, value)
 
 
@@ -180,7 +181,7 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
         DWELL.replace('dwell = "1 s", ', "")
         + '[effects]\nfriction = { O2 = "2 N m" }\n'
     )
-    with pytest.raises(NotAssembledError, match="jumps over it at time = 0 s, 1 s;"):
+    with raises(NotAssembledError, match="jumps over it at time = 0 s, 1 s;"):
         locate(scene, "torque", "0.5 N m")
 
 
@@ -188,7 +189,7 @@ def test_a_column_with_poles_says_that_it_grows_without_bound():
     """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
     scene = crank_rocker(motion=fourbar.Motion())
     for value, why in (("1", "jumps"), ("max", "has none")):
-        with pytest.raises(NotAssembledError, match=f"{why}.*, and grows without"):
+        with raises(NotAssembledError, match=f"{why}.*, and grows without"):
             locate(scene, "mechanical_advantage", value)
 
 
@@ -211,7 +212,7 @@ def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
         )
     )
     found = locate(scene, "transmission", f"{float(math.asin(at.sin_mu[0]))!r} rad")
-    assert found.places == pytest.approx([place], abs=1e-9)
+    assert found.places == approx([place], abs=1e-9)
 
 
 def test_springs_have_their_length_and_pull_as_columns():
@@ -225,11 +226,11 @@ def test_springs_have_their_length_and_pull_as_columns():
     solution = solve(scene)
     length, force = choose_columns(scene, solution, "spring_0_length,spring_0_force")
     distance = np.sqrt(0.8**2 + 0.5**2 + 0.8 * np.cos(solution.theta_2))
-    assert length.unit == "m" and length.values == pytest.approx(distance, rel=1e-13)
+    assert length.unit == "m" and length.values == approx(distance, rel=1e-13)
     assert force.unit == "N"
-    assert force.values == pytest.approx(20.0 * (distance - 0.7) - 1.0, abs=1e-12)
+    assert force.values == approx(20.0 * (distance - 0.7) - 1.0, abs=1e-12)
     assert {"spring_0_length [m]", "spring_0_force [N]"} <= set(
         str(solution.to_csv(units=fourbar.units("m N"))).split("\n")[0].split(",")
     )
-    with pytest.raises(InputError, match="is the name of a quantity"):
+    with raises(InputError, match="is the name of a quantity"):
         fourbar.Point("spring_1_force", 3, (0.1, 0.0))

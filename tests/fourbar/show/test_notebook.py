@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from pytest import raises
 
 import fourbar
 from fourbar import Tolerance, sensitivity, solve, tolerances, vary
@@ -80,7 +81,7 @@ def test_csv_goes_to_a_file(tmp_path):
 
 def test_without_pandas_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(DependencyError, match="pip install pandas"):
+    with raises(DependencyError, match="pip install pandas"):
         solve(thesis()).to_pandas()
 
 
@@ -108,7 +109,7 @@ def test_showing_needs_numpy_alone():
     ],
 )
 def test_a_new_scene_of_bad_lengths_is_refused(lengths, words):
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         write_new_scene(lengths)
 
 
@@ -203,5 +204,5 @@ def test_the_slope_of_a_size_is_its_difference():
     close = 1e-6 * np.abs(slope).max()
     assert slopes.of("|F12|", "lengths.input") == pytest.approx(slope, abs=close)
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
-        with pytest.raises(InputError, match="is not known here"):
+        with raises(InputError, match="is not known here"):
             slopes.of(wrong, "lengths.input")

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import approx
 
 import fourbar
 from fourbar import Motion, Scene, Sweep, Tolerance, solve, uniform, units
@@ -59,9 +60,9 @@ def require_shown(driver, s, row, *names):
         if axis:
             value = value["xy".index(axis)]
         if name.startswith("theta"):
-            expected = pytest.approx(math.degrees(value), abs=PRINTED_DEG)
+            expected = approx(math.degrees(value), abs=PRINTED_DEG)
         else:
-            expected = pytest.approx(value, rel=PRINTED)
+            expected = approx(value, rel=PRINTED)
         assert shown(driver, name) == [expected], name
     drawn = pins(driver)
     scale = np.hypot(*drawn["O4"]) / s.scene.linkage.ground
@@ -94,9 +95,7 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse):
     driver = browse(animate.write_page(scene, units=units("mm kN N.mm rpm")))
     s = solve(scene)
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / pi]
-    assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(
-        expected, rel=PRINTED
-    )
+    assert shown(driver, "torque", "F43_x", "omega_4") == approx(expected, rel=PRINTED)
     text = driver.find_element("tag name", "body").text
     assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text
     labels = [
@@ -112,7 +111,7 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse):
         for text in driver.find_elements("css selector", "#chart text")[-3:]
         if text.text
     )
-    assert top == pytest.approx(1e3 * s.torque.max(), rel=0.01)
+    assert top == approx(1e3 * s.torque.max(), rel=0.01)
 
 
 @pytest.fixture
@@ -204,7 +203,7 @@ def test_a_free_motion_plays_once_in_its_own_time(browse):
     assert spoken == "0.740 seconds"
     require_shown(driver, s, 37, "omega_2", "alpha_4")
     kinetic = embedded(text)["branches"]["1"]["energy"][37]
-    assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
+    assert shown(driver, "energy") == approx([kinetic], rel=PRINTED)
 
 
 STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
@@ -233,8 +232,8 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     angles = ("theta_2", "theta_3", "theta_4")
     require_shown(driver, s, 20, *angles, "drive_force", "condition")
     millimetres = 1000.0 * s.stroke[20]
-    assert shown(driver, "stroke") == pytest.approx([millimetres], rel=PRINTED)
-    assert state_of(driver, "plotted.over") == pytest.approx(s.at.places)
+    assert shown(driver, "stroke") == approx([millimetres], rel=PRINTED)
+    assert state_of(driver, "plotted.over") == approx(s.at.places)
     driver.find_element("id", "chart").click()  # its middle
     assert abs(state_of(driver, "row") - 20) <= 2
     closed, rows = np.flatnonzero(s.assembled), clockwork(driver, 400)
@@ -363,7 +362,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
         atol=1e-4,
     )
     towards = np.subtract(arrow[1], arrow[0])
-    assert atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
+    assert atan2(towards[1], towards[0]) == approx(s.theta_3[20] + 0.5, abs=0.01)
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
     names = (
         'return ["1", "3"].map(k => [parts.label[k].textContent,'
@@ -379,7 +378,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
     assert len(arrows) == 2 * 5
     shafts = np.diff(arrows, axis=1)[:, 0]
     for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
-        assert atan2(y, x) == pytest.approx(atan2(*expected[::-1]), abs=0.001)
+        assert atan2(y, x) == approx(atan2(*expected[::-1]), abs=0.001)
     driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
     assert [text for text, _ in driver.execute_script(names)] == [
         "1: 300 mm",
@@ -616,11 +615,11 @@ def test_a_picture_lies_along_its_bar(browse, tmp_path):
     element = driver.find_element("id", "picture-4")
     drawn = pins(driver)
     length = np.hypot(*(drawn["B"] - drawn["O4"]))
-    assert float(element.get_attribute("width")) == pytest.approx(length)
+    assert float(element.get_attribute("width")) == approx(length)
     turn = element.get_attribute("transform")
     angle = float(turn[turn.index("rotate(") + 7 : -1])
     away = math.remainder(angle + math.degrees(solve(crank_rocker()).theta_4[9]), 360)
-    assert away == pytest.approx(0, abs=1e-6)
+    assert away == approx(0, abs=1e-6)
 
 
 def test_with_reduced_motion_it_moves_twice_a_second(browse):
@@ -646,7 +645,7 @@ def test_positions_alone_show_no_dynamics(browse):
     assert not driver.find_element("id", "forces").is_displayed()
     assert driver.find_element("id", "omega_3").text == "–"
     driver.find_element("id", "forward").click()
-    assert shown(driver, "theta_2") == pytest.approx([10.0], abs=PRINTED_DEG)
+    assert shown(driver, "theta_2") == approx([10.0], abs=PRINTED_DEG)
 
 
 def test_it_says_why_a_position_has_no_forces(browse):
@@ -698,7 +697,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
             atol=SPREAD_PRINTED * spread.worst[20] * factor,
         )
     shares = study.spreads["torque"].shares[:, 20]
-    assert [rows[tolerance.key][0] for tolerance in loose] == pytest.approx(
+    assert [rows[tolerance.key][0] for tolerance in loose] == approx(
         100 * shares / shares.sum(), abs=0.51
     )
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
@@ -744,7 +743,7 @@ def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
         bar = scene.linkage.bar(moving)
         cells = [number(cell.text) for cell in row.find_elements("tag name", "td")[1:3]]
         stated = [bar.mass / mass, bar.moment_of_inertia / inertia]
-        assert cells == pytest.approx(stated, rel=PRINTED)
+        assert cells == approx(stated, rel=PRINTED)
 
 
 CLEAR_OF_ITS_BAR = """
@@ -788,10 +787,10 @@ def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(brow
         bar = scene.linkage.bar(moving)
         shown_numbers = [number(cell.text) for cell in row[:3]]
         stated = [1e3 * bar.length, bar.mass, bar.moment_of_inertia]
-        assert shown_numbers == pytest.approx(stated, rel=PRINTED)
+        assert shown_numbers == approx(stated, rel=PRINTED)
         along, off = (number(part) for part in row[3].text.split(", "))
         centre = 1e3 * bar.to_centre
-        assert (along, off) == pytest.approx(
+        assert (along, off) == approx(
             (centre.real, centre.imag), rel=PRINTED, abs=PRINTED
         )
     background = "return getComputedStyle(document.body).backgroundColor"

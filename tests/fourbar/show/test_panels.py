@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import legval
+from pytest import approx
 
 from fourbar.show import panels as of_panels
 from fourbar.show.panels import Wanted, fit_panels
@@ -33,14 +34,14 @@ def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative():
         return float(slow + fast)
 
     right = 0.5 * (primitive(2.0) - primitive(0.0))
-    assert panels.find_rms("curve") ** 2 == pytest.approx(right, rel=SETTLED)
+    assert panels.find_rms("curve") ** 2 == approx(right, rel=SETTLED)
 
 
 def test_a_vector_has_the_sum_of_its_components():
     panels = fit(lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1))
     # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
     right = 12.5 - 3.5 * math.sin(4.0) / 4.0
-    assert panels.find_rms("curve") ** 2 == pytest.approx(right, rel=SETTLED)
+    assert panels.find_rms("curve") ** 2 == approx(right, rel=SETTLED)
 
 
 @pytest.mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
@@ -48,9 +49,9 @@ def test_a_jump_costs_no_digits(place):
     """On an edge or anywhere else: 2 before it and -1 after it."""
     panels = fit(lambda x: np.where(x < place, 2.0, -1.0))
     right = 2.0 * place - (2.0 - place)
-    assert panels.integrate("curve") == pytest.approx(right, abs=1e-8)
+    assert panels.integrate("curve") == approx(right, abs=1e-8)
     turns = panels.accumulate("curve")
-    assert turns.max() == pytest.approx(2.0 * place, rel=1e-8)
+    assert turns.max() == approx(2.0 * place, rel=1e-8)
     assert not panels.growing
 
 
@@ -59,17 +60,17 @@ def test_a_curve_is_integrated_from_zero_to_zero():
     panels = fit(lambda x: np.sin(3.0 * x), np.array([0.0, 1.3, 2.0]))
     steps = np.diff(panels.accumulate("curve"))
     # the second half wave ends at 2 pi/3, beyond the motion
-    assert steps[steps > 0.0].sum() == pytest.approx(2.0 / 3.0, rel=SETTLED)
+    assert steps[steps > 0.0].sum() == approx(2.0 / 3.0, rel=SETTLED)
     down = (1.0 + math.cos(6.0)) / 3.0
-    assert -steps[steps < 0.0].sum() == pytest.approx(down, rel=SETTLED)
+    assert -steps[steps < 0.0].sum() == approx(down, rel=SETTLED)
 
 
 def test_the_range_of_the_integral_about_a_level():
     """Of 1/2 + sin(pi x) less its mean it is that of -cos(pi x)/pi."""
     panels = fit(lambda x: 0.5 + np.sin(pi * x), np.array([0.0, 0.7, 2.0]))
-    assert panels.integrate("curve") == pytest.approx(1.0, rel=SETTLED)
+    assert panels.integrate("curve") == approx(1.0, rel=SETTLED)
     about_mean = panels.accumulate("curve", 0.5)
-    assert np.ptp(about_mean) == pytest.approx(2.0 / pi, rel=SETTLED)
+    assert np.ptp(about_mean) == approx(2.0 / pi, rel=SETTLED)
 
 
 def draw_noise(places):
@@ -88,9 +89,9 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
     wanted = dict.fromkeys(("curve", "other"), Wanted(integrated=True))
     panels = fit_panels(compute, EDGES, wanted)
     assert panels.growing == {"curve"} and not panels.has_value("curve")
-    assert panels.list_poles("curve") == [pytest.approx(POLE, abs=1e-7)]
+    assert panels.list_poles("curve") == [approx(POLE, abs=1e-7)]
     right = math.exp(2.0) - 1.0
-    assert panels.integrate("other") == pytest.approx(right, rel=SETTLED)
+    assert panels.integrate("other") == approx(right, rel=SETTLED)
 
 
 @pytest.mark.parametrize(
@@ -111,8 +112,8 @@ def test_the_largest_size_is_the_first_of_equal_ones(curve, peak, place):
     panels = fit(curve)
     assert not panels.growing
     found = panels.find_peak("curve")
-    assert abs(found.value) == pytest.approx(peak, rel=1e-7)
-    assert found.place == pytest.approx(place, abs=2e-6)
+    assert abs(found.value) == approx(peak, rel=1e-7)
+    assert found.place == approx(place, abs=2e-6)
 
 
 @pytest.mark.parametrize("edges", (EDGES, EDGES[::-1]))
@@ -124,17 +125,17 @@ def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(edge
 
     wanted = dict.fromkeys(("flat", "pole"), Wanted())
     peak = fit_panels(compute, edges, wanted).find_peak("flat")
-    assert peak.place == pytest.approx(POLE, abs=2e-6)
+    assert peak.place == approx(POLE, abs=2e-6)
 
 
 def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
     forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
     for panels in (forwards, backwards):
-        assert panels.find_peak("curve", 1).place == pytest.approx(0.5 * pi, abs=1e-5)
-        assert panels.find_peak("curve", -1).value == pytest.approx(0.0, abs=1e-8)
+        assert panels.find_peak("curve", 1).place == approx(0.5 * pi, abs=1e-5)
+        assert panels.find_peak("curve", -1).value == approx(0.0, abs=1e-8)
     level = [fit(lambda x: 1.0 + 0.0 * x, edges) for edges in (EDGES, EDGES[::-1])]
     places = [panels.find_peak("curve").place for panels in level]
-    assert places == pytest.approx([0.0, 2.0], abs=1e-8)
+    assert places == approx([0.0, 2.0], abs=1e-8)
 
 
 def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels():
@@ -153,7 +154,7 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels():
                 return {"curve": of(x)}
 
             panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
-            assert panels.find_zeros("curve") == pytest.approx(zeros, abs=1e-9)
+            assert panels.find_zeros("curve") == approx(zeros, abs=1e-9)
 
 
 def test_rounding_need_not_settle():
@@ -172,5 +173,5 @@ def test_the_panels_of_many_waves_are_searched_at_once(monkeypatch):
 
     monkeypatch.setattr(of_panels, "legval", evaluate)
     peak = fitted.find_peak("curve", 1)
-    assert peak == pytest.approx((1.0, 0.0025), rel=1e-6)
+    assert peak == approx((1.0, 0.0025), rel=1e-6)
     assert len(searched) < 10 < min(searched)

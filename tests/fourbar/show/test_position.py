@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import Motion, solve
@@ -36,22 +37,20 @@ def test_bars_points_and_forces_are_those_of_the_solution():
     bars = [numbers(line)[1:] for line in sheet.write_bars()[1:]]
     for bar, row in zip((2, 3, 4), bars, strict=True):
         rates = [getattr(s, f"{letter}_{bar}")[0] for letter in ("omega", "alpha")]
-        assert row[1:] == pytest.approx(rates, rel=SIX_DIGITS)
+        assert row[1:] == approx(rates, rel=SIX_DIGITS)
         angle = np.degrees(getattr(s, f"theta_{bar}")[0])
-        assert row[0] == pytest.approx(angle, abs=6e-5)
+        assert row[0] == approx(angle, abs=6e-5)
     points = sheet.write_points()
     at = next(i for i, line in enumerate(points) if line.startswith("P "))
     place, speed, growth = (numbers(line) for line in points[at : at + 3])
-    assert place == pytest.approx(s.points["P"][0], rel=SIX_DIGITS)
+    assert place == approx(s.points["P"][0], rel=SIX_DIGITS)
     for row, vector in ((speed, s.velocity["P"][0]), (growth, s.acceleration["P"][0])):
-        assert row == pytest.approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
+        assert row == approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
     forces = sheet.write_pin_forces()[1:5]
     for line, name in zip(forces, ("F12", "F32", "F43", "F14"), strict=True):
         vector = getattr(s, name)[0]
         assert line.startswith(name)
-        assert numbers(line) == pytest.approx(
-            [*vector, np.hypot(*vector)], rel=SIX_DIGITS
-        )
+        assert numbers(line) == approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
 
 
 def test_what_a_scene_has_not_is_left_out():
@@ -94,7 +93,7 @@ def test_columns_of_an_angle_of_many_turns_stay_apart(turns):
         of_bar = [getattr(solution, f"{name}_{bar}")[0] for name in ("theta", "omega")]
         written = numbers(row.partition(str(bar))[2])[:2]
         shown = np.radians(written[0]), written[1] * math.tau / 60.0
-        assert shown == pytest.approx(of_bar, rel=SIX_DIGITS)
+        assert shown == approx(of_bar, rel=SIX_DIGITS)
 
 
 PRESSED = (
@@ -117,11 +116,11 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     rows = PositionSheet(scene, solve(scene), COMMON).write_ratios()
     (row,) = [row for row in rows if row.startswith("F_jaw/drive_force")]
     ratio = numbers(row)[0]
-    assert ratio == pytest.approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
+    assert ratio == approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
     assert not any(row.startswith("F_handle/drive_force") for row in rows)
     held = fourbar.Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
     loaded = solve(replace(scene, loads=(held,)))
-    assert 1.0 / loaded.drive_force[0] == pytest.approx(ratio, rel=SIX_DIGITS)
+    assert 1.0 / loaded.drive_force[0] == approx(ratio, rel=SIX_DIGITS)
 
 
 @pytest.mark.parametrize("name", ["theta_3", "theta_4"])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
+from pytest import approx
 from scipy.integrate import quad
 from scipy.special import ellipk
 
@@ -161,10 +162,10 @@ def test_facts_are_those_of_a_dense_scan(name):
         (there,) = list_sizes(scene, facts.motion.solve_at(np.array([peak.place])))[
             quantity
         ]
-        assert there == pytest.approx(abs(peak.value), rel=EXACT, abs=1e-12), quantity
+        assert there == approx(abs(peak.value), rel=EXACT, abs=1e-12), quantity
         if quantity in (*PIN_FORCE.values(), "power", "speed"):
             most = shown[quantity].max()
-            assert most == pytest.approx(abs(peak.value), rel=EXACT, abs=1e-12)
+            assert most == approx(abs(peak.value), rel=EXACT, abs=1e-12)
     for bar, (low, high) in facts.angles.items():
         angles = getattr(dense, f"theta_{bar}")
         assert low.value - EXACT <= angles.min() <= angles.max() <= high.value + EXACT
@@ -175,7 +176,7 @@ def test_facts_are_those_of_a_dense_scan(name):
     sines = np.abs(dense.sin_mu)
     assert sin(facts.transmission.value) <= sines.min() * (1.0 + EXACT)
     (sine,) = facts.motion.solve_at(np.array([facts.transmission.place])).sin_mu
-    assert abs(sine) == pytest.approx(sin(facts.transmission.value), rel=EXACT)
+    assert abs(sine) == approx(sin(facts.transmission.value), rel=EXACT)
     for bar, rates in facts.rates.items():
         if not acts(scene):
             assert rates == tuple(
@@ -196,9 +197,7 @@ def check_entry(scene, facts, dense, weights):
     assert facts.peak == panels.find_peak(drive)
     steady = not np.any(scene.motion.acceleration)
     means = {
-        quantity: pytest.approx(
-            sqrt(weights @ size**2 / weights.sum()), rel=EXACT, abs=1e-12
-        )
+        quantity: approx(sqrt(weights @ size**2 / weights.sum()), rel=EXACT, abs=1e-12)
         if steady
         else None
         for quantity, size in sizes.items()
@@ -220,7 +219,7 @@ def check_entry(scene, facts, dense, weights):
     most = np.abs(work).sum()
     for key, sign in (("energy_in", 1.0), ("energy_out", -1.0)):
         right = np.maximum(sign * work, 0.0).sum()
-        assert entry[key] == pytest.approx(right, abs=SUMMED * most)
+        assert entry[key] == approx(right, abs=SUMMED * most)
     first, last = facts.solution.at.angle[[0, -1]]
     closed = math.isclose(abs(last - first), tau)
     assert entry["closed"] == closed
@@ -229,9 +228,9 @@ def check_entry(scene, facts, dense, weights):
         return
     sense = math.copysign(tau, np.mean(dense.at.speed))
     mean = work.sum() / sense
-    assert entry["mean_torque"] == pytest.approx(mean, abs=SUMMED * sizes[drive].max())
+    assert entry["mean_torque"] == approx(mean, abs=SUMMED * sizes[drive].max())
     surplus = np.cumsum(work - work.sum() * weights / weights.sum())
-    assert entry["energy_swing"] == pytest.approx(np.ptp(surplus), rel=SWING, abs=1e-12)
+    assert entry["energy_swing"] == approx(np.ptp(surplus), rel=SWING, abs=1e-12)
 
 
 def test_a_list_has_its_own_peaks_and_means():
@@ -242,7 +241,7 @@ def test_a_list_has_its_own_peaks_and_means():
     entry = write_motor(scene, solution, {})
     assert entry["peak_torque"] == np.abs(solution.torque).max()
     rms = sqrt(np.square(solution.torque).mean())
-    assert entry["rms_torque"] == pytest.approx(rms, rel=EXACT)
+    assert entry["rms_torque"] == approx(rms, rel=EXACT)
 
 
 @pytest.mark.slow
@@ -258,7 +257,7 @@ def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones(
     pairs = [(getattr(huge.duty, n), getattr(small.duty, n)) for n in names]
     pairs += [(huge.pins[pin].rms, load.rms) for pin, load in small.pins.items()]
     for large, usual in pairs:
-        assert large / 1e300 == pytest.approx(usual, rel=EXACT)
+        assert large / 1e300 == approx(usual, rel=EXACT)
 
 
 BUCKET = """
@@ -328,11 +327,11 @@ def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes():
     facts = release_pendulum(0.0, 1.7)
     slow = sqrt(INERTIA / WEIGHT)
     period = 4.0 * slow * float(ellipk(sin(0.5 * AWAY) ** 2))
-    assert facts.period == pytest.approx(period, rel=EXTREME)
+    assert facts.period == approx(period, rel=EXTREME)
     low, high = facts.angles[2]
-    assert low == pytest.approx((1.5 * pi - AWAY, 0.0), abs=EXTREME)
+    assert low == approx((1.5 * pi - AWAY, 0.0), abs=EXTREME)
     highest = 1.5 * pi + AWAY
-    assert high == pytest.approx((highest, 0.5 * period), abs=EXTREME)
+    assert high == approx((highest, 0.5 * period), abs=EXTREME)
     damped = release_pendulum(0.0, 1.7, Viscous((("O2", 1e-6),)))
     assert damped.period is None
 
@@ -346,7 +345,7 @@ def test_a_released_turn_has_its_period():
 
     period, _ = quad(compute_slowness, 0.0, 2.0 * pi, epsabs=1e-13)
     facts = release_pendulum(30.0, 0.5)
-    assert facts.period == pytest.approx(period, rel=EXTREME)
+    assert facts.period == approx(period, rel=EXTREME)
 
 
 @pytest.mark.slow
@@ -369,4 +368,4 @@ def test_transmission_angle_is_the_least_of_all_stretches():
     scanned = np.nanmin(np.minimum(turned, pi - turned))
     signs = np.sign(dense.sin_mu[np.isfinite(dense.sin_mu)])
     assert {*signs} == {-1.0, 1.0}
-    assert least.value == pytest.approx(scanned, abs=BETWEEN_STEPS)
+    assert least.value == approx(scanned, abs=BETWEEN_STEPS)

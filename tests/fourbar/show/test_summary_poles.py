@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx
 from scipy.optimize import brentq
 
 import fourbar
@@ -163,7 +164,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
     assert (head in text) == (drive in growing)
     if drive in growing:
         poles = panels.list_poles(drive)
-        assert poles == pytest.approx(places, abs=LOCATED)
+        assert poles == approx(places, abs=LOCATED)
         written = [f"{math.degrees(pole):.4g} deg" for pole in poles]
         assert head + " and ".join(written).replace("-0 ", "0 ") in text
         sized = scene.drive is None or facts.stroke_range is not None
@@ -176,7 +177,7 @@ def test_a_torque_is_largest_where_pin_forces_have_a_pole():
     for start, stop in ((-1.0, 1.0), (1.0, -1.0), (2.0, 4.0)):
         facts = find_facts(sweep(PARALLELOGRAM, start, stop))
         weight = math.copysign(0.4 * 9.81 * 0.1, facts.peak.value)
-        assert facts.peak.value == pytest.approx(weight, rel=PEAK)
+        assert facts.peak.value == approx(weight, rel=PEAK)
         assert abs(math.sin(facts.peak.place)) < LOCATED
         assert facts.motion.panels.growing == {*PIN_FORCE.values()}
 
@@ -189,11 +190,11 @@ def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
         fourbar.motor_duty(solve(replace(scene, drive_bar=bar))) for bar in (4, 2)
     )
     for name in ("peak_power", "rms_power", "energy_in", "energy_out"):
-        number = pytest.approx(getattr(right, name), rel=LOCATED)
+        number = approx(getattr(right, name), rel=LOCATED)
         assert getattr(duty, name) == number, name
     scene, _ = POLES["cylinder in line with the crank"]
     facts = find_facts(scene)
-    assert facts.duty.peak_speed == pytest.approx(10.0 * LEVER[0], rel=PEAK)
+    assert facts.duty.peak_speed == approx(10.0 * LEVER[0], rel=PEAK)
     assert "speed peak 0.9 m/s power" in write(facts)
 
 
@@ -232,7 +233,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
                 assert high.value - 0.1 <= angles.max() <= high.value
         widths.append(high.value - low.value)
     if not facts.solution.assembled.all():
-        assert widths == pytest.approx([widths[0]] * 3, abs=LOCATED)
+        assert widths == approx([widths[0]] * 3, abs=LOCATED)
         assert widths[0] <= fourbar.swing(uniform(*lengths)) + LOCATED
 
 

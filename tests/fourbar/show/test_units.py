@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import load, solve
@@ -70,7 +71,7 @@ def test_every_number_is_in_the_unit_that_is_named(capsys):
             assert header[column] == "F12_y [lbf]"
             assert "torque [lbf in]" in header
             assert "condition" in header
-            assert float(rows[90][column]) * POUND == pytest.approx(
+            assert float(rows[90][column]) * POUND == approx(
                 solution.F12[90, 1], rel=1e-14
             )
     for name, (values, unit) in printed.items():
@@ -148,12 +149,12 @@ def test_the_table_names_its_units(capsys):
         ]
     ]
     torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
-    assert torque == pytest.approx(list(1000.0 * solve(load(MODEL)).torque), rel=1e-4)
+    assert torque == approx(list(1000.0 * solve(load(MODEL)).torque), rel=1e-4)
 
 
 @pytest.mark.parametrize("text", ["furlong", "mm in", "N.mm J", "m^2"])
 def test_what_is_no_list_of_units_is_refused(text, capsys):
-    with pytest.raises(InputError):
+    with raises(InputError):
         units(text)
     assert status(["analyze", str(MODEL), "--units", text]) == 2
     assert "units" in capsys.readouterr().err
@@ -163,7 +164,7 @@ def test_units_are_read_as_people_write_them():
     assert units("mm, N,lbf-in") == units("mm N lbf-in")
     assert units("Imperial") == units("imperial")
     assert not units("si")
-    with pytest.raises(InputError, match=r'lb-in.*did you mean "lbf-in"'):
+    with raises(InputError, match=r'lb-in.*did you mean "lbf-in"'):
         units("mm lb-in")
 
 
@@ -181,9 +182,7 @@ def test_plots_and_notebooks_say_theirs():
         if name == "torque":
             torque = solve(scene).torque
             curve = max((np.asarray(line.get_ydata()) for line in axes.lines), key=len)
-            assert np.nanmax(curve) == pytest.approx(
-                np.max(torque) / (POUND * INCH), rel=0.01
-            )
+            assert np.nanmax(curve) == approx(np.max(torque) / (POUND * INCH), rel=0.01)
     assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
     table = notebook.in_units(solve(scene), "imperial")._repr_html_()
     assert "lbf in" in table and "deg" in table and "N m" not in table
@@ -191,7 +190,7 @@ def test_plots_and_notebooks_say_theirs():
 
 @pytest.mark.parametrize("text", ["inches pounds", "in lb", "mm lbs deg"])
 def test_pounds_without_a_unit_of_force_are_one_line_that_says_what_to_write(text):
-    with pytest.raises(InputError, match="write lbf for pounds-force"):
+    with raises(InputError, match="write lbf for pounds-force"):
         units(text)
     assert units("in lb lbf")["N"][0] == "lbf"
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import raises
 
 import fourbar
 from fourbar import InputError, load, solve, uniform
@@ -133,14 +134,14 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
     ],
 )
 def test_what_has_no_sensitivities(motion, word):
-    with pytest.raises(InputError, match=word):
+    with raises(InputError, match=word):
         sensitivity(Scene(LINK, Motion(**motion, omega_2=1.0)))
 
 
 def test_an_unknown_name_is_refused():
     slopes = sensitivity(scene())
     for quantity, key in (("torque", "lengths.inptu"), ("torqe", "lengths.input")):
-        with pytest.raises(InputError, match="is not known here"):
+        with raises(InputError, match="is not known here"):
             slopes.of(quantity, key)
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from pytest import approx
 
 import fourbar
 from fourbar import (
@@ -165,14 +166,12 @@ def test_a_crank_with_mass_alone_is_a_pendulum(name):
     assert [rest.stability for rest in found] == [row[0] for row in expected]
     for rest, (stability, theta_2, slope, inertia) in zip(found, expected, strict=True):
         turned = math.remainder(rest.place.theta_2 - theta_2, TURN)
-        assert turned == pytest.approx(0.0, abs=close)
-        assert rest.inertia == pytest.approx(inertia, rel=CLOSE, abs=CLOSE)
-        assert rest.slope == pytest.approx(
-            slope, rel=max(CLOSE, 1e3 * close), abs=close
-        )
+        assert turned == approx(0.0, abs=close)
+        assert rest.inertia == approx(inertia, rel=CLOSE, abs=CLOSE)
+        assert rest.slope == approx(slope, rel=max(CLOSE, 1e3 * close), abs=close)
         if stability == "stable" and inertia:
             own = sqrt(-rest.slope / inertia) / TURN
-            assert rest.frequency == pytest.approx(own, rel=CLOSE)
+            assert rest.frequency == approx(own, rel=CLOSE)
         else:
             assert rest.frequency is None
 
@@ -185,7 +184,7 @@ def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum():
     (hanging,) = [rest for rest in equilibrium(scene).found if rest.place.branch == 0]
     assert hanging.angle == "theta_4"
     pendulum = sqrt(M * 9.81 * R / (INERTIA + M * R * R)) / (TURN)
-    assert hanging.frequency == pytest.approx(pendulum, rel=1e-9)
+    assert hanging.frequency == approx(pendulum, rel=1e-9)
 
 
 def test_a_slope_that_is_no_number_is_neither_stable_nor_unstable(monkeypatch):
@@ -204,7 +203,7 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     equilibria = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
     for rest in equilibria.found:
         ends = [math.remainder(end[0] - rest.place[0], TURN) for end in rest.held]
-        assert ends == pytest.approx([-away, away], abs=CLOSE)
+        assert ends == approx([-away, away], abs=CLOSE)
     assert len(equilibria.held) == 2
     assert all(lower.theta_2 < upper.theta_2 for lower, upper in equilibria.held)
     Q = -FALLS * np.cos(equilibria.positions.theta_2 + 0.3)
@@ -317,7 +316,7 @@ def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated():
     assert not re.search(r"\de-|largest", write_equilibria("lamp", rest))
     ((first, last),) = rest.indifferent
     ends = math.degrees(first.theta_2), math.degrees(last.theta_2)
-    assert ends == pytest.approx((-40.0, 60.0), abs=1e-9)
+    assert ends == approx((-40.0, 60.0), abs=1e-9)
 
 
 def test_nothing_that_acts_and_a_balanced_crank_are_indifferent_all_round():
@@ -327,7 +326,7 @@ def test_nothing_that_acts_and_a_balanced_crank_are_indifferent_all_round():
         equilibria = equilibrium(balanced)
         ((first, last),) = equilibria.indifferent
         assert not equilibria.found
-        assert last.theta_2 - first.theta_2 == pytest.approx(TURN)
+        assert last.theta_2 - first.theta_2 == approx(TURN)
 
 
 def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone():
@@ -376,14 +375,14 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
     wound = np.array([theta_3 - theta - pi / 2, theta_4 - theta_3 + pi / 2])
     wound -= TURN * np.rint(wound[:, :1] / TURN)
     near = np.argmin(np.abs(theta - math.radians(167.7867)))
-    assert math.degrees(abs(wound[1, near])) == pytest.approx(turned, abs=0.05)
+    assert math.degrees(abs(wound[1, near])) == approx(turned, abs=0.05)
     within = np.all(np.abs(wound) < pi, axis=0)
     energy = 5.0 * np.sum(wound**2, axis=0)[within]
     assert np.any(np.diff(np.sign(np.diff(energy)))) == bool(angles)
 
     found = equilibrium(loads(ROBOT.replace("START", f"{start} deg")))
     reached = [math.degrees(r.place.theta_2) for r in found.found if r.reached]
-    assert reached == pytest.approx(angles, abs=1e-4)
+    assert reached == approx(angles, abs=1e-4)
     from_here = math.degrees(theta[np.argmax(np.abs(wound[1]) >= pi)])
     rows = [row.split() for row in write_equilibria("robot", found).splitlines()]
     ends = [
@@ -521,8 +520,8 @@ def test_no_unit_of_length_changes_an_equilibrium(unit):
     found, same = find(unit).found, find(1.0).found
     assert len(found) == len(same) == 2
     for rest, in_metres in zip(found, same, strict=True):
-        assert rest.place == pytest.approx(in_metres.place, abs=CLOSE)
-        assert rest.slope / unit == pytest.approx(in_metres.slope, rel=1e-9)
+        assert rest.place == approx(in_metres.place, abs=CLOSE)
+        assert rest.slope / unit == approx(in_metres.slope, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -558,7 +557,7 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
         )
         assert len(one) == len(other) > 0
         for rest, same_rest in zip(one, other, strict=True):
-            assert rest == pytest.approx(same_rest)
+            assert rest == approx(same_rest)
 
 
 def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency():
@@ -572,4 +571,4 @@ def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency():
     others = [
         rest.frequency for rest in found if rest.stability == "stable" and rest.inertia
     ]
-    assert others == pytest.approx([pendulum] * 2)
+    assert others == approx([pendulum] * 2)

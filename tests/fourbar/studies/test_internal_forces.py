@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pytest import approx, raises
 
 import fourbar
 from fourbar import (
@@ -51,9 +52,9 @@ def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports():
     M = 8.0 * np.array([0.0, 0.03 * 0.175, 0.075 * 0.17, 0.075 * 0.15, 0.0]) / 0.25
     assert_allclose(internal.M[0], M, atol=1e-14)
     assert_allclose(internal.V[0], [5.6, 5.6, -2.4, -2.4, 0.0], atol=1e-13)
-    assert internal.largest.moment[0] == pytest.approx(8.0 * 0.075 * 0.175 / 0.25)
+    assert internal.largest.moment[0] == approx(8.0 * 0.075 * 0.175 / 0.25)
     assert internal.uniform
-    assert internal.largest.x[0] == pytest.approx(0.075)
+    assert internal.largest.x[0] == approx(0.075)
 
 
 @pytest.mark.parametrize(
@@ -84,8 +85,8 @@ def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     M = 3.0 * (x / length - (x > foot))
     assert_allclose(internal.M[0], M, atol=3.0 * ROUNDED)
     largest = 3.0 * max(foot, length - foot) / length
-    assert abs(internal.largest.moment[0]) == pytest.approx(largest, rel=ROUNDED)
-    assert internal.largest.x[0] == pytest.approx(foot, abs=ROUNDED)
+    assert abs(internal.largest.moment[0]) == approx(largest, rel=ROUNDED)
+    assert internal.largest.x[0] == approx(foot, abs=ROUNDED)
     elsewhere = replace(scene, loads=(Load(bar, moment=3.0),))
     assert solve(elsewhere).torque[0] == solve(scene).torque[0]
 
@@ -99,17 +100,17 @@ def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight():
     scene = Scene(linkage, AT, effects=(Gravity(9.81),))
     internal, theta = solved(scene, 3), solve(scene).theta_3[0]
     w = 2.0 / 0.25 * 9.81 * math.cos(theta)
-    assert internal.uniform and internal.x[20] == pytest.approx(0.125)
+    assert internal.uniform and internal.x[20] == approx(0.125)
     assert (
         internal.M[0, 20]
-        == pytest.approx(w * 0.25**2 / 8.0)
-        == pytest.approx(internal.largest.moment[0])
+        == approx(w * 0.25**2 / 8.0)
+        == approx(internal.largest.moment[0])
     )
-    assert internal.largest.x[0] == pytest.approx(0.125)
+    assert internal.largest.x[0] == approx(0.125)
     at_G = replace(linkage, coupler=Bar(0.25, 2.0, centre=(0.125, 0.0)))
     concentrated = solved(replace(scene, linkage=at_G), 3)
     assert not concentrated.uniform
-    assert concentrated.M[0, 20] == pytest.approx(w * 0.25**2 / 4.0)
+    assert concentrated.M[0, 20] == approx(w * 0.25**2 / 4.0)
 
 
 def test_a_crank_that_turns_is_pulled_by_its_own_mass():
@@ -129,11 +130,11 @@ def test_a_bar_that_speeds_up_bends_by_its_inertia():
     scene = Scene(replace(BARE, input=Bar(0.1, 3.0)), Motion(1.0, 0.0, 50.0))
     internal = solved(scene, 2, [0.0, 0.05, 0.1])
     torque = solve(scene).torque[0]
-    assert torque == pytest.approx(3.0 * 0.1**2 * 50.0 / 3.0)
-    assert internal.M[0, 0] == pytest.approx(-torque)
+    assert torque == approx(3.0 * 0.1**2 * 50.0 / 3.0)
+    assert internal.M[0, 0] == approx(-torque)
     m, x = 3.0 * 50.0 / 0.1, 0.05
-    assert internal.V[0, 1] == pytest.approx(m * (0.1**2 - x**2) / 2.0)
-    assert internal.M[0, 1] == pytest.approx(
+    assert internal.V[0, 1] == approx(m * (0.1**2 - x**2) / 2.0)
+    assert internal.M[0, 1] == approx(
         -m * (0.1**3 / 3.0 - 0.1**2 * x / 2.0 + x**3 / 6.0)
     )
 
@@ -177,13 +178,13 @@ def test_each_part_of_a_bar_up_to_a_cut_is_in_balance_under_all_that_acts(drive)
 
 def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan():
     scene = crank_rocker(motion=Motion(np.radians([30.0, 60.0])))
-    with pytest.raises(InputError, match="solve up to the stage 'force'"):
+    with raises(InputError, match="solve up to the stage 'force'"):
         internal_forces(scene, solve(scene), 2)
     moving = crank_rocker()
     for bar in (1, 5, "3"):
-        with pytest.raises(InputError, match="bar"):
+        with raises(InputError, match="bar"):
             internal_forces(moving, solve(moving), bar)
-    with pytest.raises(InputError, match="stations"):
+    with raises(InputError, match="stations"):
         internal_forces(moving, solve(moving), 2, [math.inf])
     open_ = crank_rocker(motion=Motion(theta_4=np.array([0.2, 2.0]), omega_4=1.0))
     internal = internal_forces(open_, solve(open_), 3)
@@ -210,7 +211,7 @@ def test_feet_that_differ_by_rounding_are_one():
     beside = np.abs(
         internal_forces(scene, s, 3, np.array([0.0, G - far, G + far, bar.length])).M
     ).max(axis=1)
-    assert np.abs(largest.moment) == pytest.approx(beside, rel=1e-4)
+    assert np.abs(largest.moment) == approx(beside, rel=1e-4)
 
 
 def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever():

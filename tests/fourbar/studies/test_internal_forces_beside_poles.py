@@ -9,6 +9,7 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import solve
@@ -107,9 +108,9 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
         np.abs(fourbar.internal_forces(SCENE, solution, bar).largest.moment)
         for bar in (2, 4)
     )
-    assert input_bar == pytest.approx(bend_input(), rel=ROUNDED, abs=0.0)
+    assert input_bar == approx(bend_input(), rel=ROUNDED, abs=0.0)
     expected = [bend_output(place) for place in places]
-    assert output_bar == pytest.approx(expected, rel=ROUNDED, abs=0.0)
+    assert output_bar == approx(expected, rel=ROUNDED, abs=0.0)
 
 
 @pytest.mark.slow
@@ -118,9 +119,7 @@ def test_the_largest_moments_are_those_of_many_digits():
     facts = summarize(SCENE, solve(SCENE))
     assert "drive_force" in facts.motion.panels.growing
     assert facts.bending[3].peak is None
-    assert facts.bending[2].peak.value == pytest.approx(
-        bend_input(), rel=ROUNDED, abs=0.0
-    )
+    assert facts.bending[2].peak.value == approx(bend_input(), rel=ROUNDED, abs=0.0)
     low, high = 0.0, 2.0 * np.pi
     for _ in range(4):
         places = np.linspace(low, high, 181)
@@ -128,5 +127,5 @@ def test_the_largest_moments_are_those_of_many_digits():
         best = int(np.argmax(moments))
         low, high = places[best - 1], places[best + 1]
     output = facts.bending[4]
-    assert output.peak.value == pytest.approx(moments[best], rel=LOCATED, abs=0.0)
-    assert output.peak.place == pytest.approx(places[best], abs=1e-5)
+    assert output.peak.value == approx(moments[best], rel=LOCATED, abs=0.0)
+    assert output.peak.place == approx(places[best], abs=1e-5)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx, raises
 
 import fourbar
 from fourbar import InputError, Tolerance, sensitivity, solve, uniform, vary
@@ -184,13 +185,13 @@ def test_a_drawn_place_and_angle_stay_as_they_were_built():
         from_A = members.points["P"][member, 0] - members.A[member, 0]
         along = members.B[member, 0] - members.A[member, 0]
         z = complex(*from_A) / complex(*along)
-        assert abs(complex(*from_A)) == pytest.approx(built[0], rel=1e-14)
-        assert np.angle(z) == pytest.approx(built[1], abs=1e-14)
+        assert abs(complex(*from_A)) == approx(built[0], rel=1e-14)
+        assert np.angle(z) == approx(built[1], abs=1e-14)
     assert (members.theta_2 == scene.motion.theta_2).all()
     # the input is shorter along its nominal direction, and A no longer lies on the
     # drawing
     a = members.lengths[1][:, 0]
-    assert a[1] == pytest.approx(math.hypot(0.006, 0.110), rel=1e-15)
+    assert a[1] == approx(math.hypot(0.006, 0.110), rel=1e-15)
 
 
 PARALLELOGRAM = """\
@@ -263,7 +264,7 @@ def test_first_order_and_samples_of_pins_agree():
         # a bar may have a tolerance of its own where its pins have none
         Tolerance("lengths.input", "0.02 mm"),
     )
-    with pytest.raises(InputError, match=r"lengths\.input.*follows from pins\.O2\.0"):
+    with raises(InputError, match=r"lengths\.input.*follows from pins\.O2\.0"):
         tolerances(replace(scene, tolerances=stated), 8)
     study = tolerances(replace(scene, tolerances=stated[:2]), 2048)
     for name in ("torque", "|F12|", "theta_4", "A_x", "P_y", "Q_x"):
@@ -295,17 +296,17 @@ def test_a_key_that_names_no_coordinate_gets_one_line(key, line):
         lambda: vary(loads(text), {key: [0.0]}),
         lambda: loads(f'{text}[tolerances]\n"{key}" = "0.1 mm"\n'),
     ):
-        with pytest.raises(InputError) as caught:
+        with raises(InputError) as caught:
             make()
         assert line in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_scene_stated_by_lengths_has_no_pins():
     scene = Scene(uniform(0.3, 0.1, 0.25, 0.22))
-    with pytest.raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
+    with raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
         vary(scene, {"pins.A.0": [0.0, 0.1]})
     text = dump(scene) + '[tolerances]\n"pins.A.0" = "0.1 mm"\n'
-    with pytest.raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
+    with raises(InputError, match=r"no \[pins\]; it states lengths: lengths\."):
         loads(text)
 
 
@@ -313,11 +314,11 @@ def test_a_length_beside_a_pin_by_which_it_follows_is_refused():
     scene = loads(DRAWING + ACTS)
     for length, pin in (("coupler", "pins.B.1"), ("ground_angle", "pins.O2.0")):
         values = {pin: [0.0, 0.01], f"lengths.{length}": 0.1}
-        with pytest.raises(InputError, match=f"follows from {pin}, which varies too"):
+        with raises(InputError, match=f"follows from {pin}, which varies too"):
             vary(scene, values)
     text = DRAWING + ACTS
     table = '[tolerances]\n"pins.A.0" = "1 mm"\n"lengths.input" = "1 mm"\n'
-    with pytest.raises(InputError, match=r"follows from pins\.A\.0, which has a tol"):
+    with raises(InputError, match=r"follows from pins\.A\.0, which has a tol"):
         loads(text + table)
 
 
@@ -326,7 +327,7 @@ def test_tolerances_of_pins_are_written_and_shown(capsys, tmp_path):
     scene = loads(f'{text}[tolerances]\npins.O2.0 = "0.05 mm"\n')
     assert loads(dump(scene)) == scene
     redrawn = replace(scene, linkage=uniform(0.3, 0.1, 0.25, 0.22))
-    with pytest.raises(InputError, match="no number of the scene has this key"):
+    with raises(InputError, match="no number of the scene has this key"):
         dump(redrawn)  # its file states lengths
     path = tmp_path / "drawn.toml"
     fourbar.save(scene, path)
@@ -363,7 +364,7 @@ def test_a_drawn_place_and_its_pins_move_independently_of_each_other():
     A = complex(*solution.A[0, 0])
     along = complex(*solution.B[0, 0]) - A
     P = complex(*solution.points["P"][0, 0])
-    assert (P - A) / (along / abs(along)) == pytest.approx(z, rel=1e-13)
+    assert (P - A) / (along / abs(along)) == approx(z, rel=1e-13)
 
 
 WISHBONE = """
@@ -430,7 +431,7 @@ input = "0.1 m"
 coupler = "0.25 m"
 output = "0.22 m"
 """
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         vary(loads(lengths + ACTS), {key: [0.0]})
     assert line in str(caught.value) and "\n" not in str(caught.value)
 
@@ -445,7 +446,7 @@ output = "0.22 m"
     ],
 )
 def test_a_hint_of_a_drawing_names_the_coordinate(key, line):
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         vary(loads(PLACED), {key: [0.0]})
     assert line in str(caught.value) and "\n" not in str(caught.value)
 
@@ -457,7 +458,7 @@ def test_distance_and_coordinate_of_one_place_do_not_vary_together():
         ("bars.coupler.centre.1", "bars.coupler.centre"),
     ):
         values = {number: 0.1, f"{place}.drawn.0": [0.0, 0.01]}
-        with pytest.raises(InputError, match=f"follows from {place}.drawn.0, which"):
+        with raises(InputError, match=f"follows from {place}.drawn.0, which"):
             vary(scene, values)
 
 
@@ -466,7 +467,7 @@ def test_a_mass_centre_on_its_pin_has_no_coordinates():
         '[bars.input]\nmass = "1 kg"\ncentre = { drawn = ["-10 mm", "-10 mm"] }\n'
     )
     words = r"no place .*; it has bars\.input\.centre\.0 \(the distance\) and"
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         vary(loads(text), {"bars.input.centre.drawn.0": [0.0]})
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Bar, Free, Motion, Scene, Sweep, solve
@@ -54,7 +55,7 @@ def test_every_position_of_the_assembly_with_that_output_angle_is_found():
     found = find_positions(scene, [("theta_4", value)])
     assert len(found.angle) == 2
     solved = solve(scene, "position", at=found)
-    assert solved.theta_4 == pytest.approx(value, abs=LOCATED)
+    assert solved.theta_4 == approx(value, abs=LOCATED)
     assert np.abs(found.angle - sweep.theta_2[100]).min() < LOCATED
 
 
@@ -71,7 +72,7 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
     theta_4 = theta_1 + pi - at_O4 + beside
     found = find_positions(scene, [("theta_4", theta_4)])
     theta_2 = theta_1 + (at_O2 if side > 0.0 else at_O2 + pi)
-    assert found.angle == pytest.approx([theta_2], abs=AT_LIMIT)
+    assert found.angle == approx([theta_2], abs=AT_LIMIT)
     (line,) = [
         line
         for line in write_block(scene, solve(scene, at=found))
@@ -85,7 +86,7 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     ((_, limit),) = find_intervals(scene.linkage, 3)
     there = solve(scene, at=find_positions(scene, [("theta_3", limit)]))
     between = there.theta_4 - there.theta_2
-    assert np.sin(between) == pytest.approx([0.0], abs=AT_LIMIT)
+    assert np.sin(between) == approx([0.0], abs=AT_LIMIT)
     told = "theta_3 is at a limit: bars 2 and 4 are parallel"
     assert told in " ".join(write_block(scene, there))
 
@@ -106,24 +107,24 @@ def test_a_release_has_a_state_at_its_start():
     found = find_positions(DROPPED, [("time", 0.0)])
     assert found.time.tolist() == [0.0]
     start = solve(DROPPED, at=found)
-    assert start.theta_2[0] == pytest.approx(1.0, abs=LOCATED)
+    assert start.theta_2[0] == approx(1.0, abs=LOCATED)
     assert start.omega_2[0] == 0.0
 
 
 @pytest.mark.slow
 def test_a_place_out_of_range_is_refused_with_the_range():
-    with pytest.raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
+    with raises(NotAssembledError, match=r"theta_2 goes from 84\.6\d* to 365"):
         find_positions(thesis(), [("theta_2", radians(30.0))])
-    with pytest.raises(NotAssembledError, match="no position of this assembly"):
+    with raises(NotAssembledError, match="no position of this assembly"):
         find_positions(crank_rocker(), [("theta_4", 0.0)])
     still = replace(crank_rocker(), motion=Motion(SWEPT))
-    with pytest.raises(InputError, match="needs a motion over time: a sweep at one"):
+    with raises(InputError, match="needs a motion over time: a sweep at one"):
         find_positions(still, [("time", 1.0)])
-    with pytest.raises(NotAssembledError, match="it stays within"):
+    with raises(NotAssembledError, match="it stays within"):
         find_positions(LAW, [("theta_2", 3.0)])
-    with pytest.raises(NotAssembledError, match="goes from 0 to 2 s"):
+    with raises(NotAssembledError, match="goes from 0 to 2 s"):
         find_positions(LAW, [("time", 3.0)])
-    with pytest.raises(NotAssembledError, match="goes from 0 to 1 s"):
+    with raises(NotAssembledError, match="goes from 0 to 1 s"):
         find_positions(DROPPED, [("time", 3.0)])
 
 
@@ -133,15 +134,15 @@ def test_a_steady_sweep_has_a_place_at_each_time(omega):
     scene = replace(crank_rocker(), motion=Motion(SWEPT, omega))
     found = find_positions(scene, [("time", 1.3)])
     begin = SWEPT.start if omega > 0.0 else SWEPT.stop
-    assert found.angle == pytest.approx([begin + 1.3 * omega], abs=1e-12)
-    with pytest.raises(NotAssembledError, match=r"the sweep goes from 0 to 2 s"):
+    assert found.angle == approx([begin + 1.3 * omega], abs=1e-12)
+    with raises(NotAssembledError, match=r"the sweep goes from 0 to 2 s"):
         find_positions(scene, [("time", 2.1)])
 
 
 def test_a_law_passes_an_angle_up_and_down():
     found = find_positions(LAW, [("theta_2", 1.5), ("time", 0.5)])
     assert len(found.angle) == 3
-    assert found.angle[:2] == pytest.approx(1.5, abs=LOCATED)
+    assert found.angle[:2] == approx(1.5, abs=LOCATED)
     assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
     begins = find_positions(LAW, [("theta_2", 0.3)])
     assert begins.time[0] == 0.0
@@ -155,13 +156,13 @@ def test_a_release_is_met_when_it_first_passes():
     )
     value = float(fine.theta_2[3001])
     found = find_positions(DROPPED, [("theta_2", value)])
-    assert found.angle[0] == pytest.approx(value, abs=1e-9)
+    assert found.angle[0] == approx(value, abs=1e-9)
     first = np.flatnonzero(
         (fine.theta_2[:-1] - value) * (fine.theta_2[1:] - value) <= 0.0
     )[0]
     assert abs(found.time[0] - fine.time[first]) <= fine.time[1] * (1.0 + 1e-6)
     state = solve(DROPPED, at=found)
-    assert state.omega_2[0] == pytest.approx(fine.omega_2[first], rel=1e-3)
+    assert state.omega_2[0] == approx(fine.omega_2[first], rel=1e-3)
     timed = find_positions(DROPPED, [("time", 0.25), ("theta_2", value)])
     assert timed.time[0] == 0.25
     assert len(timed.angle) == 2 and timed.time[1] == found.time[0]
@@ -174,7 +175,7 @@ def test_a_stroke_is_found_where_an_angle_is_commanded():
     value = float(np.nanmean(stroke))
     found = find_positions(commanded, [("stroke", value)])
     solved = solve(commanded, "position", at=found).stroke
-    assert solved == pytest.approx(value, abs=LOCATED)
+    assert solved == approx(value, abs=LOCATED)
     back = find_positions(scene, [("theta_4", float(solve(scene).theta_4[3]))])
     assert len(back.stated[0]) >= 1
 
@@ -189,7 +190,7 @@ def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     scene = Scene(linkage, Motion(inside))
     theta_4 = np.degrees(solve(scene).theta_4)
     middle = radians(0.5 * (theta_4.min() + theta_4.max()))
-    with pytest.raises(NotAssembledError, match="no position") as caught:
+    with raises(NotAssembledError, match="no position") as caught:
         find_positions(scene, [("theta_4", middle + pi)])
     ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
     least, most = map(float, ends)
@@ -231,7 +232,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     )
     with state_messages_in(units("imperial")):
         assert say_nowhere(scene) == said
-        with pytest.raises(NotAssembledError) as raised:
+        with raises(NotAssembledError) as raised:
             fourbar.equilibrium(scene)
         assert str(raised.value) == said
     other = replace(scene, motion=scene.motion.replace(side="left"))
@@ -249,6 +250,6 @@ def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
     for limit, outwards in ((low, -1.0), (high, 1.0)):
         angle = limit + 4.0 * math.pi + outwards * beyond
         kept = meet_limit(linkage, 4, angle, rounding=5e-6)
-        assert abs(kept - angle) == pytest.approx(beyond if met else 0.0, rel=1e-6)
+        assert abs(kept - angle) == approx(beyond if met else 0.0, rel=1e-6)
         inside = limit - outwards * beyond
         assert meet_limit(linkage, 4, inside, rounding=5e-6) == inside

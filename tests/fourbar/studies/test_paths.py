@@ -5,6 +5,7 @@ from math import cos, radians, sin
 
 import numpy as np
 import pytest
+from pytest import approx
 from scipy.spatial import ConvexHull
 
 from fourbar.evaluation import free_motion
@@ -65,17 +66,17 @@ def test_straightness_is_the_distance_of_the_nearest_two_lines(turned, steps):
     sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'
     scene = loads(DRIVE.format(angle=ANGLE + turned, motion=sweep))
     (path,) = measure_paths(solve(scene)).values()
-    assert 1e3 * path.stroke == pytest.approx(10.0, abs=1e-6)
-    assert 1e3 * path.straightness == pytest.approx(0.1, abs=1e-7)
+    assert 1e3 * path.stroke == approx(10.0, abs=1e-6)
+    assert 1e3 * path.straightness == approx(0.1, abs=1e-7)
     width, length, direction = scan(close(2000), np.linspace(0.0, np.pi, 181))
     path_in_full = close(200_000)
     for step in 0.02 * 0.1 ** np.arange(9):
         beside = direction + np.linspace(-step, step, 21)
         width, length, direction = scan(path_in_full, beside)
-    assert 1e3 * path.straightness == pytest.approx(width, abs=SCANNED)
-    assert 1e3 * path.stroke == pytest.approx(length, abs=SCANNED)
+    assert 1e3 * path.straightness == approx(width, abs=SCANNED)
+    assert 1e3 * path.stroke == approx(length, abs=SCANNED)
     away = path.direction - radians(turned) - direction
-    assert math.remainder(away, math.pi) == pytest.approx(0.0, abs=1e-7)
+    assert math.remainder(away, math.pi) == approx(0.0, abs=1e-7)
 
 
 CRANK = """\
@@ -102,16 +103,16 @@ def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(motion, ends):
     """Over 80 deg: chord 2 r sin 40 deg, sagitta r (1 - cos 40 deg), y to 80 mm."""
     (path,) = measure_paths(solve(loads(CRANK + motion))).values()
     half = radians(40.0)
-    assert path.stroke == pytest.approx(0.16 * sin(half), abs=1e-12)
-    assert path.straightness == pytest.approx(0.08 * (1.0 - cos(half)), abs=1e-12)
-    assert path.direction == pytest.approx(radians(60.0 - 90.0), abs=1e-9)
+    assert path.stroke == approx(0.16 * sin(half), abs=1e-12)
+    assert path.straightness == approx(0.08 * (1.0 - cos(half)), abs=1e-12)
+    assert path.direction == approx(radians(60.0 - 90.0), abs=1e-9)
     low, high = cos(radians(100.0)), cos(radians(20.0))
-    assert path.x == pytest.approx((0.08 * low, 0.08 * high), abs=1e-12)
-    assert path.y == pytest.approx((0.08 * sin(radians(20.0)), 0.08))
+    assert path.x == approx((0.08 * low, 0.08 * high), abs=1e-12)
+    assert path.y == approx((0.08 * sin(radians(20.0)), 0.08))
     if ends is None:
-        assert path.ends == pytest.approx((0.0, 1.0), abs=AT_REST)
+        assert path.ends == approx((0.0, 1.0), abs=AT_REST)
     else:
-        assert np.degrees(path.ends) == pytest.approx(ends)
+        assert np.degrees(path.ends) == approx(ends)
 
 
 CUTTER = ((0.65764732, 0.1, 0.7, 1.0), 1.0, -36.87)
@@ -137,8 +138,8 @@ def test_a_wide_curve_is_no_narrower_than_by_a_scan(lengths, distance, angle):
     unit = (ground - A) / side * np.exp(1j * at_A)
     curve = A + distance * unit * np.exp(1j * radians(angle))
     width, length, _ = scan(curve, np.linspace(0.0, np.pi, 7201))
-    assert path.straightness == pytest.approx(width, rel=1e-6)
-    assert path.stroke == pytest.approx(length, rel=1e-3)
+    assert path.straightness == approx(width, rel=1e-6)
+    assert path.stroke == approx(length, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -146,7 +147,7 @@ def test_a_circle_is_as_wide_in_every_direction():
     """The polygon of the steps would be narrower by 1e-6 of it."""
     (path,) = measure_paths(solve(loads(CRANK + 'omega_2 = "1 rad/s"\n'))).values()
     extents = [path.straightness, path.stroke, np.ptp(path.x), np.ptp(path.y)]
-    assert extents == pytest.approx([0.16] * 4, rel=1e-8)
+    assert extents == approx([0.16] * 4, rel=1e-8)
 
 
 def test_paths_are_printed_and_none_of_single_positions():
@@ -188,4 +189,4 @@ def test_a_release_is_integrated_once_for_its_path(monkeypatch):
     solution = solve(loads(CRANK + motion + free + acts))
     (path,) = measure_paths(solution).values()
     assert len(runs) == 1
-    assert path.stroke == pytest.approx(0.16 * sin(0.5), abs=1e-9)
+    assert path.stroke == approx(0.16 * sin(0.5), abs=1e-9)

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import sensitivity
@@ -96,7 +97,7 @@ def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(function, x, con
     ],
 )
 def test_what_slopes_cannot_follow_raises(change):
-    with pytest.raises(LimitError):
+    with raises(LimitError):
         change(Sloped(np.array([0.3]), np.array([[1.0]])))
 
 
@@ -129,16 +130,16 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
     scene, torque = torques("copysign", speed)
     by_speed = sensitivity(scene).of("torque", "motion.omega_2")
     ahead, behind = (torques("copysign", speed + h)[1] for h in (STEP, -STEP))
-    assert by_speed == pytest.approx((ahead - behind) / (2.0 * STEP), rel=1e-7)
+    assert by_speed == approx((ahead - behind) / (2.0 * STEP), rel=1e-7)
     other, same = torques("absolute", speed)
-    assert torque == pytest.approx(same, rel=1e-14)
-    assert by_speed == pytest.approx(
+    assert torque == approx(same, rel=1e-14)
+    assert by_speed == approx(
         sensitivity(other).of("torque", "motion.omega_2"), rel=1e-12
     )
     refused, _ = torques("maximum", speed)
-    with pytest.raises(LimitError, match=r"cannot follow numpy\.maximum"):
+    with raises(LimitError, match=r"cannot follow numpy\.maximum"):
         sensitivity(refused)
-    with pytest.raises(LimitError, match=r"cannot follow numpy\.maximum"):
+    with raises(LimitError, match=r"cannot follow numpy\.maximum"):
         fourbar.equilibrium(refused)
 
 

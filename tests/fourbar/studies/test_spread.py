@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import approx, raises
 from scipy.stats import norm
 
 import fourbar.formulas.mobility
@@ -105,7 +106,7 @@ def test_a_generator_draws_the_samples_of_its_seed():
 
 @pytest.mark.parametrize("seed", [-1, True, 1.5, "1", None])
 def test_what_is_no_seed_is_refused(seed):
-    with pytest.raises(InputError, match="Generator"):
+    with raises(InputError, match="Generator"):
         spread(Tolerance("lengths.input", 5e-5), samples=64, seed=seed)
 
 
@@ -150,7 +151,7 @@ def test_tolerances_of_a_file_come_back_as_they_were():
     ],
 )
 def test_a_bad_tolerance_is_one_line(line, words):
-    with pytest.raises(InputError) as error:
+    with raises(InputError) as error:
         loads(MODEL + "[tolerances]\n" + line, "s.toml")
     text = str(error.value)
     assert words in text and text.startswith("s.toml: tolerances") and "\n" not in text
@@ -174,10 +175,10 @@ def test_what_the_study_refuses():
         ((Tolerance("lengths.x", 1.0),), "did you mean"),
         ((Tolerance("bars.input.inertia", 1.0),), "left out"),
     ):
-        with pytest.raises(InputError, match=words):
+        with raises(InputError, match=words):
             spread(*stated)
     for samples in (1, 2.5, 10**9):
-        with pytest.raises(InputError, match="whole number"):
+        with raises(InputError, match="whole number"):
             spread(Tolerance("lengths.input", 1e-5), samples=samples)
 
 
@@ -198,7 +199,7 @@ def test_the_command_prints_draws_and_writes(tmp_path, capsys):
     in_N_mm = re.search(r"^torque N mm +\S+ +(\S+)", rows, re.M)
     assert nominal
     assert in_N_mm
-    assert float(in_N_mm[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
+    assert float(in_N_mm[1]) == approx(1000.0 * float(nominal[1]), rel=1e-5)
     assert re.search(r"unit +rad +nominal", rows)
     assert status(["tolerance", str(scene), "--samples", "64", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
@@ -255,7 +256,7 @@ def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, capsys):
         assert row is not None, printed
         _, nominal, sigma, *band, _ = map(float, row[1].split())
         assert nominal == drawn
-        assert band == pytest.approx([drawn] * 4, abs=0.03)
+        assert band == approx([drawn] * 4, abs=0.03)
         assert 0.001 < sigma < 0.02
     above = printed[: printed.index("  theta_2")].splitlines()
     assert max(map(len, above)) <= 80

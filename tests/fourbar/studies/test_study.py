@@ -9,6 +9,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from pytest import raises
 
 import fourbar
 from fourbar import (
@@ -290,16 +291,16 @@ def test_texts_with_units_are_the_numbers():
         ("effects.viscous.O2", "1 N m", "does not convert to N m s/rad"),
         ("lengths.x", "1 mm", "unknown key"),
     ):
-        with pytest.raises(InputError, match=words):
+        with raises(InputError, match=words):
             Tolerance(key, text)
-        with pytest.raises(InputError, match=words):
+        with raises(InputError, match=words):
             vary(scene, {key: [text]})
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_vary_is_refused_in_one_line(name):
     values, words = REFUSED[name]
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         vary(scene(), values)
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
@@ -313,13 +314,13 @@ def test_what_cannot_vary_is_refused_in_one_line(name):
     ],
 )
 def test_a_motion_of_one_linkage_is_refused_in_one_line(motion, words):
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         vary(Scene(LINK, motion), {"bars.coupler.mass": [1.0, 2.0]})
 
 
 def test_a_study_is_given_no_other_positions():
     study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
-    with pytest.raises(InputError, match="states its own positions"):
+    with raises(InputError, match="states its own positions"):
         solve(study, at=command(scene()))
 
 

@@ -5,6 +5,7 @@ What they draw is what the solution has.
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar import solve
@@ -39,7 +40,7 @@ def test_the_shaking_force_is_drawn_with_its_components():
     }.items():
         drawn = lines[name]
         shown = np.interp(np.linspace(0.0, 360.0, 121), *drawn.T)
-        assert shown == pytest.approx(values, rel=1e-9, abs=1e-9 * np.abs(force).max())
+        assert shown == approx(values, rel=1e-9, abs=1e-9 * np.abs(force).max())
 
 
 def test_ratios_are_those_of_the_speeds_and_no_line_crosses_a_dead_centre():
@@ -47,7 +48,7 @@ def test_ratios_are_those_of_the_speeds_and_no_line_crosses_a_dead_centre():
     s = solve(SCENE)
     drawn = lines["ω₄/ω₂"]
     shown = np.interp(np.linspace(0.0, 360.0, 121), *drawn.T)
-    assert shown == pytest.approx(s.omega_4 / 10.0, abs=1e-9)
+    assert shown == approx(s.omega_4 / 10.0, abs=1e-9)
     advantage = lines["T₄/T₂"][:, 1]
     jumps = np.isnan(advantage).sum()
     assert jumps == np.sum(np.diff(np.sign(s.omega_4)) != 0.0)
@@ -61,8 +62,8 @@ def test_instant_centres_lie_on_the_lines_of_the_bars():
     theta_1 = SCENE.linkage.ground_angle
     across = path @ np.array([-np.sin(theta_1), np.cos(theta_1)])
     assert np.isfinite(across).sum() > 30
-    assert across[np.isfinite(across)] == pytest.approx(0.0, abs=1e-9)
+    assert across[np.isfinite(across)] == approx(0.0, abs=1e-9)
     A, B = (here.A[0], here.B[0])
     centre = derive(here, "I24")
     along, away = B - A, centre[0] - A
-    assert along[0] * away[1] == pytest.approx(along[1] * away[0], rel=1e-9)
+    assert along[0] * away[1] == approx(along[1] * away[0], rel=1e-9)

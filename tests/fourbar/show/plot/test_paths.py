@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar.files.scene_file import loads
@@ -38,7 +39,7 @@ def test_the_whole_circuit_is_traced_without_a_corner():
     traced = trace(view)
     assert traced.circuit
     path = traced.path(traced.solution.points["E"])
-    assert path[0] == pytest.approx(path[-1])
+    assert path[0] == approx(path[-1])
     longest, sharpest = measure_chords(path)
     assert longest < LONGEST
     assert sharpest < 30.0
@@ -63,7 +64,7 @@ def test_a_stated_sweep_keeps_its_ends():
     traced = trace(view)
     path = traced.path(traced.solution.points["P"])
     assert not traced.circuit
-    assert path[[0, -1]] == pytest.approx(view.sweep.points["P"][[0, -1]])
+    assert path[[0, -1]] == approx(view.sweep.points["P"][[0, -1]])
     assert measure_chords(path)[0] < LONGEST
 
 

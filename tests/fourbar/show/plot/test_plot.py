@@ -19,6 +19,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.testing import assert_allclose
+from pytest import approx, raises
 
 import fourbar
 from fourbar import (
@@ -241,7 +242,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit():
         assert axes.get_xlabel().endswith(")") and axes.get_ylabel().endswith(")")
         if "theta_2" in axes.get_xlabel():
             assert axes.get_xlabel().endswith("(°)")
-            assert axes.get_xlim() == pytest.approx(turn)
+            assert axes.get_xlim() == approx(turn)
 
 
 @pytest.mark.slow
@@ -287,8 +288,8 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
         if line.get_linewidth() == 4.5
     ]
     lengths = [math.hypot(*bar) for bar in bars]
-    assert lengths == pytest.approx([100.0, 250.0, 220.0])  # mm
-    assert math.atan2(*bars[0][::-1]) == pytest.approx(1.3)
+    assert lengths == approx([100.0, 250.0, 220.0])  # mm
+    assert math.atan2(*bars[0][::-1]) == approx(1.3)
     assert axes.get_aspect() == 1.0
 
 
@@ -380,10 +381,10 @@ def test_transmission_angle_marks_limits_and_dead_centres(branch):
     marks = find_marks(composed(set_branch(thesis(FULL_TURN), branch), "transmission"))
     # bars 3 and 4 folded: |b - c| between A and O4
     limit = angle(a, d, b - c)
-    assert marks["limit"] == pytest.approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
+    assert marks["limit"] == approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
     # bars 2 and 3 folded: c seen from O2 at b - a, A on the other side
     dead_centre = 45 + 180 + branch * angle(b - a, d, c)
-    assert marks["dead centre"] % 360 == pytest.approx([dead_centre % 360], abs=1e-9)
+    assert marks["dead centre"] % 360 == approx([dead_centre % 360], abs=1e-9)
 
 
 SPRUNG = ((1, 3), (2, 3), (4, 3))
@@ -459,7 +460,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     peak = torque[np.abs(torque).argmax()]
     figure = composed(scene, "torque")
     (ring,) = (line for line in figure.axes[0].lines if line.get_marker() == "o")
-    assert ring.get_ydata()[0] == pytest.approx(peak)
+    assert ring.get_ydata()[0] == approx(peak)
     words = [text.get_text() for text in figure.findobj(Text)]
     assert f"{write_number(peak)} mN m" in words
     place = f"{math.degrees(make_view(scene).here.theta_2[0]):.4g}°"
@@ -469,7 +470,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
 def test_a_scene_without_velocity_draws_positions_only(tmp_path):
     scene = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 30)))
     assert len(composed(scene, "kinematics").axes) == 1
-    with pytest.raises(InputError, match="omega_2"):
+    with raises(InputError, match="omega_2"):
         plot.draw(scene, tmp_path / "b.svg", "torque")
     assert not (tmp_path / "b.svg").exists()
 
@@ -534,7 +535,7 @@ def test_hostile_titles_are_text(tmp_path):
     ],
 )
 def test_what_is_not_allowed_is_named(tmp_path, name, options):
-    with pytest.raises(InputError, match="must"):
+    with raises(InputError, match="must"):
         plot.draw(crank_rocker(), tmp_path / name, **options)
     assert not list(tmp_path.iterdir())
 
@@ -551,7 +552,7 @@ def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were():
 
 
 def test_a_position_that_does_not_assemble_is_refused(tmp_path):
-    with pytest.raises(NotAssembledError, match="45 deg"):
+    with raises(NotAssembledError, match="45 deg"):
         plot.draw(thesis(), tmp_path / "a.png", "linkage", position=radians(45.0))
 
 
@@ -622,8 +623,8 @@ def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path):
     shown = make_view(released(), position=0.3)
     k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
     assert shown.here.time[0] == shown.sweep.time[k]
-    assert shown.here.F12[0] == pytest.approx(shown.sweep.F12[k])
-    with pytest.raises(NotAssembledError, match="does not pass"):
+    assert shown.here.F12[0] == approx(shown.sweep.F12[k])
+    with raises(NotAssembledError, match="does not pass"):
         plot.draw(released(), tmp_path / "a.svg", position=9.0)
 
 
@@ -661,7 +662,7 @@ def test_figures_that_a_motion_does_not_have_are_refused_in_one_line(tmp_path):
         (crank_rocker(), "energy"),
         (by_law(), "energy"),
     ):
-        with pytest.raises(InputError, match="free motion"):
+        with raises(InputError, match="free motion"):
             plot.draw(scene, tmp_path / "a.svg", figure)
     assert not list(tmp_path.iterdir())
 
@@ -748,7 +749,7 @@ def test_curves_are_drawn_over_what_is_commanded(label):
         assert len(panels) == 8
     for axes in panels:
         assert axes.get_xlabel() == label
-        assert axes.get_xlim() == pytest.approx((over.min(), over.max()))
+        assert axes.get_xlim() == approx((over.min(), over.max()))
     x, y = longest_line(drive).get_data()
     drawn = np.isfinite(y)
     order = np.argsort(over)
@@ -801,7 +802,7 @@ def test_one_position_of_another_command_stands_in_its_range():
     single = COMMANDS["stroke (mm)"].replace(angle=0.3)
     shown = make_view(commanding(single))
     assert shown.at == "stroke = 300 mm"
-    assert shown.here.stroke[0] == pytest.approx(0.3, rel=1e-14)
+    assert shown.here.stroke[0] == approx(0.3, rel=1e-14)
     places = shown.sweep.at.places
     # the cylinder's shortest and longest stroke
     assert places.min() > 0.16 and places.max() < 0.34 and len(places) == 362
@@ -820,7 +821,7 @@ def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis(bar):
     stretched = math.degrees(CRANK_ROCKER.linkage.ground_angle + math.acos(cosine))
     sweep = {f"theta_{bar}": Sweep(0.7, 1.25, 40), f"omega_{bar}": 1.0}
     figure = composed(commanding(Motion(**sweep)), "transmission")
-    assert find_marks(figure)["dead centre"] == pytest.approx([stretched])
+    assert find_marks(figure)["dead centre"] == approx([stretched])
 
 
 def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
@@ -847,7 +848,7 @@ def test_the_stroke_is_a_figure_where_it_is_not_the_axis():
     drawn = np.interp(np.degrees(s.theta_4), *longest_line(axes).get_data())
     assert_allclose(drawn, 1000.0 * s.stroke, rtol=1e-14)
     for refused in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
-        with pytest.raises(InputError, match="needs a linear drive"):
+        with raises(InputError, match="needs a linear drive"):
             draw_figure(refused, "stroke")
 
 
@@ -861,4 +862,4 @@ def test_the_name_of_a_ring_stands_beyond_it_in_a_film():
 
     centre, ring = axes.transData.transform([(0.0, 0.0), (4.0, 0.0)])
     beyond = np.subtract(corner(4.0), corner(0.0))
-    assert beyond == pytest.approx(ring - centre, abs=WHOLE_PIXEL)
+    assert beyond == approx(ring - centre, abs=WHOLE_PIXEL)
