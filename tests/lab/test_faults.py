@@ -75,7 +75,11 @@ def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(monkeypatch):
         ended = Ended(
             f'...\n{{"status": {status}, "seconds": {seconds}}}\n', "", False, ""
         )
-        monkeypatch.setattr(faults, "run_to_end", lambda *_, e=ended, **__: e)
+        monkeypatch.setattr(
+            faults,
+            "run_to_end",
+            lambda *_, e=ended, **__: e,
+        )
         assert says in (faults.try_tests(0) or "")
     held = Ended('{"status": 1, "seconds": 2.0}\n', "", False, "")
     monkeypatch.setattr(faults, "run_to_end", lambda *_, **__: held)

@@ -109,7 +109,11 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(monkeypatch, times, fou
     answer = engine.start().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
-    held = Demands(engine.tolerance, ("F12",), lambda quantity, mask: np.ones(1))
+    held = Demands(
+        engine.tolerance,
+        ("F12",),
+        lambda quantity, mask: np.ones(1),
+    )
     rows = examine.Comparison("", scene, answer, solution, held).rows()
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 
@@ -124,7 +128,11 @@ def test_a_traceback_is_a_finding(monkeypatch):
 
 def test_a_position_that_does_not_close_is_a_finding(monkeypatch):
     scene = replace(crank_rocker(), linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
-    scene = replace(scene, motion=fourbar.Motion(np.array([3.0]), 1.0), loads=())
+    scene = replace(
+        scene,
+        motion=fourbar.Motion(np.array([3.0]), 1.0),
+        loads=(),
+    )
     true = fourbar.solve
 
     def pretend(*arguments, **keywords):

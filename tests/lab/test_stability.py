@@ -258,7 +258,11 @@ def test_the_command_line_says_how_few_digits_are_left():
         np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35))
     )  # bars 2, 3 in line
     for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
-        scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
+        scene = fourbar.Scene(
+            linkage,
+            fourbar.Motion(angle, 10.0),
+            drive_bar=4,
+        )
         lines = write_block(scene, fourbar.solve(scene, "error"))
         assert (
             any(

@@ -296,7 +296,11 @@ def error_bars(question):
             )
             wide = np.where(beyond, divide(width, expected), wide)
         allowed = ERROR_BARS * width + _BALLS_EXACT_TO * size
-        share = np.where(tells, np.maximum(divide(true, allowed), wide), 0.0)
+        share = np.where(
+            tells,
+            np.maximum(divide(true, allowed), wide),
+            0.0,
+        )
         share[tells & ~np.isfinite(width)] = np.inf
         index = find_worst(share)
         reason = (

@@ -138,7 +138,11 @@ class _SummaryJudge:
     def fine_places(self):
         """Return many places between the scene's own."""
         own = self.solution.at.places
-        places = np.linspace(own[0], own[-1], PEAK_INTERVALS + 1)
+        places = np.linspace(
+            own[0],
+            own[-1],
+            PEAK_INTERVALS + 1,
+        )
         return np.union1d(places, self.bends) if len(self.bends) else places
 
     def integrates(self, name):
@@ -307,7 +311,11 @@ def _judge_ranges(judged):
         near = np.array([fine.min(), fine.max()])
         reached = near + wrap_difference(there - near)
         judged.add("ranges", np.abs(reached - [low.value, high.value]))
-        judged.add_excess("ranges", fine.max() - high.value, low.value - fine.min())
+        judged.add_excess(
+            "ranges",
+            fine.max() - high.value,
+            low.value - fine.min(),
+        )
     least = judged.facts.transmission
     answers = judged.ask(least.place), judged.fine
     # at a change point the sine is the root of a rounding, and its square has digits
@@ -387,7 +395,12 @@ class _Panels(NamedTuple):
         for low, high, values in zip(
             self.low, self.high, self.values[:, :, curve] - less, strict=True
         ):
-            polynomial = Legendre.fit(_NODES, values, len(_NODES) - 1, [-1.0, 1.0])
+            polynomial = Legendre.fit(
+                _NODES,
+                values,
+                len(_NODES) - 1,
+                [-1.0, 1.0],
+            )
             zeros = polynomial.roots()
             zeros = np.sort(zeros[np.isreal(zeros) & (np.abs(zeros) < 1.0)].real)
             area = 0.5 * (high - low) * polynomial.integ(lbnd=-1.0)
@@ -457,7 +470,11 @@ def _judge_integrals(judged):
         return np.concatenate(known, axis=1)
 
     ends = judged.solution.at.places[[0, -1]]
-    first = np.linspace(ends.min(), ends.max(), FIRST_PANELS + 1)
+    first = np.linspace(
+        ends.min(),
+        ends.max(),
+        FIRST_PANELS + 1,
+    )
     panels = _lay_panels(sample, np.union1d(first, judged.bends))
 
     def judge_mean(ours, name):

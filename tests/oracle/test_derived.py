@@ -39,8 +39,17 @@ NEAREST = ("study", "sensitivity", "tolerances")
 
 def passing_change_points(name, branch):
     d, a, b, c = CHANGE_POINTS[name]
-    linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b, 2.0), fourbar.Bar(c))
-    motion = fourbar.Motion(fourbar.Sweep(0.0, 2.0 * np.pi, 24), 6.3, branch=branch)
+    linkage = fourbar.FourBar(
+        d,
+        fourbar.Bar(a),
+        fourbar.Bar(b, 2.0),
+        fourbar.Bar(c),
+    )
+    motion = fourbar.Motion(
+        fourbar.Sweep(0.0, 2.0 * np.pi, 24),
+        6.3,
+        branch=branch,
+    )
     return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
 
 
@@ -207,7 +216,11 @@ def test_a_changed_linkage_that_hardly_assembles_is_no_failure(engine):
     d, *moving = BARELY[engine]
     linkage = fourbar.FourBar(d, *(fourbar.Bar(length, 1.0) for length in moving))
     motion = fourbar.Motion(None, 2.0, 0.5)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    scene = fourbar.Scene(
+        linkage,
+        motion,
+        effects=(fourbar.Gravity(),),
+    )
     assert not failing(judge_by(scene, engine))
 
 
@@ -343,7 +356,11 @@ def test_what_a_balanced_linkage_leaves_of_a_torque_is_not_judged():
     arms = (fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3))
     linkage = fourbar.FourBar(0.06, *arms, 0.5 * np.pi)
     stiffness = 2.0 * 9.81 * 0.3 / (0.08 * 0.1)
-    spring = fourbar.Spring(Place(1, (0.1, 0.0)), Place(2, (0.08, 0.0)), stiffness)
+    spring = fourbar.Spring(
+        Place(1, (0.1, 0.0)),
+        Place(2, (0.08, 0.0)),
+        stiffness,
+    )
     scene = Scene(
         linkage,
         fourbar.Motion(fourbar.Sweep(-0.7, 1.0, 10), 0.0),

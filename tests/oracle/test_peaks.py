@@ -67,7 +67,15 @@ def find_excess(scene):
 
 
 def fall(duration, steps):
-    law = Rise("cycloidal", (1.2, 0.5), 0.3, 0.1, duration, 0.1, steps=steps)
+    law = Rise(
+        "cycloidal",
+        (1.2, 0.5),
+        0.3,
+        0.1,
+        duration,
+        0.1,
+        steps=steps,
+    )
     return replace(CRANK_ROCKER, motion=Motion(law=law))
 
 
@@ -136,8 +144,20 @@ def draw_motion(seed, number):
     else:
         kind = str(rng.choice(RISE_LAWS))
         falls = {"fall": fall, "rest": rest} if rng.random() < 0.8 else {}
-        law = Rise(kind, (last - first, rise), first, dwell, steps=steps, **falls)
-    return replace(scene, motion=Motion(law=law), drive=None, drive_bar=2)
+        law = Rise(
+            kind,
+            (last - first, rise),
+            first,
+            dwell,
+            steps=steps,
+            **falls,
+        )
+    return replace(
+        scene,
+        motion=Motion(law=law),
+        drive=None,
+        drive_bar=2,
+    )
 
 
 @pytest.mark.slow

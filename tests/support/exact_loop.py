@@ -24,7 +24,13 @@ class ExactLoop:
             B = _meet(A, b, O4, c, sign)
             return {1: ground, 2: turned, 3: (B - A) / b, 4: (B - O4) / c}
         if bar == 3:
-            A = _meet(mp.mpc(0), a, O4 - b * turned, c, sign)
+            A = _meet(
+                mp.mpc(0),
+                a,
+                O4 - b * turned,
+                c,
+                sign,
+            )
             return {1: ground, 2: A / a, 3: turned, 4: (A + b * turned - O4) / c}
         B = O4 + c * turned
         A = _meet(mp.mpc(0), a, B, b, -sign)

@@ -128,7 +128,11 @@ class Equations:
     def _add(self, term, mass):
         if isinstance(term, Gravity):
             for k in range(3):
-                _push(self.world[k], mass[k] * arb(term.magnitude), arb(term.angle))
+                _push(
+                    self.world[k],
+                    mass[k] * arb(term.magnitude),
+                    arb(term.angle),
+                )
         elif isinstance(term, Viscous):
             self.damping += [(*PINS[pin], arb(k)) for pin, k in term.coefficients]
         elif isinstance(term, Load):
@@ -147,7 +151,11 @@ class Equations:
         if load.force is None:
             return
         size, angle = map(arb, load.force)
-        _push((self.own if load.frame == "bar" else self.world)[k], size, angle)
+        _push(
+            (self.own if load.frame == "bar" else self.world)[k],
+            size,
+            angle,
+        )
         force, place = [arb(0), arb(0)], [arb(0), arb(0)]
         _push(force, size, angle)
         if load.from_pin is not None:
@@ -333,4 +341,9 @@ def released(linkage, terms, theta_2, omega_2, branch, times):
                 rows.append([float(q[0]), _sine(q)])
             t, (theta, omega) = (t + h).mid(), new
     angles = np.array(rows)
-    return Reference(angles[:, 0], angles[:, 1], limits, change_points)
+    return Reference(
+        angles[:, 0],
+        angles[:, 1],
+        limits,
+        change_points,
+    )

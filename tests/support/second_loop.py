@@ -6,7 +6,6 @@ simulation is told none of their numbers.
 """
 
 import math
-import time
 from dataclasses import dataclass
 
 import mujoco
@@ -313,7 +312,13 @@ class Simulation:
 
     def compile(self, wheel, carrier=None):
         """Compile the loop with a flywheel, or what else keeps the crank's speed."""
-        text = self.loop.write(self.settings, self.timestep, wheel, carrier, self.omega)
+        text = self.loop.write(
+            self.settings,
+            self.timestep,
+            wheel,
+            carrier,
+            self.omega,
+        )
         model = mujoco.MjModel.from_xml_string(text)
         model.body_invweight0[:] *= self.settings.weight_factor
         if isinstance(carrier, TurningWheel):
@@ -332,13 +337,6 @@ class Simulation:
         if isinstance(carrier, Servo) and carrier.position_gain:
             self.data.act[:] = theta_2
             self.data.ctrl[-1] = self.omega
-
-    def time_steps(self, count):
-        """Time so many steps from the start of the sweep, processor seconds."""
-        self.start(float(self.sweep[0]))
-        began = time.process_time()
-        mujoco.mj_step(self.model, self.data, count)
-        return time.process_time() - began
 
     def run(self):
         """Step through the sweep and read states on the way."""
@@ -370,7 +368,12 @@ class Simulation:
             acceleration, closing, drive = self.probe_drive(angles, alpha_2)
         turned = _add_crank(acceleration)
         forces = self.balance(angles, speeds, turned, closing, drive)
-        return Sample(float(angles[0]), float(speeds[0]), alpha_2, forces)
+        return Sample(
+            float(angles[0]),
+            float(speeds[0]),
+            alpha_2,
+            forces,
+        )
 
     def exerted(self):
         """Return the torque on the crank, N m: that of the servo, or the multiplier of

@@ -54,7 +54,12 @@ def test_dir_shows_what_there_is_and_nothing_else():
 def test_a_number_where_a_bar_belongs_gets_a_sentence(number):
     words = r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar"
     with pytest.raises(fourbar.InputError, match=words):
-        fourbar.FourBar(0.3, fourbar.Bar(0.1), number, fourbar.Bar(0.22))
+        fourbar.FourBar(
+            0.3,
+            fourbar.Bar(0.1),
+            number,
+            fourbar.Bar(0.22),
+        )
 
 
 ALWAYS_WRONG = (5j, [[1, 2], [3]], np.zeros((3, 3)), object())
@@ -284,7 +289,12 @@ def calls_by_name():
     load_by |= {"moment": 0.1, "frame": "bar"}
     load_by["table"] = fourbar.Table((0.0, 2.0), (1.0, 1.0))
     laws = {"theta_3": (0.4, 0.5, 0.6, 0.5), "theta_4": (1.9, 2.0, 2.1, 2.0)}
-    drawn = fourbar.DrawnPins((0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05))
+    drawn = fourbar.DrawnPins(
+        (0.0, 0.0),
+        (0.0, 0.1),
+        (0.175, 0.05),
+        (0.25, 0.05),
+    )
     driven = {"drive": fourbar.LinearDrive(fourbar.Place(2, pair), end)}
     stated = [
         ("Load", load, load_by),
@@ -391,7 +401,12 @@ def test_the_public_formulas_agree_with_a_solution():
     )
     assert gaps.min(axis=0).max() < 0.01 * linkage.coupler.length
     pin = fourbar.instant_centres(*at)[2, 3].point
-    np.testing.assert_allclose(np.column_stack(pin), solution.A, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(
+        np.column_stack(pin),
+        solution.A,
+        rtol=0.0,
+        atol=1e-15,
+    )
 
 
 def test_classify_as_json_is_what_the_formulas_say(capsys):

@@ -173,7 +173,11 @@ def test_the_drive_makes_up_for_what_the_example_takes(latch):
     assert with_it is not None and without is not None
     motion = FreeBody().answer(scene, command(scene)).quantities
     x = (np.degrees(motion["theta_4"]) - 115.0) / 5.0
-    couple = np.where(np.abs(x) < 1.0, -0.8 * x * (1.0 - np.abs(x)), 0.0)
+    couple = np.where(
+        np.abs(x) < 1.0,
+        -0.8 * x * (1.0 - np.abs(x)),
+        0.0,
+    )
     assert 2 <= np.count_nonzero(couple) < 20 and couple.min() < 0.0 < couple.max()
     power = -couple * motion["omega_4"]
     assert (with_it - without) * 10.0 == pytest.approx(

@@ -148,7 +148,11 @@ def test_processor_time_is_bounded_by_the_process_itself():
         "bound_processor_time(0.1)\n"
         "while True: pass"
     )
-    ended = subprocess.run([sys.executable, "-c", spinning], timeout=60, check=False)
+    ended = subprocess.run(
+        [sys.executable, "-c", spinning],
+        timeout=60,
+        check=False,
+    )
     assert ended.returncode == -signal.SIGXCPU
 
 
@@ -161,4 +165,8 @@ def test_a_worker_loads_no_library_of_windows():
         "import mujoco, sys\n"
         "sys.exit('glfw' in sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", looking], timeout=60, check=True)
+    subprocess.run(
+        [sys.executable, "-c", looking],
+        timeout=60,
+        check=True,
+    )

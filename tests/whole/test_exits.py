@@ -379,7 +379,11 @@ def test_the_help_says_of_each_command_what_the_command_says(group):
 def test_the_help_of_the_harness_imports_no_engine():
     code = "import sys; from fourbar_validation.cli import status; status(['--help']); "
     code += "sys.exit(bool({'scipy', 'mujoco', 'pint', 'rich'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        check=False,
+    )
     assert done.returncode == HOLDS
 
 

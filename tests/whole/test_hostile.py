@@ -349,7 +349,12 @@ def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path):
 
 def test_a_worker_carries_only_its_own_scenes(tmp_path):
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
-    (job,) = pool.make_jobs(suite, [1], (), draw=False)
+    (job,) = pool.make_jobs(
+        suite,
+        [1],
+        (),
+        draw=False,
+    )
     assert job.name == "b" and len(job.suite) == 1
 
 

@@ -122,7 +122,12 @@ def test_a_worker_killed_once_is_not_held_against_the_engine(
         (tmp_path / "lives" / str(life)).touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
     unlucky = Engine("unlucky", Unlucky, EQUIVALENCE)
-    judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1)
+    judge_all(
+        Few(("a",)),
+        tmp_path / "run",
+        (*EXACT, unlucky),
+        workers=1,
+    )
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = [row.engine for row in rows if row.verdict == FAILS]
     assert failing == ["unlucky"] * blamed
@@ -224,7 +229,11 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path):
 
 def test_a_record_is_read_from_its_part_as_it_was(tmp_path):
     errors = (math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
-    record = Record("a", title="A", rows=[Row("a", "engine", "exact", "F12", *errors)])
+    record = Record(
+        "a",
+        title="A",
+        rows=[Row("a", "engine", "exact", "F12", *errors)],
+    )
     with Store(tmp_path, {}).held() as store:
         store.put(5, [record.kept_all()])
         (kept,) = store.read(5)
@@ -539,7 +548,11 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(pool, "judge_job", noting)
     monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.plan, "PICTURED", 3)
-    monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
+    monkeypatch.setattr(
+        fourbar_validation.run.run,
+        "write_html",
+        lambda *_, **__: "",
+    )
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
     without = run(
         Plan(Few(), (*EXACT, blunders), RunOptions(drawn=False)), tmp_path / "without"

@@ -6,7 +6,6 @@ printed in the source of the task.
 """
 
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,12 +13,11 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.errors import HOLDS
-from tests.support.texts import COORDINATES, HUNG, PLIERS, PULL
+from tests.support.texts import COORDINATES, PLIERS
 
 WIDTH = 80
 PRINTED = 1e-5
 """Relative: a value of six or seven digits against one that is printed with six."""
-Steps = Callable[..., str]
 
 
 @pytest.fixture
@@ -127,17 +125,6 @@ def test_the_output_angle_is_known(ask, tmp_path):
         text = ask("analyze", "midterm.toml", "--units", "in rad")
         assert row_of(text, "bar 2") == pytest.approx([theta_2], abs=5e-5)
         assert row_of(text, "P") == pytest.approx(place, rel=PRINTED)
-
-
-def test_pliers_have_their_advantage_without_a_speed(ask, tmp_path):
-    (tmp_path / "pliers.toml").write_text(PLIERS)
-    text = ask("analyze", "pliers.toml")
-    assert row_of(text, "omega_4/omega_2")[0] == pytest.approx(0.1332544, rel=PRINTED)
-    assert row_of(text, "mechanical advantage")[0] == pytest.approx(
-        1.0 / 0.1332544,
-        rel=PRINTED,
-    )
-    assert row_of(text, "F_jaw/F_handle")[0] == pytest.approx(31.969, rel=PRINTED)
 
 
 def test_pliers_have_their_force_ratio_over_a_sweep(ask, tmp_path):
@@ -284,20 +271,6 @@ def test_a_given_couple_moves_two_parallel_links_from_rest(ask, tmp_path):
     assert row_of(text, "F14 at O4")[2] == pytest.approx(2.139, rel=1e-3)
 
 
-def test_a_weight_hung_at_the_tip_of_the_rocker(ask, tmp_path):
-    (tmp_path / "hung.toml").write_text(HUNG)
-    rows = list_columns(ask("analyze", "hung.toml", "--columns", "theta_2,torque"))
-    right = [0.441477, -0.417152, -0.621733, 0.532516]
-    assert [torque for _, torque in rows] == pytest.approx(right, rel=PRINTED)
-
-
-def test_a_force_along_x_at_the_end_of_the_rocker(ask, tmp_path):
-    (tmp_path / "pull.toml").write_text(PULL)
-    text = ask("analyze", "pull.toml")
-    assert row_of(text, "torque") == pytest.approx([1.656231], rel=PRINTED)
-    assert row_of(text, "bar 2") == pytest.approx([60.0, 10.0, 5.0], rel=PRINTED)
-
-
 RODS = """\
 title = "Steel rods at 20 rpm, no gravity"
 [lengths]
@@ -351,16 +324,6 @@ theta_2 = "60 deg"
 omega_2 = "10.5 rad/s"
 alpha_2 = "-26 rad/s^2"
 """
-
-
-def test_an_exercise_that_states_masses_per_length(ask, tmp_path):
-    """Nine equations of the free bodies, solved apart from fourbar, are the oracle."""
-    (tmp_path / "exercise.toml").write_text(PER_LENGTH)
-    text = ask("analyze", "exercise.toml")
-    assert row_of(text, "torque") == pytest.approx([24.0736], rel=PRINTED)
-    pins = {"F12 at O2": 211.656, "F43 at B": 60.2987, "F14 at O4": 85.2365}
-    for pin, size in pins.items():
-        assert row_of(text, pin)[-1] == pytest.approx(size, rel=PRINTED)
 
 
 GUIDED = """\
@@ -426,6 +389,23 @@ coupler = "{}"
 output = "{}"
 """
 TASKS = {
+    "nine equations of the free bodies, of bars that state masses per length": (
+        PER_LENGTH,
+        {
+            "torque": (24.0736,),
+            "F12 at O2": 211.656,
+            "F43 at B": 60.2987,
+            "F14 at O4": 85.2365,
+        },
+    ),
+    "pliers, whose advantage needs no speed": (
+        PLIERS,
+        {
+            "omega_4/omega_2": (0.1332544,),
+            "mechanical advantage": (1.0 / 0.1332544,),
+            "F_jaw/F_handle": (31.969,),
+        },
+    ),
     "SymPy's test_four_bar_linkage: (M^-1 f) of its printed mass and forcing": (
         LENGTHS.format("0.13 m", "0.24 m", "0.21 m", "0.34 m")
         + """ground_angle = "180 deg"
@@ -483,4 +463,8 @@ def test_a_task_of_a_textbook_or_a_forum(task, ask, tmp_path):
     shown = ask("analyze", "task.toml", *at)
     for label, numbers in rows.items():
         printed = row_of(shown, label)
+        if isinstance(numbers, float):  # the size of a force stands last
+            printed = printed[-1]
+        elif label not in ("bar 2", "bar 3", "bar 4", "F43 at B"):
+            printed = printed[: len(numbers)]
         assert printed == pytest.approx(numbers, rel=PRINTED), label

@@ -39,5 +39,9 @@ def test_pyright_passes_the_page():
 
 @pytest.mark.slow
 def test_the_page_runs():
-    done = subprocess.run([sys.executable, PAGE], cwd=ROOT, check=False)
+    done = subprocess.run(
+        [sys.executable, PAGE],
+        cwd=ROOT,
+        check=False,
+    )
     assert done.returncode == 0

@@ -188,7 +188,11 @@ def slide(mp, scene, place, omega, alpha):
     )
     p = []
     for name, centre in zip(("crank", "rod", "slider"), centres, strict=True):
-        acceleration = slope(lambda t, centre=centre: centre(theta(t)), 0, 2)
+        acceleration = slope(
+            lambda t, centre=centre: centre(theta(t)),
+            0,
+            2,
+        )
         p.append(mp.mpf(scene["bars"][name]["mass"]) * (acceleration - weight))
     for load in scene.get("loads", ()):
         p[2] -= mp.mpf(load["force"][0]) * mp.expj(load["force"][1])
@@ -297,7 +301,12 @@ def solve_pin_forces(problem, theta, omega):
     scene = protocol.scene_from_json(problem["scene"])
     branch = np.sign(np.sin(theta)).astype(np.int8)
     growth = -pendulum(problem)[0] * np.cos(theta)
-    motion = Command(np.asarray(theta), branch, np.asarray(omega), growth)
+    motion = Command(
+        np.asarray(theta),
+        branch,
+        np.asarray(omega),
+        growth,
+    )
     released = replace(scene, motion=fourbar.Motion(0.0, 0.0))
     answers = exact.BallArithmetic().answer(released, motion).quantities
     forces = {name: answers[name] for name in PIN_FORCES}

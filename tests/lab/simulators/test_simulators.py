@@ -201,7 +201,11 @@ def test_a_run_begins_before_its_first_position_where_the_linkage_closes():
         math.tau / 10.0 / 100
     ) and course.rows.tolist() == list(range(25))
     back = replace(scene, motion=scene.motion.replace(speed=-10.0))
-    led, course = motion.lay_out(back, command._replace(speed=-10.0), 100)
+    led, course = motion.lay_out(
+        back,
+        command._replace(speed=-10.0),
+        100,
+    )
     assert motion.start(led).qpos[0] == pytest.approx(
         2.5 * math.pi
     ) and course.rows.tolist() == list(range(24, -1, -1))
@@ -286,7 +290,12 @@ def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch):
         "id": 1,
         "refusal": "it has no derivatives",
     }
-    monkeypatch.setattr(Rigid, "slopes", lambda *_: [{"how": "by hand"}], raising=False)
+    monkeypatch.setattr(
+        Rigid,
+        "slopes",
+        lambda *_: [{"how": "by hand"}],
+        raising=False,
+    )
     assert tell({"ask": "slopes", **told}) == {"id": 1, "slopes": [{"how": "by hand"}]}
     assert (
         "setting = {'steps': 3}"

@@ -236,7 +236,11 @@ def centred(change):
 
     def change_bar(bar):
         r, phi = bar.mass_centre
-        x, y = change(bar.length, r * math.cos(phi), r * math.sin(phi))
+        x, y = change(
+            bar.length,
+            r * math.cos(phi),
+            r * math.sin(phi),
+        )
         return replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
 
     return change_bar
@@ -628,7 +632,11 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, c
 
 
 def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(judged):
-    motion = fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10))
+    motion = fourbar.Motion(
+        1.0,
+        2.0,
+        free=fourbar.Free(1.0, 10),
+    )
     with pytest.raises(InputError, match="not judged while released"):
         judged(replace(OURS, motion=motion), right(OURS))
 
@@ -1046,7 +1054,11 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
         fourbar.Bar(2.06, 219.95674411, 10.35, (1.6476, math.radians(-18.7352))),
         fourbar.Bar(2.33, output_mass, 50.13),
     )
-    load = fourbar.Load(3, (100.0, math.pi / 2.0), from_pin=(3.06, math.radians(-31.0)))
+    load = fourbar.Load(
+        3,
+        (100.0, math.pi / 2.0),
+        from_pin=(3.06, math.radians(-31.0)),
+    )
     motion = fourbar.Motion(math.radians(60.0), 10.0, 5.0)
     code, printed, _ = check(
         Scene(linkage, motion, loads=(load,)),

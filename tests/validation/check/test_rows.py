@@ -130,7 +130,12 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, tmp_path):
     np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
     turned = math.radians(ends[0]) - 0.1, math.radians(ends[1]) + 0.1
     assert ((rows.at.angle > turned[0]) & (rows.at.angle < turned[1])).all()
-    at = Command(rows.at.angle, np.ones(len(theta_4), np.int8), 2.0, -1.0)
+    at = Command(
+        rows.at.angle,
+        np.ones(len(theta_4), np.int8),
+        2.0,
+        -1.0,
+    )
     torque = fourbar.solve(scene, at=at).torque
     write_table(path, "theta_4", theta_4, torque, "{:.0f}")
     assert judged(scene, path).status == HOLDS
@@ -139,12 +144,23 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, tmp_path):
 def test_the_rounding_of_another_bars_angle_is_allowed_for(tmp_path):
     """Six decimals are a rounded number; what half a unit changes is allowed."""
     scene = commanding(2, 60.0, 220.0)
-    at = Command(np.array([1.2, 1.7, 2.4]), np.ones(3, np.int8), 2.0, -1.0)
+    at = Command(
+        np.array([1.2, 1.7, 2.4]),
+        np.ones(3, np.int8),
+        2.0,
+        -1.0,
+    )
     right = fourbar.solve(scene, at=at)
     path = tmp_path / "theirs.csv"
     write_table(path, "theta_4", right.theta_4, right.torque, "{:.6f}")
     assert judged(scene, path).status == HOLDS
-    write_table(path, "theta_4", right.theta_4, right.torque * (1 + 1e-5), "{:.6f}")
+    write_table(
+        path,
+        "theta_4",
+        right.theta_4,
+        right.torque * (1 + 1e-5),
+        "{:.6f}",
+    )
     assert judged(scene, path).status == FAILED
 
 

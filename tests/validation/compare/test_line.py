@@ -30,7 +30,11 @@ PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
 
 def driven(one, other, **changes):
     ends = Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7))
-    motion = fourbar.Motion(np.linspace(0.1, 6.2, 25), 10.0, 5.0)
+    motion = fourbar.Motion(
+        np.linspace(0.1, 6.2, 25),
+        10.0,
+        5.0,
+    )
     return crank_rocker(motion=motion, drive=LinearDrive(*ends), **changes)
 
 

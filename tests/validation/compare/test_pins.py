@@ -67,4 +67,8 @@ def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(monkeypa
     )
     few = _take_plain_positions(question)
     at = [int(np.argmin(abs(question.at.angle - x))) for x in few.command.angle]
-    np.testing.assert_allclose(few.solution.torque, wanted[at], rtol=1e-12)
+    np.testing.assert_allclose(
+        few.solution.torque,
+        wanted[at],
+        rtol=1e-12,
+    )

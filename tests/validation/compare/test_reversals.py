@@ -126,7 +126,11 @@ def test_only_a_pin_that_hardly_slips_reverses():
     slip = 1e-6
     x = np.array([0.0, 5.9e-6, 6.1e-6, 1e-3, 1.0])
     effects = (Friction((("A", FRICTION),)),)
-    dry = Scene(LINKAGE, Motion(Sweep(0.1, 0.5, 4), 2.0), effects=effects)
+    dry = Scene(
+        LINKAGE,
+        Motion(Sweep(0.1, 0.5, 4), 2.0),
+        effects=effects,
+    )
     ones = np.ones(5)
     speeds = {"omega_2": 2.0 * ones, "omega_3": 2.0 + x, "omega_4": ones}
     solution = replace(solve(dry), condition=ones, **speeds)

@@ -465,16 +465,13 @@ def test_every_row_counts_however_many_there_are():
     assert (counts.scenes, counts.scenes_compared, counts.total) == (2, 1, 43)
 
 
-def test_nothing_compared_is_no_success_whatever_was_refused():
-    for none in (rows(refuse=5), rows(undecided=5), [IDENTITY, IDENTITY], []):
-        assert Counts(none).nothing and Counts(none).status == FAILED
-    assert not any(row.passed for row in rows(refuse=1, undecided=1, fail=1))
-
-
-@pytest.mark.parametrize(("part", "passed"), [(0.9, True), (1.1, False), (8.0, False)])
-def test_a_row_agrees_up_to_what_is_allowed(part, passed):
-    errors = np.array([0.0, part, 0.5]) * 1e-12
-    row = Row.judged(("a", "b", "-"), "c", errors, 1e-12, "why", np.arange(3.0))
-    assert row.passed == passed and row.theta_2 == 1.0
-    lone = Row.judged(("a", "b", "-"), "c", part * 1e-12, 1e-12, "why")
-    assert lone.passed == passed
+@pytest.mark.parametrize(("part", "passed"), [(0.9, True), (1.1, False)])
+def test_a_lone_number_agrees_up_to_what_is_allowed(part, passed):
+    row = Row.judged(
+        ("a", "b", "-"),
+        "c",
+        part * 1e-12,
+        1e-12,
+        "why",
+    )
+    assert row.passed == passed

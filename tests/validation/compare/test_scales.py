@@ -63,7 +63,11 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():
         Load(2, (50.0, 0.0), arm=(0.05, 0.0)),
         Load(2, (-50.0, 0.0), arm=(0.05, 0.0)),
     )
-    scene = Scene(ROCKER, Motion(Sweep(0.5, 0.6, 3), 0.0), loads=loads)
+    scene = Scene(
+        ROCKER,
+        Motion(Sweep(0.5, 0.6, 3), 0.0),
+        loads=loads,
+    )
     solution = solve(scene)
     scale = scale_of("torque", scene, solution, solution.torque)
     assert np.all(scale.size >= 0.25 * 100.0)
@@ -149,8 +153,16 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
 def test_the_pair_that_allows_less_of_an_error_is_taken_whole():
     """Allowed are size times max(1, N/50): 4 and 3, 2 and 6, nothing known and 1."""
     no = np.zeros(3, dtype=bool)
-    ours = Scale(np.array([2.0, 2.0, np.nan]), np.array([100.0, 1.0, np.nan]), no)
-    theirs = Scale(np.array([3.0, 1.0, 1.0]), np.array([1.0, 300.0, 1.0]), ~no)
+    ours = Scale(
+        np.array([2.0, 2.0, np.nan]),
+        np.array([100.0, 1.0, np.nan]),
+        no,
+    )
+    theirs = Scale(
+        np.array([3.0, 1.0, 1.0]),
+        np.array([1.0, 300.0, 1.0]),
+        ~no,
+    )
     taken = ours.take_strictest(theirs)
     assert taken.size.tolist() == [3.0, 2.0, 1.0]
     assert taken.cancellation.tolist() == [1.0, 1.0, 1.0]

@@ -164,7 +164,11 @@ def test_a_turned_frame_turns_gravity_with_it():
     """
     posed, by = scene("gravity"), 0.7
     sweep = posed.motion.theta_2
-    sweep = replace(sweep, start=sweep.start + by, stop=sweep.stop + by)
+    sweep = replace(
+        sweep,
+        start=sweep.start + by,
+        stop=sweep.stop + by,
+    )
     ground_angle = posed.linkage.ground_angle + by
     turned = replace(
         posed,
@@ -224,7 +228,11 @@ def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(name, monke
     true, effect = question.solve, ACTING[name]
     kind = "loads" if isinstance(effect, Load) else "effects"
     elsewhere = replace(scene(name), **{kind: (moved(effect),)})
-    monkeypatch.setattr(question, "solve", lambda _, *a, **k: true(elsewhere, *a, **k))
+    monkeypatch.setattr(
+        question,
+        "solve",
+        lambda _, *a, **k: true(elsewhere, *a, **k),
+    )
     engines, quantities = fail_with(name, INVERSE)
     assert engines >= INVERSE and "torque" in quantities
 

@@ -207,7 +207,14 @@ def test_a_force_at_a_point_drives(name, bar, frame):
     drive = PointDrive(Place(bar, (0.17, 0.6)), 1.1, frame)
     for lengths in MECHANISMS.values():
         motion = Motion(None, 10.0, 3.0)
-        case = Scene(bars(lengths), motion, None, LOADS, EFFECTS, drive=drive)
+        case = Scene(
+            bars(lengths),
+            motion,
+            None,
+            LOADS,
+            EFFECTS,
+            drive=drive,
+        )
         assert failures(name, case, every=12) == []
 
 
@@ -280,7 +287,12 @@ def with_bar(number, **values):
     """A crank-rocker with another mass, inertia or mass centre of one bar."""
     bars = {2: Bar(0.1, 0.2), 3: Bar(0.25, 0.5), 4: Bar(0.22, 0.4)}
     bars[number] = Bar(bars[number].length, **values)
-    return Scene(FourBar(0.3, *bars.values()), Motion(SIX, 10.0, 3.0), 2, LOADS)
+    return Scene(
+        FourBar(0.3, *bars.values()),
+        Motion(SIX, 10.0, 3.0),
+        2,
+        LOADS,
+    )
 
 
 MASSLESS = {"mass": 0.0}, {"mass": 0.0, "inertia": 0.1}
@@ -345,7 +357,12 @@ def test_simbody_loses_a_constraint_where_the_limit_says(name, monkeypatch):
     """
     from fourbar_lab.engines import opensim
 
-    linkage = FourBar(0.3, Bar(0.25, 0.2), Bar(0.22, 0.5), Bar(0.3, 0.4))
+    linkage = FourBar(
+        0.3,
+        Bar(0.25, 0.2),
+        Bar(0.22, 0.5),
+        Bar(0.3, 0.4),
+    )
     beyond = at_limit(linkage, 1e-13)
     assert failures(name, at_limit(linkage, 1e-6)) == []
     assert "drops" in failures(name, beyond)[0][1]
@@ -575,7 +592,13 @@ def test_a_scene_before_leaves_nothing_behind(kind):
     """An engine keeps one tree for all its scenes."""
     motion = Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
     plain = Scene(CRANK_ROCKER, motion)
-    loaded = Scene(replace(CRANK_ROCKER, ground=0.31), motion, 4, LOADS, EFFECTS)
+    loaded = Scene(
+        replace(CRANK_ROCKER, ground=0.31),
+        motion,
+        4,
+        LOADS,
+        EFFECTS,
+    )
     kept = Exact("kept", partial(keep_tree, kind))
     kept.answer(loaded, command(loaded))
     after, fresh = (
@@ -600,7 +623,13 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
     link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
-        case = Scene(link, motion, drive, (), (Gravity(), friction))
+        case = Scene(
+            link,
+            motion,
+            drive,
+            (),
+            (Gravity(), friction),
+        )
         engine, bodies = (
             answered(name, case).quantities["torque"][0]
             for name in ("pinocchio-inverse", "free-body")

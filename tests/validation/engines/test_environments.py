@@ -152,7 +152,12 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
 
     def fails_at_pip(line):
         lines.append(list(map(str, line)))
-        return Ended("", "", failed="pip" in lines[-1], last="stop")
+        return Ended(
+            "",
+            "",
+            failed="pip" in lines[-1],
+            last="stop",
+        )
 
     monkeypatch.setattr(environments, "run_to_end", fails_at_pip)
     with pytest.raises(DependencyError, match="none: its environment cannot be made"):

@@ -41,7 +41,12 @@ DIGITS = 50.0 * EPS
 """Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles.
 """
 ONE = [engine for engine in ENGINES if engine.name == "free-body"]
-RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
+RECTANGLE = fourbar.FourBar(
+    0.3,
+    fourbar.Bar(0.1),
+    fourbar.Bar(0.3),
+    fourbar.Bar(0.1),
+)
 
 
 def answered(scene):
@@ -113,7 +118,11 @@ def test_the_angles_solve_the_closure_equations_to_50_digits():
             closed = free_body_closure.close(linkage, theta_2, branch)
             for i in np.flatnonzero(closed.assembled):
                 near = [mp.mpf(float(closed.theta[k, i])) for k in (0, 1)]
-                open_by = partial(gap, linkage.lengths, mp.mpf(float(theta_2[i])))
+                open_by = partial(
+                    gap,
+                    linkage.lengths,
+                    mp.mpf(float(theta_2[i])),
+                )
                 x, y = mp.findroot(open_by, near)
                 sine = float(mp.sin(y - x))
                 assert sine * branch[i] > 0.0
@@ -138,7 +147,11 @@ def test_a_lever_of_an_upright_rectangle(drive, torque, F12, F32, F43, F14):
 
     The bars are upright and 0.1 m long, and the coupler a two-force bar.
     """
-    load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
+    load = Load(
+        4,
+        (10.0, 0.0),
+        arm=(0.05, math.pi / 2),
+    )
     got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
     assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
     for name, force in {"F12": F12, "F32": F32, "F43": F43, "F14": F14}.items():

@@ -536,7 +536,11 @@ def test_a_report_shows_the_versions_that_guests_state(tmp_path, suite, monkeypa
         write_program(tmp_path, name, (hello, f'["gravity"], "version": "{version}"}}'))
         for name, version in stated.items()
     ]
-    plan = Plan(suite, guests.read_guests(entries, ()), RunOptions(drawn=False))
+    plan = Plan(
+        suite,
+        guests.read_guests(entries, ()),
+        RunOptions(drawn=False),
+    )
     summary = run(plan, tmp_path / "out")
     shown = {line.name: line.version for line in summary.engines if line.name in stated}
     assert shown == {"numpy-like": "", "own": "2.1", "own 3.0": ""}
@@ -622,7 +626,11 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
             continue
         ours, theirs = (ask_at(one, scene, command) for one in (inside, outside))
         for name in ("setting", "assembled", "refusal", "alarms", "evidence"):
-            np.testing.assert_equal(getattr(theirs, name), getattr(ours, name), name)
+            np.testing.assert_equal(
+                getattr(theirs, name),
+                getattr(ours, name),
+                name,
+            )
         np.testing.assert_equal(theirs.quantities, ours.quantities)
         np.testing.assert_equal(theirs.predicted, ours.predicted)
         answered += 1

@@ -14,7 +14,18 @@ from fourbar_validation.regression.record import NOTHING_KNOWN
 from fourbar_validation.regression.rules import list_weakened
 from tests.support.runs import HERE, compare_rows, kinds
 
-ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-9, AGREES, "", 1.0, 1.0)
+ROW = Row(
+    "scene",
+    "engine",
+    "exact",
+    "torque",
+    1e-15,
+    1e-9,
+    AGREES,
+    "",
+    1.0,
+    1.0,
+)
 
 
 def changed(**fields):

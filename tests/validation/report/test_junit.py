@@ -19,7 +19,18 @@ from fourbar_validation.report.overview import Overview
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary, compute_shares
 
-ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "", 1.0, 1.0)
+ROW = Row(
+    "scene",
+    "engine",
+    "exact",
+    "torque",
+    1e-15,
+    1e-14,
+    AGREES,
+    "",
+    1.0,
+    1.0,
+)
 OUTCOMES = {
     AGREES: "passed",
     DEGRADED: "passed",

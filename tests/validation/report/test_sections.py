@@ -28,7 +28,18 @@ from tests.validation.report.test_report import demo, report
 
 
 def judged(scene, verdict):
-    return Row(scene, "engine", "exact", "torque", 1.0, 1.0, verdict, "", 0.0, 1.0)
+    return Row(
+        scene,
+        "engine",
+        "exact",
+        "torque",
+        1.0,
+        1.0,
+        verdict,
+        "",
+        0.0,
+        1.0,
+    )
 
 
 def test_every_scene_is_counted_in_its_family_alone():

@@ -287,7 +287,11 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(pin, bar):
     """
     scene = crank_rocker(loads=(), drive_bar=bar)
     standing = scene.motion.replace(speed=0.0, acceleration=0.0)
-    scene = replace(scene, motion=standing, effects=(fourbar.Gravity(),))
+    scene = replace(
+        scene,
+        motion=standing,
+        effects=(fourbar.Gravity(),),
+    )
     right = fourbar.solve(scene, "force")
     joint, behind = {
         ("A", 3): (right.B, (3,)),
@@ -494,43 +498,41 @@ def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     assert causes[0] == "F32 is in the frame of bar 2, not in world axes: F32"
 
 
-class Scaled:
-    """Free bodies in which something that acts is left out, doubled or reversed."""
+def scale(without, factor):
+    """Leave out, double or reverse what a scene has not."""
 
-    name = "plain"
-
-    def __init__(self, without, factor):
-        self.without, self.factor = without, factor
-
-    def answer(self, scene, at):
-        whole = FreeBody().answer(scene, at)
-        rest = FreeBody().answer(self.without, at)
-        numbers = dict(whole.quantities)
+    def change(numbers, at):
+        rest = FreeBody().answer(without, at).quantities
         for name in FORCES:
-            left = rest.quantities[name]
-            numbers[name] = left + self.factor * (numbers[name] - left)
+            numbers[name] = rest[name] + factor * (numbers[name] - rest[name])
         numbers.pop("torque_inertia", None)
-        return replace(whole, engine=self.name, quantities=numbers)
+
+    return partial(Altered, change)
 
 
 GROUND, COUPLER = fourbar.Place(1, (0.3, 0.2)), fourbar.Place(3, (0.1, 0.4))
 SPRING = fourbar.Spring(GROUND, COUPLER, 90.0, 0.1, 4.0)
-SLACK = fourbar.Spring(GROUND, fourbar.Place(4, (0.1, 0.0)), 50.0, 0.1)
+SLACK = fourbar.Spring(
+    GROUND,
+    fourbar.Place(4, (0.1, 0.0)),
+    50.0,
+    0.1,
+)
 TORSION = fourbar.Torsion((("O4", 2.0, 1.0, 0.0),))
+BOTH, ONE, SLIPPED, GRASPED = (
+    fourbar.Springs(springs)
+    for springs in (
+        (SPRING, SLACK),
+        (SPRING,),
+        (replace(SPRING, preload=0.0),),
+        (replace(SPRING, length=0.0),),
+    )
+)
 ACTING = {
-    "the springs": (fourbar.Springs((SPRING, SLACK)),),
-    "part 2 of the springs": (
-        fourbar.Springs((SPRING, SLACK)),
-        fourbar.Springs((SPRING,)),
-    ),
-    "the preload of spring 1": (
-        fourbar.Springs((SPRING,)),
-        fourbar.Springs((replace(SPRING, preload=0.0),)),
-    ),
-    "the free length of spring 1": (
-        fourbar.Springs((SPRING,)),
-        fourbar.Springs((replace(SPRING, length=0.0),)),
-    ),
+    "the springs": (BOTH,),
+    "part 2 of the springs": (BOTH, ONE),
+    "the preload of spring 1": (ONE, SLIPPED),
+    "the free length of spring 1": (ONE, GRASPED),
     "the rest angle of torsion spring 1": (
         TORSION,
         fourbar.Torsion((("O4", 2.0, 0.0, 0.0),)),
@@ -553,8 +555,7 @@ def test_what_acts_may_be_left_out_doubled_or_reversed(name, word):
         replace(bare, effects=(*bare.effects, *effects)) for effects in ([acting], left)
     )
     verb = "are" if name.endswith("s") else "is"
-    causes = find_causes(partial(Scaled, without, DONE[word]), scene)
-    assert f"{name} {verb} {word}" in causes
+    assert f"{name} {verb} {word}" in find_causes(scale(without, DONE[word]), scene)
 
 
 def with_bars(**bars):
@@ -608,15 +609,18 @@ OTHER_SCENES = {
 @pytest.mark.parametrize("words", OTHER_SCENES)
 def test_another_scene_of_an_adversary_is_named_first(words):
     scene, other, factor = OTHER_SCENES[words]
-    assert find_causes(partial(Scaled, other, factor), scene)[0] == words
+    assert find_causes(scale(other, factor), scene)[0] == words
 
 
 @pytest.mark.parametrize("word", DONE)
 def test_a_load_may_be_left_out_doubled_or_reversed(word):
-    load = fourbar.Load(4, (3.0, 0.7), from_pin=(0.05, 1.0))
+    load = fourbar.Load(
+        4,
+        (3.0, 0.7),
+        from_pin=(0.05, 1.0),
+    )
     scene = replace(SCENE, loads=(load,))
-    causes = find_causes(partial(Scaled, SCENE, DONE[word]), scene)
-    assert f"load 1 (bar 4) is {word}" in causes
+    assert f"load 1 (bar 4) is {word}" in find_causes(scale(SCENE, DONE[word]), scene)
 
 
 @pytest.mark.parametrize(
@@ -664,53 +668,61 @@ def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():
     assert name_wrong({"one": reverse_F43, "two": reverse_y}).keys() == twice.keys()
 
 
+def failing(engine, quantity, error=0.3):
+    return Row(
+        "s",
+        engine,
+        "exact",
+        quantity,
+        error,
+        1e-14,
+        FAILS,
+        "",
+        1.0,
+        1.0,
+    )
+
+
+def agreeing(engine, quantity):
+    return replace(failing(engine, quantity), error=0.0, verdict=AGREES)
+
+
+def overview_of(rows, **parts):
+    overview = Overview()
+    overview.add(Record("s", rows=rows, **parts))
+    return overview
+
+
 def test_what_differs_from_two_engines_is_listed_and_shown_first():
     """The identity that fails with it has the larger error, and is a consequence."""
-    names = ("torque", "F12", "F32", "F43", "F14", "theta_3")
+    names = ("torque", *PIN_FORCES, "theta_3")
     rows = [
-        Row("s", engine, "exact", name, error, 1e-14, FAILS, "", 1.0, 1.0)
-        for engine, name, error in (
-            (FORMULAS, "power", 0.9),
-            ("one", "torque", 0.3),
-            ("one", "torque_inertia", 0.2),
-        )
+        failing(FORMULAS, "power", 0.9),
+        failing("one", "torque"),
+        failing("one", "torque_inertia", 0.2),
     ]
-    overview = Overview()
     against = {name: ["one", "two"] for name in names}
-    overview.add(Record("s", rows=rows, against=against))
-    (cause,) = overview.causes
+    (cause,) = overview_of(rows, against=against).causes
     words = "one, two agree with each other, and differ from it in"
     assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
 
 
 def test_what_differs_is_what_the_engine_itself_has_wrong():
-    closure, inertia = (
-        Row("s", "wg", "exact", name, 0.3, 1e-14, FAILS, "", 1.0, 1.0)
-        for name in ("closure", "torque_inertia")
-    )
-    agreeing = [
-        replace(closure, quantity=name, verdict=AGREES, error=0.0)
-        for name in ("theta_3", "F12")
-    ]
-    assembled = replace(closure, quantity="assembled", error=9.0, allowed=0.0)
-    loop = "positions at which the loop closes differ, pin forces and motion agree"
+    rows = [agreeing("wg", name) for name in ("theta_3", "F12")]
+    open_loop = replace(failing("wg", "assembled", 9.0), allowed=0.0)
     for row, words in (
-        (closure, "closure differs, pin forces and motion agree"),
-        (assembled, loop),
-        (inertia, "inertial part of the torque differs, pin forces and motion agree"),
+        (failing("wg", "closure"), "closure differs"),
+        (open_loop, "positions at which the loop closes differ"),
+        (failing("wg", "torque_inertia"), "inertial part of the torque differs"),
     ):
-        overview = Overview()
-        overview.add(Record("s", rows=[row, *agreeing], causes={"wg": []}))
-        assert overview.causes[0].text.startswith(words)
+        overview = overview_of([row, *rows], causes={"wg": []})
+        said = f"{words}, pin forces and motion agree"
+        assert overview.causes[0].text.startswith(said)
 
 
 def test_only_engines_that_declare_few_errors_are_independent():
-    rows = [
-        Row("s", engine, "exact", name, 0.0, 1e-14, AGREES, "", 1.0, 1.0)
-        for engine in ("one", "two")
-        for name in ("torque", "F12", "F32", "F43", "F14")
-    ]
+    rows = [agreeing(engine, name) for engine in ("one", "two") for name in FORCES]
     for declared, confirmed in ((1e-4, 1), (1.1e-4, 0)):
         overview = Overview()
         overview.declared = {"one": 1e-14, "two": declared}
@@ -719,13 +731,11 @@ def test_only_engines_that_declare_few_errors_are_independent():
 
 
 def test_where_nobody_looked_the_report_says_so():
-    row = Row("s", "wg", "exact", "torque", 0.3, 1e-14, FAILS, "", 1.0, 1.0)
     for causes, words in (
         ({}, "mistakes are not looked for there"),
         ({"wg": []}, "no known mistake explains it"),
     ):
-        overview = Overview()
-        overview.add(Record("s", rows=[row], causes=causes))
+        overview = overview_of([failing("wg", "torque")], causes=causes)
         assert overview.causes[0].text.endswith(words)
 
 
@@ -797,89 +807,90 @@ def test_single_precision_is_named_and_a_smooth_error_of_its_size_is_not():
     assert find_causes(partial(Altered, stretch)) == []
 
 
-class Misplaced:
-    """Free bodies whose loads are others, position by position."""
+def displace(change):
+    """Return free bodies whose loads are others, position by position."""
 
-    name = "plain"
+    class Misplaced:
+        name = "plain"
 
-    def answer(self, scene, at):
-        right = fourbar.solve(scene, "position", at=at)
-        parts = []
-        for i in range(len(at.angle)):
-            loads = tuple(self.change(scene, right, i, load) for load in scene.loads)
-            here = at.part(np.array([i]))
-            parts.append(FreeBody().answer(replace(scene, loads=loads), here))
-        numbers = {
-            name: np.concatenate([part.quantities[name] for part in parts])
-            for name in ("theta_3", "theta_4", "F12", "F32", "F43", "F14", "torque")
-        }
-        assembled = np.ones(len(parts), dtype=bool)
-        return Answer(self.name, "exact", at, assembled, numbers)
+        def answer(self, scene, at):
+            right = fourbar.solve(scene, "position", at=at)
+            parts = []
+            for i in range(len(at.angle)):
+                loads = tuple(change(scene, right, i, load) for load in scene.loads)
+                here = at.part(np.array([i]))
+                parts.append(FreeBody().answer(replace(scene, loads=loads), here))
+            numbers = {
+                name: np.concatenate([part.quantities[name] for part in parts])
+                for name in ("theta_3", "theta_4", *FORCES)
+            }
+            assembled = np.ones(len(parts), dtype=bool)
+            return Answer(self.name, "exact", at, assembled, numbers)
 
-    def change(self, scene, right, i, load):
-        raise NotImplementedError
-
-
-class FromThePin(Misplaced):
-    """Arms are measured from the bar's first pin."""
-
-    def change(self, scene, right, i, load):
-        first = {2: 0j, 3: complex(*right.A[i])}.get(load.bar)
-        if first is None:
-            d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
-            first = d * np.exp(1j * theta_1)
-        G = complex(*getattr(right, f"G{load.bar}")[i])
-        r, phi = load.arm
-        place = first + r * np.exp(1j * phi) - G
-        return replace(load, arm=(float(abs(place)), float(np.angle(place))))
+    return Misplaced
 
 
-class FromG(Misplaced):
-    """Places that are told from the bar's first pin are taken from G."""
-
-    def change(self, scene, right, i, load):
-        return replace(load, from_pin=None, from_centre=load.from_pin)
-
-
-class AtPoint(Misplaced):
-    """Forces act at the mass centre, or at the first pin, wherever they should."""
-
-    def __init__(self, at_pin):
-        self.place = {"from_pin" if at_pin else "from_centre": (0.0, 0.0)}
-
-    def change(self, scene, right, i, load):
-        none = {"arm": None, "from_pin": None, "from_centre": None}
-        return replace(load, **none | self.place)
+def from_the_pin(scene, right, i, load):
+    """Measure the arm from the first pin of bar 4."""
+    linkage = scene.linkage
+    first = linkage.ground * np.exp(1j * linkage.ground_angle)
+    r, phi = load.arm
+    place = first + r * np.exp(1j * phi) - complex(*right.G4[i])
+    return replace(load, arm=(float(abs(place)), float(np.angle(place))))
 
 
-class Turning(Misplaced):
-    """Forces of fixed direction turn with their bars."""
+def from_G(scene, right, i, load):
+    """Take a place from G that is told from the bar's first pin."""
+    return replace(load, from_pin=None, from_centre=load.from_pin)
 
-    def change(self, scene, right, i, load):
-        size, direction = load.force
-        theta = float(getattr(right, f"theta_{load.bar}")[i])
-        return replace(load, force=(size, direction + theta))
+
+def at_point(form, scene, right, i, load):
+    """Let the force act at G or at the first pin, wherever it should."""
+    none = {"arm": None, "from_pin": None, "from_centre": None}
+    return replace(load, **none | {form: (0.0, 0.0)})
+
+
+def turning(scene, right, i, load):
+    """Turn a force of fixed direction with its bar."""
+    size, direction = load.force
+    return replace(load, force=(size, direction + float(right.theta_4[i])))
 
 
 @pytest.mark.parametrize(
-    ("guest", "place", "words"),
+    ("change", "place", "words"),
     [
-        (FromThePin, "arm", "its arm is measured from the bar's first pin, not from G"),
         (
-            FromG,
+            from_the_pin,
+            "arm",
+            "its arm is measured from the bar's first pin, not from G",
+        ),
+        (
+            from_G,
             "from_pin",
             "its place is measured from G, not from the bar's first pin",
         ),
         # stack-of-tasks/pinocchio#1544
-        (partial(AtPoint, True), "arm", "its force acts at the first pin of the bar"),
-        (partial(AtPoint, False), "from_pin", "its force acts at G of the bar"),
+        (
+            partial(at_point, "from_pin"),
+            "arm",
+            "its force acts at the first pin of the bar",
+        ),
+        (
+            partial(at_point, "from_centre"),
+            "from_pin",
+            "its force acts at G of the bar",
+        ),
         # stack-of-tasks/pinocchio#1543
-        (Turning, "arm", "its direction turns with the bar"),
-        (Turning, "from_pin", "its direction turns with the bar"),
+        (turning, "arm", "its direction turns with the bar"),
+        (turning, "from_pin", "its direction turns with the bar"),
     ],
 )
-def test_a_load_that_acts_elsewhere_is_named(guest, place, words):
+def test_a_load_that_acts_elsewhere_is_named(change, place, words):
     motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 8), 10.0)
-    load = fourbar.Load(4, (3.0, 0.7), **{place: (0.05, 1.0)})
+    load = fourbar.Load(
+        4,
+        (3.0, 0.7),
+        **{place: (0.05, 1.0)},
+    )
     scene = crank_rocker(motion=motion, loads=(load,))
-    assert find_causes(guest, scene)[0] == f"load 1 (bar 4): {words}"
+    assert find_causes(displace(change), scene)[0] == f"load 1 (bar 4): {words}"

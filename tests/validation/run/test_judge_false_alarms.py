@@ -34,7 +34,13 @@ POSITIONS = np.array([0.14, 1.75, 4.03, 4.73])
 
 def bars(d, a, b, c, theta_1=0.0, r=None):
     far = None if r is None else (r, 0.35)
-    return FourBar(d, Bar(a, 0.01), Bar(b, 1.0, centre=far), Bar(c, 0.5), theta_1)
+    return FourBar(
+        d,
+        Bar(a, 0.01),
+        Bar(b, 1.0, centre=far),
+        Bar(c, 0.5),
+        theta_1,
+    )
 
 
 SCENES = {
@@ -128,7 +134,11 @@ def test_an_exact_zero_needs_no_error_bar(monkeypatch):
     """
     kite = fourbar.uniform(0.3, 0.1, 0.1, 0.3)
     spring = fourbar.effects.Torsion((("A", 2.0, 0.1, 0.0),))
-    motion = Motion(np.array([1.0, 2.0, 4.0]), 6.0, branch=-1)
+    motion = Motion(
+        np.array([1.0, 2.0, 4.0]),
+        6.0,
+        branch=-1,
+    )
     scene = fourbar.Scene(kite, motion, effects=(spring,))
     true, added = printed.solve, 0.0
 
@@ -222,7 +232,11 @@ def test_a_table_of_uneven_steps_that_overshoots_its_points_is_a_right_law(ends)
         angles = rng.uniform(-1.0, 1.0, 7) * 10.0 ** rng.uniform(-3.0, 0.5)
         angles[-1] = angles[0]
         time = (0.0, *np.cumsum(steps).tolist())
-        law = Law(time=time, theta_2=tuple(angles.tolist()), ends=ends)
+        law = Law(
+            time=time,
+            theta_2=tuple(angles.tolist()),
+            ends=ends,
+        )
         scene = replace(crank_rocker(), motion=Motion(law=law))
         (row,) = check_law(make_question("law", scene, ()))
         assert not row.failed, row

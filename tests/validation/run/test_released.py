@@ -27,7 +27,12 @@ def falling(coupler=0.15, **motion):
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
     )
-    released = fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 100), **motion)
+    released = fourbar.Motion(
+        1.0,
+        0.0,
+        free=fourbar.Free(1.0, 100),
+        **motion,
+    )
     return Scene(linkage, released, effects=(fourbar.Gravity(),))
 
 
@@ -110,7 +115,12 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     branch,
 ):
     """The couples of dry friction that hold it are those of its own assembly."""
-    friction = fourbar.effects.Friction.at(O2=5.0, A=5.0, B=5.0, O4=5.0)
+    friction = fourbar.effects.Friction.at(
+        O2=5.0,
+        A=5.0,
+        B=5.0,
+        O4=5.0,
+    )
     motion = fourbar.Motion(
         np.radians(250.0),
         0.0,
@@ -185,7 +195,11 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
 
     Kinetic energy and work are equal, and their difference is no scale.
     """
-    scene = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
+    scene = replace(
+        falling(),
+        effects=(),
+        loads=(fourbar.Load(4, moment=0.1),),
+    )
     for steps in (20, 200):  # 10 and 1 ms apart
         released = fourbar.Free(0.2, steps)
         rows = judge(

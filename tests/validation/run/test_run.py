@@ -23,7 +23,18 @@ from tests.support.here import judge_here
 from tests.support.runs import save_run
 from tests.support.unlucky import Few
 
-ROW = Row("a", "mine", "exact", "F32", 1e-15, 1e-14, AGREES, "", 2.0, 1.0)
+ROW = Row(
+    "a",
+    "mine",
+    "exact",
+    "F32",
+    1e-15,
+    1e-14,
+    AGREES,
+    "",
+    2.0,
+    1.0,
+)
 MINE = describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite")
 FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 

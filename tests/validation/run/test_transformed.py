@@ -34,7 +34,11 @@ LOADS = (
     fourbar.Load(3, (2.0, -1.4), from_pin=(0.1, 0.3), frame="bar", moment=-0.2),
     fourbar.Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
 )
-AT_A_POINT = fourbar.PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
+AT_A_POINT = fourbar.PointDrive(
+    Place(3, (0.1, 0.2)),
+    1.1,
+    "bar",
+)
 SCENES = {
     "everything": crank_rocker(loads=LOADS, effects=EVERYTHING),
     "arm": crank_rocker(),
@@ -202,7 +206,11 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
     motion = fourbar.Motion(fourbar.Sweep(0.9, 5.9, 7), 1.3)
     left_out = {}
     for d in (0.3 + 4 * np.spacing(0.3), 0.31):
-        scene = fourbar.Scene(FourBar(d, *bars), motion, effects=(springs,))
+        scene = fourbar.Scene(
+            FourBar(d, *bars),
+            motion,
+            effects=(springs,),
+        )
         question = make_question("scene", scene, ())
         assert bool(list(check_transformed(question))) == (d == 0.31)
         left_out[d] = [line for line in question.left_out if "wound" in line]

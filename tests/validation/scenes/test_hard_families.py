@@ -252,7 +252,13 @@ class Spoiled:
         s = fourbar.solve(scene, at=command)
         numbers = {name: np.array(getattr(s, name)) for name in COMPARED_QUANTITIES}
         numbers["F32"] *= 1.0 + self.part
-        return Answer(self.name, "exact", command, np.array(s.assembled), numbers)
+        return Answer(
+            self.name,
+            "exact",
+            command,
+            np.array(s.assembled),
+            numbers,
+        )
 
 
 class Wrong(Spoiled):

@@ -167,7 +167,11 @@ def test_a_wrong_load_is_seen():
 
 
 def test_positions_outside_the_range_are_not_assembled():
-    posed = scene(TRIPLE, fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72), 10.0)
+    posed = scene(
+        TRIPLE,
+        fourbar.Sweep(0.2 - math.pi, 0.2 + math.pi, 72),
+        10.0,
+    )
     command = fourbar.command(posed)
     answer = MujocoSimulated().answer(posed, command)
     inside = np.abs(command.theta_2 - 0.2) < math.radians(

@@ -1,7 +1,6 @@
 """Errors that `cost` plots are a second loop's: every drive, integrator, softness."""
 
 import math
-import statistics
 from dataclasses import dataclass, replace
 
 import pytest
@@ -17,7 +16,6 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.support.second_loop import (
     LoopSettings,
     Servo,
-    Simulation,
     TurningWheel,
     measure,
 )
@@ -25,13 +23,6 @@ from tests.support.second_loop import (
 AGREES = 0.05
 """Part by which two loops may differ that read the same run at positions of their own.
 """
-
-NOISE = 1.6
-"""Factor between the times of a step of two models of one loop: 0.7 to 1.05 were
-measured on two busy cores.
-"""
-ROUNDS, STEPS = 15, 100
-"""Timings of each loop, and the steps of one."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +118,11 @@ def make_scene(drive):
     """
     if drive == "cylinder":
         scene = fourbar.load(MODELS / "capabilities" / "cylinder_2_4.toml")
-        window = fourbar.Sweep(math.radians(80.0), math.radians(150.0), 60)
+        window = fourbar.Sweep(
+            math.radians(80.0),
+            math.radians(150.0),
+            60,
+        )
         return replace(
             scene,
             motion=scene.motion.replace(angle=window, speed=30.0, acceleration=0.0),
@@ -190,21 +185,6 @@ def test_so_is_that_of_every_integrator_and_softness(drive, case):
 @pytest.mark.parametrize("drive", DRIVES)
 def test_so_is_that_of_every_other_drive_of_the_crank(drive, case):
     compare(drive, CARRIED[case])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", ["defaults, Euler", "no pads", "pads"])
-@pytest.mark.parametrize("drive", DRIVES)
-def test_a_step_takes_as_long_as_in_a_second_loop(drive, case):
-    """In turns, so that both meet the same machine; the middle ratio counts."""
-    scene, settings = make_scene(drive), CASES[case].settings
-    setup = TrialSetup(scene, command(scene))
-    settings = replace(settings, steps_per_revolution=float(CASES[case].steps))
-    time_steps, _ = setup.make_clocks(settings, CASES[case].closure)
-    again = replace(CASES[case].again, wheel=size_flywheel(scene, settings))
-    second = Simulation(scene, again)
-    ratios = [time_steps(STEPS) / second.time_steps(STEPS) for _ in range(ROUNDS)]
-    assert 1.0 / NOISE < statistics.median(ratios) < NOISE
 
 
 def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven():

@@ -28,7 +28,17 @@ def make_row(torque, off, condition=0.5):
     soft = PinsAndTorque(
         torque + off, {name: np.array([3.0, 4.0 + off]) for name in PINS}
     )
-    return InsideRow(0.1, 1.0, 0.0, 0.2, soft, rigid, 1e-4, AT_REST, condition)
+    return InsideRow(
+        0.1,
+        1.0,
+        0.0,
+        0.2,
+        soft,
+        rigid,
+        1e-4,
+        AT_REST,
+        condition,
+    )
 
 
 def test_errors_are_sizes_of_differences_and_scales_those_of_rigid_pins():
@@ -83,7 +93,11 @@ def test_an_error_is_over_its_scale():
 
 
 def test_fewer_positions_keep_both_ends():
-    motion = LoopMotion(tuple(np.linspace(0.0, 1.0, 101).tolist()), 1.0, 0.0)
+    motion = LoopMotion(
+        tuple(np.linspace(0.0, 1.0, 101).tolist()),
+        1.0,
+        0.0,
+    )
     assert motion.thin_out(3).angle == (0.0, 0.5, 1.0)
     assert motion.thin_out(500) == motion
 

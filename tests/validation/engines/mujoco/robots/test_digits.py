@@ -71,7 +71,12 @@ CHANGE_POINT = """
 
 
 def read(text):
-    return read_loop_scene(RobotFile(Path("foot.xml"), text), PoseOptions(), None, 1.0)
+    return read_loop_scene(
+        RobotFile(Path("foot.xml"), text),
+        PoseOptions(),
+        None,
+        1.0,
+    )
 
 
 def list_equal(made):

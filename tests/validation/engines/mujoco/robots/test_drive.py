@@ -116,7 +116,11 @@ ANGLES = ("theta_2", "theta_3", "theta_4")
 def command(scene, bar, angles, branch):
     """Return a scene that commands a bar, on which its drive acts too."""
     stated = {f"theta_{bar}": angles, f"omega_{bar}": 2.0}
-    return replace(scene, motion=Motion(**stated, branch=branch), drive_bar=bar)
+    return replace(
+        scene,
+        motion=Motion(**stated, branch=branch),
+        drive_bar=bar,
+    )
 
 
 def find_circuit_of(scene):

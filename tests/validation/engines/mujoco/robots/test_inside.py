@@ -186,7 +186,11 @@ def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     angles = spread_over_range(inside, made, 5)
     rows = inside.answer_states(LoopMotion(tuple(angles), 2.0, 3.0)).rows
     assert len(rows) == len(angles)
-    branch = np.full(len(rows), made.scene.motion.branch, dtype=np.int8)
+    branch = np.full(
+        len(rows),
+        made.scene.motion.branch,
+        dtype=np.int8,
+    )
     command = Command(angles - _turn_back(inside, made), branch, 2.0, 3.0)
     formulas = solve(made.scene, "force", at=command)
     free_bodies = FreeBody().answer(made.scene, command).quantities
@@ -210,7 +214,11 @@ def test_the_start_of_a_simulation_is_not_judged():
     inside, _ = open_loop("excavator")
     assert inside.find_constant() == 0.02
     start = inside.loop.angles[1]
-    motion = LoopMotion(tuple(start + np.linspace(0.0, 0.6, 31)), 1.0, 0.0)
+    motion = LoopMotion(
+        tuple(start + np.linspace(0.0, 0.6, 31)),
+        1.0,
+        0.0,
+    )
     through = inside.answer_through_time(motion)
     assert min(row.angle for row in through.rows) >= start + 0.1 - 1e-3
     errors, scales = through.errors(), through.scales(inside.loop.longest)

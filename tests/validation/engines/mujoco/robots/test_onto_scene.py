@@ -56,7 +56,11 @@ def make_scene(branch, gravity=None):
         fourbar.Bar(0.35, 0.7, 0.7 * 0.35**2 / 12.0, (0.175, 0.0)),
     )
     sign = {"open": OPEN, "crossed": CROSSED}[branch]
-    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 4.0, branch=sign)
+    motion = fourbar.Motion(
+        fourbar.Sweep(0.0, math.tau, 36),
+        4.0,
+        branch=sign,
+    )
     effects = (fourbar.Gravity() if gravity is None else gravity,)
     return fourbar.Scene(linkage, motion, effects=effects)
 

@@ -174,7 +174,11 @@ def test_a_range_is_that_of_the_driven_joint(sense):
     low, high = (span[0] - ONE_STEP, span[1] + ONE_STEP)
     assert all(low <= joint <= high for joint in far)
     with pytest.raises(InputError, match="must overlap the motion of knee, "):
-        measure_loops(write_leg(sense), replace(options, span=(2.0, 3.0)), None)
+        measure_loops(
+            write_leg(sense),
+            replace(options, span=(2.0, 3.0)),
+            None,
+        )
 
 
 @pytest.mark.parametrize(
