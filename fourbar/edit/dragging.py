@@ -235,13 +235,7 @@ def _drag_pin(
         key = ("lengths", bar)
         document.put(
             key,
-            _write_like(
-                document.at(key),
-                abs(dragged.to - pins[pin]),
-                dragged.grain,
-                "m",
-                "m",
-            ),
+            _write_length(document.at(key), abs(dragged.to - pins[pin]), dragged.grain),
         )
     if dragged.what == "O4":
         angle = cmath.phase(dragged.to)
@@ -281,18 +275,14 @@ def _drag_drawn_pin(
     for axis, coordinate in enumerate(place):
         key = ("pins", str(dragged.what), axis)
         old = document.at(key)
-        document.put(key, _write_like(old, coordinate, dragged.grain, "m", "m"))
+        document.put(key, _write_length(old, coordinate, dragged.grain))
 
 
-def parse_place(stated: Any, drawing: DrawnPins | None = None, bar: int = 1) -> complex:
+def parse_place(stated: Any) -> complex:
     """Return the place of a bar that an entry of the file states, m.
 
-    The entry is polar, by x and y, or as drawn.
+    The entry is polar, or by x and y.
     """
-    if isinstance(stated, dict) and DRAWN_WORD in stated:
-        assert drawing is not None  # the scene was read
-        x, y = (to_si(text, "m") for text in stated[DRAWN_WORD])
-        return drawing.into_bar(bar, (x, y))
     if isinstance(stated, dict):
         x = to_si(stated["x"], "m")
         y = to_si(stated["y"], "m")
@@ -334,8 +324,8 @@ def put_place(
         like_x = document.at((*path, "x")) or length
         like_y = document.at((*path, "y")) or length
         parts = {
-            "x": _write_like(like_x, place.real, grain, "m", "m"),
-            "y": _write_like(like_y, place.imag, grain, "m", "m"),
+            "x": _write_length(like_x, place.real, grain),
+            "y": _write_length(like_y, place.imag, grain),
         }
         stated: Any = parts
     else:
@@ -344,7 +334,7 @@ def put_place(
         angle_grain = grain / max(distance, grain)
         old_angle = document.at((*path, 1)) if before == "polar" else None
         parts = {
-            0: _write_like(length, distance, grain, "m", "m"),
+            0: _write_length(length, distance, grain),
             1: _write_dragged_angle(old_angle, angle, angle_grain),
         }
         stated = list(parts.values())
@@ -353,6 +343,10 @@ def put_place(
         return
     for step, text in parts.items():
         document.put((*path, step), text)
+
+
+def _write_length(old: object, value: float, grain: float) -> str:
+    return _write_like(old, value, grain, "m", "m")
 
 
 def _write_dragged_angle(old: object, angle: float, grain: float) -> str:

@@ -53,17 +53,9 @@ _WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 CENTRES = ("I13", "I24")
 """Places that lie at infinity now and then: a figure has them, no curve."""
-ANIMATED_SCALARS = (
-    *ANGLES,
-    "condition",
-    *RATES,
-    "torque",
-    "torque_error",
-    "power",
-    "drive_force",
-    "drive_force_error",
-    "stroke",
-)
+DRIVE_SCALARS = ("torque", "torque_error", "power", "drive_force", "drive_force_error")
+"""Numbers of a drive, which a released motion has not."""
+ANIMATED_SCALARS = (*ANGLES, "condition", *RATES, *DRIVE_SCALARS, "stroke")
 
 
 _STRIP = """<p id="strip" class="hint"></p>
@@ -271,13 +263,7 @@ def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     columns = _collect_columns(solution)
     columns["theta_2"] = solution.theta_2.tolist()
     if scene.motion.free is not None:
-        for name in (
-            "torque",
-            "torque_error",
-            "power",
-            "drive_force",
-            "drive_force_error",
-        ):
+        for name in DRIVE_SCALARS:
             columns.pop(name, None)
         columns["energy"] = compute_energies(scene, solution).kinetic
     duration = float(thinned.time[-1] - thinned.time[0])
@@ -487,6 +473,6 @@ def _hash_content(text: str) -> str:
 def _embed_json(value: object) -> str:
     """Write JSON that can stand inside a script element, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    text = text.replace("<", "\\u003c")
-    text = text.replace(">", "\\u003e")
-    return text.replace("&", "\\u0026")
+    for mark in "<>&":
+        text = text.replace(mark, f"\\u{ord(mark):04x}")
+    return text

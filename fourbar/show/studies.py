@@ -70,12 +70,7 @@ def write_type(
     bars, not of the output alone.
     """
     mobility = classify(linkage)
-    if mobility.surplus > 0.0:
-        relation = "<"
-    elif mobility.surplus < 0.0:
-        relation = ">"
-    else:
-        relation = "="
+    relation = {1.0: "<", -1.0: ">", 0.0: "="}[float(np.sign(mobility.surplus))]
     outer = min(linkage.lengths) + max(linkage.lengths)
     factor, unit = (
         (1.0, "") if units is None else choose_unit(max(linkage.lengths), "m", units)

@@ -59,7 +59,8 @@ def trace(view: View) -> Trace:
         if circuit:
             at = _list_circuit_commands(view, steps)
         else:
-            at = _list_range(view, steps)
+            first, last = view.sweep.at.places[[0, -1]]
+            at = command_at(view.scene, np.linspace(first, last, steps + 1))
         solution = solve(view.scene, "position", at=at)
         followed = [solution.A, solution.B, *solution.points.values()]
         if all(_longest_chord(points) <= _CHORD for points in followed):
@@ -78,11 +79,6 @@ def _list_circuit_commands(view: View, steps: int) -> Command:
         steps,
     )
     return Command(theta_2, assembly.astype(np.int8), None, 0.0)
-
-
-def _list_range(view: View, steps: int) -> Command:
-    places = view.sweep.at.places
-    return command_at(view.scene, np.linspace(places[0], places[-1], steps + 1))
 
 
 def _measure_chords(points: Array) -> tuple[Array, float]:

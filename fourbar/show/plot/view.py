@@ -221,9 +221,7 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
         return None
     sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
-    if sweeps:
-        return _choose_position(sweeps)
-    return None
+    return _choose_position(sweeps) if sweeps else None
 
 
 def describe_change_points(motion: Solution) -> str:
