@@ -5,6 +5,7 @@ import io
 import math
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -128,3 +129,35 @@ def test_the_report_is_printed_and_written(
     assert {row.engine for row in written} == {error.method for error in errors}
     assert torque.verdict == UNDECIDED
     assert torque.error in [error.part for error in errors]
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "reached", "said"),
+    [
+        ({}, 0.001, True, "The file is within 0.01 as it is."),
+        ({"solref": "1 1"}, 0.001, True, "Type this for an error within 0.01:"),
+        (
+            {"solref": "1 1"},
+            0.1,
+            False,
+            "None of 9 combinations was within 0.01; the best:",
+        ),
+        (
+            {},
+            0.1,
+            False,
+            "None of 9 combinations was within 0.01; the best is the file",
+        ),
+        ({}, math.inf, False, "None of 9 combinations has an answer: too many steps"),
+    ],
+)
+def test_advice_begins_with_what_was_reached(changes, error, reached, said):
+    settings = RobotSettings((0.02, 1.0), (0.9,), 0.001, "Euler", "Newton", 100, 1e-8)
+    tried = TriedSettings(settings, changes, error, 0.0, 0.0, 1e-6)
+    ends = (0.01, 5, tried, (), tried, reached, 9, (), None, None)
+    loop = SimpleNamespace(refusal="too many steps")
+    about, first, *others = describe_advice(loop, SettingsAdvice(*ends))
+    assert about.startswith("Errors are the worst")
+    assert first.startswith(said)
+    no_part = any("No part of the range" in str(block) for block in others)
+    assert no_part == (error == 0.1)

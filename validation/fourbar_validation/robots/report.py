@@ -347,15 +347,18 @@ def describe_advice(
         " more positions and renews the torque at each, which changes its errors"
         " through time."
     )
-    if not best.changes:
-        yield f"The file is within {advice.wanted:g} as it is."
-    elif advice.reached:
-        yield f"Type this for an error within {advice.wanted:g}:"
-    else:
+    if not math.isfinite(best.error):
+        reason = loop.refusal or "MuJoCo loses the motion"
+        yield f"None of {advice.tried} combinations has an answer: {reason}"
+    elif not advice.reached:
         yield (
             f"None of {advice.tried} combinations was within {advice.wanted:g}; the"
-            " best:"
+            f" best{':' if best.changes else ' is the file as it is.'}"
         )
+    elif best.changes:
+        yield f"Type this for an error within {advice.wanted:g}:"
+    else:
+        yield f"The file is within {advice.wanted:g} as it is."
     for element in advice.typed:
         yield Typed(element)
     if best.changes:
@@ -387,7 +390,7 @@ def _describe_deciding(
             f"The best is within {advice.wanted:g} from {ends[0]} to {ends[1]}:"
             f" --range {','.join(ends)} looks for the cheapest there"
         )
-    elif not advice.reached:
+    elif not advice.reached and math.isfinite(advice.best.error):
         yield "No part of the range was found in which it is within the wanted error."
 
 

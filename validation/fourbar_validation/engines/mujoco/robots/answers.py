@@ -54,11 +54,12 @@ class LoopMotion(NamedTuple):
         """
         count = min(len(self.angle), most)
         keep = np.linspace(0, len(self.angle) - 1, count).round().astype(int)
-        states = [*self.states()]
-        angles, *rates = zip(*(states[i] for i in keep), strict=True)
-        if not self.varies:
-            return self._replace(angle=angles)
-        return LoopMotion(angles, *rates)
+
+        def pick(part: tuple[float, ...]) -> tuple[float, ...]:
+            return tuple(np.array(part)[keep].tolist())
+
+        rates = (pick(part) if isinstance(part, tuple) else part for part in self[1:])
+        return LoopMotion(pick(self.angle), *rates)
 
 
 @dataclass(frozen=True, slots=True)

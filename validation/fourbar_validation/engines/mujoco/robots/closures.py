@@ -231,16 +231,17 @@ class _Chain:
 
         The bearer is a bar, or None if another joint bears this one.
         """
-        up = climb(self.model, end)
         side: list[tuple[int, int | None]] = []
-        for body in up[: up.index(common)]:
+        for body in climb(self.model, end):
+            if body == common:
+                break
             joints = list_joints(self.model, body)
             moving = [joint for joint in joints if joint not in finder.held]
-            for joint in reversed(moving[1:]):
-                side.append((joint, None))
-            if moving:
-                parent = find_parent(self.model, body)
-                side.append((moving[0], finder.root[parent]))
+            bearers = [
+                finder.root[find_parent(self.model, body)],
+                *[None] * len(moving),
+            ]
+            side += reversed([*zip(moving, bearers, strict=False)])
         return side
 
     @property

@@ -68,8 +68,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
-    project_closures,
-    resolve_normals,
+    evaluate_closures,
 )
 from fourbar_validation.engines.mujoco.runner import Stepper
 
@@ -430,14 +429,8 @@ class LoopInside:
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.closure, data)
         normal = data.xmat[self.loop.bodies[1][0]].reshape(3, 3) @ self.loop.axis
-        return project_closures(
-            data.efc_pos[: data.nefc],
-            data.efc_J.reshape(-1, self.closure.nv)[: data.nefc],
-            data.efc_id[: data.nefc],
-            resolve_normals(
-                self.closure, data, dict.fromkeys(self.loop.closures, normal)
-            ),
-        )
+        normals = dict.fromkeys(self.loop.closures, normal)
+        return evaluate_closures(self.closure, data, normals)
 
     def state(self, angle: float, speed: float) -> _RobotState | None:
         """Return the closed state at an angle and a speed of the commanded bar.

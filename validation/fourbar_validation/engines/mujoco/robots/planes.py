@@ -10,7 +10,6 @@ from copy import copy
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -60,58 +59,35 @@ def find_normals(
     return normals
 
 
-def resolve_normals(
+def evaluate_closures(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     normals: Mapping[int, Array],
-) -> dict[int, tuple[Array, Array]]:
-    """Return each normal in the axes of the world, and in those of the second end.
-
-    MuJoCo states the turn of a weld in the axes of its second body or site.
-    """
-    resolved = {}
-    for number, normal in normals.items():
-        second = int(model.eq_obj2id[number])
-        by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
-        axes = data.site_xmat[second] if by_sites else data.xmat[second]
-        resolved[number] = (normal, axes.reshape(3, 3).T @ normal)
-    return resolved
-
-
-def project_rows(rows: Array, normal: Array, turned: Array) -> Array:
-    """Return rows of a connect or a weld without what no planar motion changes.
-
-    The first three rows are a shift, (3,) or (3, nv), and three more of a weld are a
-    turn. `turned`: the normal in the axes of the turn.
-    """
-    parts = [rows[:3] - np.outer(normal, normal) @ rows[:3]]
-    if len(rows) > len(normal):
-        parts.append(np.outer(turned, turned) @ rows[3:])
-    return np.concatenate(parts)
-
-
-def project_closures(
-    residual: Array,
-    jacobian: Array,
-    equalities: NDArray[np.int32],
-    normals: Mapping[int, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
-    """Project the residuals of closures on their planes, and their derivatives.
+    """Return residual (m,) and Jacobian (m, nv) of all rows in a state that is placed.
+
+    What no planar motion changes is left out: of the first three rows of a connect or
+    a weld, a shift, the part along the normal, and of three more of a weld, a turn,
+    the parts across it. The derivative of the model is dense.
 
     Parameters
     ----------
-    residual, jacobian : of all rows, (m,) and (m, nv).
-    equalities : number of the equality of each row, (m,).
-    normals : of the plane of each equality that has one, as `resolve_normals` gives
-        them.
+    normals : of the plane of each equality that has one, by its number.
     """
-    residual = residual.copy()
-    jacobian = jacobian.copy()
-    for number, pair in normals.items():
-        rows = np.flatnonzero(equalities == number)
-        if len(rows):
-            residual[rows] = project_rows(residual[rows], *pair)
-            jacobian[rows] = project_rows(jacobian[rows], *pair)
+    shape = (data.nefc, model.nv)
+    residual = data.efc_pos[: data.nefc].copy()
+    jacobian = data.efc_J[: math.prod(shape)].reshape(shape).copy()
+    for number, normal in normals.items():
+        rows = np.flatnonzero(data.efc_id[: data.nefc] == number)
+        # MuJoCo states the turn of a weld in the axes of its second body or site
+        second = int(model.eq_obj2id[number])
+        by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
+        axes = data.site_xmat[second] if by_sites else data.xmat[second]
+        turned = axes.reshape(3, 3).T @ normal
+        for values in (residual, jacobian):
+            values[rows[:3]] -= np.outer(normal, normal) @ values[rows[:3]]
+            if len(rows) > len(normal):
+                values[rows[3:]] = np.outer(turned, turned) @ values[rows[3:]]
     return residual, jacobian
 
 

@@ -28,9 +28,8 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
+    evaluate_closures,
     find_normals,
-    project_closures,
-    resolve_normals,
 )
 
 FREE_JOINT, BALL, SLIDE, HINGE_JOINT = (
@@ -287,15 +286,8 @@ class _Closing:
         data = self.data
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.model, data)
-        if not data.nefc:
-            return np.zeros(0), np.zeros((0, self.model.nv))
         normals = find_normals(self.model, data, self.held)
-        return project_closures(
-            data.efc_pos[: data.nefc],
-            data.efc_J.reshape(-1, self.model.nv)[: data.nefc],
-            data.efc_id[: data.nefc],
-            resolve_normals(self.model, data, normals),
-        )
+        return evaluate_closures(self.model, data, normals)
 
     def size(self, qpos: Array) -> float:
         """Return the largest residual in a pose, m or rad."""

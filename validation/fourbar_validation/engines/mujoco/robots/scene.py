@@ -31,6 +31,7 @@ from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     describe_actuator,
     is_enabled,
+    list_actuators,
     list_lifted_masses,
     name_joint,
 )
@@ -161,11 +162,9 @@ def _sum_over_motors(
 ) -> float:
     total = float(of_dofs[model.jnt_dofadr[joint]])
     of_motors = getattr(model, field, np.zeros(model.nu))  # since MuJoCo 4.0
-    for number in range(model.nu):
-        on_joint = model.actuator_trntype[number] == mujoco.mjtTrn.mjTRN_JOINT
-        if on_joint and int(model.actuator_trnid[number, 0]) == joint:
-            total += float(of_motors[number] * model.actuator_gear[number, 0] ** 2)
-    return total
+    motors = list_actuators(model, joint)
+    gears = model.actuator_gear[motors, 0]
+    return total + float(of_motors[motors] @ gears**2)
 
 
 def write_pose(

@@ -252,14 +252,9 @@ class SettingsSearch:
     def _list_values(self) -> dict[str, list[Any]]:
         """Return the values of each setting that are combined, the file's own first."""
         own = self.own
-        if own.solref[0] > 0.0:
-            constant = own.solref[0]
-        else:
-            constant = _FIRST_CONSTANT
-        if own.solref[0] > 0.0:
-            ratio = own.solref[1]
-        else:
-            ratio = 1.0
+        constant, ratio = own.solref
+        if constant <= 0.0:
+            constant, ratio = _FIRST_CONSTANT, 1.0
         shortest = FEWEST_TIMESTEPS * own.timestep
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
@@ -284,12 +279,8 @@ class SettingsSearch:
         """
         values = self._list_values()
         solvers: list[dict[str, Any]] = [{}]
-        name, iterations, tolerance = SOLVER
-        solved: dict[str, Any] = {
-            "solver": name,
-            "iterations": iterations,
-            "tolerance": tolerance,
-        }
+        names = ("solver", "iterations", "tolerance")
+        solved: dict[str, Any] = dict(zip(names, SOLVER, strict=True))
         tight = self.measure(replace(self.own, **solved))
         if tight.error < 0.9 * self.measure(self.own).error:
             solvers.append(solved)
@@ -323,18 +314,11 @@ def _write_elements(
 ) -> tuple[str, ...]:
     """Return the elements of the file that are to be changed, with their new values."""
     written = []
-    option = {
-        name: value
-        for name, value in tried.changes.items()
-        if name not in ("solref", "solimp")
-    }
+    option = dict(tried.changes)
+    names: list[str] = [name for name in ("solref", "solimp") if name in option]
+    closure = {name: option.pop(name) for name in names}
     if option:
         written.append(ET.tostring(ET.Element("option", option), encoding="unicode"))
-    closure = {
-        name: value
-        for name, value in tried.changes.items()
-        if name in ("solref", "solimp")
-    }
     if closure:
         root = ET.fromstring(file.text)
         equalities = [
