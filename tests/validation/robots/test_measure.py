@@ -28,6 +28,7 @@ from fourbar_validation.robots.measure import _subtract_formulas
 from tests.support.robots import FOOT_PARALLELOGRAM, make_parallelogram
 from tests.support.scenes import crank_rocker
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
 
 

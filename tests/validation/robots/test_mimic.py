@@ -27,6 +27,7 @@ KNEE = Scene(
     fourbar.Motion(np.radians(np.linspace(-40.0, 40.0, 161)), 5.0),
     title="knee of a leg",
 )
+pytestmark = pytest.mark.usefixtures("in_this_process")
 FILE = """<mujoco><worldbody>
 <body name="crank"><joint name="c" axis="0 0 1"/>
 <inertial pos="0.02 0 0" mass="0.1" diaginertia="1e-5 1e-5 1e-5"/></body>
@@ -94,7 +95,6 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     assert abs(best.coefficients[0]) <= best.angle + ROUND_OFF
 
 
-@pytest.mark.slow
 def test_a_parallelogram_loses_nothing_and_its_crossed_form_much(
     tmp_path,
 ):
@@ -111,7 +111,6 @@ def test_a_parallelogram_loses_nothing_and_its_crossed_form_much(
     assert crossed.file.angle == pytest.approx(np.abs(missed).max(), rel=1e-9)
 
 
-@pytest.mark.slow
 def test_a_motion_through_a_change_point_is_refused(tmp_path):
     angles = np.radians(np.linspace(-30.0, 30.0, 61))
     motion = PARALLELOGRAM.motion.replace(angle=angles)
@@ -142,7 +141,6 @@ def ask_mujoco(path):
     return leader, np.array(follower)
 
 
-@pytest.mark.slow
 def test_what_the_file_loses_through_its_own_zero(tmp_path):
     report = measure_mimic(write(tmp_path), "s", KNEE)
     assert math.degrees(report.file.angle) == pytest.approx(1.7507, abs=5e-5)
@@ -164,7 +162,6 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path):
     assert report.file.angle == pytest.approx(off, rel=1e-9)
 
 
-@pytest.mark.slow
 def test_each_error_stands_with_its_name(
     tmp_path,
     capsys,
@@ -225,7 +222,6 @@ def test_least_squares_are_the_normal_equations():
     np.testing.assert_allclose(fit_squares(x, y, 3), right, rtol=1e-10)
 
 
-@pytest.mark.slow
 def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):
     home, elsewhere = tmp_path / "a" / "b", tmp_path / "assets"
     for folder in (home, elsewhere):
@@ -241,14 +237,12 @@ def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):
         measure_mimic(path, "s", KNEE)
 
 
-@pytest.mark.slow
 def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path):
     few = replace(KNEE, motion=KNEE.motion.replace(angle=np.linspace(-0.5, 0.5, 5)))
     with pytest.raises(InputError, match="range of at least 6 positions"):
         measure_mimic(write(tmp_path), "s", few)
 
 
-@pytest.mark.slow
 def test_a_joint_that_follows_none_is_refused(tmp_path):
     with pytest.raises(InputError, match="follows no other"):
         measure_mimic(write(tmp_path), "c", KNEE)
@@ -304,7 +298,6 @@ def test_a_follower_on_the_crank_turns_the_coupler(tmp_path):
     assert math.degrees(report.shifted) == pytest.approx(7.418, abs=5e-4)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("ground", [0.03, 0.04])
 def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
     tmp_path,
@@ -327,7 +320,6 @@ def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
     assert "theta_2 is 90 deg + drive, from 60 to 120 deg" in told
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tree", "bars"),
     [

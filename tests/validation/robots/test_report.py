@@ -91,7 +91,7 @@ def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
     settings = RobotSettings((0.02, 1.0), (0.9,), 1e-6, "Euler", "Newton", 100, 1e-8)
     tried = TriedSettings(settings, {}, 0.1, math.inf, math.inf, math.inf)
     advice = SettingsAdvice(0.2, 9, tried, (), tried, False, 1, (), None, None)
-    *_, table = describe_advice(None, advice)
+    *_, table = describe_advice(SimpleNamespace(refusal="too many"), advice)
     assert table.rows == [("nothing", "0.1", "-", "-")]
 
 

@@ -315,14 +315,11 @@ class _Finder:
 
     def _name(self, number: int) -> str:
         """Name an equality so that no other has the same name."""
-        name = describe_equality(self.model, number)
-        same = []
-        for other in range(self.model.neq):
-            if describe_equality(self.model, other) == name:
-                same.append(other)
-        if len(same) == 1:
+        names = [describe_equality(self.model, n) for n in range(self.model.neq)]
+        name = names[number]
+        if names.count(name) == 1:
             return name
-        return f"{name}-{same.index(number) + 1}"
+        return f"{name}-{names[: number + 1].count(name)}"
 
     def _is_pin(self, number: int) -> bool:
         """Return True for a connect, and for a weld that lets its bodies turn."""
@@ -553,15 +550,17 @@ class _Finder:
         model = self.model
         pins = dict[frozenset[int], Array]()
         for joint in joints:
-            body = int(model.jnt_bodyid[joint])
-            pair = (self.root[body], self.root[find_parent(model, body)])
-            pins[frozenset(pair)] = self.data.xanchor[joint]
-        for other in coupled:
-            ends = find_ends(model, self.data, other)
-            pins[frozenset(self.root[end.body] for end in ends)] = ends[0].place
-        ends = find_ends(model, self.data, number)
-        first, last = (self.root[end.body] for end in ends)
-        pins[frozenset((first, last))] = ends[0].place
+            parent = self.root[find_parent(model, int(model.jnt_bodyid[joint]))]
+            pins[frozenset((self._find_root(joint), parent))] = self.data.xanchor[joint]
+        for equality in (*coupled, number):
+            ends = find_ends(model, self.data, equality)
+            first, last = (self.root[end.body] for end in ends)
+            pins[frozenset((first, last))] = ends[0].place
+        of_others = {
+            self._find_root(joint)
+            for chain in coupled.values()
+            for joint in chain.joints
+        }
         bars = {bar for pair in pins for bar in pair}
         for inner in permutations(bars - {first, last}, 2):
             cycle = [first, *inner, last]
@@ -577,11 +576,6 @@ class _Finder:
             cycle = cycle[ground:] + cycle[:ground]
             if cycle[1] > cycle[3]:
                 cycle[1:] = reversed(cycle[1:])
-            of_others = {
-                self.root[int(model.jnt_bodyid[joint])]
-                for chain in coupled.values()
-                for joint in chain.joints
-            }
             shared = [name_body(model, bar) for bar in cycle[1:] if bar in of_others]
             if len(shared) == len(cycle) - 1:  # it is the four-bar of another closure
                 continue

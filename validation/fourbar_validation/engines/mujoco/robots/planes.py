@@ -79,6 +79,8 @@ def evaluate_closures(
     jacobian = data.efc_J[: math.prod(shape)].reshape(shape).copy()
     for number, normal in normals.items():
         rows = np.flatnonzero(data.efc_id[: data.nefc] == number)
+        if not len(rows):  # it is switched off
+            continue
         # MuJoCo states the turn of a weld in the axes of its second body or site
         second = int(model.eq_obj2id[number])
         by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
