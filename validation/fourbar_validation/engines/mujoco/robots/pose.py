@@ -10,7 +10,6 @@ the loops.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 
 import mujoco
 import numpy as np
@@ -44,8 +43,6 @@ LARGEST_RESIDUAL = 1e-5
 MOST_NEWTON_STEPS = 100
 LONGEST_NEWTON_STEP = 0.3
 """rad or m; longer steps leave the region where the loops are nearly linear."""
-PARTS_OF_A_RANGE = (0.25, 0.75)
-"""Places in a joint's range from which closing is tried again."""
 _DAMPING = 1e-4
 """Weight of a step against the residuals. It keeps what no equality decides where it
 is.
@@ -295,16 +292,26 @@ class _Closing:
         return float(np.abs(residuals).max(initial=0.0))
 
     def list_starts(self, stated: Array) -> Iterator[Array]:
-        """List poses, (nq,), whose limited joints are mid-range, but one of them."""
-        places = self.model.jnt_qposadr[self.joints]
-        places = places[np.isfinite(self.low[places])]
-        for place, part in ((None, 0.5), *product(places, PARTS_OF_A_RANGE)):
-            qpos = stated.copy()
-            for limited in places:
-                low, high = self.low[limited], self.high[limited]
-                share = part if limited == place else 0.5
-                qpos[limited] = low + share * (high - low)
-            yield qpos
+        """List poses from which closing may end elsewhere, (nq,), the nearest first.
+
+        A hinge without a range is turned by quarters. Then all joints with one are
+        mid-range, and one of them besides is moved.
+        """
+        middle = stated.copy()
+        turned = []
+        moved = []
+        for joint in self.joints:
+            place = self.model.jnt_qposadr[joint]
+            low, high = self.low[place], self.high[place]
+            if math.isfinite(low):
+                middle[place] = 0.5 * (low + high)
+                moved += [(place, low + part * (high - low)) for part in (0.25, 0.75)]
+            elif self.model.jnt_type[joint] == HINGE_JOINT:
+                quarters = 0.5 * math.pi * np.arange(1, 4)
+                turned += [(place, value) for value in stated[place] + quarters]
+        yield from (_put(stated, *change) for change in turned)
+        yield middle
+        yield from (_put(middle, *change) for change in moved)
 
     def close(self, start: Array) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,)."""
@@ -332,6 +339,13 @@ class _Closing:
             step[self.dofs] = lsq_linear(matrix, wanted, room).x
             mujoco.mj_integratePos(self.model, qpos, step, 1.0)
         return qpos
+
+
+def _put(qpos: Array, place: int, value: float) -> Array:
+    """Return a copy of a pose with one position replaced, (nq,)."""
+    moved = qpos.copy()
+    moved[place] = value
+    return moved
 
 
 def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
