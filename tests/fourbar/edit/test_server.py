@@ -105,6 +105,11 @@ def bench(path, monkeypatch, capsys):
     return run
 
 
+def set_input(length):
+    """The request of a page that types the length of the input."""
+    return {"do": "set", "path": ["lengths", "input"], "value": length}
+
+
 def port_of(address):
     return address.split("/")[2].rpartition(":")[2]
 
@@ -271,9 +276,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench):
     async def ask(made, address):
         first_page, second_page = await page(address), await page(address)
         await told(first_page, {"do": "hello"})
-        about = await told(
-            first_page, {"do": "set", "path": ["lengths", "input"], "value": "4 in"}
-        )
+        about = await told(first_page, set_input("4 in"))
         assert not about["settled"] and "torque_error" not in str(about["columns"])
         for line in (first_page, second_page):
             about = await settled(line)
@@ -281,9 +284,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench):
             assert "torque_error" in str(about["columns"])
             assert about["saved"] is False
             assert "  torque   peak" in "".join(about["data"]["summary"])
-        assert "refused" in await told(
-            second_page, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"}
-        )
+        assert "refused" in await told(second_page, set_input("9 ft"))
 
     session = bench(ask)
     assert session.state_file.exists()  # it is not saved
@@ -303,7 +304,7 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
         data = made.session.do({"do": "text", "text": text})["data"]
         sampled = asyncio.create_task(made._sample(made.session.now, data))
         await asyncio.sleep(0)
-        made.session.do({"do": "set", "path": ["lengths", "input"], "value": "101 mm"})
+        made.session.do(set_input("101 mm"))
         changed.set()
         await sampled
         assert not finished
@@ -393,9 +394,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
             asked_for.wait, 20
         )  # the summary of the first state is under way
         for size in range(101, 111):
-            about = await told(
-                line, {"do": "set", "path": ["lengths", "input"], "value": f"{size} mm"}
-            )
+            about = await told(line, set_input(f"{size} mm"))
             assert f'"{size} mm"' in about["text"] and not about["settled"]
             await asyncio.sleep(
                 server.ERROR_BAR_DELAY * 1.2
@@ -557,9 +556,7 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
 
         async def save():
             line = await page(address)
-            await told(
-                line, {"do": "set", "path": ["lengths", "input"], "value": "105 mm"}
-            )
+            await told(line, set_input("105 mm"))
             assert (await told(line, {"do": "save"})).get("saved")
             line.close()
 

@@ -13,6 +13,7 @@ from pytest import approx
 
 import fourbar
 from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, uniform, vary
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_motor
 from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
@@ -28,17 +29,11 @@ def test_shaking_is_the_momentum_that_the_bars_lose(drive):
     scene = crank_rocker(loads=(), effects=(), drive=drive)
     s = solve(scene)
     force, moment = np.zeros((61, 2)), np.zeros(61)
-    for number, G, a, alpha in (
-        (2, s.G2, s.a_G2, s.alpha_2),
-        (3, s.G3, s.a_G3, s.alpha_3),
-        (4, s.G4, s.a_G4, s.alpha_4),
-    ):
-        bar = scene.linkage.bar(number)
+    for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True):
+        G, a, alpha = (getattr(s, f"{x}{number}") for x in ("G", "a_G", "alpha_"))
         force -= bar.mass * a
-        moment -= (
-            bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0])
-            + bar.moment_of_inertia * alpha
-        )
+        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0])
+        moment -= bar.moment_of_inertia * alpha
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
 
@@ -46,12 +41,10 @@ def test_shaking_is_the_momentum_that_the_bars_lose(drive):
 def test_bearing_load():
     listed = Motion(np.linspace(0.1, 0.1 + tau, 61), 10.0)
     s = solve(crank_rocker(motion=listed))
-    load = np.hypot(s.F43[:-1, 0], s.F43[:-1, 1])
+    load = np.hypot(*s.F43[:-1].T)
     bearing = bearing_load(s, "B")
     assert bearing.largest == load.max() and bearing.where == s.theta_2[load.argmax()]
-    assert (
-        abs(bearing.rms - np.linalg.norm(load) / np.sqrt(60)) < 1e-14 * bearing.rms * 60
-    )
+    assert bearing.rms == approx(np.sqrt(np.mean(load**2)), rel=60e-14)
 
 
 def test_what_damping_turns_into_heat_is_what_the_drive_gives_over_a_turn():
@@ -94,26 +87,19 @@ def test_the_swing_of_the_energy_of_a_balanced_weight_is_known_by_hand():
 
 
 def test_the_json_holds_the_duty():
-    scene = crank_rocker(
-        motion=Motion(np.linspace(0.0, tau, 61), 10.0)
-    )  # between which nothing stands
-    s = solve(scene)
-    duty, entry = motor_duty(s), write_motor(scene, s, units("imperial"))
+    listed = Motion(np.linspace(0.0, tau, 61), 10.0)  # between which nothing stands
+    s = solve(crank_rocker(motion=listed))
+    duty, entry = motor_duty(s), write_motor(s.scene, s, units("imperial"))
     inch_pound = 0.0254 * 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp"
     assert entry["units"]["energy_out"] == "lbf in"
-    assert (
-        abs(entry["rms_power"] * 6600.0 * inch_pound - duty.rms_power)
-        < ROUND_OFF * duty.rms_power
-    )
-    assert (
-        abs(entry["energy_out"] * inch_pound - duty.energy_out)
-        < ROUND_OFF * duty.energy_out
-    )
-    assert (
-        abs(entry["pins"]["B"]["rms"] * inch_pound / 0.0254 - bearing_load(s, "B").rms)
-        < ROUND_OFF * 100.0
-    )
+    rms_force = entry["pins"]["B"]["rms"] * inch_pound / 0.0254
+    for printed, number in (
+        (entry["rms_power"] * 6600.0 * inch_pound, duty.rms_power),
+        (entry["energy_out"] * inch_pound, duty.energy_out),
+        (rms_force, bearing_load(s, "B").rms),
+    ):
+        assert printed == approx(number, rel=ROUND_OFF)
 
 
 def test_a_study_has_what_each_of_its_members_has():
@@ -122,47 +108,42 @@ def test_a_study_has_what_each_of_its_members_has():
     One has another ground, and one never closes.
     """
     scene = crank_rocker(loads=())
-    values = {
-        "lengths.ground": np.array([0.3, 0.32, 0.31, 3.0]),
-        "lengths.ground_angle": np.array([0.2, 0.3, 0.1, 0.0]),
-    }
-    turn = np.linspace(0.1, 0.1 + 2.0 * np.pi, 61)
+    grounds, angles = [0.3, 0.32, 0.31, 3.0], [0.2, 0.3, 0.1, 0.0]
+    turn = np.linspace(0.1, 0.1 + tau, 61)
     theta_2 = np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn])
-    s = solve(vary(scene, {**values, "motion.theta_2": theta_2}))
-    force = shaking_force(s)
-    moment = shaking_moment(s)
-    duty = motor_duty(s)
-    load = bearing_load(s, "A")
+    values = {
+        "lengths.ground": grounds,
+        "lengths.ground_angle": angles,
+        "motion.theta_2": theta_2,
+    }
+    s = solve(vary(scene, values))
+    force, moment = shaking_force(s), shaking_moment(s)
+    duty, load = motor_duty(s), bearing_load(s, "A")
     assert force.shape == (4, 61, 2) and moment.shape == (4, 61)
     for member in range(3):
-        d, angle = (float(array[member]) for array in values.values())
-        linkage = replace(scene.linkage, ground=d, ground_angle=angle)
-        alone = solve(
-            replace(
-                scene,
-                linkage=linkage,
-                motion=scene.motion.replace(angle=theta_2[member]),
-            )
+        linkage = replace(
+            scene.linkage, ground=grounds[member], ground_angle=angles[member]
         )
+        motion = scene.motion.replace(angle=theta_2[member])
+        alone = solve(replace(scene, linkage=linkage, motion=motion))
         assert moment[member] == approx(shaking_moment(alone), rel=1e-12, abs=1e-12)
         assert force[member] == approx(shaking_force(alone), rel=1e-12, abs=1e-12)
-        for of_study, one in (
-            (duty, motor_duty(alone)),
-            (load, bearing_load(alone, "A")),
-        ):
-            for array, number in zip(of_study, one, strict=True):
-                if number is None:  # a member of a study without a number has NaN
-                    assert array is None or np.isnan(array[member])
-                else:
-                    assert number == approx(array[member], rel=1e-12)
-    assert np.isnan(load.largest[3])
-    assert np.isnan(duty.rms_power[3])
-    assert np.isnan(moment[3]).all()
-    assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()
+        numbers = (*motor_duty(alone), *bearing_load(alone, "A"))
+        for array, number in zip((*duty, *load), numbers, strict=True):
+            if number is None:  # a member of a study without a number has NaN
+                assert array is None or np.isnan(array[member])
+            else:
+                assert number == approx(array[member], rel=1e-12)
+    lost = load.largest, duty.rms_power, duty.energy_in, duty.energy_out
+    assert np.isnan([array[3] for array in lost]).all() and np.isnan(moment[3]).all()
     assert duty.closed.tolist()[:3] == [True, True, False]
-    speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}
-    rest = motor_duty(solve(vary(scene, speeds)))
-    assert np.isfinite(rest.energy_in).tolist() == [False, True]
+
+
+def test_a_member_at_rest_has_no_energies():
+    turn = np.linspace(0.1, 0.1 + tau, 61)
+    speeds = {"motion.omega_2": [0.0, 3.0], "motion.theta_2": turn}
+    duty = motor_duty(solve(vary(crank_rocker(loads=()), speeds)))
+    assert np.isfinite(duty.energy_in).tolist() == [False, True]
 
 
 def test_a_study_of_a_motion_law_keeps_its_time():
