@@ -25,6 +25,7 @@ from tests.support.scenes import CYLINDER, crank_rocker
 DOCS = Path(__file__).parents[2] / "docs"
 
 
+@pytest.mark.slow
 def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     names = sorted(dir(fourbar))
     page = (DOCS / "api.md").read_text(encoding="utf-8")

@@ -457,6 +457,7 @@ def test_no_line_is_longer_than_a_screen_can_show(header, row, tmp_path, capsys)
     assert len(printed.out) < 4 * LONGEST_MESSAGE
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_a_closed_standard_input_is_one_line():
     done = subprocess.run(

@@ -91,6 +91,7 @@ def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
     ]
 
 
+@pytest.mark.slow
 def test_line_ends_of_windows_are_read(folder, capsys):
     scene, table = folder / "scène.toml", folder / "table.csv"
     assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS

@@ -348,6 +348,7 @@ length = "1e6 ft"
 """
 
 
+@pytest.mark.slow
 def test_a_frame_with_a_spring_on_a_roller(ask, tmp_path):
     """V = 160 sin(theta) + 100 cos^2(theta) lbf ft: sin(theta) = 0.8, or upright."""
     (tmp_path / "frame.toml").write_text(GUIDED)

@@ -103,6 +103,7 @@ def test_places_lie_in_the_turn_of_the_sweep_in_rising_order():
     assert 0.0 <= found[0] < found[1] <= 2.0 * pi
 
 
+@pytest.mark.slow
 def test_a_release_has_a_state_at_its_start():
     found = find_positions(DROPPED, [("time", 0.0)])
     assert found.time.tolist() == [0.0]

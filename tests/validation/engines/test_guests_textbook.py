@@ -57,6 +57,7 @@ def test_it_agrees_on_a_balanced_crank(left):
     assert check(balance(left))
 
 
+@pytest.mark.slow
 def test_it_agrees_on_random_scenes():
     drawn = (draw_random_scene(991, i, tuple(DrawnType)) for i in range(10))
     assert sum(map(check, drawn)) >= 5

@@ -207,6 +207,7 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path, saved, call):
     assert [call(*command)[0] for command in commands.values()] == [0, 0, 0]
 
 
+@pytest.mark.slow
 def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path, saved, call):
     kept = tmp_path / "kept"
     assert call("accept", saved("run", ROW), "--to", kept)[0] == 0
@@ -424,6 +425,7 @@ def test_the_report_says_who_is_at_fault(worse, sentence):
         assert sentence in html.unescape(form(changes))
 
 
+@pytest.mark.slow
 def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first():
     """One cause for all scenes, with the numbers of the worst."""
     old, new = disagreeing(["sim F12", "sim torque", "one torque"])
@@ -666,6 +668,7 @@ def test_rows_alone_say_that_their_class_is_another():
     assert not compare_rows(loose, strict).weakened
 
 
+@pytest.mark.slow
 def test_an_allowance_that_grew_tenfold_is_printed_and_no_regression():
     """K eps/condition, at a worst position that is another one."""
     hard = changed(condition=1e-2, allowed=1e-12)

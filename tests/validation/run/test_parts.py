@@ -148,6 +148,7 @@ def test_a_resumed_run_says_which_answers_it_keeps(parts, capsys):
     assert "scenes, random-0-000000000, random-0-000000001, random-0-000000006" in said
 
 
+@pytest.mark.slow
 def test_what_is_no_folder_of_a_part_is_refused(parts, tmp_path, capsys):
     line = ["collect", str(tmp_path), "-o", str(tmp_path / "all")]
     assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
@@ -158,6 +159,7 @@ def test_what_is_no_folder_of_a_part_is_refused(parts, tmp_path, capsys):
     assert "must be a folder that `run --part` wrote" in refusal(line, capsys)
 
 
+@pytest.mark.slow
 def test_scene_files_need_not_be_where_parts_are_collected(tmp_path):
     scene = tmp_path / "models" / "mine.toml"
     scene.parent.mkdir()

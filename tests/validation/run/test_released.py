@@ -190,6 +190,7 @@ def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(monkeypatch, 
     assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
 
 
+@pytest.mark.slow
 def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
     """Released from rest by a couple alone.
 

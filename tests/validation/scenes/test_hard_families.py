@@ -425,6 +425,7 @@ def test_a_free_motion_through_change_points_in_every_engine():
         assert rows[engine, quantity].error < most
 
 
+@pytest.mark.slow
 def test_an_engine_that_drifts_unpredicted_fails(monkeypatch):
     """Wrong by the same amount with either step, an engine predicts nothing of it; the
     exact solution shows it.

@@ -128,6 +128,7 @@ def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():
     assert "ranges" not in note
 
 
+@pytest.mark.slow
 def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too():
     scene = make_scene("open")
     examined = examine_text(scene, write_mjcf(scene), {})
