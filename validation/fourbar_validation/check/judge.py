@@ -30,7 +30,7 @@ from fourbar_validation.compare.tolerance import (
     Mask,
     compute_difference,
     divide,
-    find_condition,
+    find_conditions,
     magnitude,
     replace_zero_size,
 )
@@ -135,8 +135,6 @@ class Judge:
         self.stage = "position" if self.at.speed is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
-        self._scales: dict[str, Scale] = {}
-        self._exact: dict[str, Array] = {}
         self._allowed: dict[str, _Allowed] = {}
         self._where: dict[str, Mask] = {}
         self._judged: dict[str, tuple[Array, Array, Array]] = {}
@@ -175,27 +173,35 @@ class Judge:
             self._where[key] = np.asarray(self._answer(key) & self.table.stated(key))
         return self._where[key]
 
-    def scale(self, key: str) -> Scale:
-        """Compute size of a key and how far its terms cancel, (n,)."""
-        if key not in self._scales:
-            name = name_quantity(key)
-            made_of = find_made_of(name, self.scene)
-            values = self._right_columns[name]
-            self._scales[key] = self._terms.scales([made_of], [values]).select(0)
-        return self._scales[key]
+    @cached_property
+    def _made_of(self) -> list[str]:
+        """Return the quantity whose size and condition each key has."""
+        return [
+            find_made_of(name_quantity(key), self.scene) for key in self.table.values
+        ]
 
     @cached_property
-    def _terms(self) -> TermSizes:
-        return TermSizes(self.scene, self.right)
+    def _scales(self) -> dict[str, Scale]:
+        columns = [self._right_columns[name_quantity(key)] for key in self.table.values]
+        scales = TermSizes(self.scene, self.right).scales(self._made_of, columns)
+        return {key: scales.select(i) for i, key in enumerate(self.table.values)}
+
+    @cached_property
+    def _exact(self) -> dict[str, Array]:
+        linkage = self.scene.linkage
+        conditions = find_conditions(self._made_of, linkage, self.right)
+        allowed = EQUIVALENCE.allowed(conditions)
+        exact = {}
+        for of_key, (key, scale) in zip(allowed, self._scales.items(), strict=True):
+            exact[key] = np.where(scale.size == 0.0, 0.0, scale.factor * of_key)
+        return exact
+
+    def scale(self, key: str) -> Scale:
+        """Return size of a key and how far its terms cancel, (n,)."""
+        return self._scales[key]
 
     def find_exact(self, key: str) -> Array:
-        """Compute the error that round-off allows a key at each position, (n,)."""
-        if key not in self._exact:
-            scale, linkage = self.scale(key), self.scene.linkage
-            made_of = find_made_of(name_quantity(key), self.scene)
-            condition = find_condition(made_of, linkage, self.right)
-            allowed = scale.factor * EQUIVALENCE.allowed(condition)
-            self._exact[key] = np.where(scale.size == 0.0, 0.0, allowed)
+        """Return the error that round-off allows a key at each position, (n,)."""
         return self._exact[key]
 
     def hold(self, key: str, exact: Array) -> None:
