@@ -175,6 +175,9 @@ class Calculation:
             linkage, theta[2], {1: zero + ground, **unit}, first_pin, omega, alpha
         )
         self.driving = name_driving(scene)
+        fields = [one for one in scene.effects if isinstance(one, Gravity)]
+        self.weighs = bool(fields)
+        self.weights = self.apply(*fields).force
 
     def none(self) -> BodyWrenches:
         """Return wrenches of nothing."""
@@ -482,42 +485,31 @@ class Calculation:
 
     def _change_bars(self) -> Iterator[Change]:
         """Give each bar, and every bar, another mass or moment of inertia."""
-        fields = [one for one in self.scene.effects if isinstance(one, Gravity)]
-        weights = self.apply(*fields).force
-        every: dict[str, BodyWrenches] = {}
-        for bar in MOVING_BARS:
-            if fields:
+        if self.weighs:
+            for bar in MOVING_BARS:
                 less = self.none()
-                less.push(bar, -weights[bar], self.motion.to_centre(bar))
+                less.push(bar, -self.weights[bar], self.motion.to_centre(bar))
                 yield Change(f"the weight of bar {bar} is missing", less)
-            for text, wrenches in self._list_bar_mistakes(bar, weights[bar]):
-                yield Change(f"{BAR_NAMES[bar]}: {text}", wrenches)
-                every[text] = every.get(text, self.none()).plus(wrenches)
-        for text, wrenches in every.items():
-            yield Change(f"every bar: {text}", wrenches)
-        yield from self._exchange_bars(weights)
+        for name, text, wrenches in self._list_bar_mistakes():
+            yield Change(f"{name}: {text}", wrenches)
+        yield from self._exchange_bars()
 
-    def _exchange_bars(self, weights: Mapping[int, ComplexArray]) -> Iterator[Change]:
+    def _exchange_bars(self) -> Iterator[Change]:
         """Give a bar the mass of another one; exchange mass and inertia of two."""
         bodies = {bar: self.motion.linkage.bar(bar) for bar in MOVING_BARS}
         for bar, other in permutations(MOVING_BARS, 2):
             names = BAR_NAMES[bar], BAR_NAMES[other]
-            of_mass = self._give_mass(bar, bodies[other], weights)
+            of_mass = self._give_mass(bar, bodies[other])
             yield Change(f"{names[0]}: mass of the {names[1]}", of_mass)
             if bar < other:
-                both = of_mass.plus(self._give_mass(other, bodies[bar], weights))
+                both = of_mass.plus(self._give_mass(other, bodies[bar]))
                 less = find_inertia(bodies[other]) - find_inertia(bodies[bar])
                 both.couple(bar, -less * self.motion.alpha[bar])
                 both.couple(other, less * self.motion.alpha[other])
                 text = f"{names[0]} and {names[1]}: mass and inertia are exchanged"
                 yield Change(text, both)
 
-    def _give_mass(
-        self,
-        bar: int,
-        body: Bar,
-        weights: Mapping[int, ComplexArray],
-    ) -> BodyWrenches:
+    def _give_mass(self, bar: int, body: Bar) -> BodyWrenches:
         """Return what acts besides on a bar of another one's mass."""
         mass = find_mass(self.motion.linkage.bar(bar))
         more = find_mass(body) - mass
@@ -526,31 +518,29 @@ class Calculation:
         to_centre = self.motion.to_centre(bar)
         wrenches.push(bar, -more * a_G, to_centre)
         if mass:
-            wrenches.push(bar, more / mass * weights[bar], to_centre)
+            wrenches.push(bar, more / mass * self.weights[bar], to_centre)
         return wrenches
 
     def list_factors(self) -> Iterator[tuple[str, BodyWrenches]]:
         """List what may have a factor, with what it lets act on the bars."""
-        every: dict[str, BodyWrenches] = {}
-        fields = [one for one in self.scene.effects if isinstance(one, Gravity)]
-        weights = self.apply(*fields).force
-        for bar in MOVING_BARS:
-            for text, less in self._list_bar_mistakes(bar, weights[bar]):
+        for name, text, less in self._list_bar_mistakes():
+            if text.endswith(_LEFT_OUT):
                 what = text.removesuffix(_LEFT_OUT)
-                if what != text:
-                    wrenches = self.none().plus(less, -1.0)
-                    every[what] = every.get(what, self.none()).plus(wrenches)
-                    yield f"{BAR_NAMES[bar]}: {what}", wrenches
-        for what, wrenches in every.items():
-            yield f"every bar: {what}", wrenches
+                yield f"{name}: {what}", self.none().plus(less, -1.0)
         for name, wrenches, _ in self._list_acting():
             yield name, wrenches
 
-    def _list_bar_mistakes(
-        self,
-        bar: int,
-        weight: ComplexArray,
-    ) -> Iterator[tuple[str, BodyWrenches]]:
+    def _list_bar_mistakes(self) -> Iterator[tuple[str, str, BodyWrenches]]:
+        """List mistakes in mass and inertia of each bar, then of every bar."""
+        every: dict[str, BodyWrenches] = {}
+        for bar in MOVING_BARS:
+            for text, wrenches in self._list_mistakes_of(bar):
+                every[text] = every.get(text, self.none()).plus(wrenches)
+                yield BAR_NAMES[bar], text, wrenches
+        for text, wrenches in every.items():
+            yield "every bar", text, wrenches
+
+    def _list_mistakes_of(self, bar: int) -> Iterator[tuple[str, BodyWrenches]]:
         """List mistakes in mass and inertia of a bar, with what they let act."""
         body = self.motion.linkage.bar(bar)
         mass, inertia = find_mass(body), find_inertia(body)
@@ -559,7 +549,7 @@ class Calculation:
         about_pin, massless, pointlike = (self.none() for _ in range(3))
         about_pin.couple(bar, -mass * np.abs(to_centre) ** 2 * alpha)
         massless.push(bar, mass * join(getattr(self.right, f"a_G{bar}")), to_centre)
-        massless.push(bar, -weight, to_centre)
+        massless.push(bar, -self.weights[bar], to_centre)
         pointlike.couple(bar, inertia * alpha)
         if mass:
             yield "inertia about the pin used as the inertia about G", about_pin
