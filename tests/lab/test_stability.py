@@ -21,7 +21,7 @@ SAMPLES = 10
 """Per family: half a second each; the ten thousand of each are `python -m fourbar_lab
 stability`.
 """
-FED_BACK = 4
+FED_BACK = 8
 """Per family and bar."""
 ONCE_BAD = {
     # seed, number, and what once was beyond its bound there
