@@ -13,7 +13,7 @@ import pytest
 import fourbar
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import predict_from_data
@@ -210,3 +210,15 @@ def test_ten_times_its_prediction_an_error_is_degraded_and_no_more(times, verdic
 
     answer = make_answer(torque=moved("torque", MIDDLE, times * 1e-10))
     assert compare(answer, predicted=predict)["torque"].verdict == verdict
+
+
+def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold():
+    """A tolerance wider than a thousandth at every position leaves nothing to decide
+    by.
+    """
+    blind = replace(FORMULAS, condition=np.full(POSITIONS, 1e-14))
+    held = Demands(EQUIVALENCE, ("omega_3", "F12"))
+    compared = Comparison("", SCENE, make_answer(), blind, held, blind).rows()
+    rows = {row.quantity: row for row in compared}
+    assert rows["F12"].verdict == UNDECIDED
+    assert rows["undecided"].failed and rows["undecided"].allowed == 0.5
