@@ -551,10 +551,8 @@ class _SceneBlock:
         rms = facts.duty.rms_force if facts.linear else facts.duty.rms_torque
         if rms is None:
             return row
-        mean = self._value(
-            self._without_rounding(rms), drive.unit, abs(facts.peak.value)
-        )
-        return f"{row}, RMS {mean}"
+        rms = self._without_rounding(rms)
+        return f"{row}, RMS {self._value(rms, drive.unit, abs(facts.peak.value))}"
 
     def _write_growth(self, name: str) -> str:
         """Write where a quantity grows without bound."""

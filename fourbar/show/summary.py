@@ -180,11 +180,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         solution=solution,
         kind=kind,
         motion=motion,
-        counts={
-            name: solution.status.count(name)
-            for code, name in enumerate(STATUS_NAMES)
-            if (solution.status_code == code).any()
-        },
+        counts=_count_statuses(solution),
         commanded=(float(places[0]), float(places[-1])),
         angles={bar: find_range(f"theta_{bar}") for bar in MOVING_BARS},
         transmission=_find_transmission(motion),
@@ -212,6 +208,12 @@ def _classify_motion(scene: Scene, solution: Solution, motion: MotionCurves) -> 
         return "list"
     closes = not solution.at.moves_stroke and is_once_round(solution)
     return "turn" if closes and not motion.stretches else "sweep"
+
+
+def _count_statuses(solution: Solution) -> dict[str, int]:
+    codes, numbers = np.unique(solution.status_code, return_counts=True)
+    pairs = zip(codes, numbers, strict=True)
+    return {STATUS_NAMES[code]: int(number) for code, number in pairs}
 
 
 def _find_transmission(motion: MotionCurves) -> Peak:

@@ -195,10 +195,9 @@ def meet_limit(linkage: FourBar, bar: int, angle: float, rounding: float) -> flo
 
     Any other angle stays.
     """
-    ends = [end for ends in find_intervals(linkage, bar) for end in ends]
-    inside = any(
-        (angle - low) % TURN <= high - low for low, high in find_intervals(linkage, bar)
-    )
+    intervals = find_intervals(linkage, bar)
+    inside = any((angle - low) % TURN <= high - low for low, high in intervals)
+    ends = [end for interval in intervals for end in interval]
     nearest = min(ends, key=lambda end: abs(math.remainder(angle - end, TURN)))
     away = math.remainder(angle - nearest, TURN)
     return angle if inside or abs(away) > rounding else angle - away
