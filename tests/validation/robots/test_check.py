@@ -53,6 +53,9 @@ from fourbar_validation.robots.judge import (
 from fourbar_validation.robots.judge import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
+    JudgedError,
+    LoopJudgement,
+    judge_file,
 )
 from tests.support.robots import answer_of, answers_of, change, mend, notes_of
 from tests.support.robots import examine_text as examine
@@ -898,6 +901,12 @@ def test_a_ratio_beyond_the_range_of_doubles_has_its_remark():
     assert difference.remark.startswith("10^308 times")
 
 
+def set_attribute(text, name, value):
+    changed, times = re.subn(f' {name}="[^"]*"', f' {name}="{value}"', text)
+    assert times == 1
+    return changed
+
+
 def rows_with(torque, force):
     errors = {"torque": torque, "F12": force}
     return [
@@ -925,6 +934,27 @@ def test_a_setting_that_is_finer_is_no_difference(key, finer):
     for value, count in ((finer, 0), (1.0 / finer, 1)):
         theirs = ours | {key: ModelEntry(value)}
         assert len(find_differences(ours, theirs)) == count
+
+
+def test_what_to_type_is_advised_where_a_setting_differs():
+    rows = [JudgedError(row, 0.0) for row in rows_with(0.05, 0.3)]
+    for key, advised in (("option.timestep", 1), ("lift.output", 0)):
+        listed = [Difference(key, 0.0, 1.0, "")]
+        sentences = LoopJudgement(None, listed, rows, []).sentences()  # type: ignore[arg-type]
+        assert sum("advise SCENE FILE" in text for text in sentences) == advised
+
+
+def test_a_range_is_asked_of_both_files():
+    """Both turn from 0.5 to 0.9 rad, where the coarser steps of theirs are worse."""
+    text = set_attribute(GENERATED, "timestep", "0.004")
+    file = RobotFile(MINE_XML, text)
+    options = MeasureOptions(PoseOptions(), span=(0.5, 0.9))
+    judgement = judge_file("range", CRANK_ROCKER, file, options)
+    joints = [row.joint for row in judgement.measured.states.rows]
+    assert (min(joints), max(joints)) == pytest.approx((0.5, 0.9))
+    at_states = [e for e in judgement.errors if e.row.engine == FILE_AT_ONE_STATE]
+    for error in at_states:
+        assert error.generated == pytest.approx(error.row.error, rel=1e-6, abs=1e-12)
 
 
 REFUSED = [

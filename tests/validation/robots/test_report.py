@@ -9,6 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from fourbar.linkage import Bar, FourBar
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
@@ -24,6 +27,7 @@ from fourbar_validation.robots.report import (
     STATES_FILE,
     TextTable,
     Typed,
+    _describe_limit,
     describe_advice,
     describe_measurement,
     list_measured_rows,
@@ -129,6 +133,21 @@ def test_the_report_is_printed_and_written(
     assert {row.engine for row in written} == {error.method for error in errors}
     assert torque.verdict == UNDECIDED
     assert torque.error in [error.part for error in errors]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "near"), [(8.9, True), (-9.0, True), (11.0, False)]
+)
+def test_how_near_a_state_is_to_a_change_point_is_told_within_ten_degrees(
+    degrees, near
+):
+    bars = (Bar(0.1), Bar(0.3), Bar(0.1))
+    scene = Scene(FourBar(0.3, *bars), Motion(1.0, 1.0))
+    told = _describe_limit(SimpleNamespace(scene=scene), math.radians(degrees))
+    assert told.startswith(
+        f"{abs(degrees):.2g} deg from a change point" if near else ""
+    )
+    assert bool(told) == near
 
 
 @pytest.mark.parametrize(

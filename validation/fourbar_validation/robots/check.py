@@ -26,6 +26,7 @@ from fourbar_validation.robots.options import (
     ROBOT_PATH,
     loop_option,
     pose_options,
+    range_option,
     speed_option,
     torque_option,
 )
@@ -76,6 +77,7 @@ def _read_role_names(pairs: tuple[str, ...]) -> dict[str, str]:
 @loop_option
 @pose_options
 @speed_option
+@range_option
 @torque_option
 @click.option(
     "--mimic",
@@ -153,7 +155,8 @@ def check_mjcf_command(
 def _write_stated(robot: Mapping[str, Any]) -> str:
     """Write the options that win over the scene, as they were typed."""
     texts = []
-    for name, value in robot.items():
+    named = {"range" if name == "span" else name: robot[name] for name in robot}
+    for name, value in named.items():
         for text in value if isinstance(value, tuple) else (value,):
             if text:
                 texts.append(f"--{name} {text}")

@@ -35,7 +35,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
     measure_sizes,
 )
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.report.templating import write_error
 from fourbar_validation.robots.differences import (
     Difference,
@@ -67,7 +67,7 @@ _BY_STIFFEST = (
 )
 """Method by which the error of a file is predicted that nobody holds to another."""
 _ADVICE = (
-    "What to type into the file for an error E, if its settings are the cause: "
+    "What to type into the file for an error E, as far as its settings are the cause: "
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
 _LENGTHS_FIRST = (
@@ -154,7 +154,7 @@ class LoopJudgement:
             )
         if self.is_of_another_linkage:
             yield _LENGTHS_FIRST
-        elif self.counts[FAILS]:
+        elif self.counts[FAILS] and any(is_setting(d.key) for d in self.differences):
             yield _ADVICE
 
     @property
@@ -187,8 +187,12 @@ def judge_file(
     if options.speed is not None:
         scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
     with examine_guarded(file) as examined:
-        generated = examined(_EXAMINE, scene, None)
         theirs = examined(_EXAMINE, scene, file, held)
+        plain = MeasureOptions(PoseOptions())
+        if options.span is not None:
+            angles = theirs.measured.command(theirs.measured.states).angle
+            plain = replace(plain, span=(float(angles.min()), float(angles.max())))
+        generated = examined(_EXAMINE, scene, None, plain)
         ours = {
             (row.engine, row.quantity): row.error
             for row in list_rows(name, generated.measured, SIMULATED)
@@ -203,7 +207,7 @@ def judge_file(
                 differences,
                 lambda measured: list_rows(name, measured, tolerance),
                 rows,
-                lambda changes: examined(_CHANGED, scene, changes),
+                lambda changes: examined(_CHANGED, scene, changes, plain),
                 lambda changes: examined(_MENDED, scene, file, held, changes),
             )
     if parts := list_unread(file.text):

@@ -294,7 +294,10 @@ def _write_ratio(equality: JointEquality) -> str:
 def _write_theta_2(equality: JointEquality) -> str:
     """Write theta_2 as what the file makes it: the leader and an angle."""
     if equality.theta_2 is None:
-        return f"{equality.leader} (no pin at the end of its bar tells another zero)"
+        return (
+            f"{equality.leader} (the file does not tell its zero: a site at the end of"
+            " the input bar, and a joint of the output on the ground, would)"
+        )
     zero = equality.theta_2 - equality.side * equality.leader_zero
     angle = f"{math.degrees(math.remainder(zero, math.tau)) + 0.0:.6g} deg"
     sign = "+" if equality.side > 0.0 else "-"

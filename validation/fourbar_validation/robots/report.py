@@ -65,10 +65,10 @@ LEAST_LEFT_OUT = 1e-4
 """Part of the largest that a scene leaves out, below which the table has no rows of
 it: MuJoCo's errors have about as many digits.
 """
-NEAR_A_LIMIT = math.radians(5.0)
+NEAR_A_LIMIT = math.radians(10.0)
 """Angle of the driven bar from a limit position or a change point within which forces
-are told to grow: at 5 deg they are about three times those of a well-conditioned
-position.
+are told to grow: beyond a change point of a parallelogram they are then six times those
+of its rectangle.
 """
 STATES_FILE = (
     *("loop", "method", "joint [deg]", "omega [rad/s]", "alpha [rad/s^2]"),
@@ -226,7 +226,7 @@ def _describe_loop(
         yield (
             f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
             f"{write_degrees(worst.joint)} deg; a step takes "
-            f"{1e6 * loop.through_time.seconds_per_step:.3g} us"
+            f"{1e6 * loop.through_time.seconds_per_step:.2g} us"
         )
     sticking = {name for row in loop.states.rows for name in row.sticking}
     for name in sorted(sticking):
@@ -364,8 +364,8 @@ def describe_advice(
     if best.changes:
         yield (
             f"error {before.error:.2g} -> {best.error:.2g}, gap {1e3 * before.gap:.2g} "
-            f"-> {1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.3g} -> "
-            f"{1e6 * best.seconds_per_step:.3g} us a step"
+            f"-> {1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.2g} -> "
+            f"{1e6 * best.seconds_per_step:.2g} us a step"
         )
     yield from _describe_deciding(loop, advice)
     rows = [_write_tried(one) for one in (before, *advice.alone)]
@@ -397,7 +397,7 @@ def _describe_deciding(
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
     """Write a row of settings; what was not simulated, in too many steps, is a dash."""
     changes = " ".join(f'{name}="{value}"' for name, value in tried.changes.items())
-    simulated = (f"{tried.through_time:.2g}", f"{1e3 * tried.cost:.3g} ms/s")
+    simulated = (f"{tried.through_time:.2g}", f"{1e3 * tried.cost:.2g} ms/s")
     return (
         changes or "nothing",
         f"{tried.states:.2g}",

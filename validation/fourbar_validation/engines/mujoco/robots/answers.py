@@ -176,7 +176,7 @@ class InsideAnswer:
     assembly, rad: no state counts from there on.
     """
     seconds_per_step: float = math.nan
-    """Processor time of a step of the whole robot, s."""
+    """Processor time of a step of the whole robot between two states, the least, s."""
 
     def collect(self, which: str) -> dict[str, Array]:
         """Return torque (n,) and pin forces (n, 2), N m and N: "soft" or "rigid"."""

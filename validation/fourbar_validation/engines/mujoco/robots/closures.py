@@ -337,8 +337,9 @@ class _Finder:
             polynomial = " ".join(f"{c + 0.0:.6g}" for c in numbers)
             return (
                 f"{follower} follows {name_joint(model, leader)}, polycoef "
-                f"{polynomial}: no loop is closed (check-mjcf SCENE FILE --mimic "
-                f"{follower} holds it against one)"
+                f"{polynomial}: no loop is closed (write the loop that it stands for, "
+                "by fourbar new SCENE --pins; then check-mjcf SCENE FILE --mimic "
+                f"{follower} says what it loses)"
             )
         if kind == "tendon":
             return "a tendon equality is no pin"
@@ -464,7 +465,7 @@ class _Finder:
         first, *others = (",".join(hold) for hold in holds)
         text += f"; --hold {first}"
         if others:
-            text += f" (or {', '.join(others[:_MOST_HOLDS])})"
+            text += f" (or {' or '.join(others[:_MOST_HOLDS])})"
         return f"{text} makes it a four-bar"
 
     def _list_others(self, number: int, *further: str) -> list[int]:

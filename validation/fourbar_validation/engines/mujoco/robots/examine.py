@@ -117,14 +117,16 @@ def examine_file(
     return Examined(described, measured, notes)
 
 
-def examine_changed(scene: Scene, changes: Changes) -> list[LoopMeasurement | None]:
+def examine_changed(
+    scene: Scene, changes: Changes, options: MeasureOptions = _PLAIN
+) -> list[LoopMeasurement | None]:
     """Measure the generated file, then it with each entry alone changed.
 
     The file is without a drive, and first as it is. None stands for an entry that
     cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
     file = _generate(scene, "none")
-    found = find_loop_of_scene(file, scene, _PLAIN)
+    found = find_loop_of_scene(file, scene, options)
     generated = describe_model(_see(found, scene))
     texts = (set_entry(file.text, generated, key, value) for key, value in changes)
 
@@ -132,8 +134,8 @@ def examine_changed(scene: Scene, changes: Changes) -> list[LoopMeasurement | No
         if text is None:
             return None
         try:
-            changed = find_loop_of_scene(replace(file, text=text), scene, _PLAIN)
-            return measure_on_scene(changed, scene, _PLAIN, briefly=True)
+            changed = find_loop_of_scene(replace(file, text=text), scene, options)
+            return measure_on_scene(changed, scene, options, briefly=True)
         except FourBarError:
             # with this entry it is no four-bar, or does not compile
             return None
