@@ -1,11 +1,14 @@
 """Recorded runs whose rows are all at hand."""
 
+from dataclasses import replace
+
 from pandas import DataFrame
 
-from fourbar_validation.compare.rows import COLUMN_TYPES, write_results
+from fourbar_validation.compare.rows import AGREES, COLUMN_TYPES, Row, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import compare_runs
 from fourbar_validation.regression.record import (
     describe_run,
@@ -15,8 +18,24 @@ from fourbar_validation.regression.record import (
 
 HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 """What a run of one engine was made with."""
+ROW = Row(
+    "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
+)
+"""A row that agrees."""
+FORMS = (
+    render.write_junit_of_changes,
+    render.write_differences,
+    render.write_pull_request_comment,
+    render.write_differences_page,
+)
+"""What writes the changes between two runs."""
 HEAD = "scene,engine,setting,positions,seconds,times_formulas\n"
 """First line of a table of times."""
+
+
+def changed(**fields):
+    """Return ROW with other fields."""
+    return replace(ROW, **fields)
 
 
 def save_run(folder, rows, times="", about=HERE):
