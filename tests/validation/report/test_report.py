@@ -390,7 +390,8 @@ def test_failures_are_one_line_an_engine_and_cause(tmp_path, capsys):
     """A mistake that explains more scenes is named before one that fits a few by
     chance.
     """
-    swapped, sign = "F32 and F43 are exchanged: F32, F43", "sign reversed"
+    swapped = "F32 and F43 are exchanged: F32, F43, all else agrees"
+    sign = "sign reversed"
     scenes = []
     for k in range(23):
         of_scene = replace(OF_MINE, scene=f"scene {k:02d}")
@@ -401,7 +402,7 @@ def test_failures_are_one_line_an_engine_and_cause(tmp_path, capsys):
     scenes[0].rows.append(Row.unmeasured("scene 00", "theirs", "", "all", FAILS, died))
     summary = summary_of(scenes)
     assert [str(cause) for cause in summary.overview.causes] == [
-        f"mine: {swapped}, all else agrees: 23 scenes; worst scene 00 120 deg",
+        f"mine: {swapped}: 23 scenes; worst scene 00 120 deg",
         f"theirs: no answer: {died}: 1 scene; worst scene 00",
     ]
     assert [line.engine for line in summary.lines] == ["mine", "theirs"]

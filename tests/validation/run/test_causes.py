@@ -312,7 +312,8 @@ def find_causes(guest, scene=SCENE):
     assert any(row.engine == "plain" for row in record.rows)
     failed = any(row.engine == "plain" and row.failed for row in record.rows)
     assert failed == ("plain" in record.causes)
-    return record.causes.get("plain", [])
+    causes = record.causes.get("plain", [])
+    return [cause.removesuffix(", all else agrees") for cause in causes]
 
 
 @pytest.mark.slow
@@ -456,6 +457,32 @@ def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
 
 NEAR_A_LIMIT = "nearest to a limit"
 """Scene in which only the error predicted for an engine tells a digit from none."""
+
+
+def test_mistakes_in_several_columns_are_named_together():
+    def reverse_both(numbers, at):
+        reverse_F43(numbers, at)
+        numbers["F12"] = numbers["F12"] * (1.0, -1.0)
+
+    of_F43 = "sign reversed, or F_ij given for F_ji: F43"
+    causes = find_causes(partial(Altered, reverse_both))
+    assert causes[0] == f"{of_F43}; y reversed: F12"
+
+
+@pytest.mark.parametrize("spoiled", [["alpha_3"], ["alpha_3", "a_G3"]])
+def test_a_mistake_that_explains_less_than_nine_tenths_is_not_named(spoiled):
+    """The other branch changes fewer than twenty quantities."""
+
+    def take_other_branch(numbers, at):
+        other = at._replace(branch=-at.branch)
+        numbers |= FreeBody().answer(SCENE, other).quantities
+        ripple = 1.0 + 0.1 * np.cos(np.arange(len(at.angle)) ** 2.0)
+        for name in spoiled:
+            numbers[name] = (numbers[name].T * ripple).T
+
+    causes = find_causes(partial(Altered, take_other_branch))
+    named = ["the other branch, but alpha_3 differs"]
+    assert causes == (named if len(spoiled) == 1 else [])
 
 
 @pytest.mark.parametrize("name", [*OTHER_COMMANDS, NEAR_A_LIMIT])
@@ -706,6 +733,17 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
     words = "one, two agree with each other, and differ from it in"
     assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
+
+
+def test_pin_forces_of_which_one_fails_do_not_agree():
+    """Its row is fourbar's cause, as two other engines blame fourbar for it."""
+    rows = [failing("wg", name) for name in ("F12", "torque")]
+    causes = overview_of(
+        [*rows, agreeing("wg", "F14")],
+        against={"F12": ["one", "two"]},
+    ).causes
+    (text,) = (cause.text for cause in causes if cause.engine == "wg")
+    assert text == "torque differs; mistakes are not looked for there"
 
 
 def test_what_differs_is_what_the_engine_itself_has_wrong():

@@ -417,7 +417,7 @@ def _name_causes(
             f"{NO_ANSWER_PREFIX}{NUMBER_IN_A_REASON.sub('#', _take_reason(whole[0]))}"
         ]
     if known := scene.causes.get(engine):
-        return [f"{text}, all else agrees" for text in known]
+        return known
     if engine == FORMULAS and scene.against:
         engines = sorted({name for names in scene.against.values() for name in names})
         return [
@@ -437,10 +437,10 @@ def _name_causes(
         return [f"no number for {', '.join(missing[:4])}"]
     differ = [group for group in OVERVIEW_GROUPS if group in groups]
     differ += sorted(groups - set(OVERVIEW_GROUPS))
-    answered = {
-        _name_group(row) for row in scene.rows if row.engine == engine and row.passed
-    }
-    agree = [group for group in OVERVIEW_GROUPS if group in answered - groups]
+    of_engine = [row for row in scene.rows if row.engine == engine]
+    agreeing = {_name_group(row) for row in of_engine if row.passed}
+    agreeing -= {_name_group(row) for row in of_engine if row.failed}
+    agree = [group for group in OVERVIEW_GROUPS if group in agreeing]
     words = _join_groups(differ[:3], "differ")
     if agree:
         words += f", {_join_groups(agree, 'agree')}"

@@ -5,7 +5,7 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.quantities import OK, UNITS, Array
 from fourbar_validation.check.judge import Judge
-from fourbar_validation.check.mistakes import explain
+from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.rows import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.check.variants import Wanted, always
@@ -87,12 +87,32 @@ def find_causes(
             found = explain(judge, differing)
     except FourBarError:
         return None
-    return [
-        explanation.text
-        if explanation.whole
-        else f"{explanation.text}: {', '.join(explanation.quantities)}"
-        for explanation in found
-    ]
+    return _say_causes(found, list(map(judge.table.label, differing)))
+
+
+def _say_causes(found: list[Explanation], differing: list[str]) -> list[str]:
+    """Say what each mistake explains, and which quantities it leaves.
+
+    Mistakes in columns are made together, each in the columns that it explains first.
+    """
+    causes = [(one.text, set(one.quantities)) for one in found if one.whole]
+    columns = []
+    explained: set[str] = set()
+    for one in found:
+        if not one.whole and not explained.issuperset(one.quantities):
+            columns.append(f"{one.text}: {', '.join(one.quantities)}")
+            explained.update(one.quantities)
+    if columns:
+        causes.append(("; ".join(columns), explained))
+    causes.sort(key=lambda cause: -len(cause[1]))
+    said = []
+    for text, names in causes:
+        rest = [name for name in differing if name not in names]
+        if rest:
+            said.append(f"{text}, but {', '.join(rest)} differ{'s' * (len(rest) < 2)}")
+        else:
+            said.append(f"{text}, all else agrees")
+    return said
 
 
 def choose_rows(wrong: Mask, most: int) -> slice:
