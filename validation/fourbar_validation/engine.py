@@ -24,7 +24,7 @@ from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines, hash_files
-from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
+from fourbar_validation.engines.registry import list_engines
 from fourbar_validation.places import PACKAGE
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
@@ -52,7 +52,7 @@ def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
     """
     if ":" in entry:
         return _open_class(entry)
-    engines = {engine.name: engine for engine in (*ENGINES, *load_further(), BALLS)}
+    engines = list_engines()
     if entry not in engines:
         raise _NotFoundError(f"must be module:Class, or one of {', '.join(engines)}")
     engine = engines[entry]

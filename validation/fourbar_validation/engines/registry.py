@@ -299,6 +299,11 @@ def load_further() -> tuple[Engine, ...]:
     return engines
 
 
+def list_engines() -> dict[str, Engine]:
+    """Return the engines of harness and lab by name, ball arithmetic first."""
+    return {engine.name: engine for engine in (BALLS, *ENGINES, *load_further())}
+
+
 def make_demands(
     engine: Engine,
     scene: Scene,

@@ -236,7 +236,7 @@ def select_engines(request: Request) -> tuple[Engine, ...]:
     hard = request.suite == HARD_SUITE
     folders = [path.parent for path in request.scenes]
     table = fill_table(folders, request.guest, request.time_limit, balls=hard)
-    engines = choose_engines(request.engines, table)
+    engines = choose_engines(request.engines, table, request.time_limit)
     if hard:
         engines = tuple(map(hold_fully, engines))
     if request.error is not None:
