@@ -4,10 +4,10 @@ Engines are handed the angles of a law, so that none of them would notice.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.quantities import Array
 from fourbar.scene.motion import Law, Rise, Sine
@@ -88,7 +88,7 @@ def _restate_spline(law: Law, time: Array) -> _Restated:
     else:  # one cubic through the first two pieces, and through the last two
         jumps = np.array([jerk[1] - jerk[0], jerk[-1] - jerk[-2]])
         misfits.append(jumps * shortest * shortest)
-    piece = np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(h) - 1)
+    piece = _find_pieces(t, time)
     s = time - t[piece]
     angle, speed, first, jerk = angle[piece], speed[piece], first[piece], jerk[piece]
     rates = (
@@ -156,44 +156,35 @@ def _restate_sine(law: Sine, time: Array) -> _Restated:
 
 
 def _restate_rates(law: Law, time: Array) -> _Restated:
-    """Restate a table with speeds: the polynomial of each piece, solved for."""
-    stated = (law.angle, law.omega or (0.0,), law.alpha or (0.0,))
-    steps = np.diff(law.time)
+    """Restate a table with speeds by Krogh's polynomial of each piece."""
+    from scipy.interpolate import KroghInterpolator
+
+    columns = [
+        np.array(column) for column in (law.angle, law.omega, law.alpha) if column
+    ]
+    t = np.array(law.time)
+    steps = np.diff(t)
     shortest = float(steps.min())
     size = 0.0
-    for order, column in enumerate(stated):
+    for order, column in enumerate(columns):
         size += float(steps.max()) ** order * float(np.abs(column).max())
+    piece = _find_pieces(t, time)
+    rates = np.zeros((3, len(time)))
+    for number in np.unique(piece).tolist():
+        ends = np.repeat([0.0, steps[number]], len(columns))
+        stated = [column[i] for i in (number, number + 1) for column in columns]
+        curve = KroghInterpolator(ends, stated)
+        here = piece == number
+        rates[:, here] = curve.derivatives(time[here] - t[number], 3)
     return _Restated(
-        _solve_pieces(law, time),
+        rates,
         size * law.time[-1] / shortest,
         shortest,
-        "the polynomial through angles and rates, solved for piece by piece",
+        "the polynomial through angles and rates, piece by piece",
     )
 
 
-def _solve_pieces(law: Law, time: Array) -> Array:
-    """Solve for the polynomial of each piece; angle and rates at times, (3, n)."""
-    stated = [law.angle, law.omega, law.alpha][: 2 if law.alpha is None else 3]
-    columns = np.array(stated, dtype=float)
-    count = 2 * len(columns)
-    powers = np.arange(count)
-    rates = np.zeros((3, len(time)))
-    for piece, (start, stop) in enumerate(pairwise(law.time)):
-        h = stop - start
-        here = (time >= start) & (time <= stop)
-
-        def derive(u: Any, order: int) -> Any:
-            """Return the derivatives of the powers of u, one a column."""
-            factor = np.ones(count)
-            for step in range(order):
-                factor = factor * (powers - step)
-            return factor * np.power.outer(u, np.maximum(powers - order, 0))
-
-        orders = range(len(columns))
-        left = [derive(u, order) for u in (0.0, 1.0) for order in orders]
-        right = [columns[k, n] * h**k for n in (piece, piece + 1) for k in orders]
-        coefficients = np.linalg.solve(np.array(left), np.array(right))
-        u = (time[here] - start) / h
-        for order in range(3):
-            rates[order, here] = derive(u, order) @ coefficients / h**order
-    return rates
+def _find_pieces(t: Array, time: Array) -> NDArray[np.intp]:
+    """Find the piece of a table of times in which each time lies, (n,)."""
+    after = np.searchsorted(t, time, side="right")
+    return np.clip(after - 1, 0, len(t) - 2)
