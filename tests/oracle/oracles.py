@@ -8,19 +8,17 @@ from fourbar_validation.run.question import NotAskedError
 from tests.oracle.cuts import internal_forces
 from tests.oracle.equilibria import equilibria
 from tests.oracle.files import sdf, usd
-from tests.oracle.printed import blocks, error_bars, friction_residual, points
+from tests.oracle.points import points
 from tests.oracle.sensitivities import sensitivity, study, tolerances
 from tests.oracle.summary import summary
 
-AT_POSITIONS = (points, blocks, error_bars, friction_residual)
-"""Oracles of the numbers of a solution."""
 OF_FORCES = (
     *(study, sensitivity, tolerances, internal_forces),
     *(summary, equilibria, sdf, usd),
 )
 """Oracles that need the forces of the free bodies."""
-ORACLES = {oracle.__name__: oracle for oracle in (*AT_POSITIONS, *OF_FORCES)}
-AT_THETA_2 = (error_bars, sdf, usd)
+ORACLES = {oracle.__name__: oracle for oracle in (points, *OF_FORCES)}
+AT_THETA_2 = (sdf, usd)
 """Oracles that need a command of theta_2."""
 
 

@@ -21,14 +21,15 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.run.question import NotAskedError, take_member
 from tests.oracle.bounds import DIFFERENCES, SPREAD
-from tests.oracle.coordinates import DRAWN_SETTING, is_coordinate
-from tests.oracle.printed import move_points
+from tests.oracle.points import move_points
 from tests.oracle.variants import (
+    DRAWN_SETTING,
     SceneFile,
     ask_beside,
     ask_free_bodies,
     at_places,
     hold_to,
+    is_coordinate,
     is_near_change_point,
     make_row,
     split_unknowns,
@@ -221,10 +222,10 @@ def _judge_slopes(question, derivatives, file, nominal, direction):
         changes = {key: part * RELATIVE_STEP * step for key, step in direction.items()}
         moved = file.move(changes)
         answer = ask_beside(moved, scene, nominal)
-        points = _place_points(moved, answer, file.find_origin(changes))
+        points = _place_points(moved, answer, moved.drawing or scene.drawing)
         return answer.quantities | points
 
-    points_at = _place_points(scene, nominal, file.find_origin({}))
+    points_at = _place_points(scene, nominal, scene.drawing)
     at_nominal = nominal.quantities | points_at
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     comparable = np.array([status == "ok" for status in derivatives.status])
@@ -267,14 +268,13 @@ def _judge_slopes(question, derivatives, file, nominal, direction):
     ]
 
 
-def _place_points(scene, answer, origin):
+def _place_points(scene, answer, drawing):
     """Return places, velocities and accelerations of the scene's points by an
-    answer's angles, in the coordinates of a drawing.
-
-    `origin`: place of O2 in the drawing, m.
+    answer's angles, in the coordinates of a drawing if there is one.
     """
     reference = make_reference(scene, answer)
     assert reference is not None
+    origin = complex(*drawing.O2) if drawing else 0j
     placed = {}
     for name, moved in move_points(scene, reference).items():
         shifts = (origin, 0j, 0j)

@@ -10,6 +10,7 @@ import math
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +63,7 @@ _CUT_BESIDE = 1e-10
 acts there makes a jump.
 """
 PEAK_INTERVALS = 1440
-"""Intervals of the motion at whose ends nothing may exceed a peak or a range."""
+"""Intervals between two edges at whose ends nothing may exceed a peak or a range."""
 EXCESS_BETWEEN_POSITIONS = 1e-3
 """Part by which a largest value without a place may exceed that of many positions. Its
 own position lies between two of them.
@@ -127,23 +128,25 @@ class _SummaryJudge:
         return ask_free_bodies(self.scene, self.solution.at)
 
     @cached_property
-    def bends(self):
-        """Return the times within the motion at which one part of a law follows."""
-        law = self.scene.motion.law
-        if law is None:
-            return np.empty(0)
-        return np.array(law.time[1:-1])
+    def edges(self):
+        """Return the places at which the motion or a load changes its law, and its
+        ends.
+        """
+        places, scene = self.solution.at.places, self.scene
+        inner = getattr(scene.motion.law, "time", ())
+        if scene.motion.law is None and scene.motion.bar == 2:
+            tables = (load.table for load in scene.loads if load.table is not None)
+            inner = [corner for table in tables for corner in table.theta_2]
+        ends = np.sort(places[[0, -1]])
+        inside = [place for place in inner if ends[0] < place < ends[1]]
+        return np.union1d(ends, inside)
 
     @cached_property
     def fine_places(self):
-        """Return many places between the scene's own."""
-        own = self.solution.at.places
-        places = np.linspace(
-            own[0],
-            own[-1],
-            PEAK_INTERVALS + 1,
-        )
-        return np.union1d(places, self.bends) if len(self.bends) else places
+        """Return many places between the scene's own, the closest beside the edges."""
+        graded = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, PEAK_INTERVALS + 1))
+        pieces = [low + (high - low) * graded for low, high in pairwise(self.edges)]
+        return np.unique(np.concatenate(pieces))
 
     def integrates(self, name):
         """Return whether a quantity has an integral over the motion.
@@ -475,7 +478,7 @@ def _judge_integrals(judged):
         ends.max(),
         FIRST_PANELS + 1,
     )
-    panels = _lay_panels(sample, np.union1d(first, judged.bends))
+    panels = _lay_panels(sample, np.union1d(first, judged.edges))
 
     def judge_mean(ours, name):
         rms = math.sqrt(panels.mean_square(columns[name]))

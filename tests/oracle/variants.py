@@ -2,8 +2,8 @@
 results.
 """
 
+import cmath
 import json
-import math
 import tomllib
 from contextlib import suppress
 from copy import deepcopy
@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fourbar.errors import InputError
 from fourbar.files import dump, loads
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import BAR_NUMBERS, ENDS, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
 from fourbar.scene import command as command_of
 from fourbar.scene import with_signs
@@ -35,12 +36,7 @@ from fourbar_validation.run.question import (
     NotAskedError,
     spread_evenly,
 )
-from tests.oracle.coordinates import (
-    Coordinates,
-    find_entry,
-    is_coordinate,
-)
-from tests.oracle.printed import compare_points
+from tests.oracle.points import compare_points
 
 POSITIONS_OF_VARIANTS = 5
 """Positions at which whatever takes more than one call is judged."""
@@ -118,23 +114,46 @@ class _FileNumber(NamedTuple):
     step: float
 
 
+DRAWN_SETTING = "drawn"
+"""Setting of rows that judge numbers of a drawing."""
+_ALONG_AXES = (1.0, 1.0j)
+"""A coordinate's direction in the plane, by its index."""
+
+
+def is_coordinate(key):
+    """Return whether a key names a coordinate of a drawn pin or place."""
+    return key.startswith("pins.") or ".drawn." in key
+
+
+def find_entry(document, key):
+    """Find the table that holds a number, and its name or index there.
+
+    Raises KeyError if the file leaves it out.
+    """
+    *path, last = [int(part) if part.isdecimal() else part for part in key.split(".")]
+    for part in path:
+        document = document[part]
+    if isinstance(last, str) and last not in document:
+        raise KeyError(key)
+    return document, last
+
+
 class SceneFile:
     """The text of a scene's file, in which numbers are moved: it states lengths and
-    polar pairs, and what it leaves out follows the lengths. The coordinates of a
-    drawing move what it states.
+    polar pairs, and what it leaves out follows the lengths. A second one states the
+    pins of a drawing, in which coordinates are moved.
     """
 
     def __init__(self, scene):
         self.scene = scene
-        # tolerances may be of coordinates, which this file does not have
-        stated = replace(scene, drawing=None, coordinates=(), tolerances=())
-        self._document = tomllib.loads(dump(stated))
-        self._coordinates = None
+        # tolerances may be of coordinates, which a file by lengths does not have
+        stated = replace(scene, coordinates=(), tolerances=())
+        self._by_pins = tomllib.loads(dump(stated))
+        self._by_lengths = tomllib.loads(dump(replace(stated, drawing=None)))
         if scene.drawing is not None:
-            self._coordinates = Coordinates(scene.drawing, self._document)
-        self._lines = {
-            key: _write_toml_line(key, value) for key, value in self._document.items()
-        }
+            pins = {pin: complex(*getattr(scene.drawing, pin)) for pin in PIN_FORCE}
+            self._feet = {bar: pins[ends[0]] for bar, ends in ENDS.items()}
+            self._bars = {bar: pins[j] - pins[i] for bar, (i, j) in ENDS.items()}
 
     def find_stated(self, keys):
         """Find those of the keys whose numbers the file states.
@@ -155,23 +174,32 @@ class SceneFile:
 
         Raises KeyError if the file leaves it out.
         """
-        if self._coordinates is not None and is_coordinate(key):
-            return self._coordinates.read(key), self._coordinates.shortest
-        table, last = find_entry(self._document, key)
+        drawn = is_coordinate(key)
+        if ".drawn." in key:
+            (holder, last), bar, axis = self._find_place(self._by_pins, key)
+            along = self._bars[bar] / abs(self._bars[bar])
+            place = self._feet[bar] + cmath.rect(*map(_read, holder[last])) * along
+            return (place.real, place.imag)[axis], min(map(abs, self._bars.values()))
+        table, last = find_entry(self._by_pins if drawn else self._by_lengths, key)
         entry = table[last]
         if isinstance(entry, list):
             entry = entry[0]
-        text, _, unit = str(entry).partition(" ")
-        number = float(text)
-        if unit == "rad":
-            return number, 1.0
-        return number, number
+        number = _read(entry)
+        if drawn:
+            return number, min(map(abs, self._bars.values()))
+        return number, 1.0 if str(entry).endswith(" rad") else number
 
-    def find_origin(self, changes):
-        """Return the place of O2, m, after coordinates of a drawing were changed."""
-        if self._coordinates is None:
-            return 0j
-        return self._coordinates.move_origin(changes)
+    def _find_place(self, document, key):
+        """Find the entry of a drawn place, its bar, and the index of a coordinate."""
+        name, _, axis = key.partition(".drawn.")
+        if name.endswith(".centre"):
+            return (
+                find_entry(document, name),
+                BAR_NUMBERS[name.split(".")[1]],
+                int(axis),
+            )
+        holder, last = find_entry(document, f"{name}.from_pin")
+        return (holder, last), holder["bar"], int(axis)
 
     def move(self, changes):
         """Read the file after some of its numbers were changed by so much.
@@ -180,34 +208,35 @@ class SceneFile:
 
         Raises NotAskedError where the changed linkage can never assemble.
         """
-        if self._coordinates is not None:
-            changes = self._coordinates.follow(changes)
-        lengths = [
-            length + changes.get(f"lengths.{bar}", 0.0)
-            for bar, length in zip(
-                ("ground", "input", "coupler", "output"),
-                self.scene.linkage.lengths,
-                strict=True,
-            )
-        ]
-        if max(lengths) >= 0.5 * math.fsum(lengths):
-            raise NotAskedError("a changed linkage can never assemble")
-        tables = {
-            top: deepcopy(self._document[top])
-            for top in {key.partition(".")[0] for key in changes}
-        }
+        drawn = any(map(is_coordinate, changes))
+        document = deepcopy(self._by_pins if drawn else self._by_lengths)
         for key, change in changes.items():
-            table, last = find_entry(tables, key)
+            if ".drawn." in key:  # moved where the bars are drawn
+                (table, last), bar, axis = self._find_place(document, key)
+                place = cmath.rect(*map(_read, table[last]))
+                along = self._bars[bar] / abs(self._bars[bar])
+                place += change * _ALONG_AXES[axis] * along.conjugate()
+                table[last] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
+                continue
+            table, last = find_entry(document, key)
             old = table[last]
             if isinstance(old, list):
-                moved = [_change_entry(entry, change) for entry in old]
+                table[last] = [_change_entry(entry, change) for entry in old]
             else:
-                moved = None
-            table[last] = _change_entry(old, change) if moved is None else moved
-        lines = self._lines | {
-            key: _write_toml_line(key, value) for key, value in tables.items()
-        }
-        return loads("\n".join(lines.values()))
+                table[last] = _change_entry(old, change)
+        try:
+            return loads(
+                "\n".join(_write_toml_line(*entry) for entry in document.items())
+            )
+        except InputError as refused:
+            if refused.key != "lengths":
+                raise
+            raise NotAskedError("a changed linkage can never assemble") from refused
+
+
+def _read(quantity):
+    """Read the number of a text with a unit, or of a plain one."""
+    return float(str(quantity).partition(" ")[0])
 
 
 def _change_entry(quantity, change):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import Point, solve, uniform
+from fourbar import solve, uniform
 from fourbar.effects import (
     Gravity,
     Load,
@@ -17,7 +17,6 @@ from fourbar.effects import (
     Springs,
     Table,
     Torsion,
-    pin_friction,
 )
 from fourbar.formulas import longer
 from fourbar.linkage import Bar, FourBar
@@ -30,10 +29,10 @@ from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import TOO_SMALL
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.run.question import Question
-from tests.oracle import printed
 
 TURNS = 2000.0 * np.pi
+BARS = 10.0
+"""Error bars: 2 in 100 million normal errors exceed ten of them."""
 
 
 def sized(k=1.0, turns=0.0):
@@ -107,6 +106,15 @@ SCENES |= {
     f"{effect.key} near a limit": near_a_limit(effect)
     for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))
 }
+SCENES |= {
+    name: FAULT_SCENES[name]
+    for name in (
+        "crank-rocker",
+        "near a limit",
+        "short output",
+        "ends of a spring nearly meet",
+    )
+}
 
 
 @pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
@@ -130,7 +138,7 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
         half_a_digit = 0.5 * np.spacing(
             np.max([magnitude(value) for value in values], axis=0)
         )
-        assert (error <= 10.0 * width).all(), name
+        assert (error <= BARS * width).all(), name
         assert (width >= half_a_digit).all()
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
 
@@ -143,36 +151,6 @@ def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     tally = judge_samples(family, range(3))
     assert tally.too_small and max(tally.too_small.values()) <= TOO_SMALL
     assert not any(tally.too_large.values()) and not tally.warned
-
-
-def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch):
-    ends = Point("P", 1, (0.2, 0.6)), Point("Q", 3, (0.15, -0.4))
-    spring = Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.2)
-    table = Table((0.0, 1.0, 4.0, 6.2), (1.0, 1.0, -2.0, -2.0))  # 0 at 2 rad
-    scene = Scene(
-        FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)),
-        Motion(np.linspace(0.1, 6.0, 111), 3.0),
-        loads=(Load(4, moment=1.0, table=table),),
-        effects=(Springs((spring,)), Torsion.at(B=(0.5, 0.7, 0.0))),
-        points=ends,
-    )
-    swept = solve(scene)
-    away = [
-        np.hypot(*(swept.points["Q"] - swept.points["P"]).T) - 0.2,
-        swept.theta_4 - swept.theta_3 - 0.7,
-        swept.theta_2 - 2.0,
-    ]
-    seen = []
-    true = solve
-    question = Question("", scene, command(scene))
-    monkeypatch.setattr(
-        printed,
-        "solve",
-        lambda *args, at: seen.append(at.theta_2) or true(*args, at=at),
-    )
-    rows = list(printed.error_bars(question))
-    assert {row.verdict for row in rows} == {"agrees"}
-    assert {swept.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
 
 
 def test_a_bar_is_of_the_motion_that_begins_to_one_side():
@@ -190,39 +168,6 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side():
         assert torque_error.max() < 1e-13
 
 
-def test_a_bar_is_as_wide_as_what_a_position_loses():
-    """The direction of a spring is lost where its ends nearly meet, by no power of any
-    sine.
-    """
-    scene = FAULT_SCENES["ends of a spring nearly meet"]
-    rows = printed.error_bars(Question("", scene, command(scene)))
-    assert [row.verdict for row in rows] == ["agrees", "agrees"]
-
-
-def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch):
-    """Eight thousand positions of several loaded pins took eight minutes.
-
-    Each was searched from many starts.
-    """
-    searched, search = [], pin_friction._search
-    monkeypatch.setattr(
-        pin_friction,
-        "_search",
-        lambda problems: searched.extend(problems.F) or search(problems),
-    )
-    jammed = replace(
-        sized(),
-        motion=Motion(np.array([0.3, 0.5]), 10.0),
-        effects=(fourbar.PinFriction.at(A=(50.0, 0.01), B=(40.0, 0.02)),),
-    )
-    question = Question("", jammed, command(jammed))
-    assert set(question.solution.status) == {"jammed"}
-    del searched[:]
-    (row,) = printed.blocks(question)
-    assert row.passed
-    assert 0 < len(searched) < 10
-
-
 def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     """Compare a heavy crank beside its equilibrium with balls.
 
@@ -236,7 +181,7 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     solution = solve(scene, "error")
     exact = BallArithmetic().answer(scene, command(scene))
     error = np.abs(solution.torque - exact.quantities["torque"])
-    assert (error <= printed.ERROR_BARS * solution.torque_error).all()
+    assert (error <= BARS * solution.torque_error).all()
 
 
 def near_a_limit_of_bar_3():

@@ -132,6 +132,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
                 bodies.inertia_moment[bar][:] -= sign * couple
     largest = max(np.hypot(*getattr(s, name).T).max() for name in PIN_FORCE.values())
     assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest
+    assert s.friction_residual.any() or len(pins) == 1
     compare_with_thirteen(bodies, s)
 
 

@@ -18,9 +18,9 @@ from fourbar.files import dump, loads
 from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from fourbar.studies.spread import tolerances
-from tests.oracle.coordinates import DRAWN_SETTING, is_coordinate
 from tests.oracle.oracles import judge_by
 from tests.oracle.test_derived import failing
+from tests.oracle.variants import DRAWN_SETTING, is_coordinate
 
 PIN_KEYS = tuple(f"pins.{pin}.{axis}" for pin in PINS for axis in (0, 1))
 STEP = 1e-6

@@ -15,7 +15,7 @@ from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import Files, read_default_suite
-from tests.oracle.coordinates import is_coordinate
+from tests.oracle.variants import is_coordinate
 
 
 def scenes():
