@@ -188,7 +188,7 @@ HARD = {
     "a command of the output": (
         commanding(Motion(theta_4=Sweep(2.0, 2.75, 20), omega_4=2.0, alpha_4=1.0)),
         "",
-        f"theta_3 N2 ranges {AT_REST}",
+        "theta_3 N2 ranges missed",
     ),
     "a command of a stroke": (
         commanding(Motion(stroke=Sweep(0.2, 0.3, 20), stroke_speed=0.2, side="left")),
@@ -199,7 +199,7 @@ HARD = {
     "tolerances of coordinates": (loads(LIFT), "tolerances", "theta_4 drive_force"),
     "a lamp that a spring balances": (balanced_lamp(0.0), "summary", "ranges pins"),
     "forces that grow between positions": (
-        crank_rocker(motion=EVENLY, drive_bar=4),
+        crank_rocker(motion=Motion(Sweep(0.12, 0.12 + math.tau, 40), 9.0), drive_bar=4),
         "summary",
         "ranges pins",
     ),

@@ -4,8 +4,14 @@ import numpy as np
 from flint import arb, ctx
 
 import fourbar
+from fourbar import Motion, Scene
 from fourbar.scene import with_signs
-from fourbar_validation.engines.balls import compute_outputs, make_balls
+from fourbar_validation.engines.balls import (
+    compute_directions,
+    compute_outputs,
+    make_balls,
+    polar_ball,
+)
 
 
 def answer_in_balls(scene, at=None):
@@ -33,3 +39,25 @@ def answer_in_balls(scene, at=None):
         name: np.stack([columns[f"{name}_x"], columns[f"{name}_y"]], axis=-1)
         for name in ends
     }
+
+
+def move_in_balls(linkage, bar, angle, sign):
+    """Return the motion of all bars as one turns evenly at 1 rad/s.
+
+    `sign`: of the sine between the two other bars. Beside the outputs in balls, whose
+    omega_k and alpha_k are first and second derivatives by the angle, it has the
+    directions of all bars under u_k, as complex numbers.
+    """
+    names = f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}"
+    scene = Scene(linkage, Motion(**dict(zip(names, (angle, 1.0, 0.0), strict=True))))
+    precision = ctx.prec
+    try:
+        inputs = make_balls(scene, angle)
+        outputs = compute_outputs(scene, sign, inputs)
+        directions = compute_directions(inputs, sign)
+        ground = polar_ball(arb(1), inputs["theta_1"])
+        for number, u in enumerate((ground, *directions), 1):
+            outputs[f"u_{number}"] = complex(float(u.real), float(u.imag))
+    finally:
+        ctx.prec = precision
+    return inputs | outputs

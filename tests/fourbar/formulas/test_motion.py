@@ -31,14 +31,6 @@ def assembled(state):
     return (state.position.half.outer >= 0.0) & (state.position.half.inner >= 0.0)
 
 
-def test_positions_that_cannot_close_are_nan_and_say_so():
-    moving = compute_state(bare(1.0, 1.0, 0.4, 0.4), np.array([0.5, 2.0]), 1)
-    assert assembled(moving).tolist() == [True, False]
-    rates = moving.omega(3), moving.alpha(4), moving.point(3, 0.1)
-    for value in (moving.direction(3), *rates):
-        assert np.isnan(value).tolist() == [False, True]
-
-
 @pytest.mark.parametrize(
     "lengths",  # no bars alike, or one pair: one alone never stays parallel
     [
