@@ -201,7 +201,7 @@ HARD = {
     "forces that grow between positions": (
         crank_rocker(motion=Motion(Sweep(0.12, 0.12 + math.tau, 40), 9.0), drive_bar=4),
         "summary",
-        "ranges pins",
+        "ranges",
     ),
     # a force drives the coupler, and has no lever at two places within steps
     "the same bending everywhere": (
