@@ -227,7 +227,7 @@ class Case(NamedTuple):
     ) -> State:
         """Close the loop at the half angles of a command.
 
-        Every path from an angle to the forces uses it. `moving`: False: positions only.
+        `moving`: False: positions only. Without a command, `compute_state` closes it.
         """
         path = self.path
         q = commanded.angle

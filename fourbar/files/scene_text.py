@@ -39,7 +39,7 @@ from fourbar.scene.motion import (
     Sweep,
 )
 from fourbar.scene.pictures import TracedPicture
-from fourbar.studies.keys import find_misfit, list_entries
+from fourbar.studies.keys import OF_A_UNIFORM_BAR, find_misfit, list_entries
 from fourbar.writing import write_text
 
 BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
@@ -194,12 +194,16 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
 
 
 def _write_bar(bar: Bar) -> dict[str, Any]:
-    """Write the numbers of a bar; a density states its mass, the pins its length."""
+    """Write the numbers of a bar; a density states its mass, the pins its length.
+
+    What a uniform bar has follows from the numbers before it.
+    """
     numbers = write_numbers(bar)
     del numbers["length"]
     if bar.density is not None:
         del numbers["mass"]
-    return numbers
+    last = {name: numbers.pop(name) for name in OF_A_UNIFORM_BAR if name in numbers}
+    return numbers | last
 
 
 def _require_writable(effects: tuple[Effect, ...]) -> None:

@@ -71,6 +71,9 @@ the digits of a double are lost then.
 """
 OF_ONE_PREFIX = 1e-4
 """Part of the largest of its kind below which a quantity has a prefix of its own."""
+FAR_BELOW_PEAK = 0.1
+"""Part of its peak below which a mean has a prefix of its own: it would begin with 0.0.
+"""
 _STATUS_WORDS = {"change_point": "at a change point"}
 """Words for the statuses of positions that are not the names alone."""
 _BESIDE_CHANGE_POINT = 1e-9
@@ -97,13 +100,17 @@ def write_block(
     scene: Scene,
     solution: Solution,
     units: Conversion = COMMON,
-    **options: Any,
+    *,
+    pressure: float | None = None,
+    headed: bool = True,
+    width: int | None = None,
 ) -> list[str]:
     """Write the summary of a solved scene line by line; of one position, everything.
 
-    The options are those of `write_facts`.
+    The parameters are those of `write_facts`.
     """
-    return write_facts(summarize(scene, solution), units, **options)
+    facts = summarize(scene, solution)
+    return write_facts(facts, units, pressure=pressure, headed=headed, width=width)
 
 
 def write_facts(
@@ -256,6 +263,15 @@ class _SceneBlock:
             largest = None
         text = write_short(value, unit, self.units, largest, self.digits)
         return text.replace(" ", _NBSP)
+
+    def _beside(self, value: float, unit: str, peak: float | None) -> str:
+        """Write a mean of a line, with the prefix of its peak unless it is far below.
+
+        In a table all of one kind have one prefix, to be compared at a glance.
+        """
+        if peak is None or 0.0 < abs(value) < FAR_BELOW_PEAK * abs(peak):
+            return self._value(value, unit)
+        return self._value(value, unit, abs(peak))
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
@@ -552,7 +568,7 @@ class _SceneBlock:
         if rms is None:
             return row
         rms = self._without_rounding(rms)
-        return f"{row}, RMS {self._value(rms, drive.unit, abs(facts.peak.value))}"
+        return f"{row}, RMS {self._beside(rms, drive.unit, facts.peak.value)}"
 
     def _write_growth(self, name: str) -> str:
         """Write where a quantity grows without bound."""
@@ -664,7 +680,7 @@ class _SceneBlock:
         speed = self._value(duty.peak_speed, "rad/s")
         mean = ""
         if duty.rms_torque is not None:
-            rms = self._value(duty.rms_torque, "N m", duty.peak_torque)
+            rms = self._beside(duty.rms_torque, "N m", duty.peak_torque)
             mean = f" (RMS {rms})"
         power = self._value(duty.peak_power, "W")
         return f"at least {torque} at {speed}{mean}, {power}"
@@ -678,7 +694,7 @@ class _SceneBlock:
         if duty.mean_torque is None:
             return [self._row("cycle", swing)]
         mean_torque = self._without_rounding(duty.mean_torque)
-        mean = self._value(mean_torque, "N m", duty.peak_torque)
+        mean = self._beside(mean_torque, "N m", duty.peak_torque)
         return [self._row("cycle", f"mean torque {mean}; {swing}")]
 
     def _write_drive_head(self) -> str:

@@ -16,11 +16,16 @@ from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
 from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
 from fourbar.solution import Conversion, Solution, find_values
+from fourbar.solving import solve
 
 LABEL_WIDTH, _CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
 _NUMBER_LABEL = 22
 """Width of the label of a number that stands alone."""
+ROUNDING_OF_PLACE = 2.0**-26
+"""rad; to the root of round-off the place of a largest value is located, at which a
+rate is zero. A number that changes its sign within it is shown as zero.
+"""
 AT_INFINITY = 1e7
 """Times the places of A and B beyond which an instant centre is at infinity. Where a
 bar turns back, which is located to some 1e-9 of its turn, I13 is 1e8 times as far away.
@@ -49,6 +54,20 @@ class PositionSheet:
             self.without_side = str(error)
         self.has_limits = limits is not None
         self.solution = solution if limits is None else limits
+        stage = "position" if solution.omega_2 is None else "acceleration"
+        at = solution.at._replace(origin=None)
+        self.beside = [
+            solve(scene, stage, at=at._replace(angle=at.angle + away))
+            for away in (-ROUNDING_OF_PLACE, ROUNDING_OF_PLACE)
+        ]
+
+    def _read(self, name: str) -> Array | None:
+        """Return a quantity of the motion, zero where it changes its sign."""
+        values = find_values(self.solution, name)
+        if values is None:
+            return None
+        before, after = (find_values(beside, name)[0] for beside in self.beside)
+        return np.where(before * after < 0.0, 0.0, values[0])
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""
@@ -81,10 +100,10 @@ class PositionSheet:
         """List angle, speed or acceleration of the moving bars, (3,)."""
         numbers = []
         for bar in MOVING_BARS:
-            values = getattr(self.solution, f"{letter}_{bar}")
-            if values is None:
+            number = self._read(f"{letter}_{bar}")
+            if number is None:
                 return None
-            numbers.append(values[0])
+            numbers.append(number)
         return np.array(numbers)
 
     def _rests(self) -> bool:
@@ -114,13 +133,13 @@ class PositionSheet:
         largest = {start: self._find_largest(start, names) for start in scales}
         for name in names:
             for start, unit in scales.items():
-                vector = find_values(self.solution, start + name)
+                vector = self._read(start + name)
                 if vector is None:
                     continue
                 label = name if not start else f"  {start[0]}"
                 row = self._write_vector(
                     label,
-                    vector[0],
+                    vector,
                     unit,
                     largest[start],
                     sized=bool(start),
@@ -228,10 +247,10 @@ class PositionSheet:
         """Find the largest component of a kind: what is below its rounding is zero."""
         largest = 0.0
         for name in names:
-            vector = find_values(self.solution, start + name)
+            vector = self._read(start + name)
             if vector is None:
                 continue
-            size = float(np.max(np.abs(vector[0])))
+            size = float(np.max(np.abs(vector)))
             if np.isfinite(size):
                 largest = max(largest, size)
         return largest

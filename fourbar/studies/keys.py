@@ -67,7 +67,8 @@ another form in a study.
 _BY_MATERIAL = ("density", "section", "diameter", "mass_per_length")
 """Numbers of a bar that are varied only where the scene states them."""
 _MASS_CENTRE = "centre"
-_OF_A_UNIFORM_BAR = ("inertia", _MASS_CENTRE)
+OF_A_UNIFORM_BAR = ("inertia", _MASS_CENTRE)
+"""Numbers of a bar that are those of a uniform one if they are left out."""
 _LENGTH_OF_BAR = {bar: f"lengths.{name}" for bar, name in BAR_NAMES.items()}
 _GROUND_ANGLE = "lengths.ground_angle"
 NumberPath = tuple[str | int, ...]
@@ -153,7 +154,7 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
         absent.add("mass")
     stated = [item for item in entries.items() if item[1].place[2] not in absent]
     # what a uniform bar has follows from the numbers before it
-    return dict(sorted(stated, key=lambda item: item[1].place[2] in _OF_A_UNIFORM_BAR))
+    return dict(sorted(stated, key=lambda item: item[1].place[2] in OF_A_UNIFORM_BAR))
 
 
 def _list_pins() -> dict[str, SceneNumber]:

@@ -182,11 +182,9 @@ def move_inside_limit(scene: Scene, bar: int, angle: float) -> tuple[float, bool
 
     Both assemblies meet at a limit, and lie as far from it on both sides beside it.
     """
-    for low, high in find_intervals(scene.linkage, bar):
-        for end, inwards in ((low, INSIDE_LIMIT), (high, -INSIDE_LIMIT)):
-            is_limit = abs(math.remainder(angle - end, TURN)) <= SAME_POSITION
-            if is_limit and high - low < TURN:
-                return end + inwards, True
+    for limit, beyond, outwards in _find_nearest_limit(scene.linkage, bar, angle):
+        if abs(beyond) <= SAME_POSITION:
+            return limit - outwards * INSIDE_LIMIT, True
     return angle, False
 
 
@@ -195,12 +193,27 @@ def meet_limit(linkage: FourBar, bar: int, angle: float, rounding: float) -> flo
 
     Any other angle stays.
     """
-    intervals = find_intervals(linkage, bar)
-    inside = any((angle - low) % TURN <= high - low for low, high in intervals)
-    ends = [end for interval in intervals for end in interval]
-    nearest = min(ends, key=lambda end: abs(math.remainder(angle - end, TURN)))
-    away = math.remainder(angle - nearest, TURN)
-    return angle if inside or abs(away) > rounding else angle - away
+    for _, beyond, outwards in _find_nearest_limit(linkage, bar, angle):
+        if 0.0 < beyond <= rounding:
+            return angle - outwards * beyond
+    return angle
+
+
+def _find_nearest_limit(
+    linkage: FourBar, bar: int, angle: float
+) -> list[tuple[float, float, float]]:
+    """Find the limit of a bar that is nearest to an angle; none of one that turns.
+
+    An entry has the limit, how far the angle is beyond it, and the sense that leads
+    out of the range there, +1 or -1.
+    """
+    limits = []
+    for interval in find_intervals(linkage, bar):
+        for limit, outwards in zip(interval, (-1.0, 1.0), strict=True):
+            if interval[1] - interval[0] < TURN:
+                beyond = outwards * math.remainder(angle - limit, TURN)
+                limits.append((limit, beyond, outwards))
+    return sorted(limits, key=lambda entry: (abs(entry[1]), entry[1]))[:1]
 
 
 def is_same_position(name: str, first: float, second: float) -> bool:
