@@ -35,23 +35,47 @@ from tests.support.scenes import balance, crank_rocker, thesis
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
+
+
 MODELS = ROOT / "models"
+
+
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
+
+
 THESIS = MODELS / "thesis.toml"
+
+
 STROKE = MODELS / "capabilities" / "stroke_input.toml"
+
+
 KEYS = """
 schema title status branch theta_2 theta_3 theta_4 omega_2 omega_3 omega_4 alpha_2
 alpha_3 alpha_4 A B G2 G3 G4 a_A a_B a_G2 a_G3 a_G4 F12 F32 F43 F14 torque drive_bar
 sin_mu condition assembled
 """
+
+
 CONTRACT = KEYS.split()
 """The keys that programs which read the JSON rely on."""
+
+
 OF_THE_INPUT = {"theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"}
+
+
+PUMP = MODELS / "gallery" / "pump_jack.toml"
 LENGTHS = ("0.3", "0.1", "0.25", "0.22")
-ALL = ((), ("--all",))
+
+
 BARE = ("--lengths", "300 mm", "10 cm", "0.25", "0.22", "--omega", "60 rpm")
+
+
 MADE = make_scene(0.3, 0.1, 0.25, 0.22, omega=tau)
+
+
 Ended = tuple[int, str, str]
+
+
 Fourbar = Callable[..., Ended]
 
 
@@ -122,8 +146,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
     document = strict(run("analyze", "scene.toml", "--json"))
     assert set(CONTRACT) <= set(document) and np.shape(document["theta_3"]) == (1,)
     assert document["torque"] is document["F12"] is document["omega_2"] is None
-    code, out, _ = run("analyze", "scene.toml")
-    assert code == HOLDS and "bar 3 " in out and "N m" not in out
+    assert "N m" not in run("analyze", "scene.toml")[1]
     (row,) = read_csv(run("analyze", "scene.toml", "--csv"))
     assert row["torque [N m]"] == "" and row["theta_2 [rad]"] == "1.0"
 
@@ -134,9 +157,6 @@ def test_a_free_motion_has_time_and_no_drive(run):
     save(crank_rocker(motion=released), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
-    out = run("analyze", "scene.toml")[1]
-    assert "released for 0.5 s, without a drive" in out and " at t = " in out
-    assert "torque" not in out
 
 
 @pytest.mark.parametrize(
@@ -197,20 +217,13 @@ def test_what_rests_at_every_angle_is_no_range_of_one(run):
     assert "indifferent (Q = 0 throughout): everywhere on its circuit" in out
 
 
-@pytest.mark.parametrize(
-    "name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P,=1+1", "P\n=1+1"]
-)
+@pytest.mark.parametrize("name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P\n=1+1"])
 def test_a_heading_of_csv_is_a_word_and_no_formula(name, run):
     """A spreadsheet calculates a cell that begins with =, and a point heads columns."""
     file = Path("scene.toml")
     save(crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)), file)
-    printed = run("analyze", file, "--csv", "--units", "SI")[1]
-    cells = printed.splitlines()[0].replace("|", "").replace("/", "_").split(",")
-    assert "P_x" in cells and all(cell.isidentifier() for cell in cells)
-    text = file.read_text().replace("P = ", f"{json.dumps(name)} = ", 1)
-    file.write_text(text)
-    code, out, err = run("analyze", file, "--csv")
-    assert (code, out) == (BAD_INPUT, "") and "must be a word of letters" in err
+    file.write_text(file.read_text().replace("P = ", f"{json.dumps(name)} = ", 1))
+    refuses(run("analyze", file, "--csv"), "must be a word of letters")
 
 
 @pytest.mark.slow
@@ -225,13 +238,16 @@ def test_degrees_are_of_angles_alone_and_named(run):
     rows = read_csv(run("analyze", CRANK_ROCKER, "--csv", "--units", "SI", "--degrees"))
     assert float(rows[90]["theta_2 [deg]"]) == approx(90.0, rel=1e-15)
     assert "theta_2" not in rows[0]
+    for heading in rows[0]:
+        name, _, _ = heading.replace("|", "").replace("/", "_").partition(" [")
+        assert name.isidentifier(), heading
 
 
 ROW = re.compile(r" *\d+\.\d{4} ")
 
 
 @pytest.mark.slow
-def test_the_table_of_positions_says_in_what_units(run):
+def test_the_table_of_positions_says_in_what_units_and_may_be_thinned(run):
     lines = run("analyze", THESIS, "--table")[1].split("\n")
     assert lines[0] == "Thesis model mechanism" and len(lines) > 361
     heading = next(n for n, line in enumerate(lines) if "theta_2 " in line)
@@ -239,37 +255,27 @@ def test_the_table_of_positions_says_in_what_units(run):
     assert lines[heading + 1].split()[:3] == ["deg", "N", "m"]
     radians = run("analyze", THESIS, "--table", "--radians")[1].split("\n")
     assert radians[heading + 1].split()[0] == "rad"
+    assert run("analyze", THESIS, "--all")[1].split("\n") == lines
+    thinned = run("analyze", CRANK_ROCKER, "--every", 100)[1].splitlines()
+    rows = [line.split()[0] for line in thinned if ROW.match(line)]
+    assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
 
 
 def test_a_terminal_gets_some_forty_rows():
-    lines = print_positions(load(CRANK_ROCKER), 80).splitlines()
+    lines = tables.print_positions(solve(load(CRANK_ROCKER)), 80).splitlines()
     rows = [line for line in lines if ROW.match(line)]
     assert len(rows) == 37
     assert [rows[n].split()[0] for n in (1, -1)] == ["10.0000", "360.0000"]
     shown = "shown: every 10th of the 361 positions; --all shows each"
     assert lines.index(rows[-1]) < lines.index(shown)
-    assert max(map(len, lines)) <= 80
-
-
-@pytest.mark.slow
-def test_every_thins_the_table_and_keeps_its_last_position(run):
-    thinned = run("analyze", CRANK_ROCKER, "--every", 100)[1].splitlines()
-    rows = [line.split()[0] for line in thinned if ROW.match(line)]
-    assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
-    every, table = (run("analyze", CRANK_ROCKER, x)[1] for x in ("--all", "--table"))
-    assert every == table and every.count("\n") > 361
 
 
 @pytest.mark.parametrize("width", [40, 80, 120, 400])
 def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing(width):
-    text = print_positions(crank_rocker(), width)
+    text = tables.print_positions(solve(crank_rocker()), width)
     table = [line for line in text.split("\n") if not line.startswith("not shown")]
     assert max(map(len, table)) <= width and "…" not in text and "T2" in text
     assert ("not shown: " in text) == (width < 400)
-
-
-def print_positions(scene, width):
-    return tables.print_positions(solve(scene), width)
 
 
 def test_the_digits_of_the_torque():
@@ -331,41 +337,30 @@ def test_classify_says_what_turns_and_how_far(run):
 
     d, a, b, c = map(float, LENGTHS)
     text = run("classify", *LENGTHS)[1]
-    stretched = angle(c, d, b + a)
-    folded = 180.0 + angle(c, d, b - a)
-    row = re.search(r"  output: input, coupler stretched +(.*) +open", text)[1]
-    cells = [stretched, stretched, 180.0 - angle(a + b, d, c)]
-    assert [float(cell) for cell in row.split()] == approx(cells, abs=6e-5)
-    row = re.search(r"  output: input, coupler folded +(.*) +open", text)[1]
-    cells = [folded, folded - 180.0]
-    assert [float(cell) for cell in row.split()[:2]] == approx(cells, abs=6e-5)
+    stretched, folded = angle(c, d, b + a), 180.0 + angle(c, d, b - a)
+    for name, cells in (
+        ("stretched", [stretched, stretched, 180.0 - angle(a + b, d, c)]),
+        ("folded", [folded, folded - 180.0, 180.0 - angle(b - a, d, c)]),
+    ):
+        row = re.search(rf"  output: input, coupler {name} +(.*) +open", text)[1]
+        assert [float(cell) for cell in row.split()] == approx(cells, abs=6e-5)
     least = angle(d - a, b, c)
     ratio = (folded - stretched) / (360.0 - folded + stretched)
-    assert (
-        f"""
-angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg
-    to {angle(d + a, b, c):.4f} deg at 180.0000 deg
-"""
-        in text
-    )
-    assert f"\nsmallest transmission angle: {least:.4f} deg\n" in text
-    assert f"strokes at constant omega_2: {ratio:.4f}\n" in text
-    assert f"output {angle(a + b, d, c) - angle(b - a, d, c):.4f} deg" in text
-    assert (
-        """
-input: no limits, coupler and output are never in line:
-    ground + input = 0.4 < coupler + output = 0.47
-    |ground - input| = 0.2 > |coupler - output| = 0.03
-"""
-        in text
-    )
-    lines, every = ({*run("classify", *LENGTHS, *x)[1].splitlines()} for x in ALL)
+    for words in (
+        f"angle between coupler and output: {least:.4f} deg at theta_2 = 0.0000 deg\n"
+        f"    to {angle(d + a, b, c):.4f} deg at 180.0000 deg\n",
+        f"\nsmallest transmission angle: {least:.4f} deg\n",
+        f"strokes at constant omega_2: {ratio:.4f}\n",
+        f"output {angle(a + b, d, c) - angle(b - a, d, c):.4f} deg",
+        "\ninput: no limits, coupler and output are never in line:\n"
+        "    ground + input = 0.4 < coupler + output = 0.47\n"
+        "    |ground - input| = 0.2 > |coupler - output| = 0.03\n",
+    ):
+        assert words in text
+    every = run("classify", *LENGTHS, "--all")[1].splitlines()
     of_coupler = {line for line in every if line.startswith("  coupler:")}
-    assert len(of_coupler) == 4 and not of_coupler & lines and lines <= every
-
-
-def test_a_structure_does_not_move(run):
-    assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3
+    assert len(of_coupler) == 4 and {*every} - of_coupler >= {*text.splitlines()}
+    assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3  # a structure
 
 
 @pytest.mark.parametrize(
@@ -402,30 +397,39 @@ def test_who_asks_for_positions_only_is_told_no_force(bars, run):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("units, unit", [((), "lbf in"), (("--units", "SI"), "N m")])
-def test_plot_and_animate_show_the_units_of_the_scene(units, unit, run):
-    run("new", "inches.toml", "--lengths", "12 in", "4 in", "10 in", "9 in")
-    assert run("plot", "inches.toml", *units, "-o", "a.svg")[0] == HOLDS
-    picture = Path("a.svg").read_text().replace("mN m", "N m")
-    assert f"$T_2$ ({unit})" in picture
-    assert run("animate", "inches.toml", *units, "-o", "a.html")[0] == HOLDS
-    assert ('"lbf in"' in Path("a.html").read_text()) == (unit == "lbf in")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments, said, holds",
     [
-        (("plot", "--figure", "linkage", "--at", "30 deg", "-o", "a.svg"), "", "<svg"),
-        (("animate", "-o", "a.html"), "", "<html"),
-        (("animate", "--seconds", "0.12", "-o", "a.gif"), ": 3 frames", "GIF89a"),
+        (
+            (
+                "plot",
+                CRANK_ROCKER,
+                "--figure",
+                "linkage",
+                "--at",
+                "30 deg",
+                "-o",
+                "a.svg",
+            ),
+            "",
+            "<svg",
+        ),
+        (("plot", PUMP, "-o", "a.svg"), "", "$T_2$ (lbf in)"),
+        (("animate", PUMP, "-o", "a.html"), "", '"lbf in"'),
+        (("animate", PUMP, "--units", "SI", "-o", "a.html"), "", '"N m"'),
+        (
+            ("animate", CRANK_ROCKER, "--seconds", 0.12, "-o", "a.gif"),
+            ": 3 frames",
+            "GIF",
+        ),
     ],
 )
 def test_plot_and_animate_write_what_their_ending_says(arguments, said, holds, run):
-    command, *options = arguments
-    file = Path(options[-1])
-    printed = f"wrote {file}{said}\n"
-    assert run(command, CRANK_ROCKER, *options) == (HOLDS, printed, "")
+    """Without an option they show the units of the scene: those of the pump-jack are
+    inches and pounds.
+    """
+    file = Path(arguments[-1])
+    assert run(*arguments) == (HOLDS, f"wrote {file}{said}\n", "")
     assert holds.encode() in file.read_bytes()
 
 
@@ -488,45 +492,12 @@ def test_a_title_does_not_steer_the_terminal(run):
     assert strict(run("analyze", "scene.toml", "--json"))["title"] == title
 
 
-def start(*arguments, **streams):
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams
-    command = [sys.executable, *arguments]
-    return subprocess.run(command, cwd=ROOT, text=True, check=False, **streams)
-
-
 @pytest.mark.slow
 def test_the_command_line_starts_light():
     heavy = ["pint", "rich", "matplotlib", "scipy", "mujoco", "pinocchio", "jinja2"]
     program = "import sys, fourbar.cli; print({*sys.argv[1:]} & {*sys.modules})"
-    assert start("-c", program, *heavy).stdout == "set()\n"
-    done = start("-m", "fourbar", "--version")
-    version = f"fourbar, version {fourbar.__version__}\n"
-    assert (done.returncode, done.stdout) == (0, version)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "arguments",
-    [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")],
-)
-def test_a_reader_that_leaves_early_is_no_error(arguments):
-    reading, writing = os.pipe()
-    os.close(reading)
-    done = start("-m", "fourbar", *arguments, stdout=writing)
-    os.close(writing)
-    assert (done.returncode, done.stderr) == (HOLDS, "")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    not Path("/dev/full").exists(),
-    reason="only Linux has a device that is always full",
-)
-def test_standard_output_that_is_full():
-    with Path("/dev/full").open("w") as full:
-        done = start("-m", "fourbar", "analyze", "models/thesis.toml", stdout=full)
-    assert (done.returncode, done.stderr.count("\n")) == (BROKEN, 1)
-    assert "No space left" in done.stderr
+    command = [sys.executable, "-c", program, *heavy]
+    assert subprocess.check_output(command, cwd=ROOT, text=True) == "set()\n"
 
 
 INCHES = """\
@@ -541,11 +512,15 @@ mass = "1 lb"
 theta_2 = "60 deg"
 omega_2 = "60 rpm"
 """
+
+
 RAM = """\
 [drive]
 from = { bar = 1, from_pin = ["3 in", "-60 deg"] }
 to = { bar = 2, from_pin = ["1 in", "0 deg"] }
 """
+
+
 GAS_SPRING = """\
 [effects]
 [[effects.springs]]
@@ -557,9 +532,15 @@ stroke = "2 in"
 extended_force = "30 lbf"
 compressed_force = "40 lbf"
 """
+
+
 BY_STROKE = INCHES.replace('theta_2 = "60 deg"', 'stroke = "1 in"\nside = "left"')
 BY_STROKE = BY_STROKE.replace('omega_2 = "60 rpm"', 'stroke_speed = "1 in/s"') + RAM
+
+
 FAR = INCHES.replace('"5 in"', '"7 in"').replace('"60 deg"', '"180 deg"')
+
+
 SAME_PINS = """\
 [pins]
 O2 = ["1 in", "2 in"]
@@ -567,7 +548,11 @@ A = ["1 in", "2 in"]
 B = ["7 in", "2 in"]
 O4 = ["9 in", "1 in"]
 """
+
+
 STROKE_OF_GAS = "springs[0].gas.stroke = 6 in: must be less than the extended length"
+
+
 SIX_BARS = """\
 [lengths]
 ground = "900 mm"
@@ -575,8 +560,14 @@ input = "400 mm"
 coupler = "700 mm"
 output = "380 mm"
 """
+
+
 POINTS_ON = "several loops (six bars) in PMKS+"
+
+
 NEVER_CLOSE = "lengths = 50, 2, 4, 4.5 in: the bars"
+
+
 REFUSED_FILES = [  # text of a scene file, words of the line that refuses it
     (INCHES.replace('"5 in"', '"50 in"'), NEVER_CLOSE),
     (INCHES.replace('"5 in"', '"50 in"'), "of the other three, 10.5 in"),
@@ -630,15 +621,21 @@ def refuses(ended, words):
 
 
 IN_INCHES = ("50in", "2in", "4in", "4.5in")
+
+
 SIX = ("1", "2", "3", "4", "5", "6")
-PUSHED = MODELS / "capabilities" / "push_output.toml"
+
+
 BUCKET = MODELS / "gallery" / "excavator_bucket.toml"
+
+
 PLOT = ("-o", "a.svg", "--at")
+
+
 REFUSED = [  # arguments, words of the line that refuses them
     (("analyze", "x.toml", "--json", "--csv"), "give one of them"),
     (("analyze", "x.toml", "--json", "--every", 2), "hold every position"),
     (("analyze", CRANK_ROCKER, "--pressure", "210 bar"), "needs a cylinder"),
-    (("analyze", PUSHED, "--pressure", "10 MPa"), "needs a cylinder"),
     (("analyze", BUCKET, "--pressure", 210), 'did you mean "210 bar"?'),
     (("plot", CRANK_ROCKER, *PLOT, "12"), 'did you mean "12 deg"?'),
     (("plot", STROKE, *PLOT, "350"), 'did you mean "350 mm"?'),
@@ -653,15 +650,11 @@ REFUSED = [  # arguments, words of the line that refuses them
     (("mjcf", CRANK_ROCKER, "-o", "a.sdf"), ".xml, .mjcf, or have no ending"),
     # a message has the units that were typed
     (("classify", *IN_INCHES), NEVER_CLOSE),
-    (("new", "never.toml", "--lengths", *IN_INCHES), NEVER_CLOSE),
     (("mjcf", "--lengths", *IN_INCHES, "-o", "never.xml"), NEVER_CLOSE),
     (("classify", "50", "2", "4", "4.5"), "lengths = 50, 2, 4, 4.5: the bars"),
     # other mechanisms
     (("classify", *SIX), POINTS_ON),
-    (("new", "f.toml", "--lengths", *(f"{x}m" for x in SIX)), POINTS_ON),
     (("new", "f.toml", "--pins", "0,0 0,1 1,2 3,3 4,4 5,5", "--unit", "mm"), POINTS_ON),
-    (("mjcf", "--lengths", *SIX, "-o", "f.xml"), POINTS_ON),
-    (("sdf", "--lengths", *SIX[:5], "-o", "f.sdf"), POINTS_ON),
     (("analyze", CRANK_ROCKER, "--at", "theta_5=30 deg"), POINTS_ON),
     (("analyze", CRANK_ROCKER, "--columns", "omega_6/omega_2"), POINTS_ON),
     (("analyze", CRANK_ROCKER, "--columns", "F56_x"), POINTS_ON),

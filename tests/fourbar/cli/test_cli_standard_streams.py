@@ -3,92 +3,70 @@
 Pipes are read to their end.
 """
 
-import json
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 
+from fourbar.cli import status
 from fourbar.errors import BAD_INPUT
 
-ROOT = Path(__file__).parents[3]
-SCENE = ROOT / "models" / "crank_rocker.toml"
+SCENE = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 TEXT = SCENE.read_bytes()
 
 
-def call_fourbar(
-    folder,
-    *arguments,
-    scene=TEXT,
-):
-    """Run the command line in a folder, with a scene on a pipe.
+@pytest.fixture
+def call(monkeypatch, capfdbinary, tmp_path, tmp_path_factory):
+    """Runs the command line with a scene on its standard input."""
+    monkeypatch.chdir(tmp_path)
 
-    The pipe is its standard input.
-    """
-    line = [sys.executable, "-m", "fourbar", *arguments]
-    return subprocess.run(
-        line,
-        input=scene,
-        capture_output=True,
-        check=False,
-        cwd=folder,
-    )
+    def run(*arguments, scene=TEXT):
+        piped = tmp_path_factory.mktemp("piped") / "scene"
+        piped.write_bytes(scene)
+        with piped.open(encoding="utf-8") as stream:
+            monkeypatch.setattr(sys, "stdin", stream)
+            return status([*arguments]), *capfdbinary.readouterr()
 
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["-", "/dev/stdin"])
-@pytest.mark.posix
-def test_a_scene_is_read_from_standard_input(name, tmp_path):
-    for form in ("--json", "--degrees"):  # the block has the units of the file
-        of_file = call_fourbar(tmp_path, "analyze", str(SCENE), form)
-        of_pipe = call_fourbar(tmp_path, "analyze", name, form)
-        assert of_pipe.returncode == 0 and not of_pipe.stderr
-        assert of_pipe.stdout == of_file.stdout
+    return run
 
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_a_scene_is_read_from_a_pipe_of_the_shell(tmp_path):
-    line = f"{sys.executable} -m fourbar analyze <(cat '{SCENE}') --json"
+@pytest.mark.parametrize("name", ["-", "/dev/stdin", f"<(cat '{SCENE}')"])
+def test_a_scene_is_read_from_standard_input_and_from_a_pipe_of_the_shell(name, call):
+    """The block would have the units of the file."""
+    line = f"{sys.executable} -m fourbar analyze {name} --json < '{SCENE}'"
     piped = subprocess.run(["bash", "-c", line], capture_output=True, check=True)
-    assert json.loads(piped.stdout)["title"]
+    assert (0, piped.stdout, piped.stderr) == call("analyze", str(SCENE), "--json")
 
 
-@pytest.mark.slow
-@pytest.mark.posix
-def test_a_mistake_on_standard_input_is_one_line(tmp_path):
-    wrong = call_fourbar(tmp_path, "analyze", "-", scene=b"[lengths]\nground = 3\n")
-    assert wrong.returncode == BAD_INPUT
-    assert wrong.stderr.count(b"\n") == 1 and b"lengths.ground" in wrong.stderr
+def test_a_mistake_on_standard_input_is_one_line(call):
+    code, _, err = call("analyze", "-", scene=b"[lengths]\nground = 3\n")
+    assert code == BAD_INPUT
+    assert err.count(b"\n") == 1 and b"lengths.ground" in err
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments, start",
     [
-        (("analyze", "-", "--csv", "-o", "-"), b"status,"),
-        (("analyze", "-", "--json", "-o", "-"), b"{"),
-        (("mjcf", "-", "-o", "-"), b"<"),
-        (("sdf", "-", "--without-loads", "-o", "-"), b"<"),
-        (("usd", "-", "--without-loads", "-o", "-"), b"#usda"),
-        (("plot", "-", "-o", "-"), b"<?xml"),
-        (("animate", "-", "-o", "-"), b"<!doctype html>"),
+        ("analyze - --csv", b"status,"),
+        ("analyze - --json", b"{"),
+        ("mjcf -", b"<"),
+        ("sdf - --without-loads", b"<"),
+        ("usd - --without-loads", b"#usda"),
+        pytest.param("plot -", b"<?xml", marks=pytest.mark.slow),
+        pytest.param("animate -", b"<!doctype html>", marks=pytest.mark.slow),
     ],
-    ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
-def test_a_file_is_written_to_standard_output(arguments, start, tmp_path):
-    written = call_fourbar(tmp_path, *arguments)
-    assert written.returncode == 0, written.stderr
-    assert written.stdout.lower().startswith(start.lower())
+def test_a_file_is_written_to_standard_output(arguments, start, call, tmp_path):
+    code, out, err = call(*arguments.split(), "-o", "-")
+    assert code == 0, err
+    assert out.lower().startswith(start)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-def test_the_defaults_of_lengths_do_not_enter_the_file(tmp_path):
-    import xml.etree.ElementTree as ET
-
-    lengths = ("0.3", "0.1", "0.25", "0.22")
-    written = call_fourbar(tmp_path, "mjcf", "--lengths", *lengths, "-o", "-")
-    assert ET.fromstring(written.stdout).tag == "mujoco"
-    assert b"kg/m" in written.stderr
+def test_the_defaults_of_lengths_do_not_enter_the_file(call):
+    _, out, err = call(*["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.22", "-o", "-"])
+    assert ET.fromstring(out).tag == "mujoco" and b"kg/m" in err
