@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from fourbar_validation.engines.mujoco.robots.examine import (
     examine_mended,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge import LoopJudgement, judge_file, list_answers
 
@@ -232,12 +234,31 @@ LIFTED = """
 """A weld that is a pin, springs, friction, and bodies that are held against gravity."""
 
 
+def file_of(text: str) -> RobotFile:
+    """Return a text as a file that names no other."""
+    return RobotFile(Path("robot.xml"), text)
+
+
+def measure(
+    file: str | RobotFile,
+    scene: Scene | None = None,
+    pose: PoseOptions | None = None,
+    **options: Any,
+) -> LoopMeasurement:
+    """Measure the one loop of a file or text, or the one that is chosen."""
+    if isinstance(file, str):
+        file = file_of(file)
+    asked = MeasureOptions(pose or PoseOptions(), **options)
+    (loop,) = measure_loops(file, asked, scene).loops
+    return loop
+
+
 def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
     """Examine a text as a file that names no other.
 
     None: the file generated from the scene.
     """
-    file = None if text is None else RobotFile(Path("theirs.xml"), text)
+    file = None if text is None else file_of(text)
     return examine_file(scene, file, MeasureOptions(PoseOptions(), names=names))
 
 

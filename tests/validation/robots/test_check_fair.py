@@ -671,7 +671,7 @@ def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     through = loop.through_time
     assert through is not None and len(through.rows) > 2
     for answer in (loop.states, through):
-        assert answer.find_worst(loop.scales) < YIELD
+        assert answer.find_worst(loop.scales).error < YIELD
 
 
 YIELD = 1e-3

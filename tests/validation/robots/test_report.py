@@ -19,6 +19,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
+    WorstState,
 )
 from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
@@ -36,6 +37,9 @@ from fourbar_validation.robots.report import (
     write_states,
 )
 from tests.support.robots import FINGER
+
+SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
+"""A parallelogram, in line at 0 and 180 deg."""
 
 
 @cache
@@ -93,8 +97,9 @@ def test_percentages_have_one_notation(part, written):
 
 def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
     settings = RobotSettings((0.02, 1.0), (0.9,), 1e-6, "Euler", "Newton", 100, 1e-8)
-    tried = TriedSettings(settings, {}, 0.1, math.inf, math.inf, math.inf)
-    advice = SettingsAdvice(0.2, 9, tried, (), tried, False, 1, (), None, None)
+    missing = WorstState(math.inf)
+    tried = TriedSettings(settings, {}, WorstState(0.1), missing, math.inf, math.inf)
+    advice = SettingsAdvice(0.2, 9, tried, (), tried, 1, (), None)
     *_, table = describe_advice(SimpleNamespace(refusal="too many"), advice)
     assert table.rows == [("nothing", "0.1", "-", "-")]
 
@@ -141,9 +146,7 @@ def test_the_report_is_printed_and_written(
 def test_how_near_a_state_is_to_a_change_point_is_told_within_ten_degrees(
     degrees, near
 ):
-    bars = (Bar(0.1), Bar(0.3), Bar(0.1))
-    scene = Scene(FourBar(0.3, *bars), Motion(1.0, 1.0))
-    told = _describe_limit(SimpleNamespace(scene=scene), math.radians(degrees))
+    told = _describe_limit(SimpleNamespace(scene=SCENE), math.radians(degrees))
     assert told.startswith(
         f"{abs(degrees):.2g} deg from a change point" if near else ""
     )
@@ -172,11 +175,17 @@ def test_how_near_a_state_is_to_a_change_point_is_told_within_ten_degrees(
 )
 def test_advice_begins_with_what_was_reached(changes, error, reached, said):
     settings = RobotSettings((0.02, 1.0), (0.9,), 0.001, "Euler", "Newton", 100, 1e-8)
-    tried = TriedSettings(settings, changes, error, 0.0, 0.0, 1e-6)
-    ends = (0.01, 5, tried, (), tried, reached, 9, (), None, None)
-    loop = SimpleNamespace(refusal="too many steps")
-    about, first, *others = describe_advice(loop, SettingsAdvice(*ends))
+    worst = WorstState(error, "F12", 0.5, 0.5)
+    tried = TriedSettings(settings, changes, worst, WorstState(0.0), 0.0, 1e-6)
+    advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None)
+    assert advice.reached == reached
+    loop = SimpleNamespace(
+        refusal="too many steps", scene=SCENE, turned=0.0, joint="knee"
+    )
+    about, first, *others = describe_advice(loop, advice)
     assert about.startswith("Errors are the worst")
     assert first.startswith(said)
     no_part = any("No part of the range" in str(block) for block in others)
     assert no_part == (error == 0.1)
+    decides = "F12 at single states decides, at knee = 28.65 deg"
+    assert (decides in others) == math.isfinite(error)

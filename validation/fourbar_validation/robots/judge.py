@@ -184,8 +184,7 @@ def judge_file(
     if options.error is not None:
         tolerance = hold_simulated(options.error, "what this file may be wrong by")
     held = replace(options, error=None)
-    if options.speed is not None:
-        scene = replace(scene, motion=scene.motion.replace(speed=options.speed))
+    scene = options.state_speed(scene)
     with examine_guarded(file) as examined:
         theirs = examined(_EXAMINE, scene, file, held)
         plain = MeasureOptions(PoseOptions())

@@ -376,9 +376,10 @@ def _describe_deciding(
     loop: LoopMeasurement, advice: SettingsAdvice
 ) -> Iterator[ReportBlock]:
     """Say which state decides the error, and in which range it is within the wanted."""
-    state = advice.deciding
-    if state is not None:
-        method = MEASURED_THROUGH_TIME if state.through_time else f"at {STATES}"
+    state = advice.best.deciding
+    if math.isfinite(state.error):
+        through_time = state is advice.best.through_time
+        method = MEASURED_THROUGH_TIME if through_time else f"at {STATES}"
         near = _describe_limit(loop, state.angle - loop.turned)
         yield (
             f"{state.quantity} {method} decides, at {loop.joint} ="
@@ -397,10 +398,10 @@ def _describe_deciding(
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:
     """Write a row of settings; what was not simulated, in too many steps, is a dash."""
     changes = " ".join(f'{name}="{value}"' for name, value in tried.changes.items())
-    simulated = (f"{tried.through_time:.2g}", f"{1e3 * tried.cost:.2g} ms/s")
+    simulated = (f"{tried.through_time.error:.2g}", f"{1e3 * tried.cost:.2g} ms/s")
     return (
         changes or "nothing",
-        f"{tried.states:.2g}",
+        f"{tried.states.error:.2g}",
         *(simulated if math.isfinite(tried.cost) else ("-", "-")),
     )
 

@@ -18,6 +18,7 @@ from fourbar.quantities import Array
 from fourbar_validation.engines.description import ModelEntry, Value
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
+    list_actuators,
     list_lifted_masses,
 )
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
@@ -153,34 +154,13 @@ def _describe_bar(
     armature of a hinge on the ground turns with the bar, and is inertia of it.
     """
     model = seen.model
-    data = seen.data
-    parts = seen.list_parts(bar)
-    masses = model.body_mass[parts]
-    mass = float(masses.sum())
-    places = np.array([seen.in_plane(data.xipos[part]) for part in parts])
-    if mass:
-        centre = masses @ places / mass
-    else:
-        centre = places[0]
-    inertia = 0.0
-    for part, part_mass, place in zip(parts, masses, places, strict=True):
-        across = data.ximat[part].reshape(3, 3).T @ seen.normal
-        inertia += float(
-            across**2 @ model.body_inertia[part]
-            + part_mass * (place - centre) @ (place - centre)
-        )
-    arm = centre - seen.in_plane(seen.locate(bar, FIRST_PIN[bar]))
-    x, y = seen.line(bar)
-    angle = 0.0
-    if arm.any():
-        turned = math.atan2(arm[1], arm[0]) - math.atan2(y, x)
-        angle = math.remainder(turned, math.tau)
+    mass, (distance, angle), inertia = seen.lump(bar)
     key = f"bars.{BAR_NAMES[bar]}"
     element = f'body "{model.body(seen.loop.bodies[bar][0]).name}"'
     values = {
         "mass": mass,
         "inertia": inertia,
-        "centre.distance": math.hypot(*arm),
+        "centre.distance": distance,
         "centre.angle": angle,
     }
     described = {
@@ -198,7 +178,7 @@ def _describe_bar(
             f"{element} inertial and {hinge}",
             "armature",
         )
-    lifted = float(list_lifted_masses(model)[parts].sum())
+    lifted = float(list_lifted_masses(model)[seen.list_parts(bar)].sum())
     described[f"lift.{BAR_NAMES[bar]}"] = ModelEntry(lifted, element, "gravcomp")
     return described
 
@@ -736,7 +716,7 @@ def mend_entry(
         model.jnt_limited[seen.hinge[pin]] = 0
     elif subject == "pins" and what == "motor":
         joint = seen.hinge[pin]
-        for i in seen.list_actuators(joint):
+        for i in list_actuators(model, joint):
             model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
     elif subject == "option" and rest in ENUMERATIONS:
         setattr(model.opt, rest, _number_of_word(rest, str(value)))

@@ -6,7 +6,6 @@ What makes a planar four-bar, and the reason where none is made.
 import math
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -20,18 +19,15 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     list_closures,
     require_loops,
 )
-from fourbar_validation.engines.mujoco.robots.loop import (
-    PoseOptions,
-    RobotFile,
-)
-from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, rotation
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, file_of, rotation
 from tests.whole.test_imports import ROOT
 
 MODELS = ROOT / "models" / "robots"
 
 
 def report_of(text, **options):
-    return list_closures(RobotFile(Path("robot.xml"), text), PoseOptions(**options))
+    return list_closures(file_of(text), PoseOptions(**options))
 
 
 def closure_of(text, **options):

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -10,25 +9,18 @@ import pytest
 
 import fourbar
 from fourbar.formulas.mobility import classify
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.digits import find_rounding
 from fourbar_validation.engines.mujoco.robots.inside import (
     RESIDUAL_OF_AN_OPEN_LOOP,
     LoopInside,
 )
-from fourbar_validation.engines.mujoco.robots.loop import (
-    PoseOptions,
-    RobotFile,
-)
-from fourbar_validation.engines.mujoco.robots.measure import (
-    POSITIONS_OF_A_LOOP,
-    measure_loops,
-)
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.measure import RIGID, list_errors_by_method
-from tests.support.robots import FOOT_PARALLELOGRAM, rotation
+from tests.support.robots import FOOT_PARALLELOGRAM, file_of, measure, rotation
 from tests.support.shares import slow_but
 
 ANCHOR = 'anchor="-0.06 0 0"'
@@ -71,12 +63,7 @@ CHANGE_POINT = """
 
 
 def read(text):
-    return read_loop_scene(
-        RobotFile(Path("foot.xml"), text),
-        PoseOptions(),
-        None,
-        1.0,
-    )
+    return read_loop_scene(file_of(text), PoseOptions(), None, 1.0)
 
 
 def list_equal(made):
@@ -173,8 +160,7 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
 @pytest.mark.parametrize("text", slow_but({FIVE_DIGITS}, [FREE, FIVE_DIGITS, LARGE]))
 def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
     """The rigid robot is that of the formulas within the digits of its lengths."""
-    file = RobotFile(Path("foot.xml"), text)
-    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), None).loops
+    loop = measure(text)
     assert loop.rounding > 1e-7
     assert len(loop.states.in_line) == 2
     assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
@@ -190,9 +176,8 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
 
 def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     """The bars are in line there, and leave a gap of what a + d = b + c misses by."""
-    file = RobotFile(Path("foot.xml"), LARGE)
     made = read(LARGE)
-    model = pose_robot(compile_robot(file).model, PoseOptions()).model
+    model = pose_robot(compile_robot(file_of(LARGE)).model, PoseOptions()).model
     in_line = 0.5 * math.pi
     ground, crank, coupler, output = made.loop.lengths
     miss = abs(ground + crank - coupler - output)

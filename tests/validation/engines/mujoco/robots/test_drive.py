@@ -18,12 +18,11 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
 )
 from fourbar_validation.engines.mujoco.robots.examine import examine_file
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.measure import find_left_out, list_errors_by_method
-from tests.support.robots import Planar
+from tests.support.robots import Planar, file_of, measure
 from tests.support.shares import slow_but
 
 SCENE = """
@@ -90,10 +89,7 @@ one speed through time; empty where they have one.
 def measured(drive):
     scene = loads(f"{SCENE}[drive]\n{DRIVES[drive]}\n")
     bare = loads(SCENE)
-    file = RobotFile(Path("bare.xml"), write_mjcf(bare, drive="none"))
-    options = MeasureOptions(PoseOptions(), loop="B")
-    (loop,) = measure_loops(file, options, scene).loops
-    return loop
+    return measure(write_mjcf(bare, drive="none"), scene, loop="B")
 
 
 @pytest.mark.slow
@@ -148,7 +144,7 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
     a command of each other bar: it moves there, through a limit of that bar.
     """
     text = Planar(base="", drive="", cut=cut, equality=STIFF, more=SOLVER).text()
-    file = RobotFile(Path("cut.xml"), text)
+    file = file_of(text)
     made = read_loop_scene(file, PoseOptions(), None, 2.0).scene
     posed = find_loop_of_scene(file, made, MeasureOptions(PoseOptions()))
     bars = made.linkage.moving
@@ -167,7 +163,7 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
         (command(made, bar, angles, branch) for branch in BRANCH_NAMES),
         key=lambda way: np.ptp(list_ways(way) - list_ways(in_circuit)),
     )
-    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
+    loop = measure(file, scene)
     assert find_left_out(loop) < 1e-8
     for error in list_errors_by_method(loop):
         assert error.median < SOFT, error

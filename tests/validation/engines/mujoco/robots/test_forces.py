@@ -5,7 +5,6 @@ import io
 import math
 import re
 from itertools import combinations
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,15 +13,12 @@ import pytest
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.engines.mujoco.robots.ancestry import list_lifted_masses
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.judge import FILE_AT_ONE_STATE
-from tests.support.robots import answer_of, examine_text
+from tests.support.robots import answer_of, examine_text, measure
 from tests.whole.test_docs import blocks, read
 from tests.whole.test_imports import ROOT
 
@@ -73,9 +69,7 @@ def test_pin_forces_are_those_of_the_free_body(scene, flags):
     theta_2 = np.asarray(answer.at.theta_2) % math.tau
     at = int(np.argmin(np.abs(theta_2 - math.pi / 2.0)))
     assert answer.quantities["F14"][at, 1] == right
-    file = RobotFile(Path("lifted.xml"), text)
-    options = MeasureOptions(PoseOptions(), loop="B")
-    (loop,) = measure_loops(file, options, scene).loops
+    loop = measure(text, scene, loop="B")
     rows = {round(math.degrees(row.angle)) % 360: row for row in loop.states.rows}
     assert rows[90].soft.forces["F14"][1] == right
     assert rows[90].rigid.forces["F14"][1] == right

@@ -1,7 +1,6 @@
 """A loop is closed onto the assembly of its scene, or its pose is refused."""
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +11,7 @@ from fourbar.scene.motion import CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.judge import FILE_THROUGH_TIME
@@ -21,7 +20,7 @@ from fourbar_validation.robots.measure import (
     find_worst_of_loop,
 )
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
-from tests.support.robots import answer_of, examine_text, notes_of
+from tests.support.robots import answer_of, examine_text, file_of, measure, notes_of
 
 TEXT = """
 <mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
@@ -39,13 +38,19 @@ TEXT = """
 <equality><connect name="close" site1="rodend" site2="rockerend"/></equality>
 <actuator><velocity name="m" joint="j_crank" kv="50"/></actuator></mujoco>"""
 """Its rest pose is flat and open: nothing in it tells an assembly."""
-FILE = RobotFile(Path("loop.xml"), TEXT)
+FILE = file_of(TEXT)
 OPEN_POSE = {"j_crank": "60deg", "j_rod": "-30deg", "j_rocker": "95deg"}
 """Whole degrees near the open assembly; 6 mm are left."""
 
 
 NEAR_G = fourbar.Gravity(9.80665)
 """The gravity of a scene differs from the robot's 9.81 in its size alone."""
+
+
+def read_advice(text):
+    """Return the positions of joints that are to be typed after --pose."""
+    typed = text.rpartition("--pose ")[2].partition(" ")[0]
+    return dict(entry.split("=") for entry in typed.split(","))
 
 
 def make_scene(branch, gravity=None):
@@ -69,8 +74,7 @@ def make_scene(branch, gravity=None):
 @pytest.mark.parametrize("branch", ["open", "crossed"])
 def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch):
     scene = make_scene(branch)
-    measured = measure_loops(FILE, MeasureOptions(PoseOptions()), scene)
-    (loop,) = measured.loops
+    loop = measure(TEXT, scene)
     assert find_left_out(loop) < SCENE_ROUND_OFF
     assert find_worst_of_loop(loop) < 0.06
     (remark,) = [text for text in loop.remarks if "in line" in text]
@@ -82,28 +86,23 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch):
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
 def test_gravity_tells_the_side_by_its_direction_alone(branch, axis):
     """The hinges turn the other way: the plane is seen from the other side."""
-    file = RobotFile(Path("loop.xml"), TEXT.replace("0 -1 0", axis))
-    scene = make_scene(branch, NEAR_G)
-    (loop,) = measure_loops(file, MeasureOptions(PoseOptions()), scene).loops
+    loop = measure(TEXT.replace("0 -1 0", axis), make_scene(branch, NEAR_G))
     difference = 1.0 - 9.80665 / 9.81
     assert find_left_out(loop) < 2.0 * difference
 
 
 def test_a_pose_of_the_other_assembly_is_refused_for_another_size_of_gravity():
-    options = MeasureOptions(PoseOptions(OPEN_POSE))
     with pytest.raises(InputError, match="to the open assembly"):
-        measure_loops(FILE, options, make_scene("crossed", NEAR_G))
+        measure(TEXT, make_scene("crossed", NEAR_G), PoseOptions(OPEN_POSE))
 
 
 @pytest.mark.slow
 def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes():
     scene = make_scene("crossed")
-    options = MeasureOptions(PoseOptions(OPEN_POSE))
     with pytest.raises(InputError, match="to the open assembly") as refused:
-        measure_loops(FILE, options, scene)
+        measure(TEXT, scene, PoseOptions(OPEN_POSE))
     assert "the scene names the crossed one" in str(refused.value)
-    text = str(refused.value).rpartition("--pose ")[2]
-    advised = dict(entry.split("=") for entry in text.split(","))
+    advised = read_advice(str(refused.value))
     measured = measure_loops(FILE, MeasureOptions(PoseOptions(advised)), scene)
     assert find_left_out(measured.loops[0]) < 1e-6
     assert not [note for note in measured.notes if "what is left" in note]
@@ -114,9 +113,7 @@ def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
     (remark,) = [text for text in made.remarks if "in line" in text]
     assert "closed to the crossed one" in remark
     assert made.scene.motion.branch == CROSSED
-    text = remark.rpartition("--pose ")[2].partition(" ")[0]
-    advised = dict(entry.split("=") for entry in text.split(","))
-    other = read_loop_scene(FILE, PoseOptions(advised), None, 4.0)
+    other = read_loop_scene(FILE, PoseOptions(read_advice(remark)), None, 4.0)
     assert other.scene.motion.branch == OPEN
     assert not [text for text in other.remarks if "in line" in text]
 

@@ -9,7 +9,6 @@ Jacobian.
 import cmath
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -19,12 +18,9 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.files import loads
-from fourbar_validation.engines.mujoco.robots.loop import (
-    PoseOptions,
-    RobotFile,
-)
+from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
 from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
-from tests.support.robots import Planar
+from tests.support.robots import Planar, file_of
 from tests.whole.test_imports import ROOT
 
 MODELS = ROOT / "models" / "robots"
@@ -166,7 +162,7 @@ class WholeRobot:
 
 def read(text, *, loop=None, speed=3.0, **pose):
     options = PoseOptions(**pose)
-    return read_loop_scene(RobotFile(Path("robot.xml"), text), options, loop, speed)
+    return read_loop_scene(file_of(text), options, loop, speed)
 
 
 def compare(text, made, speed=3.0):

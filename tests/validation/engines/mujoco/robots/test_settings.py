@@ -150,8 +150,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     stiff = replace(whole.own, solimp=STIFFEST_IMPEDANCE)
     error = whole.measure(stiff).error
     assert error > 2.0 * wanted
-    deciding = whole.find_deciding(stiff)
-    assert deciding is not None
+    deciding = whole.measure(stiff).deciding
     assert deciding.error == pytest.approx(error, rel=1e-9)
     assert deciding.angle == pytest.approx(last, abs=1e-2)
     within = whole.find_range(stiff, wanted)

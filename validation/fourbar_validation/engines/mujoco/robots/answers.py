@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,6 +119,18 @@ def divide(error: float, scale: float) -> float:
     return math.inf if error else 0.0
 
 
+class WorstState(NamedTuple):
+    """State at which one of the torque and the pin forces has the worst error."""
+
+    error: float
+    """Error over the scale of the quantity; infinite without an answer."""
+    quantity: str = ""
+    joint: float = math.nan
+    """Position of the driven joint, rad."""
+    angle: float = math.nan
+    """Angle of the commanded bar in the plane of the loop, rad."""
+
+
 class BarMotion(NamedTuple):
     """Angles (rad) and speeds (rad/s) of the moving bars in the plane of a loop."""
 
@@ -206,15 +218,18 @@ class InsideAnswer:
         conditions = np.array([row.condition for row in self.rows])
         return find_scales(self.sizes(), conditions, lever)
 
-    def find_worst(self, scales: Mapping[str, float]) -> float:
-        """Return the worst error of torque and pin forces, each over its scale.
+    def find_worst(self, scales: Mapping[str, float]) -> WorstState:
+        """Return the state of the worst error of torque and pin forces over its scale.
 
         The error is infinite without an answer.
         """
         if self.lost or not self.rows:
-            return math.inf
-        errors = self.errors().items()
-        return max(divide(float(error.max()), scales[name]) for name, error in errors)
+            return WorstState(math.inf)
+        return max(
+            WorstState(divide(float(error), scales[name]), name, row.joint, row.angle)
+            for name, errors in self.errors().items()
+            for row, error in zip(self.rows, errors, strict=True)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,43 +283,29 @@ class TriedSettings:
     settings: RobotSettings
     changes: dict[str, str]
     """Attributes that differ from the file's."""
-    states: float
-    """Worst error of torque and pin forces at single states, over the largest of each;
-    infinite without an answer.
-    """
-    through_time: float
-    """Worst error at the states of a simulation, over the largest of each; infinite
-    without an answer.
-    """
+    states: WorstState
+    """Worst single state."""
+    through_time: WorstState
+    """Worst state of a simulation."""
     gap: float
     """Largest gap of the simulation, m."""
     seconds_per_step: float
     """Processor time of a step of the whole robot, s."""
 
     @property
+    def deciding(self) -> WorstState:
+        """State of the greater of the two errors."""
+        return max(self.states, self.through_time)
+
+    @property
     def error(self) -> float:
         """The greater of the two errors."""
-        return max(self.states, self.through_time)
+        return self.deciding.error
 
     @property
     def cost(self) -> float:
         """Processor time of a simulated second, s."""
         return self.seconds_per_step / self.settings.timestep
-
-
-@dataclass(frozen=True, slots=True)
-class DecidingState:
-    """State at which settings have their worst error."""
-
-    through_time: bool
-    """True for a state of a simulation, False for a single state."""
-    quantity: str
-    joint: float
-    """Position of the driven joint, rad."""
-    angle: float
-    """Angle of the commanded bar in the plane of the loop, rad."""
-    error: float
-    """Error over the scale of the quantity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,16 +320,18 @@ class SettingsAdvice:
     """Each setting changed by itself, the one that helps most first."""
     best: TriedSettings
     """Cheapest combination within the wanted error, or the most accurate one tried."""
-    reached: bool
     tried: int
     typed: tuple[str, ...]
     """The best combination as elements of MJCF."""
-    deciding: DecidingState | None
-    """Worst state of the best combination; None if it has no answer."""
     within: tuple[float, float] | None
     """Widest range of the driven joint found, rad, in which the best combination is
     within the wanted error. None where it is so everywhere, or in no range tried.
     """
+
+    @property
+    def reached(self) -> bool:
+        """Tell whether the best combination is within the wanted error."""
+        return self.best.error <= self.wanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,6 +353,12 @@ class MeasureOptions:
     """Range of the driven joint, rad; None: that of the scene."""
     names: Mapping[str, str] = field(default_factory=dict)
     """Bodies of the bars and sites of pin B that are stated, by their roles."""
+
+    def state_speed(self, scene: Scene) -> Scene:
+        """Return a scene at the speed that is stated, if one is."""
+        if self.speed is None:
+            return scene
+        return replace(scene, motion=scene.motion.replace(speed=self.speed))
 
 
 @dataclass(frozen=True, slots=True)

@@ -207,19 +207,13 @@ class _Chain:
         common = find_common(self.model, first, second)
         self.ground = finder.root[common]
         self.ground_name = name_body(self.model, common)
-        self.joints: list[int] = []
-        self.bars: list[int | None] = [finder.root[first]]
+        upward = self._list_side(finder, first, common)
+        downward = self._list_side(finder, second, common)[::-1]
+        self.joints = [joint for joint, _ in upward + downward]
+        self.bars = [finder.root[first], *(bearer for _, bearer in upward)]
         """One more than joints; None: the joint hangs on another of the same body."""
-        for joint, bearer in self._list_side(finder, first, common):
-            self.joints.append(joint)
-            self.bars.append(bearer)
-        self.up = len(self.joints)
-        downward = list(reversed(self._list_side(finder, second, common)))
-        carried = [bearer for _, bearer in downward[1:]]
         if downward:
-            carried.append(finder.root[second])
-        self.joints += [joint for joint, _ in downward]
-        self.bars += carried
+            self.bars += [*(bearer for _, bearer in downward[1:]), finder.root[second]]
 
     def _list_side(
         self,
@@ -480,18 +474,16 @@ class _Finder:
 
         Loops that share bars with such a loop are among them.
         """
-        chains = {number: chain}
-        for other in self._list_others(number):
-            chains[other] = _Chain(self, *find_tied_bodies(self.model, other))
+        others = {
+            other: _Chain(self, *find_tied_bodies(self.model, other))
+            for other in self._list_others(number)
+        }
         joints = {*chain.joints}
-        coupled = {number}
-        grows = True
-        while grows:
-            more = {n for n in chains if joints & {*chains[n].joints}} - coupled
-            joints.update(*(chains[n].joints for n in more))
-            coupled |= more
-            grows = bool(more)
-        return {n: chains[n] for n in sorted(coupled - {number})}
+        coupled = dict[int, _Chain]()
+        while more := {n for n in others if joints & {*others[n].joints}}:
+            coupled |= {n: others.pop(n) for n in more}
+            joints.update(*(coupled[n].joints for n in more))
+        return dict(sorted(coupled.items()))
 
     def _list_holds(
         self,

@@ -78,10 +78,8 @@ _CLOSING_STEPS = 50
 RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
 _STRIDE = math.radians(2.0)
-_LONG_STRIDE = math.radians(12.0)
-_FAR_FROM_A_LINE = 0.5
-"""Largest turns of the driven hinge from one closed state to the next, the longer one
-where |sin(theta_4 - theta_3)| is at least this. The assembly is kept so.
+"""Largest turn of the commanded bar from one closed state to the next. The assembly is
+kept so.
 """
 LEAST_TRANSMISSION = 1e-5
 """Transmission over the longest bar below which the bars of pin B are in line. A closed
@@ -306,45 +304,26 @@ class LoopInside:
     def close(self, wanted: float) -> Array | None:
         """Return the pose at an angle of the commanded bar, or None if it is open.
 
-        The loop is followed from the last pose in strides, which are small where the
-        bars that follow are near to a line. A stride begins as the one before it went
-        on, so that the motion passes a change point smoothly.
+        The loop is followed from the last pose in strides. A stride begins as the one
+        before it went on, so that the motion passes a change point smoothly.
         """
         qpos = self._last.copy()
         rates = self._rates
-        longest = _LONG_STRIDE
-        while True:
-            sine = self._measure_sine(qpos)
-            if abs(sine) < _FAR_FROM_A_LINE:
-                longest = _STRIDE
-            angle = self.angle(qpos)
-            strides = max(math.ceil(abs(wanted - angle) / longest), 1)
-            stride = (wanted - angle) / strides
-            after = qpos.copy()
-            self._move(after, self.basis @ (rates * stride))
-            self._turn_to(after, angle + stride)
-            closed = self.close_gap(after)
-            if longest > _STRIDE and (
-                not closed or self._measure_sine(after) * sine < 0
-            ):
-                longest = _STRIDE
-                continue
-            if not closed:
+        follow = self.model.jnt_qposadr[self.model.dof_jntid[self.passive]]
+        start = self.angle(qpos)
+        strides = max(math.ceil(abs(wanted - start) / _STRIDE), 1)
+        for angle in np.linspace(start, wanted, strides + 1)[1:]:
+            before = qpos.copy()
+            stride = (wanted - start) / strides
+            self._move(qpos, self.basis @ (rates * stride))
+            self._turn_to(qpos, angle)
+            if not self.close_gap(qpos):
                 return self._jump(wanted)
             if stride:
-                rates = self._measure_turns(after - qpos) / stride
-            qpos = after
-            longest = _LONG_STRIDE
-            if strides == 1:
-                break
+                rates = (qpos - before)[follow] / stride
         self._last = qpos.copy()
         self._rates = rates
         return qpos
-
-    def _measure_turns(self, change: Array) -> Array:
-        """Return the turns of the hinges that follow in a change of pose, rad."""
-        joints = self.model.dof_jntid[self.passive]
-        return np.asarray(change[self.model.jnt_qposadr[joints]])
 
     def _jump(self, wanted: float) -> Array | None:
         """Return the pose at an angle of the commanded bar to which no motion leads.
@@ -440,10 +419,8 @@ class LoopInside:
         qpos = self.close(angle)
         if qpos is None:
             return None
-        _, jacobian = self._evaluate_closure(qpos)
-        due = -jacobian @ self.step * speed
-        turns = _solve_least_squares(jacobian @ self.basis, due)
-        return _RobotState(qpos, self.step * speed + self.basis @ turns)
+        rates = self.step + self.basis @ self._find_rates(qpos)
+        return _RobotState(qpos, speed * rates)
 
     def ask(self, qpos: Array, qvel: Array, wanted: float) -> InsideRow:
         """Evaluate a state in which the commanded bar accelerates as wanted, rad/s^2.
@@ -729,19 +706,28 @@ class LoopInside:
         data.qvel[:] = state.qvel
 
         def drive(row: InsideRow) -> None:
-            couple = armature * alpha + self._find_crank_couple(row, data)
-            data.qfrc_applied[:] = self.turn * couple
+            """Exert a couple on the bar with the power of a row's drive."""
+            couple = row.soft.torque if math.isfinite(row.soft.torque) else 0.0
+            if couple and self.acting is not None:
+                couple *= self.acting.find_speed(data) / row.speed
+            data.qfrc_applied[:] = self.turn * (armature * alpha + couple)
 
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
         stepper = Stepper(model, data, timestep)
         instants = [_find_instant(angles[0], angle, omega, alpha) for angle in angles]
-        _require_timesteps(instants[-1] / timestep, timestep)
+        if not 1.0 <= instants[-1] / timestep <= MOST_TIMESTEPS:
+            raise LimitError(
+                f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g}"
+                f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
+                " another speed"
+            )
         answer.seconds_per_step = math.inf
         self._doubtful.clear()
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
-        answer.settling = settling_time(self.find_constant(), instants[-1])
+        settled = SETTLING_TIME * self.find_constant()
+        answer.settling = min(settled, 0.5 * instants[-1])
         for instant in instants[1:]:
             if instant < answer.settling:
                 answer.skipped += 1
@@ -779,14 +765,6 @@ class LoopInside:
             model.dof_armature[self.lead] += armature
         return model, armature
 
-    def _find_crank_couple(self, row: InsideRow, data: mujoco.MjData) -> float:
-        """Return the couple on the bar with the power of a row's drive, N m."""
-        if not math.isfinite(row.soft.torque):
-            return 0.0
-        if self.acting is None:
-            return row.soft.torque
-        return row.soft.torque * self.acting.find_speed(data) / row.speed
-
     def _left_assembly(self, answer: InsideAnswer, qpos: Array) -> bool:
         """Tell whether the last row is in the other assembly, and drop such rows.
 
@@ -809,7 +787,11 @@ class LoopInside:
 
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""
-        return find_time_constant(self.model, self.loop.equality)
+        stiffness, damping = self.model.eq_solref[self.loop.equality].tolist()
+        if stiffness > 0.0 or not damping:
+            return float(max(stiffness, 0.0))
+        # stated as -stiffness and -damping: that of a critically damped closure
+        return float(2.0 / abs(damping))
 
     def answer_under_torque(
         self,
@@ -854,16 +836,6 @@ class LoopInside:
         return states
 
 
-def _require_timesteps(timesteps: float, timestep: float) -> None:
-    """Refuse a motion of more timesteps than one run takes, or of none."""
-    if not 1.0 <= timesteps <= MOST_TIMESTEPS:
-        raise LimitError(
-            f"its timestep of {timestep:g} s makes {timesteps:.3g}"
-            f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
-            " another speed"
-        )
-
-
 def _solve_least_squares(matrix: Array, right: Array) -> Array:
     """Solve for the least step; directions that move nothing count as none."""
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-9)[0])
@@ -884,28 +856,6 @@ def _measure_drift(data: mujoco.MjData, speeds: Array) -> Array:
 def _has_warned(data: mujoco.MjData) -> bool:
     """Tell whether MuJoCo has warned that it loses the motion."""
     return any(data.warning[kind].number for kind in WARNINGS)
-
-
-def find_time_constant(model: mujoco.MjModel, equality: int) -> float:
-    """Return the time constant of an equality, s."""
-    stiffness, damping = model.eq_solref[equality]
-    if stiffness > 0.0:
-        return float(stiffness)
-    # stated as -stiffness and -damping: that of a critically damped closure
-    if damping:
-        return 2.0 / abs(float(damping))
-    return 0.0
-
-
-def settling_time(constant: float, seconds: float) -> float:
-    """Return the time after which a loop that starts closed has yielded, s.
-
-    Parameters
-    ----------
-    constant : time constant of its closure, s.
-    seconds : duration of the motion, s.
-    """
-    return min(SETTLING_TIME * constant, 0.5 * seconds)
 
 
 def turn_hinges(

@@ -6,6 +6,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import groupby
 
 import mujoco
 import numpy as np
@@ -92,7 +93,7 @@ def measure_loops(
     """
     with collect_warnings() as warnings:
         if scene is not None:
-            scene = state_speed(scene, options)
+            scene = options.state_speed(scene)
             found = find_loop_of_scene(file, scene, options)
             measured = [measure_on_scene(found, scene, options)]
             notes = [*found.compiled.notes, *found.robot.notes]
@@ -118,13 +119,6 @@ def measure_loops(
             notes = [*compiled.notes, *posed.notes]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(tuple(measured), tuple(notes))
-
-
-def state_speed(scene: Scene, options: MeasureOptions) -> Scene:
-    """Return a scene at the speed that the options state, if they state one."""
-    if options.speed is None:
-        return scene
-    return replace(scene, motion=scene.motion.replace(speed=options.speed))
 
 
 def measure_on_scene(
@@ -271,15 +265,10 @@ def _measure_loop(
 
 def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
     """Return the most angles in a row at which the loop closes, in their order."""
-    runs: list[list[float]] = [[]]
     closed = {row.angle for row in states.rows}
-    for angle in sorted({*closed, *states.open}):
-        if angle in closed:
-            runs[-1].append(angle)
-        else:
-            runs.append([])
-    longest = max(len(run) for run in runs)
-    return next(tuple(run) for run in runs if len(run) == longest)
+    angles = sorted({*closed, *states.open})
+    runs = groupby(angles, key=closed.__contains__)
+    return max((tuple(run) for is_closed, run in runs if is_closed), key=len)
 
 
 def _describe_other_circuit(

@@ -8,7 +8,7 @@ import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import groupby
 
 import mujoco
 import numpy as np
@@ -61,7 +61,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     PosedRobot,
     pose_robot,
 )
-from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
+from fourbar_validation.engines.mujoco.robots.seen import Lump, SeenLoop
 
 DIGITS_OF_A_MODEL = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
@@ -143,28 +143,19 @@ def make_loop_scene(
     )
 
 
-def _reflect_armature(model: mujoco.MjModel, joint: int) -> float:
-    """Return the armature of a hinge and of its geared motors, kg m^2."""
-    return _sum_over_motors(model, joint, model.dof_armature, "actuator_armature")
+def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
+    """Return armature, kg m^2, or damping, N m s/rad, of a hinge and of its motors.
 
-
-def _reflect_damping(model: mujoco.MjModel, joint: int) -> float:
-    """Return the damping of a hinge and of its geared motors, N m s/rad."""
-    damping = model.dof_damping * is_enabled(model, "damper", "passive")
-    return _sum_over_motors(model, joint, damping, "actuator_damping")
-
-
-def _sum_over_motors(
-    model: mujoco.MjModel,
-    joint: int,
-    of_dofs: Array,
-    field: str,
-) -> float:
-    total = float(of_dofs[model.jnt_dofadr[joint]])
-    of_motors = getattr(model, field, np.zeros(model.nu))  # since MuJoCo 4.0
+    Those of a motor count behind its gear.
+    """
+    own = getattr(model, f"dof_{name}")[model.jnt_dofadr[joint]]
+    if name == "damping":
+        own = own * is_enabled(model, "damper", "passive")
+    # since MuJoCo 4.0
+    of_motors = getattr(model, f"actuator_{name}", np.zeros(model.nu))
     motors = list_actuators(model, joint)
     gears = model.actuator_gear[motors, 0]
-    return total + float(of_motors[motors] @ gears**2)
+    return float(own + of_motors[motors] @ gears**2)
 
 
 def write_pose(
@@ -225,16 +216,6 @@ def is_seen_from_behind(scene: Scene, angles: Sequence[float]) -> bool:
     return missed_behind < missed - _SAME_OUTPUT
 
 
-class _Lump(NamedTuple):
-    """Bodies that a bar carries, as one rigid body in the plane."""
-
-    mass: float
-    centre: tuple[float, float]
-    """Distance (m) from the bar's first pin, and angle (rad) from its line."""
-    inertia: float
-    """About the mass centre and the plane's normal, kg m^2."""
-
-
 class SceneOfLoop:
     """A scene that is made from one loop."""
 
@@ -284,7 +265,7 @@ class SceneOfLoop:
         source: str,
     ) -> Scene:
         """Describe the scene."""
-        lumps = {bar: self._lump(bar) for bar in MOVING_BARS}
+        lumps = {bar: self.seen.lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
         lengths = self.meet_lengths()
         bars = {}
@@ -345,40 +326,12 @@ class SceneOfLoop:
     def _in_plane(self, vector: Array) -> complex:
         return complex(*self.seen.in_plane(vector))
 
-    def _find_polar(self, bar: int, place: Array) -> tuple[float, float]:
-        """Return a place from the first pin of a bar: distance, m, and angle, rad.
-
-        The angle is from the bar's line.
-        """
-        arm = complex(*self.seen.along_bar(bar, place))
-        if abs(arm) <= ROUND_OFF_OF_LOADS * self.loop.lengths[bar - 1]:
-            return 0.0, 0.0
-        return cmath.polar(arm)
-
-    def _lump(self, bar: int) -> _Lump:
-        """Sum what a bar carries."""
-        model = self.model
-        data = self.data
-        bodies = self.carried[bar]
-        masses = model.body_mass[bodies]
-        mass = float(masses.sum())
-        if not mass:
-            return _Lump(0.0, (0.0, 0.0), 0.0)
-        centre = masses @ data.xipos[bodies] / mass
-        inertia = 0.0
-        for body, body_mass in zip(bodies, masses, strict=True):
-            axis = data.ximat[body].reshape(3, 3).T @ self.seen.normal
-            arm = self._in_plane(data.xipos[body] - centre)
-            inertia += float(axis**2 @ model.body_inertia[body])
-            inertia += float(body_mass) * abs(arm) ** 2
-        return _Lump(mass, self._find_polar(bar, centre), inertia)
-
     def _list_armature(self) -> dict[str, float]:
         """Return the armature of each hinge that has any, by its pin, kg m^2."""
         model = self.model
         armature = dict[str, float]()
         for pin, joint in self.loop.hinges.items():
-            size = _reflect_armature(model, joint)
+            size = _reflect(model, joint, "armature")
             if size:
                 armature[pin] = size
                 name = name_joint(model, joint)
@@ -407,19 +360,12 @@ class SceneOfLoop:
             yield Gravity(round_off(abs(pull)), _round_angle(angle))
         hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
         rubbing = is_enabled(model, "frictionloss", "constraint")
-        damping = []
-        friction = []
-        for pin, joint in hinges.items():
-            coefficient = _reflect_damping(model, joint)
-            if coefficient:
-                damping.append((pin, round_off(coefficient)))
-            torque = float(model.dof_frictionloss[model.jnt_dofadr[joint]]) * rubbing
-            if torque:
-                friction.append((pin, round_off(torque)))
-        if damping:
-            yield Viscous(tuple(damping))
-        if friction:
-            yield Friction(tuple(friction))
+        damping = {pin: _reflect(model, hinges[pin], "damping") for pin in hinges}
+        couples = model.dof_frictionloss[model.jnt_dofadr[[*hinges.values()]]] * rubbing
+        friction = dict(zip(hinges, couples.tolist(), strict=True))
+        for make, at_pins in ((Viscous, damping), (Friction, friction)):
+            if any(at_pins.values()):
+                yield make(tuple((p, round_off(x)) for p, x in at_pins.items() if x))
         springs = tuple(self._list_springs(hinges, at_start))
         if springs:
             yield Torsion(springs)
@@ -461,7 +407,7 @@ class SceneOfLoop:
             force = -float(lifted.sum()) * self._in_plane(self.gravity)
             if not force:
                 continue
-            place = self._find_polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
+            place = self.seen.polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
             size = round_off(abs(force))
             angle = _round_angle(cmath.phase(force))
             from_pin = (round_off(place[0]), _round_angle(place[1]))
@@ -568,7 +514,7 @@ class SceneOfLoop:
         if text not in self.remarks:
             self.remarks.append(text)
 
-    def _remark_what_is_left_out(self, lumps: dict[int, _Lump]) -> None:
+    def _remark_what_is_left_out(self, lumps: dict[int, Lump]) -> None:
         """Name what acts on the loop and is not in the scene."""
         model = self.model
         loop = self.loop
@@ -642,10 +588,10 @@ class SceneOfLoop:
 
 def _find_run(free: NDArray[np.bool_], near: int) -> tuple[int, int]:
     """Return the ends of the run of True that is nearest to an index."""
-    edges = np.flatnonzero(np.diff(free)) + 1
-    runs = [run for run in np.split(np.arange(len(free)), edges) if free[run[0]]]
-    nearest = min(runs, key=lambda run: int(np.abs(run - near).min()))
-    return int(nearest[0]), int(nearest[-1])
+    runs = groupby(range(len(free)), key=lambda index: bool(free[index]))
+    of_true = [[*run] for is_free, run in runs if is_free]
+    nearest = min(of_true, key=lambda run: min(abs(index - near) for index in run))
+    return nearest[0], nearest[-1]
 
 
 def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
@@ -657,10 +603,9 @@ def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
         return -math.inf, math.inf
     ranges = []
     for first, last in find_intervals(linkage):
-        middle = 0.5 * (first + last)
-        turns = math.tau * round((theta_2 - middle) / math.tau)
-        ranges.append((first + turns, last + turns))
-    outside = [max(ends[0] - theta_2, theta_2 - ends[1]) for ends in ranges]
-    first, last = ranges[int(np.argmin(outside))]
-    margin = min(ANGLE_FROM_LIMITS, 0.25 * (last - first))
-    return first + margin, last - margin
+        half = 0.5 * (last - first)
+        away = math.remainder(theta_2 - first - half, math.tau)
+        ranges.append((abs(away) - half, theta_2 - away, half))
+    _, middle, half = min(ranges)
+    half -= min(ANGLE_FROM_LIMITS, 0.5 * half)
+    return middle - half, middle + half

@@ -1,11 +1,14 @@
 """A loop of a compiled model in the axes of a scene, as its entries are described."""
 
+import cmath
 from copy import copy
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_roots,
     is_enabled,
@@ -20,6 +23,20 @@ _PLANES = {2: "x-y", 1: "x-z", 0: "y-z"}
 _UPRIGHT = 1e-9
 """Sine of the angle to an axis of the world from which a plane is named by its normal.
 """
+
+
+_AT_A_PIN = 1e-9
+"""Part of a bar's length below which a place is its first pin, but for round-off."""
+
+
+class Lump(NamedTuple):
+    """Bodies that a bar carries, as one rigid body in the plane."""
+
+    mass: float
+    centre: tuple[float, float]
+    """Distance (m) from the bar's first pin, and angle (rad) from its line."""
+    inertia: float
+    """About the mass centre and the plane's normal, kg m^2."""
 
 
 class SeenLoop(LoopFrame):
@@ -109,9 +126,31 @@ class SeenLoop(LoopFrame):
         """List the bodies of a bar."""
         return [body for body in range(self.model.nbody) if self.bar(body) == bar]
 
-    def list_actuators(self, joint: int) -> list[int]:
-        """List the actuators on a joint."""
-        return list_actuators(self.model, joint)
+    def polar(self, bar: int, place: Array) -> tuple[float, float]:
+        """Return a place from the first pin of a bar: distance, m, and angle, rad.
+
+        The angle is from the bar's line.
+        """
+        arm = complex(*self.along_bar(bar, place))
+        if abs(arm) <= _AT_A_PIN * self.loop.lengths[bar - 1]:
+            return 0.0, 0.0
+        return cmath.polar(arm)
+
+    def lump(self, bar: int) -> Lump:
+        """Sum what a bar carries."""
+        bodies = self.list_parts(bar)
+        masses = self.model.body_mass[bodies]
+        mass = float(masses.sum())
+        if not mass:
+            return Lump(0.0, (0.0, 0.0), 0.0)
+        places = self.data.xipos[bodies]
+        centre = masses @ places / mass
+        arms = (places - centre) @ self.axes.T
+        turns = self.data.ximat[bodies].reshape(-1, 3, 3)
+        across = (self.normal @ turns) ** 2
+        inertia = (across * self.model.body_inertia[bodies]).sum()
+        inertia += masses @ (arms**2).sum(axis=1)
+        return Lump(mass, self.polar(bar, centre), float(inertia))
 
     def stops(self, pin: str) -> tuple[float, float] | None:
         """Return the range of a pin, rad, or None without stops.

@@ -19,13 +19,12 @@ import mujoco
 
 from fourbar.errors import LimitError
 from fourbar_validation.engines.mujoco.robots.answers import (
-    DecidingState,
     InsideAnswer,
     LoopMotion,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
-    divide,
+    WorstState,
 )
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
@@ -126,19 +125,19 @@ class SettingsSearch:
         """Find the cheapest combination within an error."""
         before = self.measure(self.own)
         alone = sorted(map(self.measure, self._list_alone()), key=lambda one: one.error)
-        best, reached = self._find_cheapest(wanted)
-        typed = _write_elements(file, self.inside.loop, best)
-        within = None if reached else self.find_range(best.settings, wanted)
+        best = self._find_cheapest(wanted)
+        tried = len(self.tried)
+        within = None
+        if best.error > wanted:
+            within = self.find_range(best.settings, wanted)
         return SettingsAdvice(
             wanted,
             len(self.motion.angle),
             before,
             tuple(alone),
             best,
-            reached,
-            len(self.tried),
-            typed,
-            self.find_deciding(best.settings),
+            tried,
+            _write_elements(file, self.inside.loop, best),
             within,
         )
 
@@ -158,26 +157,6 @@ class SettingsSearch:
             answers.append(inside.answer_states(motion))
             answers.append(inside.answer_through_time(motion))
         return answers
-
-    def find_deciding(self, settings: RobotSettings) -> DecidingState | None:
-        """Return the state of the worst error, or None without an answer."""
-        answers = self._answer(settings, self.motion)
-        if len(answers) < 2 or answers[1].lost:
-            return None
-        scales = answers[0].scales(self.inside.lever)
-        states = [
-            DecidingState(
-                answer is answers[1],
-                name,
-                row.joint,
-                row.angle,
-                divide(float(error), scales[name]),
-            )
-            for answer in answers
-            for name, errors in answer.errors().items()
-            for row, error in zip(answer.rows, errors, strict=True)
-        ]
-        return max(states, key=lambda state: state.error)
 
     def find_range(
         self, settings: RobotSettings, wanted: float
@@ -205,7 +184,7 @@ class SettingsSearch:
             if last - first < 2 or tried == RANGES_TRIED:
                 return None
             scales = parts[0].scales(self.inside.lever)
-            if max(part.find_worst(scales) for part in parts) > wanted:
+            if max(part.find_worst(scales) for part in parts).error > wanted:
                 continue
             tried += 1
             inside = tuple(places[first : last + 1])
@@ -220,7 +199,8 @@ class SettingsSearch:
         """Measure what settings reach."""
         if settings in self.tried:
             return self.tried[settings]
-        states = through = gap = seconds = math.inf
+        states = through = WorstState(math.inf)
+        gap = seconds = math.inf
         answers = self._answer(settings, self.motion)
         if answers:
             scales = answers[0].scales(self.inside.lever)
@@ -271,11 +251,10 @@ class SettingsSearch:
             "timestep": [own.timestep, *(factor * own.timestep for factor in _FINER)],
         }
 
-    def _find_cheapest(self, wanted: float) -> tuple[TriedSettings, bool]:
-        """Try combinations until one serves, and return it and True.
+    def _find_cheapest(self, wanted: float) -> TriedSettings:
+        """Try combinations until one serves, first the cheapest with fewest changes.
 
-        The cheapest with the fewest changes is tried first. If none serves in time, the
-        most accurate one and False are returned.
+        If none serves in time, the most accurate one is returned.
         """
         values = self._list_values()
         solvers: list[dict[str, Any]] = [{}]
@@ -294,8 +273,8 @@ class SettingsSearch:
                 break
             measured = self.measure(settings)
             if measured.error <= wanted:
-                return measured, True
-        return min(self.tried.values(), key=lambda one: one.error), False
+                return measured
+        return min(self.tried.values(), key=lambda one: one.error)
 
     def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
         """Return the key by which combinations are sorted.
