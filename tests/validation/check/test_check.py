@@ -263,9 +263,14 @@ def scaled(**factors):
     return partial(weigh, **factors)
 
 
-def about_pin(bar):
-    added = bar.mass * bar.mass_centre[0] ** 2
-    return replace(bar, inertia=bar.moment_of_inertia + added)
+def steiner(sign):
+    """Move the axis of the moment of inertia from G to the first pin, or back."""
+
+    def move(bar):
+        added = sign * bar.mass * bar.mass_centre[0] ** 2
+        return replace(bar, inertia=bar.moment_of_inertia + added)
+
+    return move
 
 
 def about_end(bar):
@@ -344,7 +349,8 @@ OF_A_BAR = {
     "mass centre taken at mid-bar": centred(lambda d, x, y: (d / 2.0, 0.0)),
     "mass centre turned by 180 deg": centred(lambda d, x, y: (-x, -y)),
     "mass centre on the other side of the bar's line": centred(lambda d, x, y: (x, -y)),
-    "inertia about the pin": about_pin,
+    "inertia about the pin": steiner(1.0),
+    "inertia about G used as the inertia about the pin": steiner(-1.0),
     "mass left out": scaled(mass=0.0),
     "mass and moment of inertia left out": scaled(mass=0.0, inertia=0.0),
 }

@@ -4,7 +4,6 @@ Every pair of bars holds, faults show, who cannot do it says so.
 """
 
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -16,145 +15,68 @@ from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.guests import GuestClient, Hello, Program
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.question import FREE_BODY
 from tests.support.scenes import crank_rocker
+from tests.validation.engines.test_engines import driven
 
-FREE_BODY = [engine for engine in ENGINES if engine.name == "free-body"]
-EXACT = [
-    engine
-    for engine in (*ENGINES, *load_further())
-    if not engine.through_time and engine not in FREE_BODY
-]
-PAIRS = list(combinations((1, 2, 3, 4), 2))
-PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
+EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time]
 
 
-def driven(one, other, **changes):
-    ends = Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7))
-    motion = fourbar.Motion(
-        np.linspace(0.1, 6.2, 25),
-        10.0,
-        5.0,
-    )
-    return crank_rocker(motion=motion, drive=LinearDrive(*ends), **changes)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_every_pair_of_bars_agrees_with_thirteen_equations(one, other):
-    for effects in (
-        (fourbar.Gravity(), fourbar.Viscous.at(B=0.02)),
-        (fourbar.Gravity(), PINS),
-    ):
-        for branch in (1, -1):
-            scene = driven(one, other, effects=effects)
-            rows = judge(
-                "",
-                replace(scene, motion=scene.motion.replace(branch=branch)),
-                FREE_BODY,
-            ).rows
-            assert not [row for row in rows if row.failed]
-            agreeing = {
-                row.quantity
-                for row in rows
-                if row.engine == "free-body" and row.verdict == AGREES
-            }
-            assert agreeing >= {
-                "drive_force",
-                "stroke",
-                "drive_line",
-                "stroke_speed",
-                "drive_condition",
-                "F12",
-            }
-            assert "drive_force_inertia" in agreeing and "torque" not in agreeing
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(
-    engine, one, other
-):
+def judge_by(engine, scene):
+    """Return the rows of an engine by quantity."""
     if missing := engine.missing():
         pytest.skip(missing)
-    for effects in (
-        (fourbar.Gravity(), fourbar.Viscous.at(B=0.02)),
-        (fourbar.Gravity(), PINS),
-    ):
-        rows = judge("", driven(one, other, effects=effects), [*FREE_BODY, engine]).rows
-        assert not [row for row in rows if row.failed]
-        agreeing = {
-            row.quantity
-            for row in rows
-            if row.engine == engine.name and row.verdict == AGREES
-        }
-        assert agreeing >= {
-            "drive_force",
-            "stroke",
-            "stroke_speed",
-            "drive_force_inertia",
-            "F12",
-            "F32",
-            "F43",
-            "F14",
-        }
+    rows = judge("", scene, [engine]).rows
+    return {row.quantity: row for row in rows if row.engine == engine.name}
 
 
-@pytest.mark.parametrize("engine", [*FREE_BODY, *EXACT], ids=lambda engine: engine.name)
+@pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, gap):
-    if missing := engine.missing():
-        pytest.skip(missing)
-    linkage = crank_rocker().linkage
-    (theta_4,) = fourbar.solve(
-        crank_rocker(motion=fourbar.Motion(1.0)), "position"
-    ).theta_4
+    at = crank_rocker(motion=fourbar.Motion(1.0))
+    linkage, (theta_4,) = at.linkage, fourbar.solve(at, "position").theta_4
     on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
-    drive = LinearDrive(
-        Place(1, (abs(on_bar + gap), np.angle(on_bar + gap))), Place(4, (0.2, 0.4))
-    )
+    near = Place(1, (abs(on_bar + gap), np.angle(on_bar + gap)))
     scene = crank_rocker(
         motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
-        drive=drive,
+        drive=LinearDrive(near, Place(4, (0.2, 0.4))),
     )
     assert fourbar.solve(scene, "position").stroke == pytest.approx(gap, rel=0.5)
-    rows = {
-        row.quantity: row
-        for row in judge("", scene, [engine]).rows
-        if row.engine == engine.name
-    }
+    rows = judge_by(engine, scene)
     for quantity in ("stroke", "drive_line", "stroke_speed", "drive_force", "F14"):
-        assert (
-            rows[quantity].verdict == AGREES and rows[quantity].allowed < 1e-12 / gap
-        ), quantity
+        row = rows[quantity]
+        assert row.verdict == AGREES and row.allowed < 1e-12 / gap, quantity
 
 
-def test_positions_alone_have_a_stroke_that_is_judged():
-    scene = driven(3, 4)
-    rows = judge(
-        "", replace(scene, motion=scene.motion.replace(speed=None)), FREE_BODY
-    ).rows
+STANDING = {"speed": 0.0, "acceleration": 0.0}
+DRY = (fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02))
+JUDGED = {
+    "with its inertia": (
+        (2, 4),
+        {},
+        {},
+        {"drive_condition", "drive_force", "drive_force_inertia"},
+    ),
+    "positions alone": ((3, 4), {"speed": None}, {}, {"stroke", "drive_line"}),
+    "statics and friction at rest": (
+        (1, 3),
+        STANDING,
+        {"effects": DRY},
+        {"drive_force_low", "drive_force_high"},
+    ),
+}
+"""Pair of bars, motion, what acts, and quantities that agree besides."""
+
+
+@pytest.mark.parametrize("what", JUDGED)
+def test_what_is_stated_of_a_line_is_judged(what):
+    pair, motion, acting, quantities = JUDGED[what]
+    scene = driven(*pair, 1, **{"effects": (fourbar.Gravity(),)} | acting)
+    scene = replace(scene, motion=scene.motion.replace(**motion))
+    rows = judge("", scene, [FREE_BODY]).rows
     assert not [row for row in rows if row.failed]
-    assert {"stroke", "drive_line"} <= {
-        row.quantity for row in rows if row.verdict == AGREES
-    }
-
-
-def test_statics_and_friction_at_rest_agree_too():
-    scene = driven(
-        1,
-        3,
-        effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02)),
-    )
-    rows = judge(
-        "",
-        replace(scene, motion=scene.motion.replace(speed=0.0, acceleration=0.0)),
-        FREE_BODY,
-    ).rows
-    assert not [row for row in rows if row.failed]
-    assert {"drive_force_low", "drive_force_high"} <= {
-        row.quantity for row in rows if row.verdict == AGREES
-    }
+    agreeing = {row.quantity for row in rows if row.verdict == AGREES}
+    assert quantities <= agreeing and "torque" not in agreeing
 
 
 def _reversed(self, actions, force, act=LinearDrive.act):
@@ -194,18 +116,15 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_drive_is_caught(monkeypatch, fault):
     monkeypatch.setattr(LinearDrive, *FAULTS[fault])
-    rows = judge("", driven(2, 4), FREE_BODY).rows
-    assert [row for row in rows if row.verdict == FAILS]
+    scene = driven(2, 4, 1, (fourbar.Gravity(),))
+    assert [row for row in judge("", scene, [FREE_BODY]).rows if row.verdict == FAILS]
 
 
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it():
-    scene = driven(1, 4)
-    assert (
-        "a drive that exerts a force"
-        in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
-    )
+    scene = driven(1, 4, 1, (fourbar.Gravity(),))
     outside = GuestClient("outside", Program(("none",)), Hello("outside"))
-    assert (
-        outside.answer(scene, fourbar.command(scene)).refusal
-        == "the engine's hello does not list gravity, loads, cylinder in effects"
-    )
+    for engine, words in (
+        (BallArithmetic(), "a drive that exerts a force"),
+        (outside, "hello does not list gravity, loads, cylinder in effects"),
+    ):
+        assert words in engine.answer(scene, fourbar.command(scene)).refusal

@@ -2,8 +2,6 @@
 conversion of them.
 """
 
-import math
-
 import numpy as np
 import pytest
 
@@ -26,37 +24,29 @@ LOADED = crank_rocker(
 
 def test_places_are_sums_of_vectors_along_and_across_the_bar():
     stated = state_from_pins(LOADED)
-    for load, from_centre in zip(
-        stated.loads,
-        ((0.05, 1.0), (0.04, -2.0)),
-        strict=True,
-    ):
+    polar = ((0.05, 1.0), (0.04, -2.0))
+    for load, (distance, angle) in zip(stated.loads, polar, strict=True):
         r, phi = find_centre(LOADED.linkage.bar(load.bar))
-        x = r * math.cos(phi) + from_centre[0] * math.cos(from_centre[1])
-        y = r * math.sin(phi) + from_centre[0] * math.sin(from_centre[1])
-        assert load.place is not None
-        assert load.place.from_pin == pytest.approx(
-            (math.hypot(x, y), math.atan2(y, x))
-        )
+        z = r * np.exp(1j * phi) + distance * np.exp(1j * angle)
+        assert load.place.from_pin == pytest.approx((abs(z), np.angle(z)))
 
 
 def test_a_place_that_the_formulas_misread_widens_nothing(monkeypatch):
     """With places from G far away, a torque would be allowed to be as far off."""
     solution = fourbar.solve(LOADED)
-    sizes = {
-        name: TermSizes(LOADED, solution).sum_terms(name) for name in ("F12", "torque")
-    }
-    polar = Place.polar_from_pin
+
+    def sum_terms():
+        names = ("F12", "torque")
+        return [TermSizes(LOADED, solution).sum_terms(name) for name in names]
+
+    sizes, polar = sum_terms(), Place.polar_from_pin
 
     def misread(place):
         distance, angle = polar(place)
         return (distance if place.from_centre is None else 1e8 * distance), angle
 
     monkeypatch.setattr(Place, "polar_from_pin", misread)
-    for name, terms in sizes.items():
-        np.testing.assert_array_equal(
-            TermSizes(LOADED, solution).sum_terms(name), terms
-        )
+    np.testing.assert_array_equal(sum_terms(), sizes)
 
 
 def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(monkeypatch):
@@ -67,8 +57,4 @@ def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(monkeypa
     )
     few = _take_plain_positions(question)
     at = [int(np.argmin(abs(question.at.angle - x))) for x in few.command.angle]
-    np.testing.assert_allclose(
-        few.solution.torque,
-        wanted[at],
-        rtol=1e-12,
-    )
+    np.testing.assert_allclose(few.solution.torque, wanted[at], rtol=1e-12)

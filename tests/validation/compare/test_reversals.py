@@ -31,14 +31,16 @@ ROUNDING = 1e-13
 """rad; near the reversal the speed that vanishes carries some hundred roundings."""
 
 
-def scene(pin, drive=2, start=0.1):
-    sweep = Sweep(start, start + 2 * math.pi, 36)
-    return Scene(
-        LINKAGE,
-        Motion(sweep, 10.0),
-        drive,
-        effects=(Friction.at(**{pin: FRICTION}),),
-    )
+def scene(pin, start=0.1):
+    motion = Motion(Sweep(start, start + 2 * math.pi, 36), 10.0)
+    return Scene(LINKAGE, motion, effects=(Friction.at(**{pin: FRICTION}),))
+
+
+def reverse(pin):
+    """Return the solution of a scene, and its reversals."""
+    posed = scene(pin)
+    solution = solve(posed)
+    return solution, find_reversals(posed, command(posed), solution)
 
 
 def dead_centres():
@@ -60,12 +62,9 @@ def test_they_are_where_geometry_puts_them(pin, places):
 
     Bars 3 and 4 turn together where A lies on the line of centres.
     """
-    posed = scene(pin)
-    reversals = find_reversals(posed, command(posed), solve(posed))
-    assert [reversal.theta_2 for reversal in reversals] == pytest.approx(
-        places,
-        abs=ROUNDING,
-    )
+    _, reversals = reverse(pin)
+    found = [reversal.theta_2 for reversal in reversals]
+    assert found == pytest.approx(places, abs=ROUNDING)
     assert {reversal.pin for reversal in reversals} <= {pin}
 
 
@@ -74,13 +73,10 @@ def test_the_jump_is_that_of_statics():
 
     Bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|.
     """
-    posed = scene("O4")
-    for reversal in find_reversals(posed, command(posed), solve(posed)):
+    for reversal in reverse("O4")[1]:
         sine = abs(float(reversal.before.sin_mu[0]))
-        assert reversal.jump("F43") == pytest.approx(
-            2 * FRICTION / (C * sine),
-            rel=1e-9,
-        )
+        due = 2 * FRICTION / (C * sine)
+        assert reversal.jump("F43") == pytest.approx(due, rel=1e-9)
         assert reversal.jump("torque") < 1e-9  # its power f |slip| is continuous
         assert "O4" in str(reversal) and "jumps from" in str(reversal)
 
@@ -91,14 +87,9 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start):
 
     The engines' rounding decides their sense there.
     """
-    record = judge(
-        "scene",
-        scene("B", start=start),
-        [engine for engine in ENGINES if not engine.through_time],
-    )
-    assert all(row.passed for row in record.rows), [
-        row for row in record.rows if not row.passed
-    ]
+    exact = [engine for engine in ENGINES if not engine.through_time]
+    record = judge("scene", scene("B", start=start), exact)
+    assert [row for row in record.rows if not row.passed] == []
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)
     assert len(record.reversals) == (
@@ -107,9 +98,7 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start):
 
 
 def test_a_curve_is_not_drawn_across_the_jump():
-    posed = scene("O4")
-    solution = solve(posed)
-    reversals = find_reversals(posed, command(posed), solution)
+    solution, reversals = reverse("O4")
     x, y = break_curve(
         solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0]
     )
@@ -125,19 +114,16 @@ def test_only_a_pin_that_hardly_slips_reverses():
     """Bars 2 and 3 turn at 2 and 2 + x: the mask is x <= slip (2 + 2 + x + 2)."""
     slip = 1e-6
     x = np.array([0.0, 5.9e-6, 6.1e-6, 1e-3, 1.0])
-    effects = (Friction((("A", FRICTION),)),)
-    dry = Scene(
-        LINKAGE,
-        Motion(Sweep(0.1, 0.5, 4), 2.0),
-        effects=effects,
-    )
-    ones = np.ones(5)
-    speeds = {"omega_2": 2.0 * ones, "omega_3": 2.0 + x, "omega_4": ones}
-    solution = replace(solve(dry), condition=ones, **speeds)
-    reversing = mark_reversing(dry, solution, slip)
-    assert reversing.tolist() == [True, True, False, False, False]
+    dry = replace(scene("A"), motion=Motion(Sweep(0.1, 0.5, 4), 2.0))
+    solved, ones = solve(dry), np.ones(5)
+
+    def mark(omega_2, omega_3, omega_4, **how):
+        speeds = {"omega_2": omega_2, "omega_3": omega_3, "omega_4": omega_4}
+        solution = replace(solved, condition=ones, **speeds)
+        return mark_reversing(dry, solution, slip, **how).tolist()
+
+    reversing = mark(2.0 * ones, 2.0 + x, ones)
+    assert reversing == [True, True, False, False, False]
     slow = np.array([1.0, 1.1e-6, 0.9e-6, 1e-3, 0.5])
-    speeds = {"omega_2": slow, "omega_3": 2.0 * slow, "omega_4": slow}
-    solution = replace(solve(dry), condition=ones, **speeds)
-    at_rest = mark_reversing(dry, solution, slip, in_time=True)
-    assert at_rest.tolist() == [False, False, True, False, False]
+    at_rest = mark(slow, 2.0 * slow, slow, in_time=True)
+    assert at_rest == [False, False, True, False, False]

@@ -19,39 +19,37 @@ from fourbar_validation.compare.scales import (
     find_scale_of_answer,
     scale_of,
 )
-from fourbar_validation.compare.tolerance import WELL_CONDITIONED
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED, magnitude
 from tests.support.scenes import balance
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 
 
-def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_value():
+def solve_with_scale(name, scene):
+    """Return the solution of a scene, and the scale of one of its quantities."""
+    solution = solve(scene)
+    return solution, scale_of(name, scene, solution, solution[name])
+
+
+LOW, HIGH = sorted(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < 3.0)
+
+
+@pytest.mark.parametrize("quantity", ("torque", "F12", "a_G3", "omega_3"))
+def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_value(
+    quantity,
+):
     """It would be larger of terms that cancel.
 
     Near a limit, where forces diverge, it would be too.
     """
-    low, high = sorted(
-        x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi
-    )
-    scene = Scene(
-        ROCKER,
-        Motion(
-            np.append(
-                np.linspace(0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high, 7),
-                high - 1e-7,
-            ),
-            10.0,
-        ),
-    )
-    solution = solve(scene)
+    middle, tenth = 0.5 * (LOW + HIGH), 0.1 * (HIGH - LOW)
+    inside = np.linspace(middle - tenth, middle + tenth, 7)
+    scene = Scene(ROCKER, Motion(np.append(inside, HIGH - 1e-7), 10.0))
+    solution, scale = solve_with_scale(quantity, scene)
     assert solution.condition[-1] < WELL_CONDITIONED <= solution.condition[:-1].min()
-    for quantity in ("torque", "F12", "a_G3", "omega_3"):
-        values = getattr(solution, quantity)
-        size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
-        expected = np.append(np.full(7, size[:-1].max()), size[-1])
-        np.testing.assert_allclose(
-            scale_of(quantity, scene, solution, values).size, expected
-        )
+    size = magnitude(solution[quantity])
+    expected = np.append(np.full(7, size[:-1].max()), size[-1])
+    np.testing.assert_allclose(scale.size, expected)
 
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():
@@ -59,17 +57,9 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():
 
     2 x 50 N on 0.25 m cancel.
     """
-    loads = (
-        Load(2, (50.0, 0.0), arm=(0.05, 0.0)),
-        Load(2, (-50.0, 0.0), arm=(0.05, 0.0)),
-    )
-    scene = Scene(
-        ROCKER,
-        Motion(Sweep(0.5, 0.6, 3), 0.0),
-        loads=loads,
-    )
-    solution = solve(scene)
-    scale = scale_of("torque", scene, solution, solution.torque)
+    loads = (Load(2, (size, 0.0), arm=(0.05, 0.0)) for size in (50.0, -50.0))
+    scene = Scene(ROCKER, Motion(Sweep(0.5, 0.6, 3), 0.0), loads=tuple(loads))
+    _, scale = solve_with_scale("torque", scene)
     assert np.all(scale.size >= 0.25 * 100.0)
     assert np.all(scale.size <= 4.0 * 0.25 * 100.0)
     assert np.all(scale.vanishes) and np.all(scale.cancellation == 1.0)
@@ -77,14 +67,11 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():
 
 def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars():
     """Beside a limit alpha_3 grows without bound, and a_A does not."""
-    low = min(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
-    scene = Scene(ROCKER, Motion(np.array([low + 1e-9]), 10.0))
-    solution = solve(scene)
-    assert abs(solution.alpha_3[0]) > 1e9
     for name in ("v_A", "v_G2", "a_A", "a_G2"):
-        values = getattr(solution, name)
-        size = np.hypot(*values.T)
-        np.testing.assert_allclose(scale_of(name, scene, solution, values).size, size)
+        scene = Scene(ROCKER, Motion([LOW + 1e-9], 10.0))
+        solution, scale = solve_with_scale(name, scene)
+        assert abs(solution.alpha_3[0]) > 1e9
+        np.testing.assert_allclose(scale.size, magnitude(solution[name]))
 
 
 def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest():
@@ -95,9 +82,7 @@ def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest():
     """
     cancelled = {}
     for left in (1e-1, 1e-2, 1e-4):
-        scene = balance(left)
-        solution = solve(scene)
-        scale = scale_of("torque", scene, solution, solution.torque)
+        _, scale = solve_with_scale("torque", balance(left))
         moment = 0.5 * 9.80665 * 0.1
         np.testing.assert_allclose(scale.size, left * moment, rtol=0.02)
         assert not scale.vanishes.any()
@@ -106,34 +91,29 @@ def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest():
         np.testing.assert_allclose(scale.factor, cancelled[left] / 50.0)
         np.testing.assert_allclose(scale.of_terms, cancelled[left] * scale.size)
     assert cancelled[1e-4] / cancelled[1e-2] == pytest.approx(100.0, rel=0.01)
-    scene = balance(1.0)
-    solution = solve(scene)
-    scale = scale_of("torque", scene, solution, solution.torque)
+    _, scale = solve_with_scale("torque", balance(1.0))
     assert np.all(scale.factor == 1.0) and np.all(scale.of_terms == scale.size)
-    angles = scale_of("theta_3", scene, solution, solution.theta_3)
+    _, angles = solve_with_scale("theta_3", balance(1.0))
     assert np.all(angles.size == 1.0) and np.all(angles.cancellation == 1.0)
 
 
 def test_what_vanishes_is_judged_by_its_terms_and_what_has_none_by_nothing():
     scene = balance(1e-13, 0.0)
-    solution = solve(scene)
-    scale = scale_of("torque", scene, solution, solution.torque)
+    _, scale = solve_with_scale("torque", scene)
     assert np.all(scale.vanishes) and np.all(scale.cancellation == 1.0)
     assert np.all(scale.size > 0.5 * 9.8 * 0.1)
-    nothing = scale_of("omega_3", scene, solution, solution.omega_3)
+    _, nothing = solve_with_scale("omega_3", scene)
     assert not (nothing.size.any() or nothing.vanishes.any())
 
 
 def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar():
     """The accelerations of A and B, over the bar's length and the sine between both."""
-    solution = solve(Scene(ROCKER, Motion(np.array([0.9]), 10.0, 7.0)))
     a, b, c = 0.25, 0.1, 0.22
-    terms = a * 107.0 + b * solution.omega_3**2 + c * solution.omega_4**2
-    assert solution.scene is not None
     for name, length in (("alpha_3", b), ("alpha_4", c)):
-        values = getattr(solution, name)
-        scale = scale_of(name, solution.scene, solution, values)
-        expected = terms / (length * solution.condition * np.abs(values))
+        scene = Scene(ROCKER, Motion([0.9], 10.0, 7.0))
+        s, scale = solve_with_scale(name, scene)
+        terms = a * 107.0 + b * s.omega_3**2 + c * s.omega_4**2
+        expected = terms / (length * s.condition * np.abs(s[name]))
         np.testing.assert_allclose(scale.cancellation, expected)
 
 
@@ -152,16 +132,12 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
 
 def test_the_pair_that_allows_less_of_an_error_is_taken_whole():
     """Allowed are size times max(1, N/50): 4 and 3, 2 and 6, nothing known and 1."""
-    no = np.zeros(3, dtype=bool)
-    ours = Scale(
-        np.array([2.0, 2.0, np.nan]),
-        np.array([100.0, 1.0, np.nan]),
-        no,
-    )
-    theirs = Scale(
-        np.array([3.0, 1.0, 1.0]),
-        np.array([1.0, 300.0, 1.0]),
-        ~no,
+    ours, theirs = (
+        Scale(np.array(size), np.array(cancellation), np.full(3, vanishes))
+        for size, cancellation, vanishes in (
+            ([2.0, 2.0, np.nan], [100.0, 1.0, np.nan], False),
+            ([3.0, 1.0, 1.0], [1.0, 300.0, 1.0], True),
+        )
     )
     taken = ours.take_strictest(theirs)
     assert taken.size.tolist() == [3.0, 2.0, 1.0]

@@ -22,8 +22,21 @@ class Told:
         return Answer(self.name, "exact", at=self.at or command)
 
 
+@pytest.fixture
+def told():
+    """Ask an engine that keeps what it is told: its command, and that of the answer."""
+
+    def ask(scene, at=None):
+        engine = Told()
+        engine.at = at
+        made = ask_at(engine, scene, fourbar.command(scene)).at
+        return engine.command, made
+
+    return ask
+
+
 @pytest.mark.parametrize("branch", [1, -1])
-def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch):
+def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch, told):
     """With a single change point the sign is back after two turns alone.
 
     A motion that the engine made is named by its assembly too.
@@ -31,26 +44,20 @@ def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch):
     linkage = fourbar.uniform(0.4, 0.1, 0.27, 0.23)
     angles = np.radians([90.0, 270.0, 450.0, 630.0])
     scene = Scene(linkage, fourbar.Motion(angles, 3.0, branch=branch))
-    command, engine = fourbar.command(scene), Told()
-    assert ask_at(engine, scene, command).at is command
-    assert engine.command.branch.tolist() == [branch, -branch, -branch, branch]
-    engine.at = engine.command._replace(angle=angles + 1e-3)
-    made = ask_at(engine, scene, command).at
-    assert made is not None and made.branch.tolist() == [branch] * 4
+    command, _ = told(scene)
+    assert command.branch.tolist() == [branch, -branch, -branch, branch]
+    _, made = told(scene, command._replace(angle=angles + 1e-3))
+    assert made.branch.tolist() == [branch] * 4
 
 
-def test_an_engine_is_not_told_the_angles_that_the_formulas_found_from_a_stroke():
+def test_an_engine_is_told_no_angles_that_the_formulas_found_from_a_stroke(told):
     scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
-    command, engine = fourbar.command(scene), Told()
-    ask_at(engine, scene, command)
-    assert np.isfinite(command.angle).all() and np.isnan(engine.command.angle).all()
-    assert np.isnan(np.asarray(engine.command.speed)).all()
-    assert engine.command.condition == 1.0 and not engine.command.lost.any()
-    assert np.isfinite(engine.command.stated[0]).all()
-
-
-def test_without_a_stroke_the_angles_are_the_command():
-    scene, engine = crank_rocker(), Told()
-    command = fourbar.command(scene)
-    ask_at(engine, scene, command)
-    np.testing.assert_array_equal(engine.command.angle, command.angle)
+    command, _ = told(scene)
+    assert np.isfinite(fourbar.command(scene).angle).all()
+    assert np.isnan(command.angle).all() and np.isnan(command.speed).all()
+    assert command.condition == 1.0 and not command.lost.any()
+    assert np.isfinite(command.stated[0]).all()
+    scene = crank_rocker()
+    command, made = told(scene)
+    np.testing.assert_array_equal(command.angle, fourbar.command(scene).angle)
+    np.testing.assert_array_equal(made.angle, command.angle)

@@ -29,26 +29,19 @@ def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
     """In their doubles the bars miss the line by the root of a rounding, 1e-8."""
     linkage = fourbar.uniform(*(float(number) * unit for number in stated))
     scale = Fraction("0.0254") if unit == INCH else Fraction(1, 1000)
-    assert find_stated_lengths(linkage.lengths) == [
-        Fraction(text) * scale for text in stated
-    ]
-    command = fourbar.command(
-        fourbar.Scene(linkage, fourbar.Motion(np.array([0.0, math.pi]), 1.0))
-    )
-    sines = np.abs(compute_exact_sines(linkage, command))
-    assert np.nanmin(sines) < 1e-15
-    longer = fourbar.uniform(
-        linkage.ground, *(x * (1 + 1e-9) for x in linkage.lengths[1:])
-    )
+    exact = [Fraction(text) * scale for text in stated]
+    assert find_stated_lengths(linkage.lengths) == exact
+    scene = fourbar.Scene(linkage, fourbar.Motion([0.0, math.pi], 1.0))
+    command = fourbar.command(scene)
+    assert np.nanmin(np.abs(compute_exact_sines(linkage, command))) < 1e-15
+    d, *others = linkage.lengths
+    longer = fourbar.uniform(d, *(x * (1 + 1e-9) for x in others))
     assert np.all(~(np.abs(compute_exact_sines(longer, command)) < 1e-6))
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.1, 0.2, 0.3, 0.4001)])
 def test_other_lengths_are_their_doubles(lengths):
-    linkage = fourbar.uniform(*lengths)
-    assert find_stated_lengths(linkage.lengths) == [
-        Fraction(length) for length in lengths
-    ]
+    assert find_stated_lengths(lengths) == [Fraction(length) for length in lengths]
 
 
 def test_the_status_on_a_change_point_in_decimals_is_right():

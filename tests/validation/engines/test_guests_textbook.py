@@ -58,12 +58,6 @@ def test_it_agrees_on_a_balanced_crank(left):
 
 
 @pytest.mark.slow
-def test_it_agrees_on_random_scenes():
-    drawn = (draw_random_scene(991, i, tuple(DrawnType)) for i in range(10))
-    assert sum(map(check, drawn)) >= 5
-
-
-@pytest.mark.slow
 def test_it_agrees_on_a_hundred_random_scenes():
     drawn = (draw_random_scene(993, i, tuple(DrawnType)) for i in range(100))
     assert sum(map(check, drawn)) >= 65

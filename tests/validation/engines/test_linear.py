@@ -1,5 +1,4 @@
-from fractions import Fraction
-
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -15,33 +14,23 @@ def test_what_few_equations_fix_keeps_its_digits_beside_unknowns_that_are_large(
     the large unknowns in the small one.
     """
     rng = np.random.default_rng(57)
-    worst_of_elimination = 0.0
+    lost = 0.0
     for _ in range(20):
         matrix = np.vstack([np.eye(3)[0], rng.uniform(1.0, 5.0, (2, 3))])
         right = np.array([steady, *rng.uniform(1e5, 1e6, 2)])
         x = solve_refined(matrix, right)
         allowed = EPS * steady + (K * EPS) ** 2 * np.abs(x).max()
         assert abs(x[0] - steady) <= allowed
-        # the others by Cramer's rule in exact fractions
-        (a, b), (c, d) = [[Fraction(n) for n in row] for row in matrix[1:, 1:]]
-        first, second = (
-            Fraction(r) - Fraction(k) * Fraction(steady)
-            for r, k in zip(right[1:], matrix[1:, 0], strict=True)
-        )
-        exact = [
-            float((first * d - b * second) / (a * d - b * c)),
-            float((a * second - c * first) / (a * d - b * c)),
-        ]
+        with mp.workdps(50):
+            exact = [float(one) for one in mp.lu_solve(matrix.tolist(), right.tolist())]
         condition = np.linalg.cond(matrix)
-        assert np.abs(x[1:] / exact - 1.0).max() <= K * EPS * condition
-        eliminated = np.linalg.solve(matrix, right)
-        worst_of_elimination = max(worst_of_elimination, abs(eliminated[0] - steady))
-    assert worst_of_elimination > 1e-12  # the scene shows what the step is for
+        assert np.abs(x[1:] / exact[1:] - 1.0).max() <= K * EPS * condition
+        lost = max(lost, abs(np.linalg.solve(matrix, right)[0] - steady))
+    assert lost > 1e-12  # the scene shows what the step is for
 
 
 def test_many_systems_are_solved_at_once():
     rng = np.random.default_rng(1)
     matrices, right = rng.normal(size=(4, 3, 3)), rng.normal(size=(4, 3, 2))
     solved = solve_refined(matrices, right)
-    for matrix, columns, x in zip(matrices, right, solved, strict=True):
-        np.testing.assert_allclose(matrix @ x, columns, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(matrices @ solved, right, rtol=0.0, atol=1e-13)

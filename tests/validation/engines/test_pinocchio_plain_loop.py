@@ -1,28 +1,44 @@
-"""A plain loop over Pinocchio's own calls."""
+"""Plain loops over the calls of Pinocchio and of MuJoCo."""
+
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from fourbar.files import load
+import fourbar
+from fourbar.errors import LimitError
 from fourbar.scene import command
 from fourbar_validation.advise.worst_errors import compute_errors
+from fourbar_validation.engines.mujoco.plain_loop import MujocoInverseLoop
 from fourbar_validation.engines.pinocchio_plain_loop import PinocchioLoop
-from fourbar_validation.scenes.suites import MODELS
+from fourbar_validation.places import MODELS
 from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 
+SCENES = (
+    *(crank_rocker(drive_bar=bar) for bar in (2, 3)),
+    low_parallelogram(),
+    thesis(np.radians([100.0, 135.0])),
+    fourbar.load(MODELS / "crank_rocker.toml"),
+)
 
-def test_it_answers_to_round_off():
+
+@pytest.mark.parametrize("loop", [PinocchioLoop, MujocoInverseLoop])
+def test_it_answers_to_round_off(loop):
     """Where bar 2 or 3 is driven, close to limits, beyond a change point.
 
     Loads are placed from any origin.
     """
-    scenes = [crank_rocker(drive_bar=bar) for bar in (2, 3)]
-    scenes += [
-        low_parallelogram(),
-        thesis(np.radians([100.0, 135.0])),
-        load(MODELS / "crank_rocker.toml"),
-    ]
-    for scene in scenes:
+    for scene in SCENES:
         rows = command(scene)
-        assert (
-            compute_errors(scene, rows, PinocchioLoop(scene).answer(rows)).worst < 1e-11
-        )
+        assert compute_errors(scene, rows, loop(scene).answer(rows)).worst < 1e-11
+
+
+def test_friction_of_loaded_pins_and_cylinders_are_refused():
+    sliding = crank_rocker(effects=(fourbar.PinFriction.at(A=(0.2, 0.02)),))
+    cylinder = fourbar.load(MODELS / "capabilities" / "cylinder_2_4.toml")
+    for scene, words in (
+        (sliding, "loads of pins"),
+        (replace(cylinder, loads=()), "no cylinder"),
+    ):
+        with pytest.raises(LimitError, match=words):
+            PinocchioLoop(scene)

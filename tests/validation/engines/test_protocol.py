@@ -25,7 +25,7 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import bare, crank_rocker
 
 FILES = sorted(MODELS.rglob("*.toml"))
 RANDOM = (*(Random(40, 3, types) for types in (tuple(DrawnType), ())),)
@@ -93,32 +93,22 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
             assert protocol.release_from_json(back, **sent).motion == scene.motion
             continue
         commanded = list_positions(scene)
-        told, command = protocol.command_from_json(
-            back, through_text(protocol.command_to_json(scene, commanded))
-        )
+        sent = through_text(protocol.command_to_json(scene, commanded))
+        told, command = protocol.command_from_json(back, sent)
         if scene.motion.stroke is not None:
+            none = np.full_like(commanded.angle, np.nan)
             commanded = commanded._replace(
-                angle=np.full_like(commanded.angle, np.nan),
-                acceleration=np.full_like(commanded.angle, np.nan),
-                speed=(
-                    None
-                    if commanded.speed is None
-                    else np.full_like(commanded.angle, np.nan)
-                ),
+                angle=none,
+                speed=None if commanded.speed is None else none,
+                acceleration=none,
                 origin=StrokeOrigin(*commanded.stated),
             )
             assert told.motion.side == scene.motion.side
         elif commanded.speed is None:
             commanded = commanded._replace(acceleration=0.0)
-        differing = [
-            name
-            for name in commanded._fields
-            if not same(getattr(command, name), getattr(commanded, name))
-        ]
-        assert not differing, (scene.title, differing)
-        assert protocol.command_to_json(told, command) == protocol.command_to_json(
-            scene, commanded
-        )
+        pairs = zip(commanded._fields, command, commanded, strict=True)
+        assert [name for name, *both in pairs if not same(*both)] == [], scene.title
+        assert through_text(protocol.command_to_json(told, command)) == sent
         seen += 1
     assert seen > 100
 
@@ -128,37 +118,19 @@ def test_nothing_travels_that_the_formulas_computed():
 
     What the file leaves out is left out.
     """
-    scene = replace(
-        crank_rocker(),
-        effects=(fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),))),
-    )
-    data = protocol.scene_to_json(scene)
-    text = dump(scene)
+    acting = (fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),)))
+    scene = crank_rocker(effects=acting)
+    data, text = protocol.scene_to_json(scene), dump(scene)
     for number in numbers_of(data):
         assert repr(number).strip("'") in text, number
     assert data["bars"]["input"] == {"mass": 0.2}
-    assert data["bars"]["coupler"] == {
-        "mass": 0.5,
-        "inertia": 0.004,
-        "centre": [0.13, 0.3],
-    }
-    assert data["loads"][0] == {
-        "bar": 4,
-        "force": [3.0, 0.7],
-        "arm": [0.05, 1.0],
-        "moment": 0.0,
-        "frame": "world",
-    }
+    coupler = {"mass": 0.5, "inertia": 0.004, "centre": [0.13, 0.3]}
+    assert data["bars"]["coupler"] == coupler
+    placed = {"bar": 4, "force": [3.0, 0.7], "arm": [0.05, 1.0]}
+    assert data["loads"][0] == placed | {"moment": 0.0, "frame": "world"}
     assert data["effects"] == {"gravity": [9.81, -math.pi / 2], "viscous": {"O2": 0.01}}
-    massless = replace(
-        scene,
-        linkage=fourbar.FourBar(0.3, *(fourbar.Bar(x) for x in (0.1, 0.25, 0.22))),
-        loads=(),
-    )
-    assert set(protocol.scene_to_json(replace(massless, effects=()))) == {
-        "lengths",
-        "drive",
-    }
+    massless = replace(scene, linkage=bare(0.3, 0.1, 0.25, 0.22), loads=(), effects=())
+    assert set(protocol.scene_to_json(massless)) == {"lengths", "drive"}
 
 
 def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
@@ -170,46 +142,30 @@ def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
         loads=(fourbar.Load(4, moment=1.0, from_centre=(0.1, 0.0), table=table),),
     )
     data = protocol.scene_to_json(scene)
-    assert "from_pin" not in data["loads"][0], "a couple acts alike wherever it is"
-    spring = data["effects"]["springs"][0]
-    assert (spring["stiffness"], spring["length"], spring["preload"]) == (
-        gas.stiffness,
-        gas.length,
-        gas.preload,
+    (load,), (spring,) = data["loads"], data["effects"]["springs"]
+    assert "from_pin" not in load, "a couple acts alike wherever it is"
+    for name in ("stiffness", "length", "preload"):
+        assert spring[name] == getattr(gas, name)
+    assert load["table"] == {"theta_2": [*table.theta_2], "factor": [1.0, 0.5, 1.0]}
+
+
+@pytest.mark.parametrize(
+    "name", ["crank_rocker", "gallery/excavator_bucket", "gallery/tailgate"]
+)
+def test_an_engine_answers_alike_from_both_ends(name):
+    scene = fourbar.load(MODELS / f"{name}.toml")
+    commanded = list_positions(scene)
+    told, command = protocol.command_from_json(
+        protocol.scene_from_json(protocol.scene_to_json(scene)),
+        protocol.command_to_json(scene, commanded),
     )
-    assert data["loads"][0]["table"] == {
-        "theta_2": list(table.theta_2),
-        "factor": [1.0, 0.5, 1.0],
-    }
-
-
-def test_an_engine_answers_alike_from_both_ends():
-    for file in (
-        "crank_rocker.toml",
-        "gallery/excavator_bucket.toml",
-        "gallery/tailgate.toml",
-    ):
-        scene = fourbar.load(MODELS / file)
-        commanded = list_positions(scene)
-        told, command = protocol.command_from_json(
-            protocol.scene_from_json(protocol.scene_to_json(scene)),
-            protocol.command_to_json(scene, commanded),
-        )
-        direct, received = (
-            ask_at(FreeBody(), scene, commanded),
-            FreeBody().answer(told, command),
-        )
-        back = protocol.answer_from_json(
-            "free-body",
-            commanded,
-            through_text(protocol.answer_to_json(told, command, received)),
-        )
-        assert back.quantities.keys() == direct.quantities.keys()
-        assert all(
-            same(back.quantities[name], array)
-            for name, array in direct.quantities.items()
-        )
-        assert same(back.assembled, direct.assembled) and back.at is commanded
+    direct = ask_at(FreeBody(), scene, commanded)
+    answer = FreeBody().answer(told, command)
+    sent = through_text(protocol.answer_to_json(told, command, answer))
+    back = protocol.answer_from_json("free-body", commanded, sent)
+    np.testing.assert_equal(back.quantities, direct.quantities)
+    np.testing.assert_equal(back.assembled, direct.assembled)
+    assert back.at is commanded
 
 
 def test_an_answer_comes_back_with_all_that_it_says():
@@ -217,96 +173,64 @@ def test_an_answer_comes_back_with_all_that_it_says():
     commanded = list_positions(scene)
     n = len(commanded.angle)
     moved = commanded._replace(
-        angle=commanded.angle + 1e-3,
-        speed=np.full(n, 10.01),
-        acceleration=5.0,
+        angle=commanded.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0
     )
-    torque, force = np.linspace(0.0, 1.0, n), np.ones((n, 2))
-    torque[3] = np.nan
-    answer = Answer(
-        "mine",
-        "RK4",
-        moved,
-        np.arange(n) != 3,
-        {"torque": torque, "F12": force},
-        None,
-        {"torque": torque},
-        ["it slipped"],
-        {"gap": 1e-9},
-        "nothing",
-        "everything",
-        0.25,
-    )
-    back = protocol.answer_from_json(
-        "mine",
-        commanded,
-        through_text(protocol.answer_to_json(scene, commanded, answer)),
-    )
-    for name in (
-        "setting",
-        "alarms",
-        "evidence",
-        "shared",
-        "own",
-        "seconds",
-        "refusal",
-    ):
-        assert getattr(back, name) == getattr(answer, name)
+    torque, here = np.linspace(0.0, 1.0, n), np.arange(n) != 3
+    torque[~here] = np.nan
+    said = {
+        "setting": "RK4",
+        "assembled": here,
+        "quantities": {"torque": torque, "F12": np.ones((n, 2))},
+        "predicted": {"torque": torque},
+        "alarms": ["it slipped"],
+        "evidence": {"gap": 1e-9},
+        "shared": "nothing",
+        "own": "everything",
+        "seconds": 0.25,
+        "refusal": None,
+    }
+    answer = Answer("mine", at=moved, **said)
+    sent = through_text(protocol.answer_to_json(scene, commanded, answer))
+    back = protocol.answer_from_json("mine", commanded, sent)
     assert all(same(one, two) for one, two in zip(back.at, moved, strict=True))
-    assert same(back.quantities["torque"], torque) and same(
-        back.predicted["torque"], torque
-    )
-    assert same(back.quantities["F12"], force) and same(
-        back.assembled, answer.assembled
-    )
+    for name, value in said.items():
+        np.testing.assert_equal(getattr(back, name), value)
+
+
+THREE = crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
+
+
+def read_answer(data):
+    return protocol.answer_from_json("mine", list_positions(THREE), data)
 
 
 def test_what_an_answer_leaves_out_has_defaults():
-    commanded = list_positions(
-        crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
-    )
-    answer = protocol.answer_from_json(
-        "mine",
-        commanded,
-        {"answers": {"torque": [1, None, 3], "F12": [[1, 2], None, None]}},
-    )
-    assert (
-        answer.assembled.tolist() == [True, False, True]
-        and answer.setting == "exact"
-        and answer.at is commanded
-    )
+    pairs = [[1, 2], None, None]
+    answer = read_answer({"answers": {"torque": [1, None, 3], "F12": pairs}})
+    assert answer.assembled.tolist() == [True, False, True]
+    assert answer.setting == "exact"
+    np.testing.assert_array_equal(answer.at.angle, list_positions(THREE).angle)
     assert np.isnan(answer.quantities["F12"][1:]).all()
+    assert read_answer({"refusal": "no springs here"}).refusal == "no springs here"
     with pytest.raises(EngineError, match="no licence"):
-        protocol.answer_from_json("mine", commanded, {"error": "no licence"})
-    assert (
-        protocol.answer_from_json(
-            "mine", commanded, {"refusal": "no springs here"}
-        ).refusal
-        == "no springs here"
-    )
+        read_answer({"error": "no licence"})
+
+
+LENGTHS = {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22}
 
 
 WRONG_SCENES = [
     None,
     [],
     {"lengths": {}},
-    {"lengths": {"ground": "0.3 m", "input": 0.1, "coupler": 0.25, "output": 0.22}},
-    {"lengths": {"ground": True, "input": 0.1, "coupler": 0.25, "output": 0.22}},
-    {"lengths": {"ground": 10**400, "input": 0.1, "coupler": 0.25, "output": 0.22}},
-    {"lengths": {"ground": math.inf, "input": 0.1, "coupler": 0.25, "output": 0.22}},
-    {"lengths": {"ground": 9.0, "input": 0.1, "coupler": 0.25, "output": 0.22}},
-    {
-        "lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22},
-        "bars": {"input": {"mass": -1.0}},
-    },
-    {
-        "lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22},
-        "effects": {"gravity": [9.81]},
-    },
-    {
-        "lengths": {"ground": 0.3, "input": 0.1, "coupler": 0.25, "output": 0.22},
-        "motion": {},
-    },
+    {"lengths": LENGTHS | {"ground": "0.3 m"}},
+    {"lengths": LENGTHS | {"ground": True}},
+    {"lengths": LENGTHS | {"ground": 10**400}},
+    {"lengths": LENGTHS | {"ground": math.inf}},
+    {"lengths": LENGTHS | {"ground": 9.0}},
+    {"lengths": LENGTHS, "bars": {"input": {"mass": -1.0}}},
+    {"lengths": LENGTHS, "effects": {"gravity": [9.81]}},
+    {"lengths": LENGTHS, "motion": {}},
 ]
 WRONG_COMMANDS = [
     None,
@@ -361,13 +285,6 @@ WRONG_SETTINGS = [
 ]
 
 
-def read_answer(data):
-    commanded = list_positions(
-        crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
-    )
-    return protocol.answer_from_json("mine", commanded, data)
-
-
 READ = {
     "scene": (protocol.scene_from_json, WRONG_SCENES),
     "command": (partial(protocol.command_from_json, crank_rocker()), WRONG_COMMANDS),
@@ -388,18 +305,15 @@ def test_what_is_none_is_refused_in_one_line(part, number):
 
 @pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)
 def test_a_setting_that_is_none_is_refused_in_one_line(data):
-    with pytest.raises(
-        InputError,
-        match=r"^setting = [^\n]*: must be an object with name, and steps_per_turn",
-    ):
+    words = r"^setting = [^\n]*: must be an object with name, and steps_per_turn"
+    with pytest.raises(InputError, match=words):
         protocol.read_setting(data)
-    assert protocol.read_setting(None) == {} and protocol.read_setting(
-        {"error": 0.5}
-    ) == {"error": 0.5}
-    assert protocol.read_setting({"name": "a", "steps_per_turn": 1}) == {
-        "name": "a",
-        "steps_per_turn": 1,
-    }
+
+
+def test_a_setting_is_read_as_it_is_stated():
+    assert protocol.read_setting(None) == {}
+    for data in ({"error": 0.5}, {"name": "a", "steps_per_turn": 1}):
+        assert protocol.read_setting(data) == data
 
 
 def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives():
@@ -407,19 +321,15 @@ def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives():
 
     Of a stroke too, whose bar has the motion that the formulas state.
     """
-    command = list_positions(
-        fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
-    )
+    stroke = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
+    command = list_positions(stroke)
+    speed, acceleration = command.speed, command.acceleration
     faster = command._replace(
-        origin=None,
-        speed=1.2 * command.speed,
-        acceleration=1.2 * command.acceleration,
+        origin=None, speed=1.2 * speed, acceleration=1.2 * acceleration
     )
     protocol.require_near(faster, command)
-    steady = command._replace(acceleration=0.0 * command.acceleration)
-    for made, asked in (
-        (faster._replace(speed=0.0 * faster.speed), command),
-        (faster, steady),
-    ):
+    steady = command._replace(acceleration=0.0 * acceleration)
+    standing = faster._replace(speed=0.0 * speed)
+    for made, asked in ((standing, command), (faster, steady)):
         with pytest.raises(InputError, match=r"must be within .* of the command"):
             protocol.require_near(made, asked)

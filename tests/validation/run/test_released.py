@@ -5,6 +5,7 @@ Judged to its end, whatever an engine does there.
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 
 
-def falling(coupler=0.15, **motion):
+def falling(coupler=0.15):
     """It falls from rest until bars 3 and 4 lie in one line.
 
     With a coupler of 0.12 m that is a change point.
@@ -27,12 +28,7 @@ def falling(coupler=0.15, **motion):
     linkage = fourbar.FourBar(
         0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
     )
-    released = fourbar.Motion(
-        1.0,
-        0.0,
-        free=fourbar.Free(1.0, 100),
-        **motion,
-    )
+    released = fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 100))
     return Scene(linkage, released, effects=(fourbar.Gravity(),))
 
 
@@ -63,18 +59,16 @@ def find_spread_by_energy(scene, solution, instant, engine):
     for number in (2, 3, 4):
         bar = scene.linkage.bar(number)
         v, omega = (
-            getattr(solution, name)[instant]
-            for name in (f"v_G{number}", f"omega_{number}")
+            solution[f"v_G{number}"][instant],
+            solution[f"omega_{number}"][instant],
         )
         kinetic += 0.5 * (bar.mass * v @ v + bar.moment_of_inertia * omega**2)
+    rest = fourbar.Free(1.0 - times[instant], len(times) - 1 - instant)
     spread = 0.0
     for change in (lost, -lost):
         speed = solution.omega_2[instant] * np.sqrt(1.0 + change / kinetic)
-        rest = fourbar.Free(1.0 - times[instant], len(times) - 1 - instant)
         motion = fourbar.Motion(
-            float(solution.theta_2[instant]),
-            float(speed),
-            free=rest,
+            float(solution.theta_2[instant]), float(speed), free=rest
         )
         other = solve(replace(scene, motion=motion))
         apart = np.abs(other.theta_2 - solution.theta_2[instant:])
@@ -115,23 +109,12 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     branch,
 ):
     """The couples of dry friction that hold it are those of its own assembly."""
-    friction = fourbar.effects.Friction.at(
-        O2=5.0,
-        A=5.0,
-        B=5.0,
-        O4=5.0,
-    )
+    friction = fourbar.Friction.at(**dict.fromkeys(("O2", "A", "B", "O4"), 5.0))
     motion = fourbar.Motion(
-        np.radians(250.0),
-        0.0,
-        branch=branch,
-        free=fourbar.Free(0.1, 2),
+        np.radians(250.0), 0.0, branch=branch, free=fourbar.Free(0.1, 2)
     )
-    scene = Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
-        motion,
-        effects=(fourbar.Gravity(), friction),
-    )
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    scene = Scene(linkage, motion, effects=(fourbar.Gravity(), friction))
     solution = solve(scene)
     assert solution.omega_2 is not None and not solution.omega_2.any()
     rows = judge("held", scene).rows
@@ -152,42 +135,35 @@ def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
     assert answer.refusal.endswith("no inertia: the open tree has no mass matrix")
 
 
+TRUE = PinocchioReleased.release
+
+
 def answering(monkeypatch, change):
     """The rows of Pinocchio where its answer is changed."""
-    true = PinocchioReleased.release
     monkeypatch.setattr(
-        PinocchioReleased, "release", lambda *arguments: change(true(*arguments))
+        PinocchioReleased, "release", lambda *arguments: change(TRUE(*arguments))
     )
-    return [
-        row
-        for row in judge("falling", falling()).rows
-        if row.engine == "pinocchio-forward"
-    ]
+    rows = judge("falling", falling()).rows
+    return [row for row in rows if row.engine == "pinocchio-forward"]
 
 
 @pytest.mark.slow
-def test_an_engine_that_stops_before_fails(monkeypatch):
+def test_an_engine_that_stops_or_is_nan_before_the_limit_or_behind_it_fails(
+    monkeypatch,
+):
     def cut(answer):
-        return replace(
-            answer,
-            theta_2=answer.theta_2[:20],
-            omega_2=answer.omega_2[:20],
-            energy=answer.energy[:20],
-        )
+        names = ("theta_2", "omega_2", "energy")
+        return replace(answer, **{name: getattr(answer, name)[:20] for name in names})
 
-    (only,) = answering(monkeypatch, cut)
-    assert only.verdict == FAILS and "20 of 101 instants" in only.reason
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("index", [20, 60])
-def test_an_engine_that_is_nan_before_the_limit_or_behind_it_fails(monkeypatch, index):
-    def strike(answer):
+    def strike(index, answer):
         answer.theta_2[index] = np.nan
         return answer
 
-    rows = answering(monkeypatch, strike)
-    assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
+    (only,) = answering(monkeypatch, cut)
+    assert only.verdict == FAILS and "20 of 101 instants" in only.reason
+    for index in (20, 60):
+        rows = answering(monkeypatch, partial(strike, index))
+        assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
 
 
 @pytest.mark.slow
@@ -196,16 +172,10 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
 
     Kinetic energy and work are equal, and their difference is no scale.
     """
-    scene = replace(
-        falling(),
-        effects=(),
-        loads=(fourbar.Load(4, moment=0.1),),
-    )
+    pushed = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
     for steps in (20, 200):  # 10 and 1 ms apart
-        released = fourbar.Free(0.2, steps)
-        rows = judge(
-            "pushed", replace(scene, motion=scene.motion.replace(free=released))
-        ).rows
+        motion = pushed.motion.replace(free=fourbar.Free(0.2, steps))
+        rows = judge("pushed", replace(pushed, motion=motion)).rows
         assert not any(row.failed for row in rows)
         energy = row(rows, "mujoco-forward", "energy")
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, Row
+from fourbar_validation.compare.rows import FAILS, FORMULAS
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
@@ -20,21 +20,10 @@ from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.pool import Job, _judge_by_engine
 from fourbar_validation.run.run import run
 from tests.support.here import judge_here
-from tests.support.runs import save_run
+from tests.support.runs import changed, save_run
 from tests.support.unlucky import Few
 
-ROW = Row(
-    "a",
-    "mine",
-    "exact",
-    "F32",
-    1e-15,
-    1e-14,
-    AGREES,
-    "",
-    2.0,
-    1.0,
-)
+ROW = changed(scene="a", engine="mine", quantity="F32")
 MINE = describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite")
 FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 
@@ -100,13 +89,14 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
 
 @pytest.mark.parametrize("broken", ["", "mine"])
 def test_whoever_breaks_down_alone_is_blamed(broken):
+    error = ZeroDivisionError("division by zero")
+
     def attempt(job):
-        if broken in [engine.name for engine in job.engines] or not broken:
-            return ZeroDivisionError("division by zero")
-        return Record(job.name)
+        names = [engine.name for engine in job.engines]
+        return error if not broken or broken in names else Record(job.name)
 
     engines = [Engine(name, FreeBody, EQUIVALENCE) for name in ("mine", "other")]
     job = Job(Few(("a",)), 0, engines, draw=False)
-    (row,) = _judge_by_engine(job, ZeroDivisionError(), attempt).rows
+    (row,) = _judge_by_engine(job, error, attempt).rows
     assert row.engine == (broken or FORMULAS)
     assert row.reason == "ZeroDivisionError: division by zero"

@@ -5,7 +5,7 @@ Of this run, undamaged, each in its place, or made again.
 
 import pytest
 
-from fourbar.errors import DependencyError
+from fourbar.errors import DependencyError, InputError
 from fourbar_validation.run.store import RunningError, Store
 
 
@@ -29,24 +29,21 @@ def test_a_run_goes_on_from_its_own_parts(tmp_path):
         assert store.read(2) == [{"task": 2}]
 
 
-def test_the_parts_of_another_run_are_not_taken(tmp_path):
-    fill(tmp_path, "one", 0, 1)
-    done, notes = list_done(tmp_path, "two")
-    assert done == set()
-    assert notes == ["the parts of another run (suite)"]
+WRONG_PARTS = {"is of another run", "is another part", "is no file"}
 
 
-def test_a_part_that_came_from_another_run_is_not_taken(tmp_path):
-    parts = fill(tmp_path / "here", "one", 0)
-    (foreign := fill(tmp_path / "there", "two", 1) / "000001").rename(parts / "000001")
-    assert not foreign.exists()
-    assert list_done(tmp_path / "here", "one") == ({0}, ["is of another run"])
-
-
-def test_a_part_in_the_place_of_another_is_not_taken(tmp_path):
-    parts = fill(tmp_path, "one", 0)
-    (parts / "000000").rename(parts / "000003")
-    assert list_done(tmp_path, "one") == (set(), ["is another part"])
+def test_only_a_part_of_this_run_in_its_place_is_taken(tmp_path):
+    parts = fill(tmp_path / "here", "one", 0, 2)
+    foreign = fill(tmp_path / "there", "two", 1) / "000001"
+    foreign.rename(parts / "000001")
+    (parts / "000002").rename(parts / "000003")
+    for junk in ("another", ".000000.part", "000007"):
+        (parts / junk / "inner").mkdir(parents=True)
+    done, notes = list_done(tmp_path / "here", "one")
+    assert done == {0} and {*notes} == WRONG_PARTS
+    done, notes = list_done(tmp_path / "here", "two")
+    assert done == set() and notes == ["the parts of another run (suite)"]
+    assert not [*parts.iterdir()]
 
 
 @pytest.mark.parametrize("place", (0.5, 0.99))
@@ -61,6 +58,11 @@ def test_a_part_with_a_damaged_byte_is_not_taken(place, tmp_path):
         assert store.done() == set() and not part.exists()
 
 
-def test_a_folder_has_one_run_at_a_time(tmp_path):
+def test_a_folder_has_one_run_at_a_time_and_keeps_parts_in_a_folder(tmp_path):
     with Store(tmp_path, {"suite": "one"}).held(), pytest.raises(RunningError):
+        fill(tmp_path, "one", 0)
+    (tmp_path / "parts").rmdir()
+    (tmp_path / "parts").write_text("a file")
+    words = "must be a folder, in which a run keeps its parts"
+    with pytest.raises(InputError, match=words):
         fill(tmp_path, "one", 0)
