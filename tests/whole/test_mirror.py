@@ -91,6 +91,9 @@ JUDGED_BY = {
     "validation/engines/mujoco/robots/test_closures.py": (
         "validation/engines/mujoco/robots: ancestry frame loop"
     ),
+    "validation/engines/mujoco/robots/test_measure.py": (
+        "validation/engines/mujoco/robots: planes"
+    ),
     "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
     "validation/robots/test_command.py": "validation/robots: options",
     "validation/published/test_published.py": (
