@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
+from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -125,6 +126,8 @@ class LawSegment:
         self.at_knots = at_knots.tolist()
         instants = np.linspace(self.began, ends, INSTANTS_OF_A_LAW)
         angles, speeds, _ = law.at(instants)
+        # the stages of a step share their instants
+        self.evaluate_alpha = lru_cache(maxsize=4)(self._evaluate_alpha)
         self.fastest = float(np.abs(speeds).max())
         self.turning = self.fastest
         self.width = float(np.ptp(angles))
@@ -160,8 +163,7 @@ class LawSegment:
         """
         instant = self.began + seconds
         if not (isinstance(self.law, Law) and self.law.is_linear_in_acceleration):
-            _, _, alpha = self.law.at(np.array([instant]))
-            return float(alpha[0])
+            return self.evaluate_alpha(instant)
         times = self.knots
         knots_before = bisect.bisect_right(times, instant)
         after = min(max(knots_before, 1), len(times) - 1)
@@ -170,6 +172,10 @@ class LawSegment:
         start = self.at_knots[before]
         stop = self.at_knots[after]
         return float(start + part * (stop - start))
+
+    def _evaluate_alpha(self, instant: float) -> float:
+        _, _, alpha = self.law.at(np.array([instant]))
+        return float(alpha[0])
 
 
 MotionSegment = SteadySegment | LawSegment
