@@ -63,3 +63,27 @@ input = "0.1 m"
 coupler = "0.25 m"
 output = "0.22 m"
 """
+EVERYTHING = f"""\
+{LENGTHS}
+[motion]
+[effects]
+gravity = ["9.81 m/s^2", "-90 deg"]
+viscous = {{ A = "0.02 N m s/rad", O4 = "0.01 N m s/rad" }}
+friction = {{ B = "0.03 N m" }}
+flywheel = {{ bar = 4, inertia = "0.01 kg m^2" }}
+torsion = {{ B = {{ stiffness = "0.5 N m/rad", rest = "1 rad", preload = "0.1 N m" }} }}
+[effects.pin_friction]
+A = {{ coefficient = 0.2, radius = "10 mm" }}
+O4 = {{ coefficient = 0.1, radius = "20 mm" }}
+[[effects.springs]]
+from = {{ bar = 1, from_pin = ["0.1 m", "-1.5 rad"] }}
+to = {{ bar = 3, from_pin = ["0.08 m", "0.2 rad"] }}
+stiffness = "50 N/m"
+length = "0.05 m"
+[[effects.springs]]
+from = {{ bar = 4, from_pin = ["0.1 m", "-1.5 rad"] }}
+to = {{ bar = 3, from_pin = ["0.08 m", "0.2 rad"] }}
+stiffness = "50 N/m"
+length = "0.05 m"
+"""
+"""An effect of each kind, springs between other bars than neighbours."""

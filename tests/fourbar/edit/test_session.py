@@ -41,24 +41,35 @@ from fourbar.edit.session import (
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
+
+
 STROKE_INPUT = ROOT / "models" / "capabilities" / "stroke_input.toml"
+
+
 CRANK_ROCKER = ROOT / "models" / "crank_rocker.toml"
+
+BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 FILES = sorted((ROOT / "models").rglob("*.toml"))
 SHOWN = [path for path in FILES if path.parent.name in ("models", "gallery")]
-SHOWN = [path for path in FILES if path.parent.name in ("models", "gallery")]
+
 PIXEL = 1e-3
 """m: what a pixel is worth in these tests; a number dragged is exact to it."""
+
+
 BARE_SOLVES = 10
 """That an answer may take: the issue's demand."""
+
+
 BARE_A_READING, ANSWERS_A_READING = 150, 20
 """Of the processor's clock, which ticks at 15.6 ms on Windows: above a tenth of a
 second.
 """
 
-
-@pytest.fixture
-def session(tmp_path):
-    return start(tmp_path, CRANK_ROCKER)
+INCH = 0.0254
+FOUR_DIGITS = 1e-3
+"""Masses of a new scene are written with four digits."""
+PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
+PNG = b"\x89PNG\r\n\x1a\n..."
 
 
 def start(folder, model):
@@ -67,15 +78,34 @@ def start(folder, model):
     return Session(path, folder / "exports")
 
 
+@pytest.fixture
+def session(tmp_path):
+    return start(tmp_path, CRANK_ROCKER)
+
+
+@pytest.fixture
+def new(tmp_path):
+    """A session whose file is not there yet."""
+    return Session(tmp_path / "new.toml", tmp_path / "exports")
+
+
+def set_to(path, value, **more):
+    return {"do": "set", "path": path.split("/"), "value": value, **more}
+
+
+def drawn(pins=PINS_DRAWN, unit="in", grain=1e-6):
+    return {"do": "draw", "pins": pins, "unit": unit, "grain": grain}
+
+
+def pictured(kind, content):
+    data = base64.b64encode(content).decode()
+    return {"do": "picture", "data": f"data:{kind};base64,{data}"}
+
+
 def ask(session, do, **more):
-    return session.do({"do": do} | more)
-
-
-def put(session, path, value, **more):
-    return ask(session, "set", path=path.split("/"), value=value, **more)
-
-
-def accepted(told):
+    """Return the answer to a request, which is not refused."""
+    request = do if isinstance(do, dict) else {"do": do, **more}
+    told = session.do(request)
     assert "refused" not in told, told
     return told
 
@@ -123,6 +153,8 @@ def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(pa
 
 
 PARTS = list_offers()["parts"]
+
+
 NAMES = {"points": "P", "tolerances": "lengths.input"}
 
 
@@ -180,59 +212,86 @@ def test_what_a_pair_consists_of_is_read_from_the_declarations():
     }
 
 
-@pytest.mark.parametrize(
-    "place, value, words",
-    [
-        ("lengths/input", "100 kg", '"kg" does not convert to m'),
-        ("lengths/input", "", "is missing"),
-        ("lengths/ground", "9 m", "lengths"),
-        ("motion/theta_2/steps", "many", "must be a whole number"),
-        ("drive/bar", "7", "must be 2 (input), 3 (coupler) or 4 (output)"),
-        ("nothing/here", "1", "unknown key"),
-    ],
-)
-def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_stays(
-    session, place, value, words
-):
-    before = session.now.text
-    assert words in put(session, place, value)["refused"]
-    assert session.now.text == session.document.text() == before
-    assert not put(session, "lengths/input", "4 in")["data"]["time"]
+TWICE = [[0, 0]] * 4
+NO_PICTURE = "must be a PNG, JPEG or SVG picture"
+REFUSED = [
+    (set_to("lengths/input", "100 kg"), '"kg" does not convert to m'),
+    (set_to("lengths/input", ""), "is missing"),
+    (set_to("lengths/ground", "9 m"), "lengths"),
+    (set_to("motion/theta_2/steps", "many"), "must be a whole number"),
+    (
+        set_to("motion/theta_2/steps", str(MOST_SOLVED_ANEW)),
+        f"motion.theta_2.steps: must be below {MOST_SOLVED_ANEW} in the workbench",
+    ),
+    (set_to("drive/bar", "7"), "must be 2 (input), 3 (coupler) or 4 (output)"),
+    (set_to("nothing/here", "1"), "unknown key"),
+    ({}, ""),
+    ({"do": "set"}, ""),
+    ({"do": "set", "path": [], "value": "1"}, ""),
+    ({"do": "drag"}, ""),
+    (
+        {
+            "do": "drag",
+            "what": "O2",
+            "to": [0, 0],
+            "grain": 1.0,
+            "theta_2": 0.0,
+            "branch": 1,
+        },
+        "",
+    ),
+    ({"do": "text", "text": "lengths = 3"}, ""),
+    ({"do": "undo"}, ""),
+    ({"do": "redo"}, ""),
+    ({"do": "units", "units": "parsec"}, ""),
+    ({"do": "export", "format": "../x"}, ""),
+    ({"do": "restate", "path": ["lengths"], "by": "xy"}, ""),
+    ({"do": "restate", "path": ["no"], "by": "xy"}, ""),
+    *(
+        ({"do": "pressure", "pressure": wrong}, "pressure")
+        for wrong in ("210", "-1 bar", "3 mm")
+    ),
+    ({"do": "command", "command": "stroke"}, "needs a cylinder"),
+    ({"do": "command", "command": "theta_1"}, "must be one of"),
+    ({"do": "command", "command": ""}, "must be one of"),
+    (drawn(TWICE), ""),
+    (drawn([[0, 0], [1, 1]]), ""),
+    (drawn([["a", 0]] * 4), ""),
+    (drawn([[0, 0], [1, 0], [math.nan, 1], [3, 0]]), ""),
+    (drawn(unit="lb"), ""),
+    (pictured("text/html", b"<svg>"), NO_PICTURE),
+    (pictured("image/png", b"<html>"), NO_PICTURE),
+    (pictured("", b""), NO_PICTURE),
+]
+"""Requests, and words of their refusal."""
+
+
+@pytest.mark.parametrize("asked, words", REFUSED)
+def test_what_is_refused_leaves_the_last_good_state(session, asked, words):
+    text, files = session.now.text, {*session.path.parent.iterdir()}
+    assert words in session.do(asked)["refused"]
+    assert session.now.text == session.document.text() == text
+    assert {*session.path.parent.iterdir()} == files
+    assert session.pressure is None and session.now.scene.picture is None
+    assert session.unit_names == "as the file"
+    assert not ask(session, set_to("lengths/input", "4 in"))["data"]["time"]
     assert session.now.scene.linkage.input.length == 0.1016
-    assert session.now.text == before.replace('input = "100 mm"', 'input = "4 in"')
-
-
-@pytest.mark.parametrize(
-    "asked",
-    [
-        {},
-        {"do": "set"},
-        {"do": "set", "path": [], "value": "1"},
-        {"do": "drag"},
-        {"do": "text", "text": "lengths = 3"},
-    ],
-    ids=str,
-)
-def test_what_is_no_request_is_refused(session, asked):
-    assert "refused" in session.do(asked)
+    assert session.now.text == text.replace('input = "100 mm"', 'input = "4 in"')
 
 
 def test_a_gesture_is_one_step_back(session):
     before = session.now.text
     for size in range(101, 131):
-        put(session, "lengths/input", f"{size} mm", gesture="wheel")
-    put(session, "bars/output/mass", "1 kg", gesture="other")
+        ask(session, set_to("lengths/input", f"{size} mm", gesture="wheel"))
+    ask(session, set_to("bars/output/mass", "1 kg", gesture="other"))
     heavy = session.now.text
     assert len(session.texts) == 3
     ask(session, "undo")
     assert session.now.scene.linkage.input.length == approx(0.13)
     assert 'mass = "0.4 kg"' in session.now.text
-    ask(session, "undo")
-    assert session.now.text == before
-    assert "refused" in ask(session, "undo")
+    assert ask(session, "undo")["text"] == before
     ask(session, "redo")
     assert ask(session, "redo")["text"] == heavy
-    assert "refused" in ask(session, "redo")
 
 
 def solve_at(scene, angle, stage="error"):
@@ -248,7 +307,7 @@ AT_50_DEG = math.radians(50.0)
 def drag(session, what, to, **more):
     """Drag something at theta_2 = 50 deg, and return that position afterwards."""
     shown = {"theta_2": AT_50_DEG, "branch": 1, "grain": PIXEL} | more
-    accepted(ask(session, "drag", what=what, to=[to.real, to.imag], **shown))
+    ask(session, "drag", what=what, to=[to.real, to.imag], **shown)
     return solve_at(session.now.scene, AT_50_DEG)
 
 
@@ -275,7 +334,11 @@ from_pin = { x = "1 in", y = "20 mm" }
 [points]
 P = { bar = 3, from_pin = ["1 in", "20 deg"] }
 """
+
+
 ENDS = {"from": {"bar": 1}, "to": {"bar": 4}}
+
+
 SPRING = ENDS | {"stiffness": "9 N/m", "length": "1 mm"}
 
 
@@ -283,11 +346,13 @@ SPRING = ENDS | {"stiffness": "9 N/m", "length": "1 mm"}
 def loaded(session):
     """A session with a point, a spring, a couple, and a place by coordinates."""
     session.document.put(["effects", "springs"], [SPRING])
-    accepted(ask(session, "text", text=session.document.text() + LOADED))
+    ask(session, "text", text=session.document.text() + LOADED)
     return session
 
 
 TO = 0.13 + 0.11j
+
+
 DRAGGED = {
     "B": ("B", lambda s: complex(*s.B[0])),
     "O4": ("O4", lambda s: on_bar(s, 4, 0.0)),
@@ -332,11 +397,8 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(loaded, name):
 
 
 def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session):
-    """O2 cannot be dragged."""
     length = abs(complex(*drag(session, "A", 0.08 + 0.09j).A[0]))
     assert length == approx(abs(0.08 + 0.09j), abs=PIXEL)
-    shown = {"grain": 1.0, "theta_2": 0.0, "branch": 1}
-    assert "refused" in ask(session, "drag", what="O2", to=[0, 0], **shown)
 
 
 @pytest.mark.parametrize("frame", ["world", "bar"])
@@ -347,7 +409,7 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays
     path = ["loads", 3]
     changed = loaded.now.text.replace('"5 N"', f'"{size}"')
     text = changed.replace('y = "20 mm" }', f'y = "20 mm" }}\nframe = "{frame}"')
-    accepted(ask(loaded, "text", text=text))
+    ask(loaded, "text", text=text)
     drag(loaded, [*path, "from_pin"], TO)
     arrow = 0.05 * np.exp(0.7j)
     s = drag(loaded, [*path, "force"], TO + arrow, stretch=2.0)
@@ -362,22 +424,17 @@ def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
     path = ["loads", 3, "from_pin"]
     stated = loaded.now.scene.loads[3].from_pin
     for by, kind in (("polar", list), ("xy", dict)):
-        accepted(ask(loaded, "restate", path=path, by=by))
+        ask(loaded, "restate", path=path, by=by)
         assert isinstance(loaded.now.plain["loads"][3]["from_pin"], kind)
-        point = loaded.now.scene.loads[3].from_pin
-        assert point == approx(stated, rel=1e-5)
-    for wrong, by in ((path, "z"), (["lengths"], "xy"), (["no"], "xy")):
-        assert "refused" in ask(loaded, "restate", path=wrong, by=by)
-
-
-BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
+        assert loaded.now.scene.loads[3].from_pin == approx(stated, rel=1e-5)
+    assert "refused" in loaded.do({"do": "restate", "path": path, "by": "z"})
 
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
 def test_another_command_goes_over_the_same_motion(tmp_path, command):
     session = start(tmp_path, BUCKET)
     before = solve(session.now.scene)
-    accepted(ask(session, "command", command=command))
+    ask(session, "command", command=command)
     after = solve(session.now.scene)
     assert after.assembled.all() and np.isfinite(after.drive_force).all()
     values, places = getattr(before, command), getattr(after, command)
@@ -387,25 +444,31 @@ def test_another_command_goes_over_the_same_motion(tmp_path, command):
     for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
         poses = np.unwrap(getattr(before, name))[order]
         apart = getattr(after, name) - np.interp(places, values[order], poses)
-        assert np.abs(np.angle(np.exp(1j * apart))).max() < 2e-3
+        assert np.abs(np.sin(0.5 * apart)).max() < 1e-3
     assert ask(session, "undo")["text"] == BUCKET.read_text()
 
 
-def test_what_cannot_be_commanded_is_one_line(session):
-    for command, words in (
-        ("stroke", "needs a cylinder"),
-        ("theta_1", "must be one of"),
-        ("", "must be one of"),
-    ):
-        assert words in ask(session, "command", command=command)["refused"]
+@pytest.mark.parametrize("shown", [0.2, 2.0, 5.0])
+def test_another_command_goes_over_the_position_that_is_shown(session, shown):
+    """The output of a crank-rocker turns back twice.
+
+    The page shows one of the stretches.
+    """
+    ask(session, "command", command="theta_4", theta_2=shown)
+    covered = solve(session.now.scene, "position").theta_2
+    assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
+
+
+def test_what_does_not_move_cannot_be_commanded(session):
     session.change(lambda document: document.put(["motion", "theta_2"], "60 deg"))
-    assert "does not move" in ask(session, "command", command="theta_4")["refused"]
+    refused = session.do({"do": "command", "command": "theta_4"})["refused"]
+    assert "does not move" in refused
 
 
 def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(tmp_path):
     """The range shows on solving, when the file has been read."""
     session = start(tmp_path, STROKE_INPUT)
-    refused = put(session, "motion/stroke", "7000 mm")["refused"]
+    refused = session.do(set_to("motion/stroke", "7000 mm"))["refused"]
     words = r"motion\.stroke: this cylinder can have \S+ to \S+ mm"
     assert re.fullmatch(words, refused), refused
     far = session.now.scene.motion.replace(angle=7.0)
@@ -422,64 +485,32 @@ def test_a_state_that_assembles_nowhere_names_what_it_commands(session):
         evaluate_scene(scene, {})
 
 
-FOUR_DIGITS = 1e-3
-"""Masses of a new scene are written with four digits."""
-PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
-
-
-INCH = 0.0254
-
-
-@pytest.fixture
-def new(tmp_path):
-    """A session whose file is not there yet."""
-    return Session(tmp_path / "new.toml", tmp_path / "exports")
-
-
-def draw(session, pins=PINS_DRAWN, unit="in", grain=1e-6):
-    return ask(session, "draw", pins=pins, unit=unit, grain=grain)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(new, side):
     assert ask(new, "hello")["fresh"]
-    accepted(draw(new, [[x, side * y] for x, y in PINS_DRAWN]))
+    ask(new, drawn([[x, side * y] for x, y in PINS_DRAWN]))
     greeting = ask(new, "hello")
     assert not greeting["fresh"] and greeting["units"] == "as the file"
     assert new.units["N"][0] == "lbf"
     A, B, O4 = (INCH * complex(x, side * y) for x, y in PINS_DRAWN[1:])
-    s = solve_at(new.now.scene, np.angle(A), "position")
+    theta_2 = float(np.angle(A))
+    s = solve_at(new.now.scene, theta_2, "position")
     stands = [complex(*s.A[0]), complex(*s.B[0]), on_bar(s, 4, 0.0)]
     assert stands == approx([A, B, O4], abs=1e-6)
     assert solve(new.now.scene).assembled.any()
     before = new.now.plain["pins"]
-    to = INCH * (0.5 + 0.25j)
-    drag(new, "O2", to, grain=1e-6, theta_2=float(np.angle(A)))
+    drag(new, "O2", INCH * (0.5 + 0.25j), grain=1e-6, theta_2=theta_2)
     assert new.now.plain["pins"] == before | {"O2": ["0.5 in", "0.25 in"]}
 
 
 def test_what_was_typed_stays_when_another_linkage_is_drawn(new):
-    draw(new)
-    put(new, "bars/coupler/mass", "3 lb")
-    draw(new, [[0, 0], [3, 4], [14, 12], [12, -5]], grain=0.01)
+    ask(new, drawn())
+    ask(new, set_to("bars/coupler/mass", "3 lb"))
+    ask(new, drawn([[0, 0], [3, 4], [14, 12], [12, -5]], grain=0.01))
     assert new.now.plain["bars"]["coupler"]["mass"] == "3 lb"
-    drawn = INCH * math.hypot(11, 8)
-    assert new.now.scene.linkage.coupler.length == approx(drawn, abs=INCH * 0.01)
-
-
-@pytest.mark.parametrize(
-    "pins, unit",
-    [
-        ([[0, 0]] * 4, "in"),
-        ([[0, 0], [1, 1]], "in"),
-        ([["a", 0]] * 4, "in"),
-        ([[0, 0], [1, 0], [math.nan, 1], [3, 0]], "in"),
-        (PINS_DRAWN, "lb"),
-    ],
-)
-def test_what_is_no_linkage_is_not_drawn(new, pins, unit):
-    assert "refused" in draw(new, pins, unit)
+    coupler = new.now.scene.linkage.coupler
+    assert coupler.length == approx(INCH * math.hypot(11, 8), abs=INCH * 0.01)
 
 
 @pytest.mark.parametrize(
@@ -496,7 +527,7 @@ def test_results_have_the_units_of_the_file_until_others_are_chosen(
     session, length, force
 ):
     text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
-    accepted(ask(session, "text", text=text))
+    ask(session, "text", text=text)
     of_the_file = session.units
     assert of_the_file.get("N", ("N", 1.0))[0] == force
     ask(session, "units", units="mm N N.mm deg")
@@ -537,18 +568,15 @@ def settled(session):
 
 
 def test_the_answer_is_what_analyze_says(session):
-    put(session, "bars/coupler/mass", "2 lb")
+    ask(session, set_to("bars/coupler/mass", "2 lb"))
     told = unpacked(pack_frame(settled(session)))
     s = solve(loads(session.now.text), "error")
     columns = told["data"]["branches"]["1"]
     for name in ("theta_3", "torque", "torque_error", "power", "F12", "F43", "omega_4"):
         assert_array_equal(columns[name], getattr(s, name))
-    summary = "\n".join(told["data"]["summary"])
-    assert "\n  torque" in summary and "rank-rocker" in summary
+    assert "\n  torque" in "\n".join(told["data"]["summary"])
     ask(session, "units", units="imperial")
     assert "lbf" in "\n".join(settled(session)["data"]["summary"])
-    assert "refused" in ask(session, "units", units="parsec")
-    assert session.unit_names == "imperial"
 
 
 @pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.stem)
@@ -559,39 +587,33 @@ def test_every_linkage_that_people_know_has_an_answer(tmp_path, path):
 
 @pytest.mark.slow
 def test_an_answer_takes_ten_bare_solves_at_most(session):
-    best = {"bare": math.inf, "answer": math.inf}
-    # what the other tests of this process hold is not searched for garbage in here
+    """By turns, in processor time, and the quickest of each: the machine has other
+    work. What the other tests hold is not searched for garbage in here.
+    """
+    bare, answer = [], []
     gc.collect()
     gc.freeze()
-    # by turns, in processor time, and the quickest of each: the machine has other work
     for turn in range(5):
         start = time.process_time()
         for _ in range(BARE_A_READING):
             solve(session.now.scene)
         middle = time.process_time()
         for number in range(ANSWERS_A_READING):
-            request = {
-                "do": "set",
-                "path": ["lengths", "input"],
-                "value": f"{100 + (turn + number) % 9} mm",
-                "gesture": "g",
-            }
-            pack_frame(session.do(request))
-        end = time.process_time()
-        best["bare"] = min(best["bare"], (middle - start) / BARE_A_READING)
-        best["answer"] = min(best["answer"], (end - middle) / ANSWERS_A_READING)
+            length = f"{100 + (turn + number) % 9} mm"
+            pack_frame(session.do(set_to("lengths/input", length, gesture="g")))
+        bare.append((middle - start) / BARE_A_READING)
+        answer.append((time.process_time() - middle) / ANSWERS_A_READING)
     gc.unfreeze()
-    assert best["answer"] < BARE_SOLVES * best["bare"], best
+    assert min(answer) < BARE_SOLVES * min(bare), (answer, bare)
 
 
 def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(session):
-    put(session, "lengths/input", "105 mm")
+    ask(session, set_to("lengths/input", "105 mm"))
     assert ask(session, "save")["saved"] and session.saved
-    assert session.path.read_text() == CRANK_ROCKER.read_text().replace(
-        '"100 mm"', '"105 mm"'
-    )
+    expected = CRANK_ROCKER.read_text().replace('"100 mm"', '"105 mm"')
+    assert session.path.read_text() == expected
     session.path.write_text("title = 'somebody else'")
-    put(session, "lengths/input", "106 mm")
+    ask(session, set_to("lengths/input", "106 mm"))
     assert "changed on the disk" in ask(session, "save")["ask"]
     assert session.path.read_text() == "title = 'somebody else'"
     session.path.unlink()
@@ -601,12 +623,9 @@ def test_save_keeps_the_rest_and_asks_before_it_overwrites_what_changed(session)
 
 
 def test_a_session_goes_on_where_it_stopped(session):
-    put(session, "lengths/input", "105 mm")
+    ask(session, set_to("lengths/input", "105 mm"))
     ask(session, "keep")
-    put(session, "lengths/input", "110 mm")
-    for wrong in ("210", "-1 bar", "3 mm"):
-        assert "pressure" in ask(session, "pressure", pressure=wrong)["refused"]
-        assert session.pressure is None
+    ask(session, set_to("lengths/input", "110 mm"))
     ask(session, "pressure", pressure=" 210 bar ")
     session.end(gone=True)
     if os.name == "posix":  # the scene may be its owner's alone
@@ -644,7 +663,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_state_file_is_one_line(session, name):
-    put(session, "lengths/input", "105 mm")
+    ask(session, set_to("lengths/input", "105 mm"))
     session.write_state_file()
     before = session.state_file.read_text()
     damaged, replaced = re.subn(*DAMAGES[name], before, flags=re.DOTALL)
@@ -669,10 +688,10 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
     monkeypatch.setattr("fourbar.edit.session.LARGEST_STATE", largest)
     monkeypatch.setattr("fourbar.edit.session.MOST_CHARACTERS", MOST_CHARACTERS // 10)
     large = session.now.text + "".join(f"# {'µ' * 100} {n}\n" for n in range(190))
-    assert len(large) == approx(20_500, rel=0.05)
     ask(session, "text", text=large)
     for size in range(1, 531):
-        put(session, "lengths/input", f"{100 + 0.01 * size:.2f} mm", gesture=size)
+        length = f"{100 + 0.01 * size:.2f} mm"
+        ask(session, set_to("lengths/input", length, gesture=size))
         if size % 20 == 0:
             ask(session, "keep")
     session.write_state_file()
@@ -682,9 +701,8 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
     assert len(again.texts) > 40
     assert len(again.kept) == MOST_KEPT
     assert "start" in again.kept and "state 26" in again.kept
-    for _ in range(len(again.texts) - 1):
-        accepted(ask(again, "undo"))
-    assert "refused" in ask(again, "undo")
+    for _ in again.texts[1:]:
+        ask(again, "undo")
 
 
 @pytest.mark.posix
@@ -694,7 +712,7 @@ def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(session):
     link.symlink_to(session.path)
     linked = Session(link, session.exports.folder)
     assert linked.state_file == session.state_file
-    put(linked, "lengths/input", "105 mm")
+    ask(linked, set_to("lengths/input", "105 mm"))
     assert ask(linked, "save")["saved"]
     assert link.is_symlink() and '"105 mm"' in session.path.read_text()
     assert session.path.stat().st_mode & 0o777 == 0o600
@@ -704,8 +722,6 @@ def test_exports_go_into_their_folder_under_their_own_names(session):
     for name, ending in (("csv", "csv"), ("mjcf", "xml"), ("page", "html")):
         ask(session, "export", format=name)
         assert (session.exports.folder / f"scene.{ending}").stat().st_size > 1000
-    assert "refused" in ask(session, "export", format="../x")
-    assert len(list(session.path.parent.rglob("*"))) == 5
 
 
 def test_a_new_scene_begins_where_there_is_no_file(new):
@@ -714,36 +730,15 @@ def test_a_new_scene_begins_where_there_is_no_file(new):
     assert fourbar.load(new.path).linkage.ground == 0.3
 
 
-def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(session):
-    steps = "motion/theta_2/steps"
-    refused = put(session, steps, str(MOST_SOLVED_ANEW))["refused"]
-    words = f"must be below {MOST_SOLVED_ANEW} in the workbench"
-    assert refused == f"motion.theta_2.steps: {words}"
-    accepted(put(session, steps, "100"))
-
-
-@pytest.mark.parametrize("shown", [0.2, 2.0, 5.0])
-def test_another_command_goes_over_the_position_that_is_shown(session, shown):
-    """The output of a crank-rocker turns back twice.
-
-    The page shows one of the stretches.
-    """
-    accepted(ask(session, "command", command="theta_4", theta_2=shown))
-    covered = solve(session.now.scene, "position").theta_2
-    assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
-
-
 @pytest.mark.slow
 def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
     path = tmp_path / "inches.toml"
     path.write_text(write_new_scene(["12 in", "4 in", "10.123456789 in", "9 in"]))
     session = Session(path, tmp_path / "exports")
     offers = ask(session, "hello")["offers"]
-    numbers = {
-        row.get("label", row["at"][-1]): n for n, row in enumerate(offers["parts"])
-    }
+    labels = [row.get("label", row["at"][-1]) for row in offers["parts"]]
     for label in ("force", "moment", "point", "springs"):
-        ask(session, "add", part=numbers[label], name="P")
+        ask(session, "add", part=labels.index(label), name="P")
     stated = session.now.plain
     bar = offers["fields"]["bars"]["input"]
     assert bar["density"] == "0.28 lb/in^3" and bar["inertia"] == "0.68 lb in^2"
@@ -753,18 +748,10 @@ def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
     assert force["force"] == ["2.2 lbf", "-90 deg"]
     assert moment["moment"] == "-8.9 lbf in" and "force" not in moment
     assert stated["points"]["P"]["from_pin"] == ["2 in", "20 deg"]
-    data = evaluate_scene(session.now.scene, session.units, settled=True)
-    assert "s + l = 16 in < p + q = 19.1235 in" in data["summary"]
+    summary = settled(session)["data"]["summary"]
+    assert "s + l = 16 in < p + q = 19.1235 in" in summary
     # a mass that nobody weighed has no twelve digits, which its field would cut off
     assert stated["bars"]["coupler"]["mass"] == "0.5062 lb"
-
-
-PNG = b"\x89PNG\r\n\x1a\n..."
-
-
-def add_picture(session, kind, content):
-    data = base64.b64encode(content).decode()
-    return ask(session, "picture", data=f"data:{kind};base64,{data}")
 
 
 @pytest.mark.parametrize(
@@ -780,36 +767,25 @@ def test_a_picture_is_kept_beside_the_scene_and_over_no_file(
 ):
     taken = session.path.with_name("scene.jpg")
     taken.write_bytes(b"somebody's")
-    answer = add_picture(session, f"image/{kind}", content)
+    answer = ask(session, pictured(f"image/{kind}", content))
     assert answer["plain"]["picture"]["file"] == name
     assert session.path.with_name(name).read_bytes() == content
     assert taken.read_bytes() == b"somebody's"
-    answer = put(session, "picture/scale", "0.25 mm")
+    answer = ask(session, set_to("picture/scale", "0.25 mm"))
     assert answer["data"]["traced"]["scale"] == 2.5e-4
-    draw(session, grain=0.01)
+    ask(session, drawn(grain=0.01))
     traced = session.answer()["data"]["traced"]
     assert traced["file"] == name
     assert traced["shift"] == approx((0.0, 0.0))
 
 
 def test_a_picture_alone_leaves_a_new_scene_without_a_linkage(new):
-    picture = add_picture(new, "image/png", PNG)
+    picture = ask(new, pictured("image/png", PNG))
     assert picture["fresh"]
-    first = draw(new)
+    first = ask(new, drawn())
     assert not first["fresh"] and not first["changed"] and first["refer"]
     assert first["plain"]["picture"] == picture["plain"]["picture"]
     per_length = [bar.mass / bar.length for bar in new.now.scene.linkage.moving]
     assert per_length == approx(per_length[:1] * 3, rel=FOUR_DIGITS)
-    again = draw(new, [*PINS_DRAWN[:3], [12, -6]])
+    again = ask(new, drawn([*PINS_DRAWN[:3], [12, -6]]))
     assert again["changed"] and not again["refer"]
-
-
-@pytest.mark.parametrize(
-    "kind, content", [("text/html", b"<svg>"), ("image/png", b"<html>"), ("", b"")]
-)
-def test_what_is_no_picture_is_refused_and_leaves_no_file(session, kind, content):
-    before = {*session.path.parent.iterdir()}
-    refused = add_picture(session, kind, content)["refused"]
-    assert "must be a PNG, JPEG or SVG picture" in refused
-    assert {*session.path.parent.iterdir()} == before
-    assert session.now.scene.picture is None

@@ -12,6 +12,8 @@ from fourbar.show import panels as of_panels
 from fourbar.show.panels import Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
+
+
 SETTLED = 1e-9
 """Some panels of 1e-10 each."""
 
@@ -23,25 +25,29 @@ def fit(curve, edges=EDGES, rounding=0.0):
     return fit_panels(compute, edges, {"curve": Wanted(rounding, integrated=True)})
 
 
-def test_the_mean_square_of_a_smooth_curve_is_that_of_its_antiderivative():
-    """The integral of (e^{-x} cos 20 x)^2 is known, here by its complex exponents."""
-    panels = fit(lambda x: np.exp(-x) * np.cos(20.0 * x))
-
-    def primitive(x):
-        slow = -0.25 * math.exp(-2.0 * x)
-        exponent = complex(-2.0, 40.0)
-        fast = 0.5 * (np.exp(exponent * x) / exponent).real
-        return float(slow + fast)
-
-    right = 0.5 * (primitive(2.0) - primitive(0.0))
-    assert panels.find_rms("curve") ** 2 == approx(right, rel=SETTLED)
+def integrate_product(x):
+    """Integral of (e^{-x} cos 20 x)^2, by its complex exponents."""
+    fast = np.exp(complex(-2.0, 40.0) * x) / complex(-2.0, 40.0)
+    return float(-0.25 * np.exp(-2.0 * x) + 0.5 * fast.real)
 
 
-def test_a_vector_has_the_sum_of_its_components():
-    panels = fit(lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1))
-    # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
-    right = 12.5 - 3.5 * math.sin(4.0) / 4.0
-    assert panels.find_rms("curve") ** 2 == approx(right, rel=SETTLED)
+@pytest.mark.parametrize(
+    "curve, right",
+    [
+        (
+            lambda x: np.exp(-x) * np.cos(20.0 * x),
+            integrate_product(2.0) - integrate_product(0.0),
+        ),
+        # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
+        (
+            lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1),
+            25.0 - 1.75 * math.sin(4.0),
+        ),
+    ],
+    ids=("number", "vector"),
+)
+def test_the_mean_square_is_that_of_the_antiderivative(curve, right):
+    assert fit(curve).find_rms("curve") ** 2 == approx(0.5 * right, rel=SETTLED)
 
 
 @pytest.mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
@@ -71,10 +77,6 @@ def test_the_range_of_the_integral_about_a_level():
     assert panels.integrate("curve") == approx(1.0, rel=SETTLED)
     about_mean = panels.accumulate("curve", 0.5)
     assert np.ptp(about_mean) == approx(2.0 / pi, rel=SETTLED)
-
-
-def draw_noise(places):
-    return np.random.default_rng(len(places)).normal(size=len(places))
 
 
 POLE = math.sqrt(0.5)
@@ -138,28 +140,31 @@ def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
     assert places == approx([0.0, 2.0], abs=1e-8)
 
 
-def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels():
-    right = [0.3, 0.8, 1.7]
+ZEROS = [0.3, 0.8, 1.7]
 
-    def curve(x):
-        return np.prod([x - zero for zero in right], axis=0)
 
-    def touch(x):
-        return np.square(x - 0.8) * (x - 1.1)
+@pytest.mark.parametrize("edges", (EDGES, np.array([0.0, 0.31, 2.0])))
+@pytest.mark.parametrize(
+    "curve, zeros",
+    [
+        (lambda x: np.prod([x - zero for zero in ZEROS], axis=0), ZEROS),
+        (lambda x: np.square(x - 0.8) * (x - 1.1), [1.1]),
+    ],
+    ids=("crosses", "touches"),
+)
+def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, edges):
+    def compute(places):
+        return {"curve": curve(places)}
 
-    for edges in (EDGES, np.array([0.0, 0.31, 2.0])):
-        for of, zeros in ((curve, right), (touch, [1.1])):
-
-            def compute(x, of=of):
-                return {"curve": of(x)}
-
-            panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
-            assert panels.find_zeros("curve") == approx(zeros, abs=1e-9)
+    panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
+    assert panels.find_zeros("curve") == approx(zeros, abs=1e-9)
 
 
 def test_rounding_need_not_settle():
-    panels = fit(lambda x: 1e-13 * draw_noise(x), rounding=1e-12)
-    assert panels.find_rms("curve") < 1e-12
+    def draw_noise(places):
+        return 1e-13 * np.random.default_rng(len(places)).normal(size=len(places))
+
+    assert fit(draw_noise, rounding=1e-12).find_rms("curve") < 1e-12
 
 
 def test_the_panels_of_many_waves_are_searched_at_once(monkeypatch):

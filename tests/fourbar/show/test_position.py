@@ -12,15 +12,20 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Motion, solve
+from fourbar import Bar, Free, Gravity, Motion, Scene, solve
+from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.show.located import locate
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import COMMON, units
+from fourbar.studies.passing import find_positions
 from tests.support.scenes import crank_rocker
+from tests.support.shares import slow_but
 from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6
+
+
 ONE = crank_rocker(
     motion=Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
 )
@@ -53,23 +58,25 @@ def test_bars_points_and_forces_are_those_of_the_solution():
         assert numbers(line) == approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
 
 
-def test_what_a_scene_has_not_is_left_out():
-    still = replace(ONE, motion=Motion(1.0), points=())
+@pytest.mark.parametrize(
+    "motion, rates",
+    [
+        (Motion(1.0), []),
+        (Motion(1.0, 0.0), []),
+        (Motion(1.0, 0.0, 3.0), ["omega", "alpha"]),
+    ],
+)
+def test_what_a_scene_has_not_is_left_out(motion, rates):
+    """A static position has no rates, and one without a speed no forces."""
+    still = replace(ONE, motion=motion, points=())
     sheet = PositionSheet(still, solve(still), COMMON)
-    assert "omega" not in sheet.write_bars()[0]
-    assert not any(line.startswith("  v") for line in sheet.write_points())
-    assert not any(line.startswith("F_") for line in sheet.write_ratios())
-
-
-def test_a_static_position_shows_no_rates():
-    still = replace(ONE, motion=Motion(1.0, 0.0))
-    sheet = PositionSheet(still, solve(still), COMMON)
-    assert "theta" in sheet.write_bars()[0]
-    assert "omega" not in sheet.write_bars()[0]
-    assert not any(line.startswith(("  v", "  a")) for line in sheet.write_points())
-    starting = replace(ONE, motion=Motion(1.0, 0.0, 3.0))
-    sheet = PositionSheet(starting, solve(starting), COMMON)
-    assert "alpha" in sheet.write_bars()[0]
+    heading = sheet.write_bars()[0]
+    assert "theta" in heading
+    assert [name for name in ("omega", "alpha") if name in heading] == rates
+    points = [line[:3] for line in sheet.write_points()]
+    assert ("  a" in points) == bool(rates)
+    forces = any(line.startswith("F_") for line in sheet.write_ratios())
+    assert motion.speed is not None or not forces
 
 
 def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
@@ -132,3 +139,97 @@ def test_the_centre_of_a_bar_that_turns_back_is_at_infinity(name):
     rows = {line.split()[1]: line.split()[2:] for line in sheet.write_ratios()[-2:]}
     is_far = {centre: cells[:2] == ["at", "infinity"] for centre, cells in rows.items()}
     assert is_far == {"I13": name == "theta_3", "I24": False}
+
+
+PARALLELOGRAM = fourbar.FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1))
+"""Uniform bars of 1 kg/m, all in one line at theta_2 = 0 and 180 deg."""
+ALONG, ACROSS = Gravity(9.81, 0.0), Gravity(9.81, -0.5 * np.pi)
+LIMITS = "on the change point: the limits from both sides"
+
+
+def write_forces(motion, gravity=ALONG, at=None, **parts):
+    """Return the rows of pin forces, by position or where a quantity has a value."""
+    scene = Scene(PARALLELOGRAM, motion, effects=(gravity,), **parts)
+    places = None if at is None else find_positions(scene, [at])
+    solution = solve(scene, at=places)
+    assert solution.status == ["change_point"]
+    return PositionSheet(scene, solution, units("N m")).write_pin_forces(), solution
+
+
+@pytest.mark.parametrize("theta_2, sense", ((0.0, 1.0), (np.pi, -1.0)))
+def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2, sense):
+    """Weights along the line of all bars ask for no moment there.
+
+    On the frame the bars then act with their weights less m a, and each side has the
+    limit.
+    """
+    rows, _ = write_forces(Motion(theta_2, 6.0))
+    assert rows[-1] == LIMITS
+    # of G2 and G4 half of the acceleration of the coupler
+    mass_times_acceleration = -sense * 0.1 * 36.0 * (0.1 * 0.5 + 0.3 + 0.1 * 0.5)
+    along = 0.5 * 9.81 - mass_times_acceleration
+    assert numbers(rows[5]) == approx([along, 0.0, along], rel=SIX_DIGITS)
+    assert numbers(rows[6]) == [0.0]
+    beside = Motion(theta_2 + np.array([-1e-5, 1e-5]), 6.0)
+    two = solve(Scene(PARALLELOGRAM, beside, effects=(ALONG,)))
+    for row, name in zip(rows[1:5], ("F12", "F32", "F43", "F14"), strict=True):
+        mean = getattr(two, name).mean(axis=0)
+        assert numbers(row)[:2] == approx(mean, rel=SIX_DIGITS, abs=1e-8)
+
+
+def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value():
+    rows, _ = write_forces(Motion(0.0, 6.0), ACROSS)
+    assert [row.split()[-4:-1] for row in rows[1:6]] == [["-", "-", "-"]] * 5
+    assert rows[-1] == "on the change point no pin force has a limit"
+
+
+def test_a_commanded_stroke_has_the_limits_of_the_angle_that_it_commands():
+    """At rest, along a cylinder at right angles to the line of all bars.
+
+    Weights along the line ask for no force of the cylinder.
+    """
+    ends = Place(1, (0.2, -0.5 * np.pi)), Place(2, (0.06, 0.0))
+    swept = fourbar.Sweep(0.19, 0.22, 6)
+    motion = Motion(stroke=swept, side="right", stroke_speed=0.0)
+    at = "stroke", float(np.hypot(0.2, 0.06))
+    rows, _ = write_forces(motion, at=at, drive=fourbar.LinearDrive(*ends))
+    assert rows[-1] == LIMITS
+    by_angle, _ = write_forces(Motion(0.0, 0.0))
+    assert rows == by_angle
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gravity", [ALONG, ACROSS])
+def test_a_release_has_the_limits_of_its_own_motion(gravity):
+    """No torque acts: forces are bounded under any weight.
+
+    On the frame the bars act with their weights less m a. Each arm turns about the
+    same angle, so that half of it all is at each pin.
+    """
+    motion = Motion(0.5, 6.0, free=Free(2.0, 100))
+    rows, solution = write_forces(motion, gravity, ("theta_2", 0.0))
+    assert rows[-1] == LIMITS
+    lost = 0.1 * solution.a_G2 + 0.3 * solution.a_G3 + 0.1 * solution.a_G4
+    direction = np.array([np.cos(gravity.angle), np.sin(gravity.angle)])
+    shaking = numbers(rows[5])[:2]
+    assert shaking == approx(9.81 * 0.5 * direction - lost[0], rel=SIX_DIGITS, abs=1e-6)
+    halves = [-0.5 * x for x in shaking]
+    assert numbers(rows[1])[:2] == approx(halves, rel=SIX_DIGITS, abs=1e-6)
+
+
+RELEASED = Motion(0.0, 6.0, free=Free(1.0, 10))
+REASONS = [
+    (
+        Motion(law=fourbar.Rise("cycloidal", (1.0, 1.0), theta_2=0.0)),
+        "the law stands still there",
+    ),
+    (RELEASED, "the release begins or ends there, and has one side alone"),
+    (RELEASED.replace(speed=0.0), "the release stands still there"),
+]
+
+
+@pytest.mark.parametrize("motion, why", slow_but(REASONS[:1], REASONS))
+def test_the_reason_is_said_where_a_motion_begins(motion, why):
+    rows, _ = write_forces(motion, at=("time", 0.0))
+    assert rows[-1] == f"on the change point pin forces have no value: {why}"
+    assert numbers(rows[1]) == []

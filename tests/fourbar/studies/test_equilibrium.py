@@ -6,7 +6,6 @@ Released motions agree, and none is missed.
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from math import pi, radians, sqrt
 from pathlib import Path
@@ -24,7 +23,6 @@ from fourbar import (
     Gravity,
     Load,
     Motion,
-    PinFriction,
     Scene,
     Spring,
     Springs,
@@ -35,7 +33,6 @@ from fourbar import (
 from fourbar.cli import status
 from fourbar.effects import Place
 from fourbar.files import load, loads
-from fourbar.scene.motion import Free
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
@@ -45,15 +42,16 @@ from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
 MODELS = ROOT / "models"
-COUNTEREXAMPLES = ROOT / "tests" / "counterexamples"
 TURN = 2.0 * pi
 M, R, INERTIA = 1.5, 0.04, 0.002
+J = INERTIA + M * R * R
+FALLS = M * 9.81 * R
+AT_REST = -pi / 2 - 0.3
+"""theta_2 of the crank as a pendulum that hangs."""
 DOWN = Gravity()
+
 CLOSE = 1e-12
 """Relative and rad; a dozen operations in doubles, and angles of a few turns."""
-
-
-Run = Callable[..., str]
 
 
 @pytest.fixture
@@ -63,10 +61,7 @@ def run(tmp_path, monkeypatch, capsys):
 
     def call(*arguments):
         assert status(["equilibrium", *arguments]) == 0
-        printed = capsys.readouterr().out
-        if "--json" not in arguments:
-            assert max(map(len, printed.splitlines()), default=0) <= BLOCK_WIDTH
-        return printed
+        return capsys.readouterr().out
 
     return call
 
@@ -82,11 +77,9 @@ def crank_as_pendulum(*effects, loads=(), **motion):
     )
 
 
-J = INERTIA + M * R * R
-AT_REST = -pi / 2 - 0.3
-"""theta_2 of the crank as a pendulum that hangs."""
-FALLS = M * 9.81 * R
 GRID = TURN / POSITIONS_OF_A_BRANCH
+
+
 SAMPLE = 0.2 + 700.5 * GRID
 
 
@@ -104,12 +97,22 @@ def apart(excess):
 
 
 TOP = pi / 2 + 0.1
+
+
 SPRING = Springs((Spring(Place(1, (0.3, 1.0)), Place(2, (0.1, 0.0)), 100.0),))
+
+
 WITHOUT_MASS = replace(
     crank_as_pendulum(SPRING), linkage=bare(0.3, 0.1, 0.25, 0.22, 0.0)
 )
+
+
 HANGS = ("stable", AT_REST, -FALLS, J)
+
+
 STEEP = 0.5 * sqrt(2e-8)
+
+
 PENDULUMS = {
     # stability, theta_2, dQ/dq and inertia of each equilibrium; rad that they may miss
     "hanging and standing": (
@@ -176,15 +179,26 @@ def test_a_crank_with_mass_alone_is_a_pendulum(name):
             assert rest.frequency is None
 
 
-def test_the_frequency_at_a_limit_is_that_of_the_output_as_a_pendulum():
-    linkage = FourBar(0.3, Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0)), 0.5)
+def test_at_its_limits_the_output_is_a_pendulum_or_has_no_inertia():
+    """Bar 4 alone has mass, and a frequency of its own about O4 where it moves.
+
+    Hung along a limit of its own it swings in theta_4; at a limit of its own it stands
+    still to first order.
+    """
+    bars = Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0))
+    linkage = FourBar(0.3, *bars, 0.5)
+    own = sqrt(FALLS / J) / TURN
     limit = fourbar.limit_positions(linkage)[0]
     beside = Motion(np.array([limit.theta_2 + off for off in (0.01, -0.01)]))
-    scene = Scene(linkage, beside, effects=(Gravity(9.81, limit.theta_4),))
-    (hanging,) = [rest for rest in equilibrium(scene).found if rest.place.branch == 0]
+    along = Scene(linkage, beside, effects=(Gravity(9.81, limit.theta_4),))
+    (hanging,) = [rest for rest in equilibrium(along).found if rest.place.branch == 0]
     assert hanging.angle == "theta_4"
-    pendulum = sqrt(M * 9.81 * R / (INERTIA + M * R * R)) / (TURN)
-    assert hanging.frequency == approx(pendulum, rel=1e-9)
+    assert hanging.frequency == approx(own, rel=1e-9)
+    found = equilibrium(Scene(linkage, effects=(DOWN,))).found
+    stands = [rest for rest in found if rest.inertia < 1e-6]
+    assert [(rest.inertia, rest.frequency) for rest in stands] == [(0.0, None)] * 2
+    swings = [rest for rest in found if rest.stability == "stable" and rest.inertia]
+    assert [rest.frequency for rest in swings] == approx([own] * 2)
 
 
 def test_a_slope_that_is_no_number_is_neither_stable_nor_unstable(monkeypatch):
@@ -214,41 +228,6 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     assert all(rest.held for rest in stuck.found)
 
 
-@pytest.mark.slow
-def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move():
-    friction = PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))
-    scene = load(MODELS / "crank_rocker.toml")
-    scene = replace(scene, loads=(), effects=(DOWN, friction))
-    equilibria = equilibrium(scene)
-    assert len(equilibria.held) == 2
-    size = np.abs(equilibria.positions.torque).max()
-    for ends in equilibria.held:
-        signs = np.array([end.branch for end in ends], dtype=np.int8)
-        theta = np.array([end.theta_2 for end in ends])
-        at_ends = fourbar.scene.Command(theta, signs, 0.0, 0.0)
-        torques = solve(scene, at=at_ends)
-        least = np.minimum(abs(torques.torque_low), abs(torques.torque_high))
-        assert least.max() <= 1e-9 * size
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "lengths", [(3.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0)]
-)
-def test_beside_a_change_point_nothing_is_taken_for_a_rest(lengths):
-    """A kite in which A comes to O4, turned with its gravity.
-
-    As many equilibria, and as many undecided, none.
-    """
-    d, a, b, c = lengths
-    bars = Bar(a, 50.0, None, (1.2, 2.4)), Bar(b, 1.0), Bar(c, 6.0)
-    for turn in (0.0, 0.3, 2.0):
-        gravity, motion = Gravity(9.81, turn - 1.9), Motion(1.0 + turn)
-        scene = Scene(FourBar(d, *bars, turn), motion, effects=(gravity,))
-        found = sorted(rest.stability for rest in equilibrium(scene).found)
-        assert found == ["stable"] * 2 + ["unstable"] * 2
-
-
 ONE_CHANGE_POINT = [
     (1.0, 1.0, 2.0, 2.0),  # folded at theta_1: both kites, and a = d, b = c
     (2.0, 1.0, 2.5, 1.5),  # folded, of four lengths
@@ -256,8 +235,14 @@ ONE_CHANGE_POINT = [
     (2.0, 0.5, 1.25, 1.25),
 ]
 """Ground, input, coupler and output: the input turns fully, past one change point."""
+
+
 FULL = Sweep(0.0, 4.0 * pi, 360)
+
+
 HALF = Sweep(radians(30.0), radians(390.0), 180)
+
+
 BACK = Sweep(radians(500.0), radians(-100.0), 300)
 
 
@@ -302,40 +287,34 @@ def test_friction_holds_on_past_the_one_change_point():
     assert any(first.theta_2 < TURN < last.theta_2 for first, last in held)
     for first, last in held:
         angles = np.linspace(first.theta_2, last.theta_2, 101)[1:-1]
-        at = Motion(theta_2=angles, omega_2=0.0, alpha_2=0.0)
-        at_rest = solve(replace(scene, motion=at))
-        solved = np.isfinite(at_rest.torque_low)
-        assert solved.sum() >= len(angles) - 1
-        assert (at_rest.torque_low[solved] <= 0.0).all()
-        assert (at_rest.torque_high[solved] >= 0.0).all()
+        at_rest = solve(replace(scene, motion=Motion(angles, 0.0)))
+        assert np.isfinite(at_rest.torque_low).sum() >= len(angles) - 1
+        assert np.nanmax(at_rest.torque_low) <= 0.0 <= np.nanmin(at_rest.torque_high)
 
 
-def test_a_balanced_linkage_is_indifferent_over_its_sweep_as_it_is_stated():
-    rest = equilibrium(balanced_lamp())
-    # what rounding leaves of the torque is no torque
-    assert not re.search(r"\de-|largest", write_equilibria("lamp", rest))
-    ((first, last),) = rest.indifferent
-    ends = math.degrees(first.theta_2), math.degrees(last.theta_2)
-    assert ends == approx((-40.0, 60.0), abs=1e-9)
+def test_what_is_balanced_is_indifferent_over_all_that_it_reaches():
+    """What rounding leaves of a torque is no torque.
 
-
-def test_nothing_that_acts_and_a_balanced_crank_are_indifferent_all_round():
-    scene = crank_as_pendulum(DOWN)
-    centred = replace(scene.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0)))
-    for balanced in (crank_as_pendulum(), replace(scene, linkage=centred)):
-        equilibria = equilibrium(balanced)
-        ((first, last),) = equilibria.indifferent
+    In the crossed assembly of a rhombus bar 4 rests, and a load on it does nothing.
+    """
+    hanging = crank_as_pendulum(DOWN)
+    centred = replace(hanging.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0)))
+    square = load(MODELS / "textbook" / "gtdynamics_square.toml")
+    crossed = replace(square, motion=square.motion.replace(branch=-1))
+    assert not equilibrium(square).indifferent
+    lamp = equilibrium(balanced_lamp())
+    assert not re.search(r"\de-|largest", write_equilibria("lamp", lamp))
+    for equilibria, reached in (
+        (lamp, radians(100.0)),
+        (equilibrium(crank_as_pendulum()), TURN),
+        (equilibrium(replace(hanging, linkage=centred)), TURN),
+        (equilibrium(crossed), None),
+    ):
         assert not equilibria.found
-        assert last.theta_2 - first.theta_2 == approx(TURN)
-
-
-def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone():
-    """A rhombus: in its crossed assembly bar 4 rests."""
-    scene = load(MODELS / "textbook" / "gtdynamics_square.toml")
-    crossed = replace(scene, motion=scene.motion.replace(branch=-1))
-    assert not equilibrium(scene).indifferent
-    equilibria = equilibrium(crossed)
-    assert equilibria.indifferent and not equilibria.found
+        first, last = (end.theta_2 for end in equilibria.indifferent[0])
+        assert reached is None or last - first == approx(reached)
+    first, last = (math.degrees(end.theta_2) for end in lamp.indifferent[0])
+    assert (first, last) == approx((-40.0, 60.0), abs=1e-9)
 
 
 ROBOT = """
@@ -354,43 +333,20 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 """
 
 
-@pytest.mark.parametrize(
-    "start, turned, angles", [(60.0, 254.5, []), (160.0, 105.5, [167.7867])]
-)
-def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(
-    start, turned, angles
-):
-    """Two circles close the loop at 5000 angles, along which the pins are followed.
-
-    From the first that closes the spring at B is wound by 254.5 deg where the work of
-    both would vanish; a sweep that begins beside it has it within half a turn.
+@pytest.mark.parametrize("start, angles", [(60, []), (160, [167.7867])])
+def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, angles):
+    """From the first angle that closes the spring at B is wound by 254.5 deg where the
+    work of both would vanish, and by half a turn from 113 deg on; a sweep that begins
+    beside it has it within half a turn.
     """
-    theta = np.radians(np.linspace(start, 170.0, 5000))
-    to_O4 = -6.0 - 4.0 * np.exp(1j * theta)
-    theta, to_O4 = theta[np.abs(to_O4) < 8.0], to_O4[np.abs(to_O4) < 8.0]
-    d = np.abs(to_O4)
-    along = (5.0**2 - 3.0**2 + d**2) / (2.0 * d)
-    coupler = (along + 1j * np.sqrt(5.0**2 - along**2)) * to_O4 / d
-    theta_3, theta_4 = (np.unwrap(np.angle(u)) for u in (coupler, coupler - to_O4))
-    wound = np.array([theta_3 - theta - pi / 2, theta_4 - theta_3 + pi / 2])
-    wound -= TURN * np.rint(wound[:, :1] / TURN)
-    near = np.argmin(np.abs(theta - math.radians(167.7867)))
-    assert math.degrees(abs(wound[1, near])) == approx(turned, abs=0.05)
-    within = np.all(np.abs(wound) < pi, axis=0)
-    energy = 5.0 * np.sum(wound**2, axis=0)[within]
-    assert np.any(np.diff(np.sign(np.diff(energy)))) == bool(angles)
-
-    found = equilibrium(loads(ROBOT.replace("START", f"{start} deg")))
-    reached = [math.degrees(r.place.theta_2) for r in found.found if r.reached]
-    assert reached == approx(angles, abs=1e-4)
-    from_here = math.degrees(theta[np.argmax(np.abs(wound[1]) >= pi)])
-    rows = [row.split() for row in write_equilibria("robot", found).splitlines()]
-    ends = [
-        row for row in rows if row and row[-1] in ("wound", "falls", "grows", "stays")
-    ]
+    equilibria = equilibrium(loads(ROBOT.replace("START", f"{start} deg")))
+    reached = [rest.place.theta_2 for rest in equilibria.found if rest.reached]
+    assert np.degrees(reached) == approx(angles, abs=1e-4)
+    rows = write_equilibria("robot", equilibria).splitlines()
+    ends = [row.split() for row in rows if re.search("(wound|falls|grows|stays)$", row)]
     assert ends
     for angle, *_, word in ends:
-        assert (word == "wound") == (not angles and float(angle) >= from_here)
+        assert (word == "wound") == (start == 60 and float(angle) >= 113.0)
 
 
 def springy_table(**motion):
@@ -407,39 +363,32 @@ SWEPT = Sweep(radians(20.0), radians(140.0), 60)
 @pytest.mark.parametrize("branch", slow_but({1}, [1, -1]))
 def test_what_a_sweep_does_not_reach_is_told_apart(branch):
     """The other assembly has the same angles and an equilibrium among them."""
-    (rest,) = equilibrium(springy_table(theta_2=SWEPT, branch=branch)).found
+    equilibria = equilibrium(springy_table(theta_2=SWEPT, branch=branch))
+    (rest,) = equilibria.found
     assert rest.place.branch == -1
     assert rest.reached == (branch == -1)
     everywhere = equilibrium(springy_table(branch=branch)).found
     assert all(rest.reached for rest in everywhere)
-
-
-def points_of(scene, low, high):
-    """Return psi and mu where bar 4 turns between two angles, deg."""
-    sweep = Sweep(radians(low), radians(high), 977)
-    solution = solve(replace(scene, motion=Motion(theta_4=sweep)), "position")
-    assert solution.assembled.all()
-    return np.stack([solution.theta_2, solution.theta_4 - solution.theta_3], axis=1)
+    if branch == 1:
+        first, second, _ = write_equilibria("table", equilibria).split("\n\n")
+        assert "0 equilibria in this sweep without friction," in first
+        assert second.startswith(
+            "1 equilibrium in the other assembly at angles theta_2"
+        )
+        assert "138.3165" in second and "crossed" in second
 
 
 def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
     """Bar 2 turns back at its limit, theta_4 = 196.4 deg, within the sweep."""
-    sweep = Sweep(radians(150.0), radians(230.0), 60)
-    scene = springy_table(theta_4=sweep)
+    scene = springy_table(theta_4=Sweep(radians(150.0), radians(230.0), 60))
     curve = CircuitCurve(scene)
-    within = points_of(scene, 150.0, 230.0)
-    assert set(np.sign(np.sin(within[:, 1]))) == {1.0, -1.0}
-    assert curve.reached(within).all()
-    assert not curve.reached(points_of(scene, 60.0, 149.9)).any()
-    assert not curve.reached(points_of(scene, 230.1, 300.0)).any()
-
-
-def test_the_other_assembly_stands_apart_in_the_print(run):
-    fourbar.save(springy_table(theta_2=SWEPT), "table.toml")
-    first, second, _ = run("table.toml").split("\n\n")
-    assert first.startswith("0 equilibria in this sweep without friction,")
-    assert second.startswith("1 equilibrium in the other assembly at angles theta_2")
-    assert "138.3165" in second and "crossed" in second
+    for low, high in ((150.0, 230.0), (60.0, 149.9), (230.1, 300.0)):
+        swept = Motion(theta_4=Sweep(radians(low), radians(high), 977))
+        s = solve(replace(scene, motion=swept), "position")
+        assert s.assembled.all()
+        psi_and_mu = np.stack([s.theta_2, s.theta_4 - s.theta_3], axis=1)
+        assert (curve.reached(psi_and_mu) == (low == 150.0)).all()
+        assert low != 150.0 or {*np.sign(s.sin_mu)} == {1.0, -1.0}
 
 
 def test_equilibria_are_printed_in_the_units_of_the_file(run):
@@ -454,21 +403,6 @@ def test_equilibria_are_printed_in_the_units_of_the_file(run):
         *(f"{J / (pound * inch**2):.6g}", f"{slope:.6g}"),
     ):
         assert words in printed
-
-
-@pytest.mark.slow
-def test_released_ones_begin_to_move_as_stated():
-    scene = load(MODELS / "crank_rocker.toml")
-    scene = replace(scene, effects=(*scene.effects, Friction.at(O2=0.2)))
-    equilibria = equilibrium(scene)
-    chosen = range(7, len(equilibria.positions), 80)
-    for i in chosen:
-        motion = Motion(float(equilibria.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
-        released = solve(replace(scene, motion=motion), "position")
-        moved = np.sign(released.theta_2[1] - released.theta_2[0])
-        assert moved == equilibria.moves[i]
-    assert 0 in equilibria.moves[list(chosen)]
-    assert len(set(equilibria.moves.tolist())) == 3
 
 
 @pytest.mark.slow
@@ -497,10 +431,11 @@ def test_the_command_prints_what_python_finds(run):
     assert [rest["place"]["theta_2"] for rest in kept["equilibria"]] == places
     assert kept["samples"] == equilibria.samples
     assert kept["positions"]["theta_2"] == equilibria.positions.theta_2.tolist()
-    friction = COUNTEREXAMPLES / "dry_friction_on_a_crank_at_rest.toml"
-    printed = run(str(friction))
+    counterexamples = ROOT / "tests" / "counterexamples"
+    printed = run(str(counterexamples / "dry_friction_on_a_crank_at_rest.toml"))
+    assert max(map(len, printed.splitlines())) <= BLOCK_WIDTH
     assert "friction alone holds" in printed and "largest without friction: " in printed
-    kite = json.loads(run(str(COUNTEREXAMPLES / "kite_with_A_on_O4.toml"), "--json"))
+    kite = json.loads(run(str(counterexamples / "kite_with_A_on_O4.toml"), "--json"))
     assert kite["not_decided"][0]["theta_4"] is None  # which it has not there
 
 
@@ -536,39 +471,19 @@ def test_no_unit_of_length_changes_an_equilibrium(unit):
 def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
     name, start, stop, side
 ):
-    """Those of the input swept over the same.
-
-    A single position has those of its circuit.
-    """
+    """A single position has those of its circuit."""
     swept = Motion(**{name: Sweep(start, stop, 90)}, **side)
-    commanded = crank_rocker(motion=swept, effects=(DOWN,), drive=CYLINDER)
-    theta_2 = solve(commanded).theta_2
+    scene = crank_rocker(motion=swept, effects=(DOWN,), drive=CYLINDER)
+    theta_2 = solve(scene).theta_2
     same = Sweep(float(theta_2.min()), float(theta_2.max()), 90)
-    for by_name, by_input in (
-        (swept, Motion(same)),
-        (Motion(**{name: start}, **side), Motion(float(theta_2[0]))),
-    ):
-        one, other = (
-            [(*rest.place, rest.frequency) for rest in equilibrium(scene).found]
-            for scene in (
-                replace(commanded, motion=by_name),
-                replace(commanded, motion=by_input),
-            )
-        )
-        assert len(one) == len(other) > 0
-        for rest, same_rest in zip(one, other, strict=True):
-            assert rest == approx(same_rest)
 
+    def find(motion):
+        found = equilibrium(replace(scene, motion=motion)).found
+        assert found
+        return [(*rest.place, rest.frequency) for rest in found]
 
-def test_what_stands_at_a_limit_has_no_inertia_and_no_frequency():
-    """Bar 4 alone has mass and stands still to first order at its limits."""
-    bars = Bar(0.4), Bar(0.2), Bar(0.25, 1.0, 0.002, (0.1, 0.0))
-    found = equilibrium(Scene(FourBar(0.3, *bars, 0.5), effects=(DOWN,))).found
-    at_limits = [rest for rest in found if rest.inertia < 1e-6]
-    assert [(rest.inertia, rest.frequency) for rest in at_limits] == [(0.0, None)] * 2
-    # a pendulum of bar 4 about O4, whatever moves with it
-    pendulum = sqrt(9.81 * 0.1 / (0.002 + 0.01)) / TURN
-    others = [
-        rest.frequency for rest in found if rest.stability == "stable" and rest.inertia
-    ]
-    assert others == approx([pendulum] * 2)
+    for row, other in zip(find(swept), find(Motion(same)), strict=True):
+        assert row == approx(other)
+    single = Motion(**{name: start}, **side)
+    for row, other in zip(find(single), find(Motion(float(theta_2[0]))), strict=True):
+        assert row == approx(other)
