@@ -233,6 +233,7 @@ QUICK = {
     "differences that hardly assemble",
     "tolerances that hardly assemble",
     "a lift that is drawn",
+    "a command of a stroke",
 }
 
 

@@ -28,7 +28,6 @@ from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar.solving import solve
-from fourbar_validation.engines.effects import look_up
 from tests.support.scenes import crank_rocker
 
 STEP = 1e-5
@@ -226,21 +225,10 @@ def test_a_table_is_linear_between_its_points_and_periodic():
     angles = np.array([1.0, 1.25, 2.0, 1.5 - tau, 1.25 + 3 * tau])
     right = [0.0, 1.0, 4.0, 2.0, 1.0]
     assert table.at(angles) == approx(right, abs=1e-14)
-    looked_up = [look_up(table, angle) for angle in angles.tolist()]
-    assert looked_up == approx(right, abs=1e-14)
     quarter = Table(("0 deg", "90 deg"), (0.0, 1.0))
     covered = "covers 0 to 90 deg; the position at 120 deg lies outside"
     with raises(InputError, match=covered):
         quarter.at(np.radians([45.0, 120.0]))
-
-
-def test_a_load_over_theta_2_is_the_load_times_its_factor():
-    load = Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2)
-    table = Table((0.0, pi, tau), (1.0, 3.0, 1.0))
-    base = alone(theta_2=[pi / 2])
-    tabled = replace(base, loads=(replace(load, table=table),))
-    twice = replace(base, loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
-    assert solve(tabled).torque == approx(solve(twice).torque, rel=1e-14)
 
 
 def test_breaks_change_their_sign_where_forces_jump_or_bend():

@@ -241,21 +241,3 @@ def test_a_place_that_is_stated_wrongly_is_refused_with_what_to_write(old, new, 
 def test_python_refuses_what_is_no_place(make):
     with raises(InputError):
         make()
-
-
-def test_places_of_loads_are_given_by_keyword():
-    with raises(TypeError):
-        Load(3, (1.0, 0.0), (0.1, 0.0))
-
-
-def test_the_error_bar_covers_a_place_from_the_centre():
-    """The error bar of the torque holds against 40 digits of virtual work."""
-    flint = pytest.importorskip("flint")
-    from fourbar_validation.engines.balls import compute_outputs, make_balls
-
-    loads_ = (Load(3, (1e3, 0.3), from_centre=(0.01, 1.0)),)
-    scene = crank_rocker(loads=loads_, effects=(), motion=Motion(1.1, 0.0))
-    s = solve(scene, "error")
-    exact = compute_outputs(scene, 1, make_balls(scene, 1.1))
-    gap = abs(flint.arb(float(s.torque[0])) - exact["torque"])
-    assert float(gap) <= float(s.torque_error[0])

@@ -13,13 +13,13 @@ from fourbar import Motion, Point, solve
 from fourbar.effects import Place, PointDrive
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
-from fourbar.quantities import PIN_FORCES
-from fourbar_validation.engines.free_body import FreeBody
+from tests.fourbar.effects.test_linear_drive import (
+    assert_like_balls,
+    compare_with_balls,
+)
 from tests.support.scenes import crank_rocker
 from tests.support.texts import PLIERS
 
-ROUND_OFF = 1e-11
-"""Relative, times the condition: two ways of some hundred roundings each."""
 DIRECTION = 1.1
 
 HELD = (
@@ -76,29 +76,10 @@ def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(bar, frame):
     assert_allclose(s.drive_force * along, power, rtol=1e-9, atol=1e-9)
     assert_allclose(s.stroke_speed, along, atol=1e-12)
     assert_allclose(s.power, power, rtol=1e-9, atol=1e-9)
-    unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    assert_allclose(s.drive_line, unit, atol=1e-13)
     assert s.torque is None and s.stroke is None and s.drive_bar is None
-
-
-@pytest.mark.parametrize("frame", ["world", "bar"])
-@pytest.mark.parametrize("bar", [2, 3, 4])
-def test_free_bodies_find_the_same_forces(bar, frame):
-    scene = driven(bar, frame)
-    s = solve(scene)
-    answer = FreeBody().answer(scene, fourbar.command(scene))
-    theirs = answer.quantities["drive_force"]
-    condition = s.drive_condition
-    ratio = condition * theirs / s.drive_force
-    assert_allclose(ratio, condition, atol=ROUND_OFF)
-    for name in PIN_FORCES:
-        apart = condition[:, None] * (answer.quantities[name] - getattr(s, name))
-        assert np.abs(apart).max() <= ROUND_OFF * np.abs(s.F32).max(), name
-    assert_allclose(
-        answer.quantities["drive_condition"],
-        condition,
-        rtol=1e-9,
-    )
+    everywhere = np.ones(len(s), dtype=bool)
+    exact = compare_with_balls(scene, solve(scene, "error"), everywhere)
+    assert_like_balls(s, exact, everywhere)
 
 
 def test_where_the_point_moves_across_the_direction_there_is_no_lever():

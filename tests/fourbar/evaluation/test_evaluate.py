@@ -55,10 +55,12 @@ def sized(k=1.0, turns=0.0):
         Springs((spring,)),
         Torsion.at(B=(0.5 * k * k, 0.7, 0.1 * k * k)),
     )
-    load = Load(4, (3.0 * k, 0.7), arm=(0.05 * k, 1.0))
-    return Scene(
-        linkage, Motion(np.linspace(0.1, 6.0, 15), 3.0, 2.0), 2, (load,), effects
+    loads = (
+        Load(4, (3.0 * k, 0.7), arm=(0.05 * k, 1.0)),
+        Load(3, (2.0 * k, 0.3), from_centre=(0.01 * k, 1.0)),
     )
+    motion = Motion(np.linspace(0.1, 6.0, 15), 3.0, 2.0)
+    return Scene(linkage, motion, 2, loads, effects)
 
 
 def near_a_limit(effect):

@@ -257,26 +257,3 @@ def test_the_motions_shown_meet_every_force():
         for place in ("arm", "from_pin", "from_centre")
         if getattr(load, place) is not None
     } == {(frame, place) for frame in PLACES for place in PLACES[frame]}
-
-
-@pytest.mark.slow
-def test_the_reference_against_a_printed_answer():
-    """One window of IFToMM's A02 after ten seconds, through its change points.
-
-    The source is lim.ii.udc.es/mbsbenchmark.
-    """
-    bar = Bar(1.0, 1.0)
-    theirs = released(
-        FourBar(1.0, bar, bar, bar),
-        (Gravity(),),
-        np.pi / 2,
-        -1.0,
-        1,
-        np.array([0.0, 10.0]),
-    )
-    end = theirs.theta_2[-1]
-    assert abs(np.cos(end) - 0.478385058) <= 0.5e-9
-    assert abs(np.sin(end) - 0.878150179) <= 0.5e-9
-    assert (
-        theirs.change_points == 10
-    )  # multiples of 180 deg between 90 deg and -1739 deg

@@ -15,10 +15,8 @@ from fourbar.edit.dragging import Dragged, drag, list_handles
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.scene.numbers import find_unit_of_key
-from fourbar.show import animate
 from fourbar.show.plot.symbols import list_acting
 from fourbar.studies.keys import list_entries, read_number
-from tests.fourbar.show.test_animate import embedded
 
 FILE = '''
 from dataclasses import dataclass
@@ -223,11 +221,3 @@ def test_a_drag_changes_the_numbers_of_an_entry(scene):
     drag(document, scene, {}, dragged)
     second = loads(document.text()).effects[0].rows[1]
     assert cmath.rect(*second.end.from_centre) == approx(wanted, abs=1e-6)
-
-
-@pytest.mark.slow
-def test_a_figure_draws_it(scene):
-    scene.plot("linkage")
-    data = embedded(animate.write_page(scene))
-    kinds = [one["kind"] for one in data["acting"]]
-    assert kinds == ["drive", "magnets", "magnets", "spring", "spring"]

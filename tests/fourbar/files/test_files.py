@@ -382,31 +382,6 @@ def test_what_a_file_cannot_hold_is_refused():
         dump(replace(scene, title="\ud800"))
 
 
-@pytest.mark.parametrize("length", [0.05, 0.4])
-def test_what_a_bar_leaves_out_follows_its_length(length):
-    """A bar that was read gets another length: m L^2/12 and mid-bar follow.
-
-    What is stated stays.
-    """
-    read = loads(
-        '[lengths]\nground = "30 cm"\ninput = "10 cm"\n'
-        'coupler = "25 cm"\noutput = "22 cm"\n'
-        '[bars.coupler]\nmass = "0.5 kg"\n'
-        '[bars.output]\nmass = "2 kg"\ninertia = "3 kg m^2"\n'
-        'centre = ["7 cm", "0 deg"]\n'
-    ).linkage
-    coupler, output = (
-        replace(bar, length=length) for bar in (read.coupler, read.output)
-    )
-    assert coupler.moment_of_inertia == approx(0.5 * length**2 / 12.0, rel=1e-15)
-    assert coupler.mass_centre == (0.5 * length, 0.0)
-    assert output.moment_of_inertia == 3.0
-    assert output.mass_centre == approx(
-        (0.07, 0.0),
-        rel=1e-15,
-    )
-
-
 WIDTHS = {
     "loads.0.force.0": 0.1,
     "lengths.input": 5e-5,
@@ -456,14 +431,6 @@ def test_three_sigma_less_than_the_number_are_written_and_more_are_not():
         else:
             with raises(InputError, match="three sigma of it must be less"):
                 dump(scene)
-
-
-def test_the_stroke_of_a_gas_spring_is_saved():
-    ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
-    spring = Spring.gas(*ends, 0.35, 0.1, 100.0, 151.0)
-    scene = replace(crank_rocker(), effects=(Springs((spring,)),))
-    read = loads(dump(scene)).effects[0]
-    assert (read.springs[0], read.springs[0].stroke) == (spring, 0.1)
 
 
 def test_a_stroke_is_less_than_the_spring_is_long():

@@ -52,37 +52,6 @@ def test_beyond_a_limit_nothing_assembles_however_near(lengths, offset):
         assert status == ["ok", "singular", "not_assembled"]
 
 
-STEP = 1e-4
-"""s; a central difference then misses STEP^2 of the third derivative of positions that
-turn at 3 rad/s.
-"""
-BY_DIFFERENCES = 1e-5
-
-
-@pytest.mark.parametrize("alpha", [0.0, -7.0])
-@pytest.mark.parametrize("bar", [2, 3, 4])
-def test_points_move_as_their_positions_do(bar, alpha):
-    """Speeds and accelerations of points are differences of their places."""
-    link, omega, z = bare(0.3, 0.1, 0.25, 0.22, 0.4), 3.0, 0.05 - 0.02j
-    angles = np.linspace(0.3, 6.0, 9)
-
-    def place_at(time):
-        theta_2 = angles + omega * time + 0.5 * alpha * time**2
-        return compute_state(link, theta_2, 1).point(bar, z)
-
-    moving = compute_state(link, angles, 1, omega, alpha)
-    first = {2: 0.0, 3: 0.1 * moving.direction(2), 4: 0.3 * cmath.exp(0.4j)}[bar]
-    assert np.abs(moving.foot(bar) - first).max() <= CLOSURE
-    here = moving.point(bar, z)
-    assert np.abs(here - first - z * moving.direction(bar)).max() <= CLOSURE
-    ahead, back = place_at(STEP), place_at(-STEP)
-    speed = (ahead - back) / (2 * STEP)
-    bend = (ahead - 2.0 * here + back) / STEP**2
-    assert moving.velocity(bar, z) == approx(speed, abs=BY_DIFFERENCES)
-    assert moving.acceleration(bar, z) == approx(bend, abs=BY_DIFFERENCES)
-    assert moving.coefficient(1) == moving.omega(1) == moving.alpha(1) == 0.0
-
-
 def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
     """A parallelogram's bar 4 turns as bar 2.
 

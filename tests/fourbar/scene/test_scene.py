@@ -36,9 +36,6 @@ from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, command_at, with_signs
-from fourbar_validation.compare.rows import AGREES, REFUSES
-from fourbar_validation.engines.registry import ENGINES
-from fourbar_validation.run.judge import judge
 from tests.support.scenes import bare
 from tests.support.shares import slow_but
 
@@ -431,28 +428,3 @@ def test_what_takes_theta_2_alone_refuses_in_one_line():
     listed = replace(scene, motion=Motion([1.0, 2.0], [1.0, 2.0]))
     with raises(LimitError, match=r"takes one speed and acceleration$"):
         write_mjcf(listed)
-
-
-@pytest.mark.slow
-def test_the_harness_asks_who_takes_the_command_and_writes_who_refuses():
-    motion = Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0)
-    scene = replace(LOADED, motion=motion, drive_bar=3)
-    rows = judge("", scene).rows
-    assert not [row for row in rows if row.failed]
-    agreed = {
-        row.quantity
-        for row in rows
-        if row.engine == "free-body" and row.verdict == AGREES
-    }
-    assert {"theta_3", "omega_2", "alpha_2", "A", "F12", "torque", "closure"} <= agreed
-    undeclared = replace(ENGINES[0], name="undeclared", start=Undeclared)
-    rows = judge("", scene, (undeclared,)).rows
-    (row,) = (row for row in rows if row.engine == "undeclared")
-    assert row.verdict == REFUSES
-    assert row.reason == "it takes a command of theta_2, and here theta_4 is commanded"
-
-
-class Undeclared:
-    """An engine that does not say what commands it takes is asked for theta_2 alone."""
-
-    name = "undeclared"

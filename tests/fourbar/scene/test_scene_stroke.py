@@ -20,11 +20,9 @@ from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Sweep
-from fourbar.studies.keys import read_place
 from fourbar_validation.engines.prediction import compute_reference
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import crank_rocker
-from tests.support.shares import slow_but
 
 MODELS = Path(__file__).parents[3] / "models"
 
@@ -38,10 +36,6 @@ doubles lose, or some of them.
 """
 ENDS = {2: Place(2, (0.12, 0.4)), 4: Place(4, (0.15, -0.6))}
 GROUND = Place(1, (0.3, 2.2))
-DIFFERENCES = 1e-5
-"""Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times
-third derivatives of 1e4.
-"""
 
 
 def scene(bar, stroke, side="left", *, turned=False, **motion):
@@ -187,45 +181,6 @@ def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble():
     )
     assert solution.status == [["not_assembled", "ok", "not_assembled"]]
     assert np.isnan(solution.theta_2[0, ::2]).all()
-
-
-@pytest.mark.parametrize("bar, stroke", slow_but({(2, 0.3)}, [(2, 0.3), (4, 0.48)]))
-def test_sensitivities_at_a_stroke_are_its_differences(bar, stroke):
-    by_stroke, h = scene(bar, stroke, stroke_speed=0.2, stroke_acceleration=0.1), 1e-6
-    slopes = fourbar.sensitivity(by_stroke)
-    assert {
-        "motion.stroke",
-        "motion.stroke_speed",
-        "motion.stroke_acceleration",
-        "drive.to.from_pin.1",
-    } <= set(slopes.keys)
-    for key in slopes.keys:
-        value = (
-            stroke
-            if key == "motion.stroke"
-            else read_place(by_stroke, slopes.keys[key].place)
-        )
-        ends = np.array([value + h, value - h])
-        s = solve(
-            vary(by_stroke, {key: ends[:, None] if key == "motion.stroke" else ends})
-        )
-        for name in (
-            "theta_2",
-            "theta_3",
-            "alpha_4",
-            "drive_force",
-            "F12",
-            "condition",
-        ):
-            ahead, back = getattr(s, name)
-            slope = (ahead - back)[0] / (2.0 * h)
-            size = np.abs(getattr(slopes.solution, name)).max() / h
-            assert_allclose(
-                slopes.of(name, key)[0],
-                slope,
-                rtol=DIFFERENCES,
-                atol=1e-11 * size,
-            )
 
 
 @pytest.mark.parametrize(
