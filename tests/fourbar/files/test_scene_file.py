@@ -10,6 +10,7 @@ import pytest
 from pytest import approx, raises
 
 import fourbar
+from fourbar import solve
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import load, loads, read_scene_text
@@ -63,33 +64,16 @@ def test_the_file_that_the_mistakes_are_made_in_is_good(tmp_path, capsys):
 
 
 MISTAKES = [
-    # id, what is replaced, by what, words that the line must hold
+    # what is replaced, by what, words that the line must hold
+    ('title = "good"', "colour = 1", ["colour", "title, source, lengths"]),
     (
-        "unknown key at the top",
-        'title = "good"',
-        "colour = 1",
-        ["colour", "title, source, lengths"],
-    ),
-    (
-        "key of another table at the top",
         'title = "good"',
         'branch = "open"',
         ["branch = 'open'", "write it under [motion]"],
     ),
-    (
-        "effect in the motion",
-        "omega_2",
-        'gravity = "9.81 m/s^2"\nomega_2',
-        ["motion.gravity", "write it under [effects]"],
-    ),
-    (
-        "unknown key, closest named",
-        "omega_2",
-        "omega2",
-        ["motion.omega2", 'did you mean "omega_2"?'],
-    ),
+    ("omega_2", "omega2", ["motion.omega2", 'did you mean "omega_2"?']),
     *(
-        (f"{word} is meant as {key}", old, f"{word} =", [f'did you mean "{key}"?'])
+        (old, f"{word} =", [f'did you mean "{key}"?'])
         for word, old, key in (
             ("omega", "omega_2 =", "omega_2"),
             ("angle", "theta_2 =", "theta_2"),
@@ -98,367 +82,149 @@ MISTAKES = [
             ("I", "mass =", "inertia"),
         )
     ),
+    ("mass =", "radius_of_gyration =", ["write inertia = m k^2, or m (k^2 - r^2)"]),
     (
-        "radius of gyration",
-        "mass =",
-        "radius_of_gyration =",
-        ["write inertia = m k^2, or m (k^2 - r^2)"],
-    ),
-    (
-        "a pin is no point",
         'from_pin = ["5 cm", "0 deg"]',
         'point = "B"',
         ["loads[0].point = 'B'", "a point of [points]", 'from_pin = ["0 m", "0 deg"]'],
     ),
+    ("[bars.input]", "[bars.imput]", ["bars.imput", 'did you mean "input"?']),
+    ("gravity", "gravitiy", ["effects.gravitiy", 'did you mean "gravity"?']),
+    ("{ O2 =", "{ O3 =", ["effects.viscous.O3", "O2, A, B, O4"]),
+    ('"0.1 m"', '"48 kg"', ["lengths.input", "48 kg", "does not convert to m"]),
+    ('"3 N"', '"3 kg"', ["loads[0].force[0]", "3 kg", "N"]),
+    ('"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", 'did you mean "10 rev/s"?']),
+    ('"0.01 N m s/rad"', '"0.01 N m s"', ["effects.viscous.O2", "N m s/rad"]),
+    ('"0.1 m"', "9 in", ["line 4, column", 'in quotes, like "9 in"']),
+    ('"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
+    ('"0.1 m"', '"nan m"', ["lengths.input", "nan m", "finite"]),
+    ('"0.1 m"', "nan", ["lengths.input", "nan", "finite"]),
+    ('"0.1 m"', '"1e999 m"', ["lengths.input", "1e999 m", "too large"]),
+    ('"0.1 m"', '"-0.1 m"', ["lengths.input", "-0.1 m", "> 0"]),
+    ('"0.1 m"', '"1e-400 m"', ["lengths.input", "> 0"]),
+    ('"0.2 kg"', '"-1 kg"', ["bars.input.mass", "-1 kg", ">= 0"]),
     (
-        "unknown bar",
-        "[bars.input]",
-        "[bars.imput]",
-        ["bars.imput", 'did you mean "input"?'],
-    ),
-    (
-        "ground has no mass",
-        "[bars.input]",
-        "[bars.ground]",
-        ["bars.ground", "input, coupler, output"],
-    ),
-    (
-        "unknown effect",
-        "gravity",
-        "gravitiy",
-        ["effects.gravitiy", 'did you mean "gravity"?'],
-    ),
-    ("unknown pin", "{ O2 =", "{ O3 =", ["effects.viscous.O3", "O2, A, B, O4"]),
-    ("unknown key of a load", "from_pin =", "where =", ["loads[0].where"]),
-    (
-        "wrong dimension",
-        '"0.1 m"',
-        '"48 kg"',
-        ["lengths.input", "48 kg", "does not convert to m"],
-    ),
-    ("wrong force unit", '"3 N"', '"3 kg"', ["loads[0].force[0]", "3 kg", "N"]),
-    (
-        "Hz is no angular speed",
-        '"10 rad/s"',
-        '"10 Hz"',
-        ["motion.omega_2", "10 Hz", 'like "1 rpm"'],
-    ),
-    (
-        "damping without an angle",
-        '"0.01 N m s/rad"',
-        '"0.01 N m s"',
-        ["effects.viscous.O2", "N m s/rad"],
-    ),
-    ("temperature", '"0.2 kg"', '"20 degC"', ["bars.input.mass", "20 degC"]),
-    (
-        "inches without quotes",
-        '"0.1 m"',
-        "9 in",
-        ["line 4, column", 'in quotes, like "9 in"'],
-    ),
-    ("angle without quotes", '"40 deg"', "40 deg", ['in quotes, like "40 deg"']),
-    ("bare length", '"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
-    ("length without unit", '"0.1 m"', '"0.1"', ["lengths.input", "unit is missing"]),
-    (
-        "bare angle",
-        '"60 deg"',
-        "60",
-        ["motion.theta_2", "the unit is missing", "60 deg"],
-    ),
-    ("unit without number", '"0.1 m"', '"m"', ["lengths.input", "no finite number"]),
-    ("NaN", '"0.1 m"', '"nan m"', ["lengths.input", "nan m", "finite"]),
-    ("bare NaN", '"0.1 m"', "nan", ["lengths.input", "nan", "finite"]),
-    ("infinite", '"0.1 m"', '"inf m"', ["lengths.input", "inf m", "finite"]),
-    ("too large", '"0.1 m"', '"1e999 m"', ["lengths.input", "1e999 m", "too large"]),
-    ("negative length", '"0.1 m"', '"-0.1 m"', ["lengths.input", "-0.1 m", "> 0"]),
-    ("zero length", '"0.1 m"', '"0 m"', ["lengths.input", "0 m", "> 0"]),
-    ("length that rounds to zero", '"0.1 m"', '"1e-400 m"', ["lengths.input", "> 0"]),
-    ("negative mass", '"0.2 kg"', '"-1 kg"', ["bars.input.mass", "-1 kg", ">= 0"]),
-    (
-        "negative damping",
-        '"0.01 N',
-        '"-0.01 N',
-        ["effects.viscous.O2", "-0.01 N m s/rad", ">= 0"],
-    ),
-    (
-        "negative spring",
         "viscous =",
         SPRINGS.format("-0.1 m", 4),
         ["effects.springs[1].length", "-0.1", ">= 0"],
     ),
     (
-        "spring on one bar",
-        "viscous =",
-        SPRINGS.format("0.1 m", 1),
-        ["effects.springs[1].to.bar", "another bar"],
-    ),
-    (
-        "spring on a truth",
         "viscous =",
         SPRINGS.format("0.1 m", "true"),
         ["springs[1].to.bar", "True", "1 (ground)"],
     ),
     (
-        "spring that softens",
-        "viscous =",
-        SPRINGS.format("0.1 m", 4).replace("1 N/m", "-5 N/cm"),
-        ["-5 N/cm", ">= 0"],
-    ),
-    (
-        "gas and coil",
         "viscous =",
         SPRINGS.format('1 m", gas = "', 3),
         ["springs[1].stiffness", "from, to, acts, gas"],
     ),
+    ("viscous =", GAS.format(""), ["effects.springs[0].gas.stroke", "missing", "1 m"]),
     (
-        "gas without a stroke",
-        "viscous =",
-        GAS.format(""),
-        ["effects.springs[0].gas.stroke", "missing", "1 m"],
-    ),
-    (
-        "gas of too long a stroke",
-        "viscous =",
-        GAS.format('stroke = "60 cm", '),
-        ["springs[0].gas.stroke", "0.5 m"],
-    ),
-    (
-        "inertia overflows",
-        '"0.2 kg"',
-        '"1e308 kg"\n[bars.coupler]\nmass = "1e400 kg"',
-        ["bars.coupler.mass"],
-    ),
-    (
-        "lengths missing",
         GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")],
         "",
         ["lengths.ground", "missing"],
     ),
-    ("one length missing", 'output = "0.22 m"\n', "", ["lengths.output", "missing"]),
-    ("can never close", '"0.1 m"', '"10 m"', ["lengths", "never close"]),
+    ('output = "0.22 m"\n', "", ["lengths.output", "missing"]),
+    ('"0.1 m"', '"10 m"', ["lengths", "never close"]),
     (
-        "lengths without a finite sum",
-        '"0.25 m"\noutput = "0.22 m"',
-        '"1.7e308 m"\noutput = "1.7e308 m"',
-        ["lengths"],
-    ),
-    (
-        "branch misspelt",
         '"open"',
         '"opne"',
         ["motion.branch", "opne", 'did you mean "open"?', '"crossed"'],
     ),
-    ("branch as a sign", '"open"', "1", ["motion.branch", '"open" or "crossed"']),
+    ('"open"', "1", ["motion.branch", '"open" or "crossed"']),
     (
-        "drive on the ground",
         "[drive]\nbar = 2",
         "[drive]\nbar = 1",
         ["drive.bar", "1", "must be 2 (input), 3 (coupler) or 4"],
     ),
-    ("drive as text", "[drive]\nbar = 2", '[drive]\nbar = "2"', ["drive.bar", "'2'"]),
+    ("[drive]\nbar = 2", '[drive]\nbar = "2"', ["drive.bar", "'2'"]),
     (
-        "drive as truth",
-        "[drive]\nbar = 2",
-        "[drive]\nbar = true",
-        ["drive.bar", "True"],
-    ),
-    ("load on the ground", "bar = 4", "bar = 1", ["loads[0].bar", "1"]),
-    (
-        "load that does nothing",
         'force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n',
         "",
         ["loads[0]", "force"],
     ),
     (
-        "arm without a force",
         'force = ["3 N", "40 deg"]\nfrom_pin',
         'moment = "1 N m"\narm',
         ["loads[0].arm", "needs a force"],
     ),
+    ('["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
+    ('["3 N", "40 deg"]', '{ x = "1 N" }', ["loads[0].force.y", "is missing"]),
     (
-        "force without an angle",
-        '["3 N", "40 deg"]',
-        '"3 N"',
-        ["loads[0].force", "pair"],
-    ),
-    (
-        "force by one component",
-        '["3 N", "40 deg"]',
-        '{ x = "1 N" }',
-        ["loads[0].force.y", "is missing"],
-    ),
-    (
-        "force downwards",
         '["3 N", "40 deg"]',
         '["3 N", "down"]',
         ["loads[0].force[1]", 'did you mean "-90 deg"?'],
     ),
+    ('force = ["3 N", "40 deg"]', 'torque = "1 N m"', ["loads[0].torque", '"moment"?']),
+    ('"60 deg"', '"60"', ["motion.theta_2", 'did you mean "60 deg"?']),
     (
-        "torque for moment",
-        'force = ["3 N", "40 deg"]',
-        'torque = "1 N m"',
-        ["loads[0].torque", '"moment"?'],
-    ),
-    (
-        "unit left out in quotes",
-        '"60 deg"',
-        '"60"',
-        ["motion.theta_2", 'did you mean "60 deg"?'],
-    ),
-    (
-        "degrees in German",
         '"60 deg"',
         '"60 Grad"',
         ["motion.theta_2", '"Grad" is not known; did you mean "60 deg"?'],
     ),
+    ("[[loads]]", "[loads]", ["loads", "[[loads]]"]),
     (
-        "force with three parts",
-        '["3 N", "40 deg"]',
-        '["3 N", "40 deg", "1 m"]',
-        ["loads[0].force", "pair"],
-    ),
-    ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
-    (
-        "gravity without a direction",
         '["9.81 m/s^2", "-90 deg"]',
         '"9.81 m/s^2"',
         ["effects.gravity", 'like gravity = ["9.81 m/s^2", "-90 deg"]'],
     ),
+    ('"60 deg"', '"0 deg to 360 deg"', ["motion.theta_2", "steps = 360 }"]),
     (
-        "sweep as a text",
-        '"60 deg"',
-        '"0 deg to 360 deg"',
-        ["motion.theta_2", "steps = 360 }"],
-    ),
-    (
-        "torque that is given",
         "[drive]",
         '[drive]\ntorque = "5 N m"',
         ["drive.torque", "is a load", "motion.free"],
     ),
     (
-        "load over time",
         "bar = 4",
         'bar = 4\ntable = { time = ["0 s", "1 s"], factor = [0.0, 1.0] }',
         ["loads[0].table.time", "follows theta_2, not time", "--drive motor"],
     ),
+    ("bar = 4", 'bar = 4\nframe = "body"', ["loads[0].frame", '"world" or "bar"']),
+    ('"60 deg"', '{ from = "0 deg", steps = 9 }', ["motion.theta_2.to", "missing"]),
     (
-        "frame misspelt",
-        "bar = 4",
-        'bar = 4\nframe = "body"',
-        ["loads[0].frame", '"world" or "bar"'],
-    ),
-    (
-        "gravity as truth",
-        '["9.81 m/s^2", "-90 deg"]',
-        "true",
-        ["effects.gravity", "True"],
-    ),
-    (
-        "sweep without end",
-        '"60 deg"',
-        '{ from = "0 deg", steps = 9 }',
-        ["motion.theta_2.to", "missing"],
-    ),
-    (
-        "no steps",
-        '"60 deg"',
-        '{ from = "0 deg", to = "9 deg", steps = 0 }',
-        ["motion.theta_2.steps", "0"],
-    ),
-    (
-        "half a step",
         '"60 deg"',
         '{ from = "0 deg", to = "9 deg", steps = 1.5 }',
         ["motion.theta_2.steps", "1.5"],
     ),
     (
-        "steps without end",
-        '"60 deg"',
-        '{ from = "0 deg", to = "9 deg", steps = 99999999 }',
-        ["motion.theta_2.steps"],
-    ),
-    ("no angles", '"60 deg"', "[]", ["motion.theta_2"]),
-    (
-        "limit and sweep",
         '"60 deg"',
         '{ limit = 1, from = "0 deg" }',
         ["motion.theta_2.from", "limit, offset"],
     ),
-    ("limit zero", '"60 deg"', "{ limit = 0 }", ["motion.theta_2.limit", "0"]),
+    ('"60 deg"', "{ limit = 1 }", ["motion.theta_2.limit", "no limit positions"]),
+    ('branch = "open"', "free = { steps = 3 }", ["motion.free.duration", "missing"]),
     (
-        "a limit the linkage lacks",
-        '"60 deg"',
-        "{ limit = 1 }",
-        ["motion.theta_2.limit", "no limit positions"],
-    ),
-    (
-        "free without duration",
-        'branch = "open"',
-        "free = { steps = 3 }",
-        ["motion.free.duration", "missing"],
-    ),
-    ("title as a number", '"good"', "7", ["title", "7", "text"]),
-    (
-        "lengths as a number",
         GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")],
         "lengths = 3\n",
         ["lengths", "table"],
     ),
-    ("huge number", '"good"', "0x" + "f" * 5000, ["title", "huge whole number"]),
-    ("more digits than Python reads", '"good"', "1" * 5000, ["TOML"]),
-    ("broken quote", '"good"', '"good', ["TOML", "line 1"]),
-    ("a key twice", 'title = "good"', 'title = "a"\ntitle = "b"', ["TOML"]),
-    ("deep nesting", '"good"', "[" * 20000, ["TOML", "deep"]),
-    ("deep table", '"good"', "{a=" * 20000, ["TOML", "deep"]),
+    ('"good"', "0x" + "f" * 5000, ["title", "huge whole number"]),
+    ('"good"', "1" * 5000, ["TOML"]),
+    ('"good"', '"good', ["TOML", "line 1"]),
+    ('"good"', "[" * 20000, ["TOML", "deep"]),
+    ('title = "good"', '"a\\nb\\u001b[31m" = 1', ["'a\\nb\\x1b[31m'", "unknown key"]),
+    ('"open"', '"\\n\\u001b[2J\\u202e"', ["motion.branch", "\\x1b", "\\u202e"]),
+    ('title = "good"', "k" * 50000 + " = 1", ["unknown key"]),
+    (GOOD, "<mujoco/>", ["TOML", "line 1, column 1 = '<mujoco/>'"]),
     (
-        "hostile key",
-        'title = "good"',
-        '"a\\nb\\u001b[31m" = 1',
-        ["'a\\nb\\x1b[31m'", "unknown key"],
-    ),
-    (
-        "hostile value",
-        '"open"',
-        '"\\n\\u001b[2J\\u202e"',
-        ["motion.branch", "\\x1b", "\\u202e"],
-    ),
-    ("endless key", 'title = "good"', "k" * 50000 + " = 1", ["unknown key"]),
-    ("endless value", '"open"', '"' + "x" * 50000 + '"', ["motion.branch"]),
-    (
-        "code for a unit",
-        '"0.1 m"',
-        "\"1 __import__('os').system('true')\"",
-        ["lengths.input"],
-    ),
-    ("tower of powers", '"0.1 m"', '"1 m**9**9**9**9"', ["lengths.input"]),
-    ("another language", GOOD, "<mujoco/>", ["TOML", "line 1, column 1 = '<mujoco/>'"]),
-    (
-        "open heading",
         GOOD,
         'title = "a"\n\n[lengths\nground = "1 m"\n',
         ["line 3, column 9 = '[lengths'"],
     ),
-    (
-        "open text",
-        GOOD,
-        'title = "a"\nsource = """b',
-        ["line 2, column 14", "Unterminated"],
-    ),
-    ("a date", '"good"', "2024-02-31", ["TOML"]),
 ]
 
 
-@pytest.mark.parametrize(
-    "old, new, words",
-    [case[1:] for case in MISTAKES],
-    ids=[case[0] for case in MISTAKES],
-)
-def test_a_mistake_in_a_scene_file(old, new, words, tmp_path, capsys):
+@pytest.mark.parametrize("old, new, words", MISTAKES)
+def test_a_mistake_in_a_scene_file(old, new, words):
     assert GOOD.count(old) >= 1
-    file = tmp_path / "scene.toml"
-    file.write_text(GOOD.replace(old, new, 1), encoding="utf-8")
-    refused(["analyze", str(file)], [str(file), *words], tmp_path, capsys)
+    started = time.process_time()
+    with raises(InputError) as caught:
+        solve(loads(GOOD.replace(old, new, 1), "scene.toml"))
+    assert time.process_time() - started < PATIENCE
+    line = str(caught.value)
+    assert line.isprintable() and len(line) <= LONGEST_LINE
+    for word in words:
+        assert word in line, line
 
 
 def refused(arguments, words, folder, capsys):
@@ -548,14 +314,17 @@ def rocker(theta_2):
     return text.replace('"60 deg"', theta_2)
 
 
-def test_no_position_assembles(tmp_path, capsys):
-    (tmp_path / "scene.toml").write_text(rocker('"180 deg"'))
-    refused(
-        ["analyze", str(tmp_path / "scene.toml")],
-        ["scene.toml", "theta_2", "assembles at none"],
-        tmp_path,
-        capsys,
-    )
+@pytest.mark.parametrize(
+    "theta_2, words",
+    [
+        ('"180 deg"', ["theta_2", "assembles at none"]),
+        ('{ from = "0 deg", to = "9 deg", steps = 99999999 }', ["theta_2.steps"]),
+    ],
+)
+def test_positions_that_cannot_be_analysed(theta_2, words, tmp_path, capsys):
+    file = tmp_path / "scene.toml"
+    file.write_text(rocker(theta_2))
+    refused(["analyze", str(file)], ["scene.toml", *words], tmp_path, capsys)
 
 
 @pytest.mark.slow
@@ -574,7 +343,6 @@ def test_some_positions_do_not_assemble(tmp_path, capsys):
         (["mjcf"], ["scene file or --lengths"]),
         (["mjcf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
         (["mjcf", "x.toml", "--omega", "1"], ["--omega goes with --lengths"]),
-        (["sdf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
         (["usd"], ["one of the two"]),
         (["mjcf", "--lengths", "0.3", "0.1", "0.25"], ["Missing option"]),
         (
@@ -582,25 +350,16 @@ def test_some_positions_do_not_assemble(tmp_path, capsys):
             ["length of output", "> 0"],
         ),
         (
-            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "nan"],
-            ["length of output", "nan"],
-        ),
-        (
             ["mjcf", "--lengths", "0.3", "0.1", "0.25", "2 kg"],
             ["length of output", "2 kg"],
         ),
-        (["mjcf", "--lengths", "9", "0.1", "0.25", "0.2"], ["never close"]),
         (
             ["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "1 Hz"],
             ["--omega", "1 Hz"],
         ),
-        (
-            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "inf"],
-            ["--omega", "inf"],
-        ),
         *(
             (["classify", *lengths.split()], [])
-            for lengths in ("x", "1 1 1", "1 1 1 0", "1 1 1 1s")
+            for lengths in ("x", "1 1 1", "1 1 1 1s")
         ),
         (["analyse"], ["analyse"]),
         (["analyze"], ["SCENE"]),
@@ -612,23 +371,7 @@ def test_bad_arguments(arguments, words, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "pattern",
-    [
-        "a.",
-        '"a b".',
-        "a." * 99 + "a=1\n",
-        "[" + "a." * 99 + "a]\n",
-        "[",
-        "{a=",
-        '"',
-        "[[a]]\n",
-        "'''",
-        "a=1\n",
-        "[a.b.c]\n",
-        "#",
-        "\\",
-        "a" * 99 + "\n",
-    ],
+    "pattern", ["a." * 99 + "a=1\n", "[" + "a." * 99 + "a]\n", "[", '"', "[[a]]\n", "#"]
 )
 def test_large_nonsense_is_answered_soon(pattern):
     text = pattern * (LARGEST_SCENE_FILE // len(pattern))
