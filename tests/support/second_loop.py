@@ -1,8 +1,8 @@
 """Simulate a four-bar a second time, from MuJoCo's documentation alone.
 
-Nothing of `fourbar_validation` is used: not its MJCF, its assembly, its stepping, its
-reading of forces, or its comparison. The formulas judge what is simulated, and the
-simulation is told none of their numbers.
+Not the MJCF of `fourbar_validation`, its assembly, its stepping, its reading of forces,
+or its comparison: the bodies are those of a textbook. The formulas judge what is
+simulated, and the simulation is told none of their numbers.
 """
 
 import math
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 import fourbar
 from fourbar.quantities import PIN_FORCES
+from fourbar_validation.compare.pins import state_from_pins
+from tests.support.textbook import Bodies, Textbook, polar
 
 Array = NDArray[np.float64]
 TURNS_AT_LEAST = 0.1
@@ -67,92 +69,35 @@ class TurningWheel:
 
 
 class Loop:
-    """Four bars as plain numbers, and what acts on them."""
+    """Four bars by the program of a textbook, and the drive on them."""
 
     def __init__(self, scene):
+        self.bodies = Bodies(state_from_pins(scene), Textbook.newton_steps)
         self.d, self.a, self.b, self.c = map(float, scene.linkage.lengths)
         self.theta_1 = float(scene.linkage.ground_angle)
-        bars = (scene.linkage.input, scene.linkage.coupler, scene.linkage.output)
-        self.masses = [float(bar.mass) for bar in bars]
-        self.inertias = []
-        self.centres = []
+        self.masses = self.bodies.mass.tolist()
+        self.inertias = self.bodies.inertia.tolist()
+        self.centres = self.bodies.centre.tolist()
         """Mass centres from the bars' first pins, along the bars."""
-        for bar in bars:
-            slender = bar.mass * bar.length**2 / 12.0
-            inertia = slender if bar.inertia is None else bar.inertia
-            distance, angle = bar.centre or (0.5 * bar.length, 0.0)
-            self.inertias.append(float(inertia))
-            self.centres.append(complex(distance * np.exp(1j * angle)))
         self.gravity = 0j
         for effect in scene.effects:
             assert isinstance(effect, fourbar.Gravity), "the second loop knows no other"
-            self.gravity = complex(effect.magnitude * np.exp(1j * effect.angle))
+            self.gravity = polar((effect.magnitude, effect.angle))
         self.loads = scene.loads
         self.drive = scene.drive or scene.drive_bar
-        self.branch = 1.0 if scene.motion.branch == 1 else -1.0
+        self.branch = scene.motion.branch
 
-    def assemble(self, theta_2):
-        """Intersect the circles about A and O4.
-
-        The branch is the side of the diagonal on which B lies.
-        """
-        pin_A = self.a * np.exp(1j * theta_2)
-        pin_O4 = self.d * np.exp(1j * self.theta_1)
-        diagonal = pin_O4 - pin_A
-        along = (self.b**2 - self.c**2 + abs(diagonal) ** 2) / (2.0 * abs(diagonal))
-        across = math.sqrt(self.b**2 - along**2)
-        direction = diagonal / abs(diagonal)
-        for side in (1.0, -1.0):
-            pin_B = pin_A + direction * (along + 1j * side * across)
-            theta_3 = float(np.angle(pin_B - pin_A))
-            theta_4 = float(np.angle(pin_B - pin_O4))
-            if math.copysign(1.0, math.sin(theta_4 - theta_3)) == self.branch:
-                return theta_3, theta_4
-        raise AssertionError("the circles do not meet")
-
-    def speeds(self, angles, omega_2):
-        """Differentiate a e^(i t2) + b e^(i t3) - c e^(i t4) = const."""
-        first, second, third = (
-            1j * np.array([self.a, self.b, -self.c]) * np.exp(1j * angles)
-        )
-        matrix = [[second.real, third.real], [second.imag, third.imag]]
-        right = [-first.real * omega_2, -first.imag * omega_2]
-        return np.array([omega_2, *np.linalg.solve(matrix, right)])
-
-    def outside_forces(self, angles):
-        """Return force and couple of gravity and loads on bars 2, 3 and 4.
-
-        Each couple is about the first pin of the bar.
-        """
-        sums = []
-        for number in range(3):
-            turned = np.exp(1j * angles[number])
-            force = self.masses[number] * self.gravity
-            couple = _cross(self.centres[number] * turned, force)
-            for load in self.loads:
-                if load.bar != number + 2:
-                    continue
-                push, arm = self.load_vectors(load, number, angles)
-                force += push
-                couple += _cross(arm, push) + float(load.moment)
-            sums.append((force, couple))
-        return sums
-
-    def load_vectors(self, load, number, angles):
-        """Return a load's force in world axes and its arm from the bar's first pin."""
-        turned = complex(np.exp(1j * angles[number]))
-        push, centre = _polar(load.force or (0.0, 0.0)), self.centres[number]
-        if load.frame == "bar":
-            push = push * turned
-        if load.arm is not None:
-            return push, centre * turned + _polar(load.arm)
-        return push, self.load_place(load, number) * turned
+    def start(self, theta_2, omega_2):
+        """Return angles and speeds of bars 2, 3 and 4 that close the loop."""
+        assert self.bodies.close(theta_2, self.branch), "the circles do not meet"
+        right = [0.0] * 8 + [omega_2]
+        return self.bodies.theta, np.linalg.solve(self.bodies.jacobian(), right)[6:]
 
     def load_place(self, load, number):
         """Return where a load acts on its bar, from the first pin; a couple, at G."""
         if load.from_pin is not None:
-            return _polar(load.from_pin)
-        return self.centres[number] + _polar(load.from_centre or (0.0, 0.0))
+            return polar(load.from_pin)
+        return self.centres[number] + polar(load.from_centre or (0.0, 0.0))
 
     def drive_direction(self, angles):
         """Return the forces on bars 2, 3 and 4, and their couples about the first pin
@@ -164,7 +109,7 @@ class Loop:
             return forces, couples
         ends = []
         for end in (self.drive.start, self.drive.end):
-            arm = _polar((end.distance, end.angle))
+            arm = polar((end.distance, end.angle))
             if end.bar == 1:
                 ends.append((1, 0j, arm * np.exp(1j * self.theta_1)))
                 continue
@@ -223,17 +168,17 @@ class Loop:
             )
             option = 'solver="Newton" tolerance="0" iterations="10"'
         gravity = f"{self.gravity.real!r} {self.gravity.imag!r} 0"
-        ground = _polar((self.d, self.theta_1))
+        ground = polar((self.d, self.theta_1))
         sites = [[], [], []]
         motors = []
         for index, load in enumerate(self.loads):
             number = load.bar - 2
-            push = _polar(load.force or (0.0, 0.0))
+            push = polar(load.force or (0.0, 0.0))
             place = self.load_place(load, number)
             frame = "" if load.frame == "bar" else 'refsite="world"'
             couple = float(load.moment)
             if load.arm is not None:
-                couple += _cross(_polar(load.arm), push)
+                couple += _cross(polar(load.arm), push)
             sites[number].append(
                 f'<site name="load{index}" pos="{place.real!r} {place.imag!r} 0"/>'
             )
@@ -327,8 +272,7 @@ class Simulation:
 
     def start(self, theta_2):
         """Close the loop at an angle of the crank; what keeps its speed is in step."""
-        angles = np.array([theta_2, *self.loop.assemble(theta_2)])
-        speeds = self.loop.speeds(angles, self.omega)
+        angles, speeds = self.loop.start(theta_2, self.omega)
         self.data.qpos[:3] = angles[0], angles[1] - angles[0], angles[2]
         self.data.qvel[:3] = speeds[0], speeds[1] - speeds[0], speeds[2]
         carrier = self.settings.carrier
@@ -419,7 +363,8 @@ class Simulation:
     def balance(self, angles, speeds, accelerations, closing, drive):
         """Find each pin's force from Newton's law of its bar."""
         loop = self.loop
-        outside = loop.outside_forces(angles)
+        loop.bodies.theta = angles
+        outside, _ = loop.bodies.applied(speeds)
         pushes, _ = loop.drive_direction(angles)
         needed = []
         for number in range(3):
@@ -429,7 +374,7 @@ class Simulation:
                 crank = loop.a * np.exp(1j * angles[0])
                 of_centre += crank * (1j * accelerations[0] - speeds[0] ** 2)
             inertial = loop.masses[number] * of_centre
-            needed.append(inertial - outside[number][0] - drive * pushes[number])
+            needed.append(inertial - outside[number] - drive * pushes[number])
         force_34 = complex(closing[0], closing[1])
         force_14 = needed[2] - force_34
         force_23 = needed[1] + force_34
@@ -474,10 +419,6 @@ def _add_crank(joints):
     on the crank.
     """
     return np.array([joints[0], joints[0] + joints[1], joints[2]])
-
-
-def _polar(pair):
-    return complex(pair[0] * np.exp(1j * pair[1]))
 
 
 def _cross(arm, force):

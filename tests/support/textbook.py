@@ -47,7 +47,7 @@ class Textbook:
             or not all(isinstance(effect, known) for effect in scene.effects)
         ):
             return Answer(self.name, "exact", refusal="an effect has no model here")
-        bodies = _Bodies(state_from_pins(scene), self.newton_steps)
+        bodies = Bodies(state_from_pins(scene), self.newton_steps)
         n = len(command.theta_2)
         values = {
             name: np.full((n, 2) if name in PIN_FORCES else n, np.nan)
@@ -70,7 +70,7 @@ class Textbook:
         return Answer(self.name, "exact", command, assembled, values)
 
 
-class _Bodies:
+class Bodies:
     """Bars 2, 3, 4 at one position of the input: places `z` of G and angles `theta`."""
 
     def __init__(self, scene, newton_steps):
@@ -81,7 +81,7 @@ class _Bodies:
         bars = [link.bar(k) for k in (2, 3, 4)]
         self.mass = np.array([find_mass(bar) for bar in bars])
         self.inertia = np.array([find_inertia(bar) for bar in bars])
-        self.centre = np.array([_polar(find_centre(bar)) for bar in bars])
+        self.centre = np.array([polar(find_centre(bar)) for bar in bars])
         ends = np.diag(self.lengths[1:])[:2]  # A is the end of bar 2, B that of bar 3
         ends = np.vstack((np.zeros(3), ends, np.zeros(3)))
         ends[2, 2] = self.lengths[3]  # and of bar 4
@@ -139,7 +139,7 @@ class _Bodies:
         centripetal = (self.turned * omega**2).sum(axis=1)
         right = [*centripetal.real, *centripetal.imag, alpha_2]
         accelerations = np.linalg.solve(jacobian, right)
-        force, couple = self._applied(omega)
+        force, couple = self.applied(omega)
         weights = np.concatenate((self.mass, self.mass, self.inertia))
         needed = weights * accelerations - [*force.real, *force.imag, *couple]
         driven = self.jacobian(self.scene.drive_bar)
@@ -153,7 +153,7 @@ class _Bodies:
             values[name] = sign * pair
         return values
 
-    def _applied(self, omega):
+    def applied(self, omega):
         """Return force and couple about G on each bar, of loads and effects."""
         force, couple = np.zeros(3, dtype=complex), np.zeros(3)
         for load in self.scene.loads:
@@ -163,7 +163,7 @@ class _Bodies:
         slip = _SIGNS @ omega
         for effect in self.scene.effects:
             if isinstance(effect, Gravity):
-                force += self.mass * _polar((effect.magnitude, effect.angle))
+                force += self.mass * polar((effect.magnitude, effect.angle))
                 continue
             viscous = isinstance(effect, Viscous)
             sizes = dict(effect.coefficients if viscous else effect.torques)
@@ -176,13 +176,13 @@ class _Bodies:
         if load.force is None:
             return 0j, 0j
         turned = np.exp(1j * self.theta[load.bar - 2])
-        push = _polar(load.force) * (turned if load.frame == "bar" else 1.0)
+        push = polar(load.force) * (turned if load.frame == "bar" else 1.0)
         if load.place is None:
-            return push, _polar(load.arm)
-        arm = _polar(load.place.from_pin) - self.centre[load.bar - 2]
+            return push, polar(load.arm)
+        arm = polar(load.place.from_pin) - self.centre[load.bar - 2]
         return push, arm * turned
 
 
-def _polar(pair):
+def polar(pair):
     """Return a vector of a size and a direction."""
     return complex(pair[0] * np.exp(1j * pair[1]))

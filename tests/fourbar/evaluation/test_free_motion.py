@@ -66,16 +66,6 @@ def test_one_window_of_iftomm_a02():
 
 
 @pytest.mark.slow
-def test_needs_no_driving_torque():
-    """Told to move so, not released: of a release the torque is zero whatever it is."""
-    terms = (DOWN, fourbar.Viscous.at(O2=0.002, B=0.001))
-    m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
-    told = m.command._replace(origin=None)
-    s = solve(Scene(HANGING, effects=terms), "force", at=told)
-    assert np.abs(s.torque).max() < NO_TORQUE
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("coupler", [0.12, 0.15])
 def test_runs_on_through_limits_and_names_its_change_points(coupler):
     """The first has a change point, the second a limit position only."""

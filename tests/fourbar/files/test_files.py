@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pytest import approx, raises
 
@@ -36,6 +36,7 @@ from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.files.scene_text import NEW_POSITIONS, write_new_scene
 from fourbar.quantities.units import UnitError, to_si
+from tests.fourbar.test_solving import scenes
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
@@ -242,68 +243,31 @@ compressed_force = "520 N"
     assert facts(loads(dump(scene))) == facts(scene)
 
 
-def numbers(least=-1e300, most=1e300, **more):
-    return st.floats(least, most, allow_nan=False, allow_infinity=False, **more)
-
-
-LENGTH = numbers(1.0, 1.4)  # any four of these close
-BAR = st.builds(
-    Bar,
-    LENGTH,
-    numbers(0.0, 1e9),
-    numbers(0.0),
-    st.tuples(numbers(), numbers()),
+FINITE = st.floats(-1e300, 1e300, allow_nan=False)
+STEPS = st.integers(1, 10**8)
+SWEPT = st.builds(Sweep, FINITE, FINITE, STEPS) | st.builds(
+    FromLimit, st.integers(1, 4), FINITE
 )
-LOAD = st.builds(
-    Load,
-    st.integers(2, 4),
-    st.tuples(numbers(), numbers()),
-    from_pin=st.tuples(numbers(), numbers()),
-    moment=numbers(),
-    frame=st.sampled_from(("world", "bar")),
-)
-PER_PIN = st.dictionaries(
-    st.sampled_from(("O2", "A", "B", "O4")),
-    numbers(0.0),
-    min_size=1,
-)
-THETA_2 = (
-    st.none()
-    | numbers()
-    | st.lists(numbers(), min_size=1, max_size=4).map(np.array)
-    | st.builds(Sweep, numbers(), numbers(), st.integers(1, 10**8))
-    | st.builds(FromLimit, st.integers(1, 4), numbers())
-)
-MOTION = st.builds(
-    fourbar.Motion,
-    THETA_2,
-    st.none() | numbers(-1e150, 1e150),
-    numbers(),
-    st.sampled_from((1, -1)),
-    st.none() | st.builds(Free, numbers(0.0, exclude_min=True), st.integers(1, 10**8)),
-)
-EFFECTS = st.tuples(
-    st.builds(Gravity, numbers(), numbers()),
-    PER_PIN.map(lambda values: Viscous.at(**values)),
-    PER_PIN.map(lambda values: Friction.at(**values)),
-)
+RELEASED = st.builds(Free, st.floats(0.0, 1e300, exclude_min=True), STEPS)
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
-SCENE = st.builds(
-    fourbar.Scene,
-    st.builds(FourBar, LENGTH, BAR, BAR, BAR, numbers()),
-    MOTION,
-    st.integers(2, 4),
-    st.lists(LOAD, max_size=3).map(tuple),
-    EFFECTS | st.just(()),
-    TEXT,
-    TEXT,
-)
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, derandomize=True)
-@given(SCENE)
-def test_any_scene_reads_back_bit_for_bit(scene):
+@settings(
+    max_examples=150,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=list(HealthCheck),
+)
+@given(scenes(), st.none() | SWEPT | RELEASED, TEXT, TEXT)
+def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
+    """Beside listed angles: none at all, a sweep, a limit, and a release."""
+    motion = scene.motion
+    if isinstance(stated, Free):
+        motion = fourbar.Motion(0.1, motion.omega_2, free=stated)
+    elif title:
+        motion = motion.replace(angle=stated)
+    scene = replace(scene, motion=motion, title=title, source=source)
     assert facts(loads(dump(scene))) == facts(scene)
 
 

@@ -31,10 +31,6 @@ from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
 
-SPEED = 1e-2
-"""The promise of the file: the input within 1 % of omega_2 over a revolution or its
-range.
-"""
 GAP = 1e-4
 """The promise of the file: the loop closed within this part of the longest bar."""
 SHORT_OF_LIMIT = math.radians(2.0)
@@ -77,42 +73,6 @@ def at_keyframe(scene, text=""):
 
 def gap(data):
     return math.dist(data.site("B3").xpos, data.site("B4").xpos)
-
-
-def run_alone(scene):
-    """Plain MuJoCo from keyframe 0 through the sweep.
-
-    Worst gap, worst speed, angle still missing at the end.
-    """
-    model, data = at_keyframe(scene)
-    start = scene.motion.theta_2.start
-    stop = scene.motion.theta_2.stop
-    omega = scene.motion.omega_2
-    open_by = speed = 0.0
-    for _ in range(round((stop - start) / abs(omega) / model.opt.timestep)):
-        mujoco.mj_step(model, data)
-        open_by = max(open_by, gap(data) / max(scene.linkage.lengths))
-        speed = max(speed, abs(data.qvel[0] / omega - 1.0))
-    return (
-        open_by,
-        speed,
-        abs(data.qpos[0] - (stop if omega > 0 else start)) / (stop - start),
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", DrawnType)
-def test_runs_alone(kind):
-    rng = np.random.default_rng(SEED)
-    for _ in range(8):
-        scene = random_scene(rng, kind)
-        open_by, speed, missing = run_alone(scene)
-        assert open_by <= GAP and speed <= SPEED and missing <= SPEED, (
-            scene,
-            open_by,
-            speed,
-            missing,
-        )
 
 
 OPEN = 1e-9
