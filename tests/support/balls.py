@@ -27,7 +27,13 @@ def answer_in_balls(scene, at=None):
             inputs = make_balls(scene, place)
             inputs[at.commanded] += arb(0 if at.remainder is None else at.remainder)
             outputs = compute_outputs(scene, branch, inputs) or {}
-            rows.append({name: float(ball.mid()) for name, ball in outputs.items()})
+            # the ball of an angle of half a turn holds both of its names
+            rows.append(
+                {
+                    name: float(ball.mid()) if not ball.rad() > 3 else np.pi
+                    for name, ball in outputs.items()
+                }
+            )
     finally:
         ctx.prec = precision
     columns = {

@@ -17,24 +17,17 @@ from fourbar.effects import (
     PinFriction,
     Place,
     Spring,
-    Springs,
     Table,
     Torsion,
 )
 from fourbar.effects.pin_friction import MANY, NO_SOLUTION, ONE_SOLUTION, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.evaluation.case import compute_shown_state
-from fourbar.linkage import PINS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar.solving import solve
 from tests.support.scenes import crank_rocker
 
-STEP = 1e-5
-SECOND_ORDER = 1e-7
-"""N m: a central difference with this step misses 1e-10 of the third derivatives of
-these springs, which are some hundred N m.
-"""
 LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
 
@@ -48,84 +41,11 @@ def alone(*effects, **motion):
 GAS = Place(1, (0.2, 2.0)), Place(4, (0.22, 0.0))
 FORCES = 40.0, 70.0
 """N: of the gas spring at no and at full stroke."""
-WOUND = {
-    "O2": (1.5, 0.3, 0.2),
-    "A": (1.0, 0.4, 0.0),
-    "B": (2.0, 0.5, -0.1),
-    "O4": (0.5, 2.0, 0.3),
-}
-"""Stiffness, angle of rest and preload of a torsion spring at each pin."""
-COIL = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.2)), 200.0, 0.05, 3.0)
-OF_NO_LENGTH = Spring(Place(2, (0.1, 0.0)), Place(3, (0.0, 0.0)), 100.0)
-"""Both of its ends lie on A: it has a force, which is zero."""
-
-
-def energy_of_coil(s):
-    ground = 0.1 * np.exp(1j * (0.2 - 1.5))
-    end = s.A @ [1, 1j] + 0.08 * np.exp(1j * (s.theta_3 + 0.2))
-    distance = np.abs(end - ground)
-    return 3.0 * distance + 100.0 * (distance - 0.05) ** 2
-
-
-def energy_of_gas(s):
-    """Pushed in by s it has taken F1 s + (F2 - F1) s^2/(2 stroke)."""
-    first, last = FORCES
-    pushed = 0.5 - np.abs(s.B @ [1, 1j] - 0.2 * np.exp(2.2j))
-    return first * pushed + (last - first) / 0.6 * pushed**2
-
-
-def energy_of_torsion(s):
-    theta = {1: 0.2, 2: s.theta_2, 3: s.theta_3, 4: s.theta_4}
-    energy = np.zeros(len(s))
-    for pin, (k, rest, preload) in WOUND.items():
-        i, j = PINS[pin]
-        turned = np.angle(np.exp(1j * (theta[j] - theta[i] - rest)))
-        energy += preload * turned + 0.5 * k * turned**2
-    return energy
-
-
-def energy_of_weights(s):
-    return 9.81 * (0.2 * s.G2 + 0.5 * s.G3 + 0.4 * s.G4)[:, 1]
-
-
-@pytest.mark.parametrize(
-    "effect, energy",
-    [
-        (Springs((COIL,)), energy_of_coil),
-        (Springs((Spring.gas(*GAS, 0.5, 0.3, *FORCES),)), energy_of_gas),
-        (Springs((OF_NO_LENGTH,)), lambda s: np.zeros(len(s))),
-        (Torsion.at(**WOUND), energy_of_torsion),
-        (Gravity(), energy_of_weights),
-    ],
-    ids=["coil", "gas", "of no length", "torsion", "weights"],
-)
-def test_the_torque_is_the_slope_of_the_energy(effect, energy):
-    scene = alone(effect, theta_2=np.linspace(-1.0, 2.0, 9))
-    ahead, behind = (
-        energy(solve(replace(scene, motion=Motion(scene.motion.theta_2 + step))))
-        for step in (STEP, -STEP)
-    )
-    slope = (ahead - behind) / (2.0 * STEP)
-    assert solve(scene).torque == approx(slope, abs=SECOND_ORDER, rel=0)
 
 
 def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
     constant = Spring(*GAS, 0.0, 0.5, -FORCES[0])
     assert Spring.gas(*GAS, 0.5, 0.3, FORCES[0]) == constant
-
-
-@pytest.mark.parametrize("bar, name", [(2, "input"), (4, "output")])
-def test_a_flywheel_is_inertia_of_the_bar(bar, name):
-    scene = crank_rocker(effects=(Gravity(), Flywheel(0.02, bar)), drive_bar=bar)
-    plain = scene.linkage.bar(bar)
-    heavier = replace(plain, inertia=plain.moment_of_inertia + 0.02)
-    linkage = replace(scene.linkage, **{name: heavier})
-    by_wheel = solve(scene)
-    by_bar = solve(replace(scene, linkage=linkage, effects=(Gravity(),)))
-    for quantity in ("torque", "F12", "F32", "F43", "F14"):
-        right = getattr(by_bar, quantity)
-        allowed = LAST_DIGITS * np.abs(right).max()
-        assert getattr(by_wheel, quantity) == approx(right, abs=allowed)
 
 
 JAMS = math.nan, math.nan

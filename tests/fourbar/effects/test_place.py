@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx, raises
 
 import fourbar
-from fourbar import Motion, Point, Spring, solve
+from fourbar import Point, Spring, solve
 from fourbar.effects import Load, Place
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
@@ -36,60 +36,6 @@ def test_a_weight_hung_at_the_tip_of_the_rocker():
 def test_a_pull_at_the_tip_of_massless_bars():
     torque = solve(loads(PULL)).torque
     assert torque[0] == approx(1.656231, abs=PRINTED)
-
-
-PLACES = {
-    "from_pin": {"from_pin": (0.17, 0.4)},
-    "from_centre": {"from_centre": (0.06, -0.7)},
-    "point": {"point": "P"},
-    "left out": {},
-}
-
-
-def find_place(scene, load, s):
-    """Compute where a load acts at each position, x + i y.
-
-    Points and angles of the solution are all that is used.
-    """
-    bar = scene.linkage.bar(load.bar)
-    angle = {3: s.theta_3, 4: s.theta_4}[load.bar]
-    d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
-    pin = {3: s.A @ [1.0, 1j], 4: cmath.rect(d, theta_1)}[load.bar]
-    G = bar.mass_centre or (0.5 * bar.length, 0.0)
-    turned = np.exp(1j * np.asarray(angle))
-    if load.point is not None:
-        return s.points[load.point] @ [1.0, 1j]
-    if load.from_pin is not None:
-        return pin + cmath.rect(*load.from_pin) * turned
-    arm = cmath.rect(*(load.from_centre or (0.0, 0.0)))
-    return pin + (cmath.rect(*G) + arm) * turned
-
-
-@pytest.mark.parametrize("frame", ["world", "bar"])
-@pytest.mark.parametrize("bar", [3, 4])
-@pytest.mark.parametrize("form", PLACES)
-def test_a_force_does_the_work_of_its_place_and_its_direction(form, bar, frame):
-    """T2 dtheta_2 = -F . dr of a massless linkage at rest.
-
-    dr is a central difference of the place.
-    """
-    force = Load(bar, (7.0, 0.9), frame=frame, **PLACES[form])
-    theta_2, step = np.linspace(0.3, 6.0, 7), 1e-6
-    point = Point("P", bar, from_centre=(0.05, 1.1))
-    base = crank_rocker(effects=(), loads=(force,), points=(point,))
-
-    def at(shift):
-        motion = Motion(theta_2 + shift, 0.0)
-        return solve(replace(base, motion=motion))
-
-    here, ahead, behind = at(0.0), at(step), at(-step)
-    moved = find_place(base, force, ahead) - find_place(base, force, behind)
-    direction = np.full(len(theta_2), 0.9)
-    if frame == "bar":
-        direction = direction + np.asarray({3: here.theta_3, 4: here.theta_4}[bar])
-    along = (np.conj(7.0 * np.exp(1j * direction)) * moved).real
-    # the difference errs by step^2, and by the rounding of the places over the step
-    assert_allclose(here.torque, -along / (2.0 * step), atol=1e-8)
 
 
 def test_an_arm_in_world_axes_keeps_its_lever_about_G():

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from pytest import approx, raises
 
 import fourbar
@@ -13,14 +12,8 @@ from fourbar import Motion, Point, solve
 from fourbar.effects import Place, PointDrive
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
-from tests.fourbar.effects.test_linear_drive import (
-    assert_like_balls,
-    compare_with_balls,
-)
 from tests.support.scenes import crank_rocker
 from tests.support.texts import PLIERS
-
-DIRECTION = 1.1
 
 HELD = (
     PLIERS.replace("[points]", 'omega_2 = "1 rad/s"\n[points]')
@@ -48,38 +41,6 @@ def test_pliers_multiply_the_force_of_the_hand():
     handle, jaw = s.velocity["handle"][0], s.velocity["jaw"][0]
     ratio = np.hypot(*handle) / np.hypot(*jaw)
     assert grip / s.drive_force[0] == approx(ratio, rel=1e-12)
-
-
-def driven(bar, frame, **changes):
-    return crank_rocker(
-        drive=PointDrive(Place(bar, (0.15, 0.3)), DIRECTION, frame),
-        **changes,
-    )
-
-
-@pytest.mark.parametrize("frame", ["world", "bar"])
-@pytest.mark.parametrize("bar", [2, 3, 4])
-def test_the_power_of_the_force_is_that_of_a_couple_on_the_input(bar, frame):
-    """F (e . v_P) = T2 omega_2.
-
-    v_P is the velocity of the point as the solution has it.
-    """
-    point = Point("P", bar, (0.15, 0.3))
-    scene = driven(bar, frame, points=(point,))
-    s = solve(scene)
-    couple = solve(replace(scene, drive=None, drive_bar=2))
-    angle = np.full(len(s), DIRECTION)
-    if frame == "bar":
-        angle = angle + {2: s.theta_2, 3: s.theta_3, 4: s.theta_4}[bar]
-    along = (s.velocity["P"] * np.stack([np.cos(angle), np.sin(angle)], axis=1)).sum(1)
-    power = couple.torque * s.omega_2
-    assert_allclose(s.drive_force * along, power, rtol=1e-9, atol=1e-9)
-    assert_allclose(s.stroke_speed, along, atol=1e-12)
-    assert_allclose(s.power, power, rtol=1e-9, atol=1e-9)
-    assert s.torque is None and s.stroke is None and s.drive_bar is None
-    everywhere = np.ones(len(s), dtype=bool)
-    exact = compare_with_balls(scene, solve(scene, "error"), everywhere)
-    assert_like_balls(s, exact, everywhere)
 
 
 def test_where_the_point_moves_across_the_direction_there_is_no_lever():

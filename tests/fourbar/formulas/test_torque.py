@@ -1,27 +1,15 @@
 """The torque by virtual work against free bodies, energy and published figures."""
 
-from dataclasses import replace
-
 import mpmath as mp
 import numpy as np
 import pytest
-from pytest import approx
 
 import fourbar
 from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene
-from fourbar.effects import Place, Table
-from fourbar.effects.effect import Actions, list_bodies
-from fourbar.evaluation.case import compute_shown_state
-from fourbar.formulas.mobility import choose_range, limit_positions
-from fourbar.formulas.path import compute_state
-from fourbar.formulas.torque import half_slope, inertia
-from fourbar.linkage import MOVING_BARS
-from fourbar.scene import Command
+from fourbar.formulas.mobility import limit_positions
 from fourbar.solving import solve
-from fourbar_validation.cost.formulas import solve_thirteen_equations
-from tests.fourbar.formulas.test_position import LINKAGES
 from tests.support.balls import answer_in_balls
-from tests.support.scenes import bare, draw_linkage
+from tests.support.scenes import draw_linkage
 
 EPS = 2.0**-52
 K = 200.0
@@ -30,8 +18,6 @@ each, over 7000 samples.
 """
 U = 2.0**-53
 """Unit round-off of a double."""
-DIFFERENCE = 1e-6
-"""Relative: a central difference over 1e-5 rad, where all sines are above 0.3."""
 ROUNDED_SUM = 4.0 * U
 """Of the sum of four lengths: what is missing of it where each is rounded by four U."""
 
@@ -108,68 +94,3 @@ def test_statics_of_motiongenesis():
     angles = [np.degrees(rest.place[:3]) for rest in found]
     printed = [19.98690555, 71.66202052, 38.32488502]
     assert any(np.abs(angle - printed).max() <= 0.5e-8 for angle in angles)
-
-
-def with_masses(linkage):
-    """Put masses off the bars."""
-    bars = (
-        replace(bar, mass=2.0 + bar.length, inertia=0.01, centre=(0.4, phase))
-        for bar, phase in zip(linkage.moving, (0.5, -0.7, 2.0), strict=True)
-    )
-    return FourBar(linkage.ground, *bars, linkage.ground_angle)
-
-
-def inertia_of(linkage, state):
-    """Return the equivalent inertia of all bars, kg m^2."""
-    bodies = list_bodies(linkage)
-    parts = inertia(linkage.input.length, bodies, state.position, state.k)
-    return np.asarray(sum(parts))
-
-
-@pytest.mark.parametrize("name", LINKAGES)
-def test_equivalent_inertia_is_that_of_the_kinetic_energy(name):
-    """J against the speeds of the mass centres, J' against its difference."""
-    linkage, step = with_masses(LINKAGES[name]), 1e-5
-    theta_2 = np.linspace(*choose_range(linkage), 7)[1:-1] + 0.1
-    state = compute_state(linkage, theta_2, 1, 3.0)
-    ok = np.abs(state.position.sin_mu) > 0.3
-    energy = np.zeros(len(theta_2))
-    for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
-        v = np.abs(state.velocity(number, bar.to_centre))
-        energy += 0.5 * bar.mass * v**2
-        energy += 0.5 * bar.moment_of_inertia * np.asarray(state.omega(number)) ** 2
-    J = inertia_of(linkage, state)
-    assert ok.any()
-    assert 0.5 * J[ok] * 3.0**2 == approx(energy[ok], rel=1e-13)
-    bodies = list_bodies(linkage)
-    half = half_slope(linkage.input.length, bodies, state.position, state.k)
-    ahead, back = (
-        inertia_of(linkage, compute_state(linkage, theta_2 + s, 1))
-        for s in (step, -step)
-    )
-    slope = (ahead - back) / (2 * step)
-    assert 2.0 * half[ok] == approx(slope[ok], abs=DIFFERENCE * J[ok].max())
-
-
-@pytest.mark.parametrize("drive", [2, 3, 4])
-def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive):
-    """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
-    linkage = with_masses(bare(0.3, 0.1, 0.25, 0.22, 0.4))
-    ends = Place(1, (0.2, 0.3)), Place(4, (0.15, 0.2))
-    table = Table((0.0, 2.0, 6.0), (1.0, 3.0, -1.0))
-    loads = (Load(3, (2.0, 0.3), arm=(0.1, 2.0), moment=0.4, table=table),)
-    spring = fourbar.Springs((fourbar.Spring(*ends, 300.0, 0.05),))
-    effects = spring, fourbar.Friction.at(O2=0.1, B=0.3)
-    omega, signs = np.array([0.0, 3.0, -3.0, 0.0, 1.0]), np.ones(5, np.int8)
-    command = Command(np.linspace(0.2, 5.5, 5), signs, omega, np.full(5, 4.0))
-    for terms in ((loads, effects), (loads, effects[:1]), ((), ())):
-        scene = Scene(linkage, Motion(0.0, 1.0), drive, *terms)
-        s = solve(scene, "force", at=command)
-        thirteen = solve_thirteen_equations(scene, command)["torque"]
-        assert thirteen == approx(s.torque, rel=1e-11)
-        for i in range(5):
-            one = Command(*(np.asarray(part)[i : i + 1] for part in command[:4]))
-            alone = solve(scene, "force", at=one).torque
-            assert alone[0] == approx(s.torque[i], rel=1e-13)
-    state = compute_shown_state(scene, command)
-    assert Actions(state, list_bodies(linkage)).generalized_forces() == (0.0, 0.0)
