@@ -72,8 +72,10 @@ from fourbar_validation.engines.mujoco.robots.planes import (
 )
 from fourbar_validation.engines.mujoco.runner import Stepper
 
-RESIDUAL_OF_A_CLOSED_STATE = 1e-12
+CLOSED = 1e-12
 """m or rad; residual of the closure at which a state is closed."""
+NEARLY_CLOSED = 1e-9
+"""The same of a state on the way to the one that is asked for."""
 _CLOSING_STEPS = 50
 RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
@@ -312,12 +314,13 @@ class LoopInside:
         follow = self.model.jnt_qposadr[self.model.dof_jntid[self.passive]]
         start = self.angle(qpos)
         strides = max(math.ceil(abs(wanted - start) / _STRIDE), 1)
-        for angle in np.linspace(start, wanted, strides + 1)[1:]:
+        stride = (wanted - start) / strides
+        for number in range(1, strides + 1):
             before = qpos.copy()
-            stride = (wanted - start) / strides
             self._move(qpos, self.basis @ (rates * stride))
-            self._turn_to(qpos, angle)
-            if not self.close_gap(qpos):
+            self._turn_to(qpos, start + number * stride)
+            on_the_way = number < strides
+            if not self.close_gap(qpos, NEARLY_CLOSED if on_the_way else CLOSED):
                 return self._jump(wanted)
             if stride:
                 rates = (qpos - before)[follow] / stride
@@ -348,7 +351,7 @@ class LoopInside:
         _, jacobian = self._evaluate_closure(qpos)
         return _solve_least_squares(jacobian @ self.basis, -jacobian @ self.step)
 
-    def close_gap(self, qpos: Array) -> bool:
+    def close_gap(self, qpos: Array, enough: float = CLOSED) -> bool:
         """Move the hinges that follow until the closure's residual is least.
 
         Return whether the loop is then closed.
@@ -362,7 +365,7 @@ class LoopInside:
                 break
             least = size
             best = qpos.copy()
-            if size <= RESIDUAL_OF_A_CLOSED_STATE:
+            if size <= enough:
                 break
             turns = _solve_least_squares(jacobian @ self.basis, -residual)
             self._move(qpos, self.basis @ turns)

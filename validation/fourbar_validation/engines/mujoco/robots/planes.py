@@ -81,15 +81,18 @@ def evaluate_closures(
         rows = np.flatnonzero(data.efc_id[: data.nefc] == number)
         if not len(rows):  # it is switched off
             continue
+        along = np.outer(normal, normal)
+        for values in (residual, jacobian):
+            values[rows[:3]] -= along @ values[rows[:3]]
+        if len(rows) == len(normal):
+            continue
         # MuJoCo states the turn of a weld in the axes of its second body or site
         second = int(model.eq_obj2id[number])
         by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
         axes = data.site_xmat[second] if by_sites else data.xmat[second]
         turned = axes.reshape(3, 3).T @ normal
         for values in (residual, jacobian):
-            values[rows[:3]] -= np.outer(normal, normal) @ values[rows[:3]]
-            if len(rows) > len(normal):
-                values[rows[3:]] = np.outer(turned, turned) @ values[rows[3:]]
+            values[rows[3:]] = np.outer(turned, turned) @ values[rows[3:]]
     return residual, jacobian
 
 
