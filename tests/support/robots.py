@@ -492,3 +492,24 @@ FOOT_PARALLELOGRAM = """
 """A foot that a crank moves by a parallelogram of six-digit numbers: 140, 60, 140 and
 60 mm but for 0.2 um. The range of its motor ends at a change point.
 """
+
+
+def draw_knee(drawn: float) -> str:
+    """Write a parallelogram of 250 and 30 mm, drawn with all bars in line.
+
+    `drawn`: 0 or 180 deg, the angle of the crank from the ground.
+    """
+    crank = 0.03 * math.cos(math.radians(drawn))
+    return f"""
+<mujoco><option gravity="0 -9.81 0"/><worldbody>
+<body name="crank"><joint name="motor" axis="0 0 1"/>
+ <inertial pos="{crank / 2.0} 0 0" mass=".6" diaginertia="8e-4 8e-4 8e-4"/>
+ <body name="coupler" pos="{crank} 0 0"><joint name="pin" axis="0 0 1"/>
+  <inertial pos=".12 0 0" mass=".1" diaginertia="9e-4 9e-4 9e-4"/>
+  <site name="s3" pos=".25 0 0"/></body></body>
+<body name="calf" pos=".25 0 0"><joint name="knee" axis="0 0 1"/>
+ <inertial pos=".1 0 0" mass=".3" diaginertia="2e-3 2e-3 2e-3"/>
+ <site name="s4" pos="{crank} 0 0"/></body>
+</worldbody><equality><connect name="rod" site1="s3" site2="s4"/></equality>
+<actuator><motor joint="motor"/></actuator></mujoco>
+"""

@@ -543,6 +543,24 @@ def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     assert "in radians where degrees" in first.text
 
 
+def test_a_mistake_that_two_texts_describe_alike_is_named_once(check):
+    """The torques are those of linkage_sim's fourbar_inverse_dynamics.json on GitHub.
+
+    Nine equations of the free bodies without -omega^2 r in a_G have the same digits.
+    """
+    bars = [(1.0, 2.0, 0.01), (3.0, 3.0, 0.05), (2.0, 2.0, 0.02)]
+    scene = Scene(
+        fourbar.FourBar(4.0, *(fourbar.Bar(*numbers) for numbers in bars)),
+        fourbar.Motion("30 deg", 1.0),
+        effects=(fourbar.effects.Gravity(),),
+    )
+    text = "theta_2 [deg],torque\n30,21.407471\n60,8.201942\n90,-12.569902\n"
+    code, out, _ = check(scene, text)
+    assert code == FAILED
+    missing = "-omega^2 r is missing in a_G of every bar, r from its first pin to G"
+    assert out.count("looks like: ") == 1 and f"{missing} (explains" in out
+
+
 def test_two_mistakes_in_two_columns_are_both_named(judged):
     numbers = right(OURS)
     numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}

@@ -318,6 +318,11 @@ class Explanation:
     whole: bool = True
     """True if the mistake is one of the calculation, False if it is one of columns."""
 
+    def narrows(self, other: "Explanation") -> bool:
+        """Tell whether the text adds to another's, and nothing shows what it adds."""
+        more = (f"{other.text},", f"{other.text} ")
+        return self.quantities == other.quantities and self.text.startswith(more)
+
 
 @np.errstate(all="ignore")
 def explain(
@@ -344,7 +349,9 @@ def explain(
                     len(explained) == len(differing),
                     mistake.whole,
                 )
-                (whole if mistake.whole else of_columns).append(explanation)
+                among = whole if mistake.whole else of_columns
+                if not any(map(explanation.narrows, among)):
+                    among.append(explanation)
         if any(explanation.complete for explanation in (*whole, *of_columns)):
             break
     together = {name for one in of_columns for name in one.quantities}

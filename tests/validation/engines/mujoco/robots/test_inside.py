@@ -14,7 +14,7 @@ import pytest
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command
-from fourbar.scene.motion import Sweep
+from fourbar.scene.motion import CROSSED, OPEN, Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.robots.answers import (
@@ -35,7 +35,7 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_sce
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.scene import make_loop_scene
 from fourbar_validation.robots.files import read_robot
-from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER, LIFTED
+from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER, LIFTED, draw_knee
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 FILES = ["biped_foot", "gripper"]
@@ -267,3 +267,33 @@ def test_a_motor_opens_the_loop_the_more_the_harder_it_pushes():
     (strong,) = inside.answer_under_torque(start, 20.0, 0.02)
     assert math.isfinite(strong.gap) and strong.gap > 2.0 * weak.gap > 0.0
     assert np.hypot(*strong.forces["F43"]) > 2.0 * np.hypot(*weak.forces["F43"])
+
+
+def mirror(point, one, other):
+    """Return a point mirrored in the line through two others, as complex numbers."""
+    along = (other - one) / abs(other - one)
+    return one + along**2 * (point - one).conjugate()
+
+
+@pytest.mark.parametrize("turned", [-40.0, 40.0])
+@pytest.mark.parametrize("drawn", [0, 180])
+@pytest.mark.parametrize("bar", [2, 4])
+@pytest.mark.parametrize("branch", [OPEN, CROSSED])
+def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
+    branch, bar, drawn, turned
+):
+    """The open one is the parallelogram, and the other its mirror image."""
+    options = PoseOptions()
+    compiled = compile_robot(RobotFile(Path("robot.xml"), draw_knee(drawn)))
+    posed = pose_robot(compiled.model, options)
+    (closure,) = find_closures(posed, options)
+    inside = LoopInside(posed.model, closure.loop, bar=bar, branch=branch)
+    angle = closure.loop.angles[bar - 1] + math.radians(turned)
+    state = inside.state(angle, 1.0)
+    assert state is not None
+    crank, _, knee = np.exp(1j * (state.qpos + math.radians(drawn))) * 0.03
+    moved, follows = (crank, 0.25 + knee) if bar == 2 else (0.25 + knee, crank)
+    wanted = moved + (0.25 if bar == 2 else -0.25)
+    if branch == CROSSED:
+        wanted = mirror(wanted, moved, 0.25 if bar == 2 else 0.0)
+    assert follows == pytest.approx(wanted, abs=1e-9)

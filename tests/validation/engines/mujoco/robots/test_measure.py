@@ -39,6 +39,7 @@ from tests.support.robots import (
     FINGER,
     FOOT_PARALLELOGRAM,
     Planar,
+    draw_knee,
     file_of,
     make_parallelogram,
     measure,
@@ -143,6 +144,7 @@ RIGHT = {
         f"from {start}": (SINGLE, None, pose_at(start), "j2")
         for start in ("0deg", "10deg", "-160deg", "200deg")
     },
+    "drawn in line": (draw_knee(0), None, REST, "motor"),
 }
 """File, scene, pose and driven joint."""
 

@@ -35,6 +35,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.linkage import ENDS, MOVING_BARS, PINS
 from fourbar.quantities import Array
+from fourbar.scene.motion import OPEN
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
 from fourbar_validation.engines.mujoco.couple import find_couple
@@ -65,6 +66,7 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     DRIVEN_PINS,
     FOLLOWING,
     RobotLoop,
+    is_in_line,
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
@@ -156,6 +158,7 @@ class LoopInside:
         drive: LoopDrive | FileCylinder | None = None,
         *,
         bar: int = 2,
+        branch: int = OPEN,
         as_it_is: bool = False,
     ) -> None:
         """Take a loop.
@@ -164,11 +167,13 @@ class LoopInside:
         ----------
         drive : what moves it; None: a couple on the commanded bar.
         bar : the commanded bar, 2, 3 or 4.
+        branch : the assembly, where the bars that follow are in line in the pose.
         as_it_is : contacts, joint limits and other motors act as in the file.
         """
         self.loop = loop
         self.given = model
         self.bar = bar
+        self.branch = branch
         self.as_it_is = as_it_is
         self.acting = None if drive is None or drive.couple_bar == bar else drive
         self.model = copy(model)
@@ -199,7 +204,7 @@ class LoopInside:
         self.basis[self.passive, range(len(self.passive))] = 1.0
         self.basis[self.lead] = -self.turn[self.lead] * self.turn[self.passive]
         self._last = loop.qpos.copy()
-        self._rates = self._find_rates(self._last)
+        self._rates = self._find_first_rates()
         """Turn of the hinges that follow by that of the commanded bar, at the last
         pose.
         """
@@ -311,7 +316,6 @@ class LoopInside:
         """
         qpos = self._last.copy()
         rates = self._rates
-        follow = self.model.jnt_qposadr[self.model.dof_jntid[self.passive]]
         start = self.angle(qpos)
         strides = max(math.ceil(abs(wanted - start) / _STRIDE), 1)
         stride = (wanted - start) / strides
@@ -323,10 +327,15 @@ class LoopInside:
             if not self.close_gap(qpos, NEARLY_CLOSED if on_the_way else CLOSED):
                 return self._jump(wanted)
             if stride:
-                rates = (qpos - before)[follow] / stride
+                rates = self._read_turns(qpos - before) / stride
         self._last = qpos.copy()
         self._rates = rates
         return qpos
+
+    def _read_turns(self, change: Array) -> Array:
+        """Return the turns of the hinges that follow in a change of pose, (k,), rad."""
+        joints = self.model.dof_jntid[self.passive]
+        return np.asarray(change[self.model.jnt_qposadr[joints]])
 
     def _jump(self, wanted: float) -> Array | None:
         """Return the pose at an angle of the commanded bar to which no motion leads.
@@ -350,6 +359,26 @@ class LoopInside:
         """
         _, jacobian = self._evaluate_closure(qpos)
         return _solve_least_squares(jacobian @ self.basis, -jacobian @ self.step)
+
+    def _find_first_rates(self) -> Array:
+        """Return the turns as of `_find_rates` in the pose of the loop, (k,).
+
+        Where the bars that follow are in line there, motions of both assemblies pass
+        through it: the turns are those to a pose a stride away, on the side of the line
+        where the sine has the sign of the branch.
+        """
+        loop = self.loop
+        if is_in_line(loop.angles, self.bar):
+            angle = loop.angles[self.bar - 1]
+            stride = math.copysign(_STRIDE, math.sin(angle - loop.angles[0] + _STRIDE))
+            if self.bar == 4:
+                stride = -stride
+            after = assemble(
+                self.model, loop, self.bar, angle + stride, sign=self.branch
+            )
+            if after is not None:
+                return self._read_turns(after - loop.qpos) / stride
+        return self._find_rates(loop.qpos)
 
     def close_gap(self, qpos: Array, enough: float = CLOSED) -> bool:
         """Move the hinges that follow until the closure's residual is least.
@@ -893,9 +922,9 @@ def assemble(
     bar: int,
     angle: float,
     *,
-    other: bool = False,
+    sign: float | None = None,
 ) -> Array | None:
-    """Return the pose at an angle of a bar in a loop's assembly, (nq,).
+    """Return the pose at an angle of a bar in an assembly of a loop, (nq,).
 
     The bars are vectors of a closed polygon, of which the two that follow make up for
     the rest, a triangle. None if the loop is open.
@@ -903,7 +932,8 @@ def assemble(
     Parameters
     ----------
     angle : of the bar in the plane of the loop, rad.
-    other : the assembly is the one that the loop's pose is not of.
+    sign : of the sine of the angle from the first bar that follows to the second; None:
+        that of the loop's pose.
     """
     angles = dict(zip(ENDS, loop.angles, strict=True))
     vectors = {
@@ -911,9 +941,9 @@ def assemble(
         for bar, length in zip(ENDS, loop.lengths, strict=True)
     }
     first, second = FOLLOWING[bar]
-    side = math.copysign(1.0, (vectors[first].conjugate() * vectors[second]).imag)
-    if other:
-        side = -side
+    if sign is None:
+        sign = _measure_pose_sine(loop, bar)
+    side = math.copysign(1.0, sign) * _DIRECTIONS[first] * _DIRECTIONS[second]
     angles[bar] = angle
     line = -vectors[1] - _DIRECTIONS[bar] * cmath.rect(loop.lengths[bar - 1], angle)
     size = abs(line)
@@ -922,9 +952,16 @@ def assemble(
         return None
     apart = math.acos((size**2 + near**2 - far**2) / (2.0 * size * near))
     vector = cmath.rect(near, cmath.phase(line) - side * apart)
-    angles[first] = cmath.phase(_DIRECTIONS[first] * vector)
-    angles[second] = cmath.phase(_DIRECTIONS[second] * (line - vector))
+    for one, along in (first, vector), (second, line - vector):
+        turned = cmath.phase(_DIRECTIONS[one] * along) - angles[one]
+        angles[one] += math.remainder(turned, math.tau)
     return turn_hinges(model, loop, angles[2], angles[3], angles[4])
+
+
+def _measure_pose_sine(loop: RobotLoop, bar: int) -> float:
+    """Return the sine of the angle between the bars that follow in a loop's pose."""
+    first, second = (loop.angles[other - 1] for other in FOLLOWING[bar])
+    return math.sin(second - first)
 
 
 def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | None:
@@ -932,7 +969,8 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | Non
 
     None where it does not close.
     """
-    qpos = assemble(model, loop, bar, loop.angles[bar - 1], other=True)
+    other = -_measure_pose_sine(loop, bar)
+    qpos = assemble(model, loop, bar, loop.angles[bar - 1], sign=other)
     if qpos is None:
         return None
     # put together anew, no spring is wound by more than half a turn

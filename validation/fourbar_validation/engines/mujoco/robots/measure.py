@@ -172,7 +172,8 @@ def _put_inside(
     """Return a loop driven as a scene has it, by the file's own cylinder if it can."""
     drive = find_cylinder(model, scene) or LoopDrive(model, loop, scene, turned)
     bar = command(scene).bar
-    inside = LoopInside(model, loop, drive, bar=bar, as_it_is=as_it_is)
+    branch = scene.motion.branch
+    inside = LoopInside(model, loop, drive, bar=bar, branch=branch, as_it_is=as_it_is)
     flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
     inside.find_flywheel(sum(one.inertia for one in flywheels))
     return inside

@@ -151,7 +151,9 @@ class SettingsSearch:
         """
         given = self.inside
         changed = _set_settings(given.given, given.loop, settings)
-        inside = LoopInside(changed, given.loop, given.acting, bar=given.bar)
+        inside = LoopInside(
+            changed, given.loop, given.acting, bar=given.bar, branch=given.branch
+        )
         answers = []
         with suppress(LimitError):
             answers.append(inside.answer_states(motion))
