@@ -772,7 +772,7 @@ FAR_OFF = 1e-6
 
 
 @pytest.mark.parametrize(
-    "name", slow_but({"push_output"}, ["drawn", "springs", "push_output"])
+    "name", slow_but({"drawn"}, ["drawn", "springs", "push_output"])
 )
 def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     """Those that are made of a solution's quantities are judged too."""
@@ -783,7 +783,10 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     points = list_names_of_points(scene)
     table = read_table(path, points=points).from_pin(scene.origin)
     assert "not a known column" not in table.left_out.values()
-    assert list_differing(scene, table) == set()
+    assert judge_table(scene, table).status == HOLDS
+    if any(scene.origin):
+        unmoved = read_table(path, points=points)
+        assert list_differing(scene, unmoved) >= {"A", "B"}
     made = [key for key in table.values if key.strip("|") not in UNITS]
     assert len(made) > len(MADE_OF)
     for key in made:
@@ -994,16 +997,6 @@ def test_columns_that_say_nothing_or_two_things_are_refused(head, row, words, to
         judge_table(OURS, torques(head, row))
 
 
-def test_the_table_of_a_drawing_agrees_in_its_coordinates(tmp_path, check):
-    file, table = MODELS / "capabilities" / "drawn.toml", tmp_path / "of_analyze.csv"
-    assert fourbar_status(["analyze", str(file), "--csv", "-o", str(table)]) == HOLDS
-    assert check(file, table.read_text())[0] == HOLDS
-    scene = fourbar.load(file)
-    assert any(scene.origin)
-    points = list_names_of_points(scene)
-    assert list_differing(scene, read_table(table, points=points)) >= {"A", "B"}
-
-
 def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     """Five numbers of one position, each wrong, by a script of a student.
 
@@ -1026,18 +1019,6 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     )
     assert code == FAILED and NO_CAUSE in printed
     assert "looks like" not in printed
-
-
-@pytest.mark.slow
-def test_a_mistake_in_numbers_of_seven_digits_is_named_with_the_digits(judged):
-    """Gravity is reversed, and a part of 1e-7 of another mistake remains."""
-    scene = replace(OURS, effects=(fourbar.Gravity(),))
-    numbers = right(replace(scene, effects=(fourbar.Gravity(angle=math.pi / 2.0),)))
-    for name in FORCES:
-        numbers[name] *= 1.0 + 1e-7
-    judgement = judged(scene, numbers)
-    assert [one.text for one in judgement.explanations] == ["gravity is reversed"]
-    assert judgement.explained_power == -6
 
 
 @pytest.mark.parametrize(("alike", "explained"), [(9, True), (8, False)])

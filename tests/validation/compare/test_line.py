@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import LinearDrive, Place
-from fourbar_validation.compare.rows import AGREES, FAILS
+from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.guests import GuestClient, Hello, Program
 from fourbar_validation.engines.registry import ENGINES, load_further
@@ -77,47 +77,6 @@ def test_what_is_stated_of_a_line_is_judged(what):
     assert not [row for row in rows if row.failed]
     agreeing = {row.quantity for row in rows if row.verdict == AGREES}
     assert quantities <= agreeing and "torque" not in agreeing
-
-
-def _reversed(self, actions, force, act=LinearDrive.act):
-    act(self, actions, -force)
-
-
-def _of_one_end(self, actions, force):
-    push = force * self.line(actions.state)[1]
-    actions.force(self.end.bar, push, self.end.in_bar)
-
-
-def _of_the_wrong_bar(self, actions, force):
-    push = force * self.line(actions.state)[1]
-    actions.force(2, -push, self.start.in_bar)
-    actions.force(3, push, self.end.in_bar)
-
-
-FAULTS = {
-    "line reversed": ("act", _reversed),
-    "one of its two ends": ("act", _of_one_end),
-    "lever of the wrong bar": ("act", _of_the_wrong_bar),
-    "sign of the speed": (
-        "gain",
-        lambda self, state, true=LinearDrive.gain: -true(self, state),
-    ),
-    "half the leverage": (
-        "leverage",
-        lambda *arguments, true=LinearDrive.leverage: (
-            0.5 * true(*arguments)[0],
-            true(*arguments)[1],
-        ),
-    ),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_in_the_drive_is_caught(monkeypatch, fault):
-    monkeypatch.setattr(LinearDrive, *FAULTS[fault])
-    scene = driven(2, 4, 1, (fourbar.Gravity(),))
-    assert [row for row in judge("", scene, [FREE_BODY]).rows if row.verdict == FAILS]
 
 
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it():

@@ -10,7 +10,6 @@ import pytest
 
 import fourbar
 from fourbar.effects import LinearDrive, Place
-from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     FULL_ACCURACY,
@@ -142,26 +141,3 @@ def test_only_a_loop_that_misses_by_its_rounding_touches():
     limit = fourbar.limit_positions(linkage)[0].theta_2
     off = np.array([0.0, 1e-9, -1e-9, 1e-3])
     assert mark_touching(linkage, limit + off).tolist() == [True, False, False, False]
-
-
-def test_the_scale_is_of_positions_whose_condition_is_a_tenth_at_least():
-    """A rocker's pin forces grow towards its limit, and those of worse conditions
-    excuse no others.
-    """
-    linkage = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
-    limit = fourbar.limit_positions(linkage)[0].theta_2
-    away = np.array([0.3, 0.2, 1e-2, 1e-4, 1e-6])
-    weight = (fourbar.Gravity(),)
-    s = next(
-        solution
-        for sign in (1.0, -1.0)
-        for motion in [fourbar.Motion(limit + sign * away, 0.0)]
-        for solution in [fourbar.solve(fourbar.Scene(linkage, motion, effects=weight))]
-        if solution.assembled.all()
-    )
-    size = np.hypot(*s.F12.T)
-    well = s.condition >= 0.1
-    assert well.any() and not well.all() and size[~well].max() > 10.0 * size[well].max()
-    scale = scale_of("F12", s.scene, s, s.F12).size
-    assert scale[well] == pytest.approx(size[well].max())
-    assert (scale[~well] < 2.0 * size[~well]).all()

@@ -143,37 +143,6 @@ def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names):
     assert outcome(scene(*names), SIMULATED) == ([], refusing)
 
 
-ROUNDINGS = 60 * 2.0**-52
-"""Part of the largest number by which a sum of its size may be off."""
-
-
-def test_a_turned_frame_turns_gravity_with_it():
-    """Ground, input and gravity turned by one angle.
-
-    The same torque and the same forces, turned.
-    """
-    posed, by = scene("gravity"), 0.7
-    sweep, linkage = posed.motion.theta_2, posed.linkage
-    sweep = replace(sweep, start=sweep.start + by, stop=sweep.stop + by)
-    turned = replace(
-        posed,
-        linkage=replace(linkage, ground_angle=linkage.ground_angle + by),
-        motion=posed.motion.replace(angle=sweep),
-        effects=(Gravity(9.81, 0.3 + by),),
-    )
-    before, after = fourbar.solve(posed), fourbar.solve(turned)
-    forces = (before.F32 @ [1, 1j]) * np.exp(1j * by)
-    for found, expected in (
-        (after.torque, before.torque),
-        (after.F32 @ [1, 1j], forces),
-    ):
-        allowed = ROUNDINGS * np.abs(expected).max()
-        assert found == pytest.approx(expected, abs=allowed, rel=0)
-
-
-# faults
-
-
 def fail_with(name, engines):
     """Engines and quantities that fail with one effect."""
     chosen = [engine for engine in EXACT if engine.name in engines]

@@ -1,17 +1,13 @@
 """The free bodies against levers, energy and 50 digits, never against the formulas."""
 
 import math
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-import mpmath as mp
 import numpy as np
 import pytest
 
 import fourbar
 from fourbar.effects import (
-    Flywheel,
     Friction,
     Gravity,
     Load,
@@ -77,48 +73,6 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
         assert not [name for name in modules if not name.startswith(allowed)]
 
 
-# the closure
-
-
-def gap(lengths, theta_2, theta_3, theta_4):
-    """Both closure equations, theta_1 = 0, m."""
-    d, a, b, c = lengths
-    two, three, four = (mp.exp(1j * theta) for theta in (theta_2, theta_3, theta_4))
-    z = a * two + b * three - d - c * four
-    return [mp.re(z), mp.im(z)]
-
-
-def test_the_angles_solve_the_closure_equations_to_50_digits():
-    """Against Newton in 50 digits from its own angles.
-
-    The error is that of the last digits of the longest bar.
-    """
-    rng = np.random.default_rng(3)
-    checked = 0
-    with mp.workdps(50):
-        for _ in range(120):
-            d, a, b, c = (10.0 ** rng.uniform(-1.5, 0.5, 4)).tolist()
-            if 2.0 * max(d, a, b, c) > 0.99 * (d + a + b + c):
-                continue
-            linkage = fourbar.uniform(d, a, b, c)
-            theta_2 = rng.uniform(-7.0, 7.0, 5)
-            branch = rng.choice([-1, 1], 5).astype(np.int8)
-            closed = free_body_closure.close(linkage, theta_2, branch)
-            for i in np.flatnonzero(closed.assembled):
-                near = [mp.mpf(float(closed.theta[k, i])) for k in (0, 1)]
-                open_by = partial(gap, linkage.lengths, mp.mpf(float(theta_2[i])))
-                x, y = mp.findroot(open_by, near)
-                sine = float(mp.sin(y - x))
-                assert sine * branch[i] > 0.0
-                allowed = DIGITS * max(d, a, b, c) / (min(b, c) * abs(sine))
-                assert max(abs(x - near[0]), abs(y - near[1])) <= allowed
-                checked += 1
-    assert checked > 80
-
-
-# forces
-
-
 @pytest.mark.parametrize(
     ("drive", "torque", "F12", "F32", "F43", "F14"),
     [
@@ -136,23 +90,6 @@ def test_a_lever_of_an_upright_rectangle(drive, torque, F12, F32, F43, F14):
     assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
     for name, force in {"F12": F12, "F32": F32, "F43": F43, "F14": F14}.items():
         assert got[name][0] == pytest.approx(force, abs=1e-13), name
-
-
-def test_weight_of_a_crank_and_a_flywheel():
-    """Bar 2 alone has mass.
-
-    T = (I + m r^2 + J) alpha + m g r cos theta_2, and O2 carries its weight and m a_G.
-    """
-    bar = fourbar.Bar(0.1, 2.0, 0.003, (0.04, 0.0))
-    linkage, motion = replace(RECTANGLE, input=bar), fourbar.Motion(0.7, 3.0, 5.0)
-    got = answered(Scene(linkage, motion, 2, (), (Gravity(), Flywheel(0.02))))
-    inertial = (0.003 + 2.0 * 0.04**2 + 0.02) * 5.0
-    weight = 2.0 * 9.81 * 0.04 * math.cos(0.7)
-    assert got["torque"][0] == pytest.approx(inertial + weight)
-    a_G = 0.04 * np.exp(0.7j) * (5.0j - 9.0)
-    assert got["F12"][0] == pytest.approx([2.0 * a_G.real, 2.0 * (a_G.imag + 9.81)])
-    for name in ("F32", "F43", "F14"):
-        assert got[name][0] == pytest.approx([0.0, 0.0], abs=1e-14)
 
 
 SPRING = Springs(
@@ -218,14 +155,6 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect):
     assert (loss > 0.0).all()
     allowed = 1e-12 * 10.0 * np.abs(braked["torque"]).max()
     assert more == pytest.approx(loss, abs=allowed, rel=0)
-
-
-def test_dry_friction_does_nothing_at_rest():
-    dry = (Friction.at(A=1.0), PinFriction.at(B=(0.2, 0.1)))
-    still = crank_rocker(motion=fourbar.Motion([0.3, 2.0], 0.0), effects=dry)
-    free = replace(still, effects=())
-    torques = [answered(scene)["torque"] for scene in (still, free)]
-    assert torques[0] == pytest.approx(torques[1], rel=1e-14)
 
 
 @pytest.mark.parametrize(

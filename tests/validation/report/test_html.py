@@ -97,25 +97,25 @@ def wait(driver, condition):
     return WebDriverWait(driver, LOADED).until(lambda _: condition())
 
 
+def require_contrast(driver):
+    worst = driver.execute_script(CONTRASTS)
+    assert len(worst) == 5
+    assert worst[0][0] >= CONTRAST, worst
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_all_text_is_readable(browse, dark):
+    """Also in the matrix of the benchmark, with its grounds of green, yellow and red.
+
+    A light paper of a picture would hide the light text of a dark page.
+    """
     driver = browse(report(copies(2, failing=1))[1], dark=dark)
-    worst = driver.execute_script(CONTRASTS)
-    assert len(worst) == 5
-    assert worst[0][0] >= CONTRAST, worst
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("dark", [False, True])
-def test_each_letter_of_the_benchmark_is_readable(browse, dark):
-    """Its matrix has grounds of green, yellow and red."""
+    require_contrast(driver)
+    assert driver.find_elements("css selector", "svg")
+    assert driver.execute_script(PAPERS) == []
     page = (ROOT / "docs" / "examples" / "benchmark.html").read_text()
-    matrix = page[: page.index("</table>")]
-    driver = browse(matrix, dark=dark)
-    worst = driver.execute_script(CONTRASTS)
-    assert len(worst) == 5
-    assert worst[0][0] >= CONTRAST, worst
+    require_contrast(browse(page[: page.index("</table>")], dark=dark))
 
 
 @pytest.mark.slow
@@ -135,47 +135,28 @@ def test_engines_stand_before_what_checks_fourbar_against_itself(browse):
 
 
 @pytest.mark.slow
-def test_the_table_of_orders_fits_a_phone(browse):
-    pages = copies(2)
+@pytest.mark.parametrize("width", [1440, 400, 360])
+def test_every_text_is_whole_and_large_enough_and_nothing_is_left_out(browse, width):
+    """The pictures of the first screen, those of a scene that is open, and tables."""
+    pages = copies(2, failing=1)
     orders = {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0}
     for record in pages:
         record.evidence = {"mujoco-simulated": orders}
-    driver = browse(report(pages)[1], 400)
-    widths = driver.execute_script(
-        "return [...document.querySelectorAll('table.short')]"
-        ".map(e => [e.scrollWidth, e.parentElement.clientWidth])"
-    )
-    assert widths and all(table <= room for table, room in widths)
-
-
-@pytest.mark.slow
-def test_nothing_is_wider_than_a_phone_nor_left_out_there(browse):
-    driver = browse(report(copies(2, failing=1))[1], 360)
-    assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
+    driver = browse(report(pages)[1], width)
+    assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+    assert len(driver.find_elements("css selector", "details[open] svg")) == 3
+    clipped, smallest = driver.execute_script(TEXTS)
+    assert clipped == [] and smallest >= SMALLEST
     heads = driver.execute_script(
         "return [...document.querySelectorAll('table.engines th')]"
         ".map(e => [e.textContent, e.checkVisibility()])"
     )
     assert len(heads) > 10 and all(visible for _, visible in heads)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [1440, 400])
-def test_every_text_of_a_picture_is_whole_and_large_enough(browse, width):
-    """The pictures of the first screen, and those of a scene that is open."""
-    driver = browse(report(copies(2, failing=1))[1], width)
-    assert len(driver.find_elements("css selector", "details[open] svg")) == 3
-    clipped, smallest = driver.execute_script(TEXTS)
-    assert clipped == []
-    assert smallest >= SMALLEST
-
-
-@pytest.mark.slow
-def test_a_picture_has_no_paper_of_its_own(browse):
-    """Its light paper would hide the light text of a dark page."""
-    driver = browse(report(copies(2, failing=1))[1], dark=True)
-    assert driver.find_elements("css selector", "svg")
-    assert driver.execute_script(PAPERS) == []
+    widths = driver.execute_script(
+        "return [...document.querySelectorAll('table.short')]"
+        ".map(e => [e.scrollWidth, e.parentElement.clientWidth])"
+    )
+    assert widths and all(table <= room for table, room in widths)
 
 
 @pytest.mark.slow

@@ -12,25 +12,13 @@ from fourbar_validation.compare.rows import (
     FAILS,
     REFUSES,
     UNDECIDED,
-    Row,
 )
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.overview import Overview
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary, compute_shares
+from tests.support.runs import ROW
 
-ROW = Row(
-    "scene",
-    "engine",
-    "exact",
-    "torque",
-    1e-15,
-    1e-14,
-    AGREES,
-    "",
-    1.0,
-    1.0,
-)
 OUTCOMES = {
     AGREES: "passed",
     DEGRADED: "passed",

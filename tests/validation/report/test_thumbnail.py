@@ -13,10 +13,18 @@ from fourbar_validation.report.record import Record
 from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.scenes.suites import MODELS
 
+PLAIN = fourbar.load(MODELS / "crank_rocker.toml")
+WHOLE = fourbar.solve(PLAIN, "force")
 
-def count_marks(record):
-    """Count the marks of a scene's picture."""
-    return len(re.findall('class="mark"', draw_thumbnail(record) or ""))
+
+def list_marks(scene, solution, torque, *at):
+    """Return the places of the marks of an engine's torque in a scene's picture."""
+    answer = Answer("free-body", "exact", *at, quantities={"torque": torque})
+    record = Record("scene", scene, solution=solution, answers=[answer])
+    drawn = draw_thumbnail(record)
+    assert ">torque on bar 2</text>" in drawn
+    marks = re.findall(r'mark" cx="([\d.]+)" cy="([\d.]+)"', drawn)
+    return [(float(x), float(y)) for x, y in marks]
 
 
 def test_no_mark_stands_where_nothing_is_judged():
@@ -29,57 +37,27 @@ def test_no_mark_stands_where_nothing_is_judged():
     judged = solution.status_code == OK
     assert np.flatnonzero(~judged).tolist() == [0, 18, 36]
     torque = np.where(judged, solution.torque, -1e3)
-    answer = Answer("free-body", "exact", quantities={"torque": torque})
-    record = Record("kite", scene, solution=solution, answers=[answer])
-    of_the_kite = count_marks(record)
-
-    plain = fourbar.load(MODELS / "crank_rocker.toml")
-    whole = fourbar.solve(plain, "force")
-    assert (whole.status_code == OK).all()
-    answer = Answer(
-        "free-body",
-        "exact",
-        command(plain),
-        quantities={"torque": whole.torque},
-    )
-    everywhere = count_marks(Record("all", plain, solution=whole, answers=[answer]))
-    assert of_the_kite == everywhere - 1
+    assert (WHOLE.status_code == OK).all()
+    everywhere = list_marks(PLAIN, WHOLE, WHOLE.torque, command(PLAIN))
+    assert len(list_marks(scene, solution, torque)) == len(everywhere) - 1
 
 
 def test_marks_stand_at_the_positions_of_their_engine():
     """An engine that answers the first half of a turn has no mark beyond its middle."""
-    plain = fourbar.load(MODELS / "crank_rocker.toml")
-    whole = fourbar.solve(plain, "force")
-    at = command(plain)
+    at = command(PLAIN)
     half = at.part(slice(0, len(at.angle) // 2 + 1))
-    torque = whole.torque[: len(half.angle)]
-    answers = [
-        Answer("free-body", "exact", at, quantities={"torque": whole.torque}),
-        Answer("mujoco-simulated", "RK4", half, quantities={"torque": torque}),
-    ]
-    places = []
-    for answer in answers:
-        record = Record("half", plain, solution=whole, answers=[answer])
-        drawn = draw_thumbnail(record) or ""
-        marks = re.findall(r'mark" cx="([\d.]+)" cy="([\d.]+)"', drawn)
-        places.append({(float(x), float(y)) for x, y in marks})
-        assert ">torque on bar 2</text>" in drawn
-    (whole_turn, half_turn) = places
-    x = sorted(x for x, _ in whole_turn)
+    whole_turn, half_turn = (
+        sorted(list_marks(PLAIN, WHOLE, WHOLE.torque[: len(one.angle)], one))
+        for one in (at, half)
+    )
+    x = [x for x, _ in whole_turn]
     middle = 0.5 * (x[0] + x[-1] + (x[1] - x[0]))
-    assert max(x for x, _ in half_turn) <= middle < max(x)
+    assert half_turn[-1][0] <= middle < x[-1]
 
 
 def test_where_a_curve_is_cut_a_bar_says_so():
-    plain = fourbar.load(MODELS / "crank_rocker.toml")
-    whole = fourbar.solve(plain, "force")
-    pole = whole.torque.copy()
+    pole = WHOLE.torque.copy()
     pole[100:102] *= 1e3
-    bars = [
-        len(re.findall('class="cut"', draw_thumbnail(record) or ""))
-        for record in (
-            Record("as it is", plain, solution=whole),
-            Record("pole", plain, solution=replace(whole, torque=pole)),
-        )
-    ]
-    assert bars == [0, 1]
+    for torque, cuts in ((WHOLE.torque, 0), (pole, 1)):
+        record = Record("pole", PLAIN, solution=replace(WHOLE, torque=torque))
+        assert draw_thumbnail(record).count('class="cut"') == cuts

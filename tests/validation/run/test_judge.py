@@ -14,7 +14,6 @@ from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import (
     AGREES,
@@ -23,8 +22,6 @@ from fourbar_validation.compare.rows import (
     UNDECIDED,
     Counts,
     Row,
-    write_results,
-    write_rows,
 )
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
 from fourbar_validation.engines.free_body import FreeBody
@@ -178,18 +175,6 @@ def test_positions_alone_need_no_forces():
     scene = replace(crank_rocker(), motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 10)))
     rows = judge("scene", scene, []).rows
     assert {row.quantity for row in rows} == {"closure"}
-
-
-def test_results_survive_the_file(tmp_path):
-    rows = judge("scene", crank_rocker(), [Engine("echo", Echo, EQUIVALENCE)]).rows
-    write_results(rows, tmp_path / "results.csv")
-    again = list(read_columns(tmp_path / "results.csv"))
-    assert write_rows(again) == write_rows(rows)
-    keys, sorted_keys = (
-        [(row.scene, row.engine, row.setting, row.quantity) for row in some]
-        for some in (again, rows)
-    )
-    assert keys == sorted(sorted_keys)
 
 
 def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own():

@@ -21,6 +21,7 @@ from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
     FULL_ACCURACY,
+    OF_THE_INPUT,
     K,
     magnitude,
 )
@@ -68,42 +69,40 @@ def test_the_suite_is_made_from_its_parameters_alone():
     names = [first.name(i) for i in range(len(first))]
     assert names == sorted(set(names)) == [second.name(i) for i in range(len(second))]
     for i in (0, len(first) // 2, len(first) - 1):
-        assert fourbar.dump(first.scene(i)) == fourbar.dump(second.scene(i))
-    assert {first.scene(i).source for i in range(len(first))} == {
-        family.statement for family in HARD_FAMILIES
-    }
+        assert first.scene(i) == second.scene(i)
+    sources = {first.scene(i).source for i in range(len(first))}
+    assert sources == {family.statement for family in HARD_FAMILIES}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "family",
-    [f for f in HARD_FAMILIES if f.name != "released"],
-    ids=lambda family: family.name,
-)
-def test_a_scene_of_each_family_holds(family):
-    *_, (name, scene) = family.scenes()
+def take_last(family):
+    """Return the last scene of a family, at few positions."""
+    *_, (_, scene) = family.scenes()
     sweep = scene.motion.theta_2
     if isinstance(sweep, fourbar.Sweep):
         motion = scene.motion.replace(angle=replace(sweep, steps=12))
         scene = replace(scene, motion=motion)
-    require_no_failure(name, scene)
+    return scene
+
+
+POSED = {
+    **{one.name: one for one in HARD_FAMILIES if one.name != "released"},
+    **AT_CHANGE_POINTS,
+    **THROUGH_CHANGE_POINTS,
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*AT_CHANGE_POINTS, *THROUGH_CHANGE_POINTS])
-def test_every_kind_of_change_point_holds_on_both_sides_and_in_both_assemblies(name):
-    """A simulation passes through them; beside them it is asked in the family above."""
-    if name in AT_CHANGE_POINTS:
-        require_no_failure(name, AT_CHANGE_POINTS[name], EXACT)
-    else:
-        require_no_failure(name, THROUGH_CHANGE_POINTS[name])
+@pytest.mark.parametrize("name", POSED)
+def test_a_hard_scene_holds(name):
+    """No row of any check and engine fails, the file as it is shipped included.
 
-
-def require_no_failure(name, scene, engines=HARD_ENGINES):
-    """No row of any check and engine fails, the file as it is shipped included."""
-    rows = judge(name, scene, engines).rows
-    assert {row.verdict for row in rows} <= set(VERDICTS)
-    assert [row for row in rows if row.verdict == FAILS] == []
+    Beside change points a simulation is asked in the family of that name.
+    """
+    posed = POSED[name]
+    scene = posed if isinstance(posed, Scene) else take_last(posed)
+    engines = EXACT if name in AT_CHANGE_POINTS else HARD_ENGINES
+    verdicts = {row.verdict for row in judge(name, scene, engines).rows}
+    assert verdicts <= {*VERDICTS} - {FAILS}
 
 
 def place_before_toggle(*distances):
@@ -112,19 +111,6 @@ def place_before_toggle(*distances):
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     inwards = -1.0 if stretched else 1.0
     return set_angles(dress(lengths), psi + inwards * np.array(distances))
-
-
-OF_THE_INPUT = {
-    "theta_2",
-    "omega_2",
-    "alpha_2",
-    "A",
-    "G2",
-    "v_A",
-    "v_G2",
-    "a_A",
-    "a_G2",
-}
 
 
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
@@ -240,38 +226,22 @@ def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too
     assert other.verdict == FAILS and "as it opens" in other.reason
 
 
-class Spoiled:
-    """The formulas' numbers with the pin force at A spoiled.
-
-    Only for tests of the harness.
+def judge_spoiled(scene, part, predictor):
+    """Return verdict and allowed error of the formulas' numbers with F32 off by a part
+    of itself.
     """
 
-    name, part = "spoiled", 0.0
+    class Spoiled:
+        name = "spoiled"
 
-    def answer(self, scene, command):
-        s = fourbar.solve(scene, at=command)
-        numbers = {name: np.array(getattr(s, name)) for name in COMPARED_QUANTITIES}
-        numbers["F32"] *= 1.0 + self.part
-        return Answer(
-            self.name,
-            "exact",
-            command,
-            np.array(s.assembled),
-            numbers,
-        )
+        def answer(self, scene, command):
+            s = fourbar.solve(scene, at=command)
+            numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
+            numbers["F32"] *= 1.0 + part
+            return Answer(self.name, "exact", command, s.assembled, numbers)
 
-
-class Wrong(Spoiled):
-    part = 1e-4
-
-
-class AlmostRight(Spoiled):
-    part = 1e-10
-
-
-def verdict_of(adapter, scene, predictor):
     tolerance = FULL_ACCURACY if predictor else EQUIVALENCE
-    engine = Engine("spoiled", adapter, tolerance, predictor=predictor)
+    engine = Engine("spoiled", Spoiled, tolerance, predictor=predictor)
     rows = judge("scene", scene, [engine]).rows
     (row,) = [row for row in rows if (row.engine, row.quantity) == ("spoiled", "F32")]
     return row.verdict, row.allowed
@@ -282,10 +252,11 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses():
     lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 1)
     (psi, _), *_ = find_collinear_3_4(lengths)
     scene = set_angles(dress(lengths, 1), psi - 1e-8)
-    assert verdict_of(Wrong, scene, None)[0] == AGREES
-    assert verdict_of(Wrong, scene, predict_in_world_axes)[0] == FAILS
-    verdict, allowed = verdict_of(AlmostRight, scene, predict_in_world_axes)
-    assert verdict == DEGRADED and allowed < Wrong.part
+    wrong, almost_right = 1e-4, 1e-10
+    assert judge_spoiled(scene, wrong, None)[0] == AGREES
+    assert judge_spoiled(scene, wrong, predict_in_world_axes)[0] == FAILS
+    verdict, allowed = judge_spoiled(scene, almost_right, predict_in_world_axes)
+    assert verdict == DEGRADED and allowed < wrong
 
 
 @pytest.mark.slow
@@ -353,27 +324,25 @@ def test_power_and_acceleration_see_what_the_gap_does_not(monkeypatch):
     assert alarm(answer, "acceleration_gap") and alarm(answer, "power_gap")
 
 
-@pytest.mark.parametrize(
-    ("changes", "seen", "unseen"),
-    [
-        (
-            {"solver": "CG", "tolerance": 1e-8},
-            ("force_gap", "power_gap"),
-            ("acceleration_gap",),
-        ),
-        (
-            {"impedance": 0.1, "pad": None, "time_constant_steps": 300.0},
-            ("closure_gap",),
-            (),
-        ),
-        ({"flywheel": 1.0}, ("speed_error",), ()),
-    ],
-    ids=["a solver that did not converge", "a gap", "a crank that turns otherwise"],
-)
-def test_what_is_wrong_in_a_simulation_is_seen(changes, seen, unseen):
+WRONG_RUNS = {
+    "a solver that did not converge": (
+        {"solver": "CG", "tolerance": 1e-8},
+        ("force_gap", "power_gap"),
+    ),
+    "a gap": (
+        {"impedance": 0.1, "pad": None, "time_constant_steps": 300.0},
+        ("closure_gap",),
+    ),
+    "a crank that turns otherwise": ({"flywheel": 1.0}, ("speed_error",)),
+}
+
+
+@pytest.mark.parametrize("what", WRONG_RUNS)
+def test_what_is_wrong_in_a_simulation_is_seen(what):
+    changes, seen = WRONG_RUNS[what]
     answer = simulated(replace(RECIPE, **changes))
     assert all(alarm(answer, name) for name in seen)
-    assert not any(alarm(answer, name) for name in unseen)
+    assert alarm(answer, "acceleration_gap") <= ("solver" not in changes)
 
 
 @pytest.mark.parametrize("what", ["qvel", "qacc"])
@@ -425,26 +394,6 @@ def test_a_free_motion_through_change_points_in_every_engine():
         assert rows[engine, quantity].error < most
 
 
-@pytest.mark.slow
-def test_an_engine_that_drifts_unpredicted_fails(monkeypatch):
-    """Wrong by the same amount with either step, an engine predicts nothing of it; the
-    exact solution shows it.
-    """
-    from fourbar_validation.engines import pinocchio
-
-    (name, scene), *_ = families.released(durations=(1.0,), steps=4)
-    true = pinocchio.PinocchioReleased.release
-
-    def off(self, scene, times):
-        released = true(self, scene, times)
-        released.theta_2 += 1e-3
-        return released
-
-    monkeypatch.setattr(pinocchio.PinocchioReleased, "release", off)
-    rows = {(row.engine, row.quantity): row for row in judge(name, scene).rows}
-    assert rows["pinocchio-forward", "theta_2"].verdict == FAILS
-
-
 def test_a_golden_file_of_others_swept_through_its_change_point():
     """a, b, c, d = 1, 3, 2, 4 through 180 deg exactly.
 
@@ -472,16 +421,14 @@ def test_a_golden_file_of_others_swept_through_its_change_point():
 )
 def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name, why):
     suite = Hard()
-    (index,) = [i for i in range(len(suite)) if suite.name(i) == name]
-    scene = suite.scene(index)
+    names = [suite.name(i) for i in range(len(suite))]
+    scene = suite.scene(names.index(name))
     row = compare_shipped(name, scene, fourbar.command(scene))
     assert row.verdict == (UNDECIDED if why else AGREES) and why in row.reason
 
 
 def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches():
-    scene = Scene(
-        fourbar.uniform(0.3, 0.1, 0.25, 0.22),
-        fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0),
-    )
+    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0)
+    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), motion)
     row = compare_shipped("quickening", scene, fourbar.command(scene))
     assert row.verdict == AGREES, row

@@ -14,45 +14,37 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.run.run import run
-from fourbar_validation.scenes.suites import Files, read_default_suite
+from fourbar_validation.scenes.suites import read_default_suite
 from tests.oracle.variants import is_coordinate
 
-
-def scenes():
-    suite = read_default_suite()
-    return [suite.scene(i) for i in range(len(suite))]
+SUITE = read_default_suite()
+STATED = ("from_pin", "from_centre", "point", "arm")
+"""Forms of the place of a load."""
 
 
 def uses(scene):
     motion, drive = scene.motion, scene.drive
-    yield from (effect.key for effect in scene.effects)
+    keys = {effect.key for effect in scene.effects}
+    yield from keys
     yield f"command of {motion.commanded}"
     yield "drive", tuple(end.bar for _, end in drive.ends) if drive else scene.drive_bar
-    yield from (f"load in {load.frame} axes" for load in scene.loads)
     for load in scene.loads:
-        stated = ("from_pin", "from_centre", "point", "arm")
-        yield from (
-            f"load by {name}" for name in stated if getattr(load, name) is not None
-        )
-    if any(load.table for load in scene.loads):
-        yield "load over a table"
+        yield f"load in {load.frame} axes"
+        yield from (f"load by {name}" for name in STATED if getattr(load, name))
+        if load.table:
+            yield "load over a table"
     if motion.law is not None:
         yield from uses_of_law(motion.law)
-    if motion.free is not None and any(
-        effect.key == "flywheel" for effect in scene.effects
-    ):
+    if motion.free is not None and "flywheel" in keys:
         yield "released with a flywheel"
     for effect in scene.effects:
         if effect.key == "springs":
             yield from (f"spring with {s.acts}" for s in effect.springs)
         if effect.key == "torsion":
             yield from (("torsion", pin) for pin, *_ in effect.springs)
-    if scene.tolerances:
-        yield "tolerances"
-    if scene.points:
-        yield "points"
-    if scene.drawing is not None:
-        yield "drawing"
+    yield from (
+        name for name in ("tolerances", "points", "drawing") if getattr(scene, name)
+    )
     if any(is_coordinate(tolerance.key) for tolerance in scene.tolerances):
         yield "tolerance of a coordinate"
 
@@ -71,27 +63,23 @@ def uses_of_law(law):
 
 
 def test_the_default_suite_uses_every_capability():
-    used = {use for scene in scenes() for use in uses(scene)}
+    used = {use for i in range(len(SUITE)) for use in uses(SUITE.scene(i))}
     wanted = TERM_OF.keys() - {"load"}
-    wanted |= {
-        f"command of {name}" for name in ("theta_2", "theta_3", "theta_4", "stroke")
-    }
+    commands = ("theta_2", "theta_3", "theta_4", "stroke")
+    wanted |= {f"command of {name}" for name in commands}
     wanted |= {("drive", pair) for pair in itertools.combinations((1, 2, 3, 4), 2)}
     wanted |= {("drive", (4,))}  # a force at a point of the output
-    wanted |= {("drive", bar) for bar in (2, 3, 4)} | {
-        ("torsion", pin) for pin in ("O2", "A", "B", "O4")
-    }
+    wanted |= {("drive", bar) for bar in (2, 3, 4)}
+    wanted |= {("torsion", pin) for pin in ("O2", "A", "B", "O4")}
+    wanted |= {f"load by {name}" for name in STATED}
     wanted |= {
         "load in world axes",
         "load in bar axes",
-        *(f"load by {name}" for name in ("from_pin", "from_centre", "point", "arm")),
         "load over a table",
         "tolerances",
         "tolerance of a coordinate",
         "points",
         "drawing",
-    }
-    wanted |= {
         "law with ends rest",
         "cycloidal law",
         "sine law",
@@ -102,9 +90,6 @@ def test_the_default_suite_uses_every_capability():
         "spring with pull",
     }
     assert wanted <= used
-
-
-SUITE = read_default_suite()
 
 
 @pytest.mark.parametrize(
@@ -120,8 +105,7 @@ def test_every_scene_of_it_holds(index):
 
 @pytest.mark.slow
 def test_pictures_change_nothing_that_is_judged(tmp_path):
-    suite = replace(read_default_suite(), texts=read_default_suite().texts[:1])
-    assert isinstance(suite, Files)
+    suite = replace(SUITE, texts=SUITE.texts[:1])
     tables = []
     for drawn in (True, False):
         options = RunOptions(workers=1, drawn=drawn)
