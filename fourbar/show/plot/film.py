@@ -9,14 +9,14 @@ from contextlib import suppress
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import symbols
-from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage import (
     choose_drawing_scale,
     draw_mechanism,
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FRAMES_PER_SECOND = 25
+FILM_DPI = 100
+"""Pixels per inch of a film."""
 _MAX_FRAMES = 1500
 FILM_SIZE = (6.4, 5.6)
 SWEEP_SECONDS = 6.0
@@ -214,11 +216,7 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
 
     The function returns what it has moved.
     """
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
-
-    from fourbar.show.plot.frames import FILM_DPI, Stage
 
     sweep = shown.sweep
     factor, unit, size = choose_drawing_scale(shown)
@@ -230,21 +228,21 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         move_vectors = symbols.draw_vectors(axes, shown, sweep, factor, size)
     else:
         move_vectors = None
-    stage = Stage(axes)
-    as_axes = cast(Axes, stage)  # it has the methods that are called
+    drawn = list[Any]()
 
-    def put(index: int) -> tuple[Labels, list[Any]]:
+    def put(index: int) -> Labels:
         """Draw the mechanism at a position, in place of what stood there."""
-        stage.clear()
+        while drawn:
+            drawn.pop().remove()
         labels = Labels()
-        drawn = draw_mechanism(as_axes, shown, sweep, index, labels)
-        drawn += [stage.add_label(label) for label in labels.wanted]
-        return labels, drawn
+        drawn.extend(draw_mechanism(axes, shown, sweep, index, labels))
+        drawn.extend(map(write_label, labels.wanted))
+        return labels
 
     closes = np.flatnonzero(sweep.assembled)
     # the window holds what acts at every position
     for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
-        for _, line, _ in put(int(index))[0].lines:
+        for _, line, _ in put(int(index)).lines:
             axes.update_datalim(line)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
@@ -255,8 +253,7 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     figure.set_layout_engine(None)
 
     def move(index: int) -> list[Any]:
-        _, drawn = put(index)
-        passing = [one for one in drawn if not isinstance(one, Annotation)]
+        put(index)
         axis = shown.axis
         places = sweep.at.places
         theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")
@@ -266,6 +263,32 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
             caption = f"t = {shown.time[index]:.2f} s, θ₂ = {theta}°"
         title = axes.set_title(f"{caption}, {shown.branch_name} branch", pad=pad)
         arrows = [] if move_vectors is None else move_vectors(index)
-        return [*passing, *arrows, title]
+        return [*drawn, *arrows, title]
 
     return figure, move
+
+
+def write_label(label: Label) -> Any:
+    """Write a label outwards from its point, or from its ring, and return its text.
+
+    No free spot is searched: from frame to frame the label would jump. A bright edge
+    keeps the text clear of a bar of its own colour.
+    """
+    from matplotlib.patheffects import withStroke
+
+    dx, dy = np.subtract(label.at, label.shun)
+    away = complex(dx, dy) / max(math.hypot(dx, dy), 1e-300)
+    sides = ("center", "left", "right")  # -1 is the last
+    return label.axes.annotate(
+        label.text,
+        np.add(label.at, (label.ring * away.real, label.ring * away.imag)),
+        (8.0 * away.real, 11.0 * away.imag),
+        textcoords="offset points",
+        ha=sides[round(away.real)],
+        va="center",
+        color=label.colour,
+        size=label.size,
+        zorder=9,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        annotation_clip=False,
+    )
