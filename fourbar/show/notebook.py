@@ -5,7 +5,7 @@ from html import escape
 
 from fourbar.errors import FourBarError, expect
 from fourbar.formulas.mobility import classify
-from fourbar.linkage import BAR_NAMES
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.driving import describe_drive
@@ -14,56 +14,39 @@ from fourbar.show.tables import list_columns, write_with_unit
 from fourbar.show.units import units as read_units
 from fourbar.show.units import write_ends
 from fourbar.solution import DEGREES, SI, Conversion, Solution
-from fourbar.writing import describe_extent
+from fourbar.writing import describe_extent, make_html
 
 POSITIONS_AT_EITHER_END = 5
 """Positions shown at either end of a long sweep."""
 
 
 def show_scene(scene: Scene, units: Conversion = SI) -> str:
-    """Draw the linkage next to what the scene states.
+    """Draw the linkage above what the scene states.
 
     The drawing is that of `scene.plot("linkage")`.
     """
     try:
-        drawn = b64encode(
-            draw_figure(scene, "linkage", units=units)._repr_svg_().encode()
-        ).decode()
+        svg = draw_figure(scene, "linkage", units=units)._repr_svg_()
+        drawn = b64encode(svg.encode()).decode()
         picture = (
-            '<img alt="The linkage" style="width:100%"'
+            '<img alt="The linkage" style="width:24em"'
             f' src="data:image/svg+xml;base64,{drawn}">'
         )
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
-    rows = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td'
-        f' style="text-align:left">{escape(text)}</td></tr>'
-        for name, text in _list_facts(scene, units)
-    )
-    return (
-        f"<div><b>{escape(scene.title or 'Four-bar linkage')}</b>"
-        '<div style="display:flex;flex-wrap:wrap;align-items:center;gap:1em">'
-        f'<div style="width:24em">{picture}</div><table>{rows}</table></div></div>'
-    )
+    title = scene.title or "Four-bar linkage"
+    return picture + make_html(title, (), _list_facts(scene, units))
 
 
 def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
-    masses = (0.0, *(bar.mass for bar in scene.linkage.moving))
-    for name, length, mass in zip(
-        BAR_NAMES.values(),
-        scene.linkage.lengths,
-        masses,
-        strict=True,
-    ):
-        facts.append(
-            (
-                name,
-                write_with_unit(length, "m", units)
-                + (f", {write_with_unit(mass, 'kg', units)}" if mass else ""),
-            )
-        )
+    bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
+    for number, (name, length) in enumerate(bars, 1):
+        text = write_with_unit(length, "m", units)
+        if number in MOVING_BARS and (mass := scene.linkage.bar(number).mass):
+            text = f"{text}, {write_with_unit(mass, 'kg', units)}"
+        facts.append((name, text))
     speed = "positions only"
     if motion.speed is not None:
         omega = write_ends(motion.speed, lambda x: write_with_unit(x, "rad/s", units))
@@ -84,45 +67,16 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
 
 def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
     """Show the first and last positions as a table; angles in degrees by default."""
+    extent = describe_extent(solution.theta_2)
     if solution.theta_2.ndim == 2:
-        return (
-            f"<div><b>{escape(solution.title or 'Study')}</b>:"
-            f" {describe_extent(solution.theta_2)}</div>"
-        )
+        return make_html(f"{solution.title or 'Study'}: {extent}", (), ())
     cells = list_columns(solution, units)
-    count = len(solution)
-    if count <= 2 * POSITIONS_AT_EITHER_END:
-        places = list(range(count))
-    else:
-        places = [
-            *range(POSITIONS_AT_EITHER_END),
-            *range(count - POSITIONS_AT_EITHER_END, count),
-        ]
-    head = "".join(
-        f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells
-    )
-    lines = []
-    for place in places:
-        if (
-            count > 2 * POSITIONS_AT_EITHER_END
-            and place == count - POSITIONS_AT_EITHER_END
-        ):
-            more = f"… {count - 2 * POSITIONS_AT_EITHER_END} more …"
-            lines.append(
-                f'<tr><td colspan="{len(cells)}"'
-                f' style="text-align:center">{more}</td></tr>'
-            )
-        lines.append(
-            "<tr>"
-            + "".join(f"<td>{escape(column[place])}</td>" for column in cells.values())
-            + "</tr>"
-        )
-    title = escape(solution.title or "Solution")
-    positions = f"{count} position{'s' if count != 1 else ''}"
-    table = (
-        f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-    )
-    return f"<div><b>{title}</b>: {positions}{table}</div>"
+    rows = [*zip(*cells.values(), strict=True)]
+    more = len(rows) - 2 * POSITIONS_AT_EITHER_END
+    if more > 0:
+        between = slice(POSITIONS_AT_EITHER_END, -POSITIONS_AT_EITHER_END)
+        rows[between] = [(f"… {more} more …",)]
+    return make_html(f"{solution.title or 'Solution'}: {extent}", [*cells], rows)
 
 
 class InUnits:
