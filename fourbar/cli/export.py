@@ -157,13 +157,6 @@ _without_loads_option = click.option(
     help='Position of linkage and free bodies, like "135 deg" or "theta_4=30 deg".',
 )
 @click.option(
-    "--branches",
-    default="one",
-    show_default=True,
-    metavar="WHICH",
-    help="Draw one branch or both.",
-)
-@click.option(
     "--dimensions",
     is_flag=True,
     help="Write the lengths of the bars at them.",
@@ -174,7 +167,6 @@ def plot(
     out: Path,
     figure: str,
     at: str | None,
-    branches: str,
     dimensions: bool,
     units: Conversion | None,
 ) -> None:
@@ -188,7 +180,6 @@ def plot(
             out,
             figure,
             position=place,
-            branches=branches,
             units=given.suit_file_units() if units is None else units,
             dimensions=dimensions,
         )

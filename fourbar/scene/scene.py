@@ -167,7 +167,6 @@ class Scene:
         figure: str = "overview",
         *,
         position: float | None = None,
-        branches: str = "one",
         units: Any = None,
         dimensions: bool = False,
     ) -> Any:
@@ -180,15 +179,14 @@ class Scene:
             "ratios", "centres", "freebody", "bars" or "sensitivity".
         position : what is commanded where linkage and free bodies are drawn, rad or m;
             left out: the scene's own.
-        branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
         units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI
             with the prefix that suits, deg.
         dimensions : write the lengths of the bars at them.
 
         Raises
         ------
-        InputError : unknown figure or choice of branches; a figure of forces without
-            omega_2; a position or dimensions for a figure that shows none.
+        InputError : unknown figure; a figure of forces without omega_2; a position or
+            dimensions for a figure that shows none.
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """
@@ -197,7 +195,6 @@ class Scene:
             self,
             figure,
             position=position,
-            branches=branches,
             dimensions=dimensions,
             **options,
         )

@@ -18,7 +18,7 @@ from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
-from fourbar.studies.course import MotionCourse, bisect
+from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
 from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33
@@ -29,6 +29,15 @@ AT_END_OF_STROKE = 1e-6
 """Part of a gas spring's length within which it is at its end. A scene that states the
 end as a place has fewer digits than that.
 """
+_PULLS = (
+    ' pulls {where} and pushes elsewhere: with acts = "push" or "pull" it acts one way'
+)
+"""Remark on a spring that both pushes and pulls."""
+_BEYOND = (
+    ", a gas spring, is {} length of {{length}} {{where}}: it is taken to push on, and"
+    " has no stops"
+)
+"""Remark on a gas spring that goes on beyond an end of its stroke."""
 
 
 def list_couple_notes(scene: Scene) -> list[str]:
@@ -131,43 +140,42 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
     for number, spring in enumerate(springs, 1):
         distance = measure_end_distance(scene, spring, solution.at)
         distance = np.where(solution.assembled, distance, np.nan)
-        if spring.stroke is None:
-            if spring.acts is None and spring.stiffness > 0.0 and spring.slack < 0.0:
-                end = -spring.slack / spring.stiffness
-                pulls = distance > end
-                if pulls.any() and (distance < end).any():
-                    stretches = _list_stretches(
-                        scene, command_between, solution, spring, end, pulls
-                    )
-                    where = _write_stretches(solution, stretches, units)
-                    notes.append(
-                        f"spring {number} pulls {where} and pushes elsewhere: with acts"
-                        ' = "push" or "pull" it acts one way'
-                    )
-            continue
-        for sign, end, word in (
-            (1.0, spring.length, "longer than its extended length of"),
-            (
-                -1.0,
-                spring.length - spring.stroke,
-                "shorter than its compressed length of",
-            ),
-        ):
-            room = AT_END_OF_STROKE * spring.length
-            with np.errstate(invalid="ignore"):
-                beyond = sign * (distance - end) > room
+        for sense, end, room, sentence in _list_ends(spring):
+            beyond = sense * (distance - end) > room
+            # a spring that pulls throughout may be one that does
+            if not beyond.any() or (room == 0.0 and not (distance < end).any()):
+                continue
             stretches = _list_stretches(
                 scene, command_between, solution, spring, end, beyond
             )
-            if not stretches:
-                continue
-            length = write_short(end, "m", units)
-            where = _write_stretches(solution, stretches, units)
-            notes.append(
-                f"spring {number}, a gas spring, is {word} {length} {where}: it is"
-                " taken to push on, and has no stops"
+            where = " and ".join(
+                _write_stretch(solution, one, units) for one in stretches
             )
+            length = write_short(end, "m", units)
+            said = sentence.format(length=length, where=where)
+            notes.append(f"spring {number}{said}")
     return notes
+
+
+def _list_ends(spring: Spring) -> list[tuple[float, float, float, str]]:
+    """List the lengths beyond which a remark on a spring is due.
+
+    An entry has the sense of beyond, the length and the room at it, m, and the remark.
+    """
+    if spring.stroke is None:
+        if spring.acts is None and spring.stiffness > 0.0 and spring.slack < 0.0:
+            return [(1.0, -spring.slack / spring.stiffness, 0.0, _PULLS)]
+        return []
+    room = AT_END_OF_STROKE * spring.length
+    return [
+        (1.0, spring.length, room, _BEYOND.format("longer than its extended")),
+        (
+            -1.0,
+            spring.length - spring.stroke,
+            room,
+            _BEYOND.format("shorter than its compressed"),
+        ),
+    ]
 
 
 def _is_whole_motion(scene: Scene, solution: Solution) -> bool:
@@ -197,8 +205,6 @@ def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
 
 CommandBetween = Callable[[Array], Command]
 """Function that returns the command at places between those of a solution."""
-_Stretch = tuple[float | None, float | None]
-"""Places of the start and of the end; None: the motion begins or ends within."""
 
 
 def _list_stretches(
@@ -208,62 +214,27 @@ def _list_stretches(
     spring: Spring,
     end: float,
     beyond: NDArray[np.bool_],
-) -> list[_Stretch]:
-    """List where a spring is beyond a length, from where it is at positions."""
-    rows = np.flatnonzero(beyond[1:] != beyond[:-1])
-    known = np.where(beyond[rows], rows, rows + 1)
-    crossings = _locate_crossings(
-        scene, command_between, solution, spring, end, rows, known
-    )
-    stretches = list[_Stretch]()
-    start = None
-    for row, place in zip(rows, crossings, strict=True):
-        if beyond[row]:
-            stretches.append((start, float(place)))
-        else:
-            start = float(place)
-    if beyond[-1]:
-        stretches.append((start, None))
-    return stretches
+) -> list[Stretch]:
+    """List where a spring is beyond a length, from where it is at positions.
 
-
-def _locate_crossings(
-    scene: Scene,
-    command_between: CommandBetween,
-    solution: Solution,
-    spring: Spring,
-    end: float,
-    rows: NDArray[np.intp],
-    known: NDArray[np.intp],
-) -> Array:
-    """Find where a spring reaches a length in the steps that begin at rows.
-
-    A step in which nothing lies between the two positions gives the known one of them:
-    steps of a list, and those where the loop does not close.
+    A step in which nothing lies between the two positions ends at the one that is
+    beyond: steps of a list, and those where the loop does not close.
     """
+    rows = np.flatnonzero(beyond[1:] != beyond[:-1])
     at = solution.at
-    places = np.array(at.places[known], dtype=float)
+    places = np.where(beyond[rows], at.places[rows], at.places[rows + 1])
     assembled = solution.assembled[rows] & solution.assembled[rows + 1]
-    if isinstance(scene.motion.angle, np.ndarray):
-        assembled[:] = False
-    if not assembled.any():
-        return places
-    rows = rows[assembled]
-    low = at.places[rows]
-    high = at.places[rows + 1]
+    if assembled.any() and not isinstance(scene.motion.angle, np.ndarray):
+        low, high = (at.places[rows[assembled] + after] for after in (0, 1))
 
-    def is_longer(there: Array) -> NDArray[np.bool_]:
-        distance = measure_end_distance(scene, spring, command_between(there))
-        return np.greater(distance, end)
+        def is_longer(there: Array) -> NDArray[np.bool_]:
+            distance = measure_end_distance(scene, spring, command_between(there))
+            return np.greater(distance, end)
 
-    before = is_longer(low)
-
-    def is_as_before(middle: Array) -> NDArray[np.bool_]:
-        return np.equal(is_longer(middle), before)
-
-    low, high = bisect(is_as_before, low, high)
-    places[assembled] = 0.5 * (low + high)
-    return places
+        before = is_longer(low)
+        low, high = bisect(lambda there: is_longer(there) == before, low, high)
+        places[assembled] = 0.5 * (low + high)
+    return pair_ends(bool(beyond[0]), places, bool(beyond[-1]))
 
 
 def _command_between(scene: Scene, at: Command, places: Array) -> Command:
@@ -274,13 +245,7 @@ def _command_between(scene: Scene, at: Command, places: Array) -> Command:
     return Command(places, branch, None, 0.0, at.bar)
 
 
-def _write_stretches(
-    solution: Solution, stretches: list[_Stretch], units: Conversion
-) -> str:
-    return " and ".join(_write_stretch(solution, one, units) for one in stretches)
-
-
-def _write_stretch(solution: Solution, stretch: _Stretch, units: Conversion) -> str:
+def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
     """Write a stretch as "from theta_2 = 61.2 deg on"."""
     start, stop = stretch
     if solution.time is not None:

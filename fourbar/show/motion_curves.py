@@ -22,6 +22,7 @@ from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
 from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution
 from fourbar.solving import solve, split
+from fourbar.studies.course import Stretch, pair_ends
 from fourbar.studies.internal_forces import Bending, largest_bending
 
 _PANELS_OF_A_TURN, _MOST_FIRST_PANELS = 48, 960
@@ -121,7 +122,7 @@ class MotionCurves:
         return float(solution.theta_2[np.argmin(np.abs(places - place))])
 
     @cached_property
-    def stretches(self) -> list[tuple[float | None, float | None]]:
+    def stretches(self) -> list[Stretch]:
         """Places from and up to which the linkage assembles, in rising order.
 
         None at the ends of the motion; empty if it always assembles.
@@ -135,14 +136,11 @@ class MotionCurves:
         if places[0] > places[-1]:
             places = places[::-1]
             assembles = assembles[::-1]
-        changes = np.flatnonzero(assembles[1:] != assembles[:-1])
-        ends = list[float | None]()
-        if assembles[0]:
-            ends.append(None)
-        ends += [float(places[i] if assembles[i] else places[i + 1]) for i in changes]
-        if assembles[-1]:
-            ends.append(None)
-        return list(zip(ends[::2], ends[1::2], strict=True)) if changes.size else []
+        rows = np.flatnonzero(assembles[1:] != assembles[:-1])
+        if not rows.size:
+            return []
+        ends = np.where(assembles[rows], places[rows], places[rows + 1])
+        return pair_ends(bool(assembles[0]), ends, bool(assembles[-1]))
 
 
 def describe_motion(solution: Solution) -> MotionCurves:

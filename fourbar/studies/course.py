@@ -21,6 +21,19 @@ LADDER = 0.5 ** np.arange(1, 50)
 """Parts of the interval in which the linkage ceases to assemble: quantities may grow
 there as the root of what is commanded.
 """
+Stretch = tuple[float | None, float | None]
+"""Places of the start and of the end; None: the motion begins or ends within."""
+
+
+def pair_ends(begins: bool, places: Array, ends: bool) -> list[Stretch]:
+    """Pair the places at which a condition begins and ceases to hold.
+
+    Parameters
+    ----------
+    begins, ends : True if it holds at the first and at the last position.
+    """
+    all_ends = [*[None] * begins, *places.tolist(), *[None] * ends]
+    return list(zip(all_ends[::2], all_ends[1::2], strict=True))
 
 
 def follow(scene: Scene, solution: Solution) -> None:

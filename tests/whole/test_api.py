@@ -442,7 +442,7 @@ def test_a_scene_draws_itself(tmp_path):
 
 def test_help_says_the_parameters():
     shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)
-    for name in ("figure", "position", "branches", "units", "dimensions"):
+    for name in ("figure", "position", "units", "dimensions"):
         assert f"{name} :" in shown
     shown = pydoc.render_doc(fourbar.Scene, renderer=pydoc.plaintext)
     for field in fields(fourbar.Scene):

@@ -4,12 +4,11 @@ Linkage, curves over theta_2, forces and free bodies can be drawn. Needs matplot
 extra ``plot``), which is loaded when something is drawn.
 """
 
-from fourbar.show.plot.figures import BRANCHES, FIGURES, draw, draw_figure
+from fourbar.show.plot.figures import FIGURES, draw, draw_figure
 from fourbar.show.plot.studies import draw_tolerances
 from fourbar.show.plot.style import FORMATS, format_of
 
 __all__ = (
-    "BRANCHES",
     "FIGURES",
     "FORMATS",
     "draw",

@@ -5,7 +5,6 @@ Angles and rates, points, torque, energy and transmission angle are drawn.
 
 import math
 import re
-from collections.abc import Iterable
 from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
@@ -225,13 +224,7 @@ def draw_angles(axes: "Axes", view: View) -> None:
             ls=BAR_DASHES[bar],
             label=rf"$\theta_{bar}$",
         )
-    shown = np.concatenate(
-        [
-            np.degrees(getattr(branch.sweep, f"theta_{bar}"))
-            for branch in view.alike
-            for bar in bars
-        ]
-    )
+    shown = np.degrees([getattr(view.sweep, f"theta_{bar}") for bar in bars])
     set_degree_ticks(
         axes.yaxis,
         1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9,
@@ -284,14 +277,7 @@ def _draw_rates(
         )
     draw_zero_line(axes)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
-    limit = choose_limit(
-        [
-            getattr(branch.sweep, f"{letter}_{bar}")
-            for branch in view.alike
-            for bar in others
-        ]
-    )
-    clip(axes, view, curves, limit, what, unit)
+    clip(axes, view, curves, choose_limit([*curves.values()]), what, unit)
     place_legend(axes)
 
 
@@ -382,8 +368,7 @@ def _draw_drive(
     bar = view.scene.drive_bar
     poles = find_poles(view)
     values = getattr(view.sweep, name)
-    everywhere = [getattr(branch.sweep, name) for branch in view.alike]
-    limit, factor, shown_unit = choose_scale(everywhere, unit, view)
+    limit, factor, shown_unit = choose_scale([values], unit, view)
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
     plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
     for index in poles:
@@ -462,21 +447,11 @@ def draw_stroke(axes: "Axes", view: View) -> None:
     axes.set(ylabel=f"stroke ({unit})", title="Stroke of the drive")
 
 
-def _list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
-    """List the magnitudes of pin forces, of every branch that shares the scales."""
-    return [
-        np.hypot(*getattr(branch.sweep, name).T)
-        for branch in view.alike
-        for name in names
-    ]
-
-
 def draw_forces(axes: "Axes", view: View) -> None:
     """Draw the magnitudes of the four pin forces."""
     over = draw_axes(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
-    everywhere = _list_force_sizes(view)
-    limit, factor, unit = choose_scale(everywhere, "N", view)
+    limit, factor, unit = choose_scale([*sizes.values()], "N", view)
     poles = find_poles(view)
     for name, values in sizes.items():
         look = choose_force_line(name)
@@ -491,16 +466,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
     """Draw the kinetic energy of a free motion, and the work that made it."""
     over = draw_axes(axes, view)
     energies = compute_energies(view.scene, view.sweep)
-    shared = [
-        compute_energies(branch.scene, branch.sweep) for branch in view.others
-    ] + [energies]
-    most = largest_magnitude(
-        *(
-            values
-            for energy in shared
-            for values in (energy.kinetic, *energy.work.values())
-        )
-    )
+    most = largest_magnitude(energies.kinetic, *energies.work.values())
     factor, unit = choose_unit(most, "J", view.units)
     axes.plot(
         over,
@@ -676,9 +642,8 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     look = choose_force_line(name)
     direction = np.arctan2(force[:, 1], force[:, 0])
     size_here = np.hypot(*force.T)
-    everywhere = _list_force_sizes(view, (name,))
-    limit = choose_limit(everywhere)
-    top = limit or 1.08 * largest_magnitude(*everywhere) or 1.0
+    limit = choose_limit([size_here])
+    top = limit or 1.08 * largest_magnitude(size_here) or 1.0
     factor, unit = choose_unit(top, "N", view.units)
     poles = find_poles(view)
     over = view.axis.values

@@ -3,12 +3,10 @@
 Shaking force and moment, ratios, and paths of instant centres are drawn.
 """
 
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.quantities import Array
 from fourbar.show.derived import derive
 from fourbar.show.plot.curves import (
     choose_limit,
@@ -49,21 +47,13 @@ FARTHEST_CENTRE = 1.5
 """Instant centres are drawn up to this multiple of the linkage's size from it."""
 
 
-def _list_values(view: View, name: str) -> list[Array]:
-    """List a quantity of every branch that shares the scales; the view's own first."""
-    views = [view, *(other for other in view.alike if other is not view)]
-    values = [derive(branch.sweep, name) for branch in views]
-    return [column for column in values if column is not None]
-
-
 def draw_shaking_force(axes: "Axes", view: View) -> None:
     """Draw the force on the frame: its size and its components."""
     over = draw_axes(axes, view)
     poles = find_poles(view)
-    vectors = _list_values(view, "shaking_force")
-    sizes = [np.hypot(vector[:, 0], vector[:, 1]) for vector in vectors]
-    limit, factor, unit = choose_scale(sizes, "N", view)
-    curves = {"|F|": sizes[0], "F_x": vectors[0][:, 0], "F_y": vectors[0][:, 1]}
+    x, y = derive(view.sweep, "shaking_force").T
+    curves = {"|F|": np.hypot(x, y), "F_x": x, "F_y": y}
+    limit, factor, unit = choose_scale([curves["|F|"]], "N", view)
     for name, values in curves.items():
         look = {**_FORCE_LOOKS[name], "label": f"${name}$"}
         plot_between_poles(axes, over, factor * values, poles, **look)
@@ -77,12 +67,12 @@ def draw_shaking_moment(axes: "Axes", view: View) -> None:
     """Draw the moment on the frame about O2."""
     over = draw_axes(axes, view)
     poles = find_poles(view)
-    moments = _list_values(view, "shaking_moment")
-    limit, factor, unit = choose_scale(moments, "N m", view)
-    plot_between_poles(axes, over, factor * moments[0], poles, color=INK)
+    moment = derive(view.sweep, "shaking_moment")
+    limit, factor, unit = choose_scale([moment], "N m", view)
+    plot_between_poles(axes, over, factor * moment, poles, color=INK)
     draw_zero_line(axes)
     axes.set(ylabel=f"$M$ ({unit})", title="Shaking moment about $O_2$")
-    clip(axes, view, {"M": moments[0]}, limit, "Shaking moment", "N m")
+    clip(axes, view, {"M": moment}, limit, "Shaking moment", "N m")
 
 
 def draw_speed_ratios(axes: "Axes", view: View) -> None:
@@ -104,22 +94,15 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
     No line goes on beyond a pole.
     """
     over = draw_axes(axes, view)
-    everywhere = {name: _list_values(view, name) for name in names.values()}
-    limit = choose_limit([*chain(*everywhere.values())])
-    curves = dict[str, Array]()
-    for bar, name in names.items():
-        values = everywhere[name][0]
+    curves = {_SYMBOLS[name]: derive(view.sweep, name) for name in names.values()}
+    limit = choose_limit([*curves.values()])
+    for bar, (symbol, values) in zip(names, curves.items(), strict=True):
         before = values[:-1]
         after = values[1:]
         # a ratio changes its sign at a pole, where it is large, or at zero
         is_large = np.minimum(np.abs(before), np.abs(after)) > 1.0
         poles = np.flatnonzero((before * after < 0.0) & is_large)
-        curves[_SYMBOLS[name]] = values
-        look = {
-            "color": BAR_COLOURS[bar],
-            "ls": BAR_DASHES[bar],
-            "label": _SYMBOLS[name],
-        }
+        look = {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar], "label": symbol}
         plot_between_poles(axes, over, values, poles, **look)
     draw_zero_line(axes)
     clip(axes, view, curves, limit, "Ratio", "1")

@@ -5,8 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import PIN_FORCES
@@ -26,18 +24,14 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import (
     View,
-    choose_common_position,
     is_over_time,
     make_view,
-    set_branch,
 )
 from fourbar.solution import SI, Conversion, require_units
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-BRANCHES = ("one", "both")
 _Painter = Callable[["SubFigure", View, Labels], None]
 
 
@@ -174,18 +168,10 @@ TAKERS = {
 """Figures in which one position is marked, and in which bars are numbered."""
 
 
-def _choose_painter(
-    scene: Scene,
-    figure: str,
-    branches: str,
-) -> tuple[_Painter, tuple[float, float]]:
+def _choose_painter(scene: Scene, figure: str) -> tuple[_Painter, tuple[float, float]]:
     """Choose the painter and the size of a figure that the scene can show."""
-    for key, value, allowed in (
-        ("figure", figure, tuple(FIGURES)),
-        ("branches", branches, BRANCHES),
-    ):
-        if not isinstance(value, str) or value not in allowed:
-            raise InputError(key, value, "must be one of " + ", ".join(allowed))
+    if not isinstance(figure, str) or figure not in FIGURES:
+        raise InputError("figure", figure, "must be one of " + ", ".join(FIGURES))
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.speed is None and not is_over_time(scene):
         raise InputError(
@@ -216,7 +202,6 @@ def draw_figure(
     figure: str = "overview",
     *,
     position: float | None = None,
-    branches: str = "one",
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
@@ -224,7 +209,7 @@ def draw_figure(
 
     `Scene.plot` describes the parameters.
     """
-    painter, size = _choose_painter(scene, figure, branches)
+    painter, size = _choose_painter(scene, figure)
     require_units(units)
     for key, value in (("position", position), ("dimensions", dimensions or None)):
         if value is not None and figure not in TAKERS[key]:
@@ -236,19 +221,11 @@ def draw_figure(
     if position is not None:
         position = require("position", position)
     with apply_style():
-        if branches == "both":
-            scenes = [set_branch(scene, sign) for sign in (1, -1)]
-        else:
-            scenes = [scene]
-        if position is None and len(scenes) > 1:
-            position = choose_common_position(scenes)
-        views = [make_view(branch, position) for branch in scenes]
-        for shown in views:
-            shown.units = units
-            shown.dimensions = dimensions
-            shown.others = [view for view in views if view is not shown]
-            _look_between(shown)
-        return Drawing(_compose(painter, size, views))
+        shown = make_view(scene, position)
+        shown.units = units
+        shown.dimensions = dimensions
+        _look_between(shown)
+        return Drawing(_compose(painter, size, shown))
 
 
 def _look_between(shown: View) -> None:
@@ -284,55 +261,19 @@ def draw(
     draw_figure(scene, figure, **options).save(path)
 
 
-def _compose(
-    painter: _Painter,
-    size: tuple[float, float],
-    views: list[View],
-) -> "Figure":
+def _compose(painter: _Painter, size: tuple[float, float], shown: View) -> "Figure":
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
-    width, height = size
-    rows = 1
-    columns = len(views)
-    if width > 9.0:  # one under the other
-        rows = len(views)
-        columns = 1
-    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
-    parts = figure.subfigures(rows, columns, squeeze=False).ravel()
+    width, _ = size
+    figure = Figure(figsize=size, layout="constrained")
+    (part,) = figure.subfigures(squeeze=False).ravel()
     labels = Labels()
-    for part, shown in zip(parts, views, strict=True):
-        painter(part, shown, labels)
-        heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
-        if len(views) > 1:
-            heading = f"{heading} ({shown.branch_name} branch)"
-        part.suptitle(heading, **TITLE)
-        caption = textwrap.fill(" ".join(shown.notes), int(width * 18.5))
-        if caption:
-            part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
-    _share_limits([part.axes for part in parts])
+    painter(part, shown, labels)
+    heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
+    part.suptitle(heading, **TITLE)
+    caption = textwrap.fill(" ".join(shown.notes), int(width * 18.5))
+    if caption:
+        part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
     labels.settle(figure)
     return figure
-
-
-def _share_limits(columns: "list[list[Axes]]") -> None:
-    """Give the same panel of every branch the same limits.
-
-    Polar panels and free bodies share theirs already.
-    """
-    for panels in zip(*columns, strict=True):
-        if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:
-            continue
-        is_to_scale = panels[0].get_aspect() == 1.0
-        if is_to_scale:  # the data, not the limits, say what has to fit
-            corners = np.concatenate([axes.dataLim.get_points() for axes in panels])
-            for axes in panels:
-                axes.update_datalim(corners)
-                axes.autoscale_view()
-            continue
-        for limits in ("xlim", "ylim"):
-            ends = [getattr(axes, f"get_{limits}")() for axes in panels]
-            low = min(low for low, _ in ends)
-            high = max(high for _, high in ends)
-            for axes in panels:
-                getattr(axes, f"set_{limits}")(low, high)

@@ -281,7 +281,7 @@ def write_label(label: Label) -> Any:
     sides = ("center", "left", "right")  # -1 is the last
     return label.axes.annotate(
         label.text,
-        np.add(label.at, (label.ring * away.real, label.ring * away.imag)),
+        (label.at[0] + label.ring * away.real, label.at[1] + label.ring * away.imag),
         (8.0 * away.real, 11.0 * away.imag),
         textcoords="offset points",
         ha=sides[round(away.real)],

@@ -215,8 +215,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
             f" {view.here.status[0]}"
         )
         raise InputError("figure", "freebody", reason)
-    # the bars of this view are the first three
-    freed = [(v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS]
+    freed = [(bar, *list_actions(view, bar)) for bar in MOVING_BARS]
     panels, below = figure.subplots(
         2,
         3,
@@ -226,23 +225,18 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         ],
     )
     biggest = max(
-        (abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows),
+        (abs(arrow.force) for _, arrows, _ in freed for arrow in arrows),
         default=0.0,
     )
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     # one window size: the bars, too, are to one scale
     span = LABEL_SPACE * max(
-        float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max())
-        for v, bar, arrows, _ in freed
+        float(np.ptp(_reach(view, bar, arrows, scale), axis=0).max())
+        for bar, arrows, _ in freed
     )
     note(view, f"At {view.at}.")
-    for axes, text, (_, bar, arrows, couples) in zip(
-        panels,
-        below,
-        freed,
-        strict=False,
-    ):
+    for axes, text, (bar, arrows, couples) in zip(panels, below, freed, strict=True):
         _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
         _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)

@@ -306,22 +306,11 @@ def _write_bar_name(view: View, number: int) -> str:
 
 
 def choose_drawing_scale(view: View) -> tuple[float, str, float]:
-    """Choose the factor to the unit of length, that unit, and a support's size.
-
-    Drawings of both branches have the same scale.
-    """
-    most = max(
-        largest_magnitude(
-            v.sweep.A,
-            v.sweep.B,
-            v.sweep.G3,
-            *np.array(list(locate_pins(v).values())),
-        )
-        for v in view.alike
-    )
-    factor, unit = choose_unit(most, "m", view.units)
+    """Choose the factor to the unit of length, that unit, and a support's size."""
     sweep = view.sweep
     pins = np.array([*locate_pins(view).values()])
+    most = largest_magnitude(sweep.A, sweep.B, sweep.G3, pins)
+    factor, unit = choose_unit(most, "m", view.units)
     places = [sweep.A, sweep.B, sweep.G3, *sweep.points.values(), pins]
     reached = np.concatenate(places)
     extents = np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)

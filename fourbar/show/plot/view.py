@@ -46,22 +46,13 @@ class View:
     """Units of the numbers drawn; one that is left out is the SI unit with a prefix."""
     dimensions: bool = False
     """The lengths of the bars are written at them."""
-    others: "list[View]" = field(default_factory=list)
-    """The other branch, where it is drawn next to this one: to the same scales."""
-
-    @property
-    def alike(self) -> "list[View]":
-        """List this view and those that share its scales."""
-        return [self, *self.others]
 
     @property
     def axis(self) -> "Axis":
         """Quantity on the horizontal axis: time, or the commanded quantity."""
         if self.time is None:
             return axis_of(self.scene, self.sweep.at, self.units)
-        longest = max(
-            float(view.time[-1]) for view in self.alike if view.time is not None
-        )
+        longest = float(self.time[-1])
         factor = 1.0
         unit = "s"
         if longest < 1.0:
@@ -209,21 +200,6 @@ def find_drawn_place(scene: Scene) -> float | None:
     return middle + math.remainder(drawn - middle, math.tau)
 
 
-def choose_common_position(scenes: "list[Scene]") -> float | None:
-    """Choose a position that shows each of several scenes over the same range.
-
-    None is returned if each has its own range.
-    """
-    if (
-        any(is_over_time(scene) for scene in scenes)
-        or len(command(scenes[0]).angle) == 1
-    ):
-        return None
-    sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
-    sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
-    return _choose_position(sweeps) if sweeps else None
-
-
 def describe_change_points(motion: Solution) -> str:
     """Say when a free motion passed change points, where another motion is possible."""
     times = " and ".join(f"{time:.4g} s" for time in motion.change_points or ())
@@ -262,7 +238,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     if position is None:
         position = find_drawn_place(scene)
     if position is None:
-        position = _choose_position([sweep])
+        position = _choose_position(sweep)
     here = solve(scene, at=command_at(scene, np.array([position])))
     shown = View(scene, sweep, here)
     if not shown.here.assembled[0]:
@@ -306,27 +282,22 @@ def _view_motion(scene: Scene, position: float | None) -> View:
     return shown
 
 
-def _choose_position(sweeps: "list[Solution]") -> float:
-    """Choose a position that shows the bars apart, the same for all sweeps.
-
-    Well-conditioned positions are preferred.
-    """
-    first_sweep = sweeps[0]
-    assembled = np.concatenate([[False], first_sweep.assembled, [False]])
+def _choose_position(sweep: Solution) -> float:
+    """Choose a well-conditioned position that shows the bars apart."""
+    assembled = np.concatenate([[False], sweep.assembled, [False]])
     edges = np.flatnonzero(assembled[1:] != assembled[:-1])
     starts = edges[::2]
     stops = edges[1::2]
     longest = int(np.argmax(stops - starts))
     run = slice(starts[longest], stops[longest])
-    places = first_sweep.at.places[run]
+    places = sweep.at.places[run]
     quality = np.full(len(places), np.inf)
-    for sweep in sweeps:
-        for condition in (sweep.condition, sweep.drive_condition):
-            if condition is not None:
-                quality = np.minimum(quality, np.nan_to_num(condition[run]))
+    for condition in (sweep.condition, sweep.drive_condition):
+        if condition is not None:
+            quality = np.minimum(quality, np.nan_to_num(condition[run]))
     good = places[quality >= min(CLEAR, float(quality.max()))]
     lead = 0.5 * (places[-1] - places[0])
-    if not first_sweep.at.moves_stroke:
+    if not sweep.at.moves_stroke:
         lead = min(_LEAD, lead)
     nearest = np.argmin(np.abs(good - (places[0] + lead)))
     return float(good[nearest])
