@@ -78,6 +78,7 @@ def run(folder, *problems):
     }
 
 
+@pytest.mark.slow
 def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder):
     letters = run(folder)
     assert (

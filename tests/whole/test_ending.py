@@ -49,7 +49,7 @@ STARTING = b"spawn_main"
 """Word in the command line of a process that `multiprocessing` starts."""
 START_SECONDS = 1.0
 """What a worker takes until it is at work, on an idle machine."""
-KILLS = int(os.environ.get("KILLS", "2"))
+KILLS = int(os.environ.get("KILLS", "1"))
 """Moments of a start at which it is interrupted; every night there are fifty."""
 
 

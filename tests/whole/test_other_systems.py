@@ -53,10 +53,10 @@ def folder(tmp_path):
         ("fourbar.cli", "analyze scène.toml --json"),
         ("fourbar.cli", "mjcf scène.toml -o model.xml"),
         ("fourbar.cli", "animate scène.toml -o page.html"),
-        ("fourbar.cli", "plot scène.toml -o plot.svg"),
+        ("fourbar.cli", "plot scène.toml --figure linkage -o plot.svg"),
         (
             "fourbar_validation.cli",
-            "run scène.toml --workers 2 --engines free-body --out results",
+            "run scène.toml --workers 1 --engines free-body --out results",
         ),
         ("fourbar_validation.cli", "check-mjcf scène.toml {models}/crank_rocker.xml"),
     ],

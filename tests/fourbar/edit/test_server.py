@@ -478,6 +478,7 @@ def test_the_line_of_a_page_that_does_not_read_is_dropped(bench, caplog, monkeyp
     assert not caplog.records
 
 
+@pytest.mark.slow
 def test_the_picture_is_served_as_an_image_alone(bench, path):
     """An SVG opened by its address runs no script and reaches nothing here."""
 

@@ -299,6 +299,7 @@ FORCE = 0.01
 
 
 @pytest.mark.nightly
+@pytest.mark.slow
 def test_drake_loads_the_sdf_and_moves_as_released():
     pytest.importorskip("pydrake")
     plants, parsing = (

@@ -176,6 +176,7 @@ RELEASE = 1e-4
 
 
 @pytest.mark.parametrize("scale", slow_but({0.01}, [1.0, 0.01]))
+@pytest.mark.slow
 def test_a_released_linkage_falls_by_itself(scale):
     bars = [
         Bar(scale * length, mass)

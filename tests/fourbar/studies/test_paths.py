@@ -61,6 +61,7 @@ def scan(path, directions):
 @pytest.mark.parametrize(
     "turned, steps", slow_but({(20.0, 360)}, [(0.0, 36), (20.0, 360)])
 )
+@pytest.mark.slow
 def test_straightness_is_the_distance_of_the_nearest_two_lines(turned, steps):
     """Whatever the ground's angle, and however coarse the steps are."""
     sweep = f'theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}'

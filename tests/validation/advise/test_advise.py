@@ -54,6 +54,7 @@ def test_figures_of_the_crank_rocker(omega, required, most):
     assert advice.best.steps * advice.best.step_cost <= 1.2 * min(work) < max(work)
 
 
+@pytest.mark.slow
 def test_the_solver_is_searched_too():
     """A solver that stops by itself takes a third of a step less, at the same error."""
     scene, required = turning(10.0, 72), 1e-4
@@ -105,6 +106,7 @@ def test_figures_of_rockers_and_the_thesis(name, most):
     assert advice.best.steps_per_revolution <= most
 
 
+@pytest.mark.slow
 def test_the_file_alone_keeps_the_error(tmp_path):
     """What -o writes, loaded by nothing but its text.
 
@@ -146,6 +148,7 @@ def test_the_file_alone_keeps_the_error(tmp_path):
     assert steps < 100 and compute_errors(turning(), commanded, columns).worst <= 1e-5
 
 
+@pytest.mark.slow
 def test_what_lies_between_two_steps_is_judged_too():
     """Two steps that are right at both of their ends miss what the pin forces do
     between.
@@ -262,6 +265,7 @@ def test_exact_engines_stay_exact():
     )
 
 
+@pytest.mark.slow
 def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
     """Each scene is made so that one setting carries it."""
     bars = (
@@ -293,6 +297,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")
 
 
+@pytest.mark.slow
 def test_the_time_of_the_settings_is_told():
     """A second of 10 rad/s has 1.59 revolutions.
 
@@ -321,6 +326,7 @@ def test_the_time_of_the_settings_is_told():
     assert time_steps(50 * best.steps) + time_readings(100) > revolution / 1e3
 
 
+@pytest.mark.slow
 def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     setup = JudgedSetup(turning(10.0, 36))
     attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
@@ -332,6 +338,7 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     assert seconds == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_several_scenes_have_one_table(tmp_path):
     files = []
     for name, scene in (

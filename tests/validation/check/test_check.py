@@ -1099,6 +1099,7 @@ def rounded(values, digits):
 
 
 @pytest.mark.parametrize(("digits", "power"), slow_but({(5, -4)}, [(8, -7), (5, -4)]))
+@pytest.mark.slow
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     digits, power, check
 ):

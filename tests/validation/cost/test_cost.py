@@ -102,6 +102,7 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc():
     assert fast(at_tc[2]).worst < 2.0 * fast(at_tc[1]).worst
 
 
+@pytest.mark.slow
 def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     made = study.CostStudy("s", turning(), tmp_path)
     curves = {curve.name: curve for curve in study.design_curves(turning())}
@@ -154,6 +155,7 @@ def test_every_drive_exerts_the_torque_of_the_formulas(build, settings, allowed)
     assert tried(turning(), drive=build)(settings).worst <= allowed
 
 
+@pytest.mark.slow
 def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
     bars = (fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.6), fourbar.Bar(0.1, 0.2))
@@ -540,6 +542,7 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     assert cost_point.seconds_per_revolution == pytest.approx(seconds, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_settled_curve_is_judged_between_the_steps_of_its_last_turn(tmp_path):
     made = study.CostStudy("s", replace(turning(), drive_bar=4), tmp_path)
     settings = replace(BEST, steps_per_revolution=200.0)

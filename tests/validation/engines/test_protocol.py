@@ -82,6 +82,7 @@ def same(one, two):
     return one == two
 
 
+@pytest.mark.slow
 def test_every_scene_and_command_comes_back_bit_for_bit():
     seen = 0
     for scene in scenes():

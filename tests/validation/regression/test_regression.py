@@ -113,6 +113,7 @@ def read_files(folder):
     return {path: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_other_versions_are_reported():
     """Kernels that a processor is given are among them."""
     others = {"mujoco": "3.3.7", "cpu_features": "none", "blas_kernel": "Prescott"}
@@ -122,6 +123,7 @@ def test_other_versions_are_reported():
     assert "\nmujoco: 3.3.7 -> " in "\n" + render.write_differences(found)
 
 
+@pytest.mark.slow
 def test_command_writes_every_form_and_leaves_with_the_status(tmp_path, saved, compare):
     rows = [ROW, changed(scene="<script>alert(1)</script>|`x`")]
     old = saved("old", *rows)
@@ -136,6 +138,7 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path, saved, c
     assert code == HOLDS and verdict.startswith("No regression")
 
 
+@pytest.mark.slow
 def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
     tmp_path, saved, call
 ):

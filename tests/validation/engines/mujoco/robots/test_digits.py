@@ -158,6 +158,7 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
 
 
 @pytest.mark.parametrize("text", slow_but({FIVE_DIGITS}, [FREE, FIVE_DIGITS, LARGE]))
+@pytest.mark.slow
 def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
     """The rigid robot is that of the formulas within the digits of its lengths."""
     loop = measure(text)
