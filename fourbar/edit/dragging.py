@@ -226,6 +226,10 @@ def _drag_pin(
             dragged.what,
             "must be one of " + ", ".join(DRAGGED_PINS),
         )
+    ground = ("lengths", "ground")
+    if dragged.what == "O4" and isinstance(document.at(ground), dict):
+        put_place(document, ground, dragged.to, dragged.grain)
+        return
     lengths = {
         "A": {"input": "O2"},
         "B": {"coupler": "A", "output": "O4"},
@@ -317,7 +321,8 @@ def put_place(
     if length is None:
         ground = ("lengths", "ground")
         drawn = ("pins", "A", 0)
-        length = document.at(ground) or document.at(drawn)
+        length = document.at((*ground, "x")) or document.at(ground)
+        length = length or document.at(drawn)
     by = by or before
     parts: dict[str | int, str]
     if by == "xy":

@@ -3,8 +3,9 @@
 The motion may use the word "drawn".
 """
 
+import cmath
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from fourbar.linkage import (
 )
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene, command_at
-from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins, PlanePoint
 from fourbar.scene.motion import (
     BAR_OF_ANGLE,
     BRANCH_NAMES,
@@ -115,6 +116,52 @@ def state_lengths(
     return stated
 
 
+@dataclass(frozen=True, slots=True)
+class _DrawnGround:
+    """The ground of a scene of lengths, O2 at the origin; no other bar is drawn."""
+
+    angle: float
+
+    def into_bar(self, bar: int, place: PlanePoint) -> complex:
+        """Return a place in the frame of the ground, m."""
+        return complex(*place) * cmath.rect(1.0, -self.angle)
+
+
+def state_ground(read: Reader, top: dict[str, Any]) -> dict[str, Any]:
+    """State the ground of a scene of lengths by its length and angle.
+
+    The file may have x and y of O4 from O2 in their place. Drawn places of the ground
+    are stated in its frame.
+    """
+    lengths = top.get("lengths")
+    if not isinstance(lengths, dict):
+        return top
+    key = "lengths.ground_angle"
+    angle = lengths.get("ground_angle")
+    if isinstance(lengths.get("ground"), dict):
+        if angle is not None:
+            allowed = "must be left out: x and y of the ground state its angle"
+            raise read.refuse(key, angle, allowed)
+        entry = read.table("lengths.ground", lengths["ground"], ("x", "y"))
+        x, y = (
+            read.quantity(f"lengths.ground.{axis}", entry.get(axis), "m")
+            for axis in ("x", "y")
+        )
+        if not 0.0 < math.hypot(x, y) < math.inf:
+            allowed = "must be coordinates of O4 from O2, where it does not lie"
+            raise read.refuse("lengths.ground", lengths["ground"], allowed)
+        angle = f"{math.atan2(y, x)!r} rad"
+        # with every digit: lengths are compared within those that are stated
+        length = f"{math.hypot(x, y):.16e} m"
+        lengths = {**lengths, "ground": length, "ground_angle": angle}
+    ground = _DrawnGround(read.quantity(key, angle, "rad", default=0.0))
+    stated = {}
+    for name, value in top.items():
+        stated[name] = _state_places(read, name, value, ground)
+    stated["lengths"] = lengths
+    return stated
+
+
 def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
     """Return the lengths of a drawing.
 
@@ -144,7 +191,7 @@ def _state_places(
     read: Reader,
     key: str,
     value: Any,
-    drawing: DrawnPins,
+    drawing: DrawnPins | _DrawnGround,
     bar: int | None = None,
 ) -> Any:
     """State each `{ drawn = [x, y] }` of an entry in the frame of its bar."""
@@ -185,13 +232,19 @@ def _state_place(
     read: Reader,
     key: str,
     value: dict[str, Any],
-    drawing: DrawnPins,
+    drawing: DrawnPins | _DrawnGround,
     bar: int | None,
 ) -> dict[str, str]:
     """State a place of the drawing by its coordinates in the frame of its bar."""
     if bar is None:
         allowed = (
             f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
+        )
+        raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
+    if bar != 1 and isinstance(drawing, _DrawnGround):
+        allowed = (
+            "is a place of a moving bar: it is drawn where [pins] states the linkage;"
+            " here from_pin states it"
         )
         raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
     if key.endswith((".from_centre", ".arm")):

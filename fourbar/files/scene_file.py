@@ -28,6 +28,7 @@ from fourbar.files.described import PLACES_OF_ENDS, list_keys, read_described
 from fourbar.files.drawing import (
     choose_assembly,
     read_drawing,
+    state_ground,
     state_lengths,
     state_motion,
 )
@@ -226,7 +227,9 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
     top = read.table("", document, SCENE_TABLES)
     drawing = read_drawing(read, top)
-    if drawing is not None:
+    if drawing is None:
+        top = state_ground(read, top)
+    else:
         top = state_lengths(read, top, drawing)
     points = _read_points(read, top.get("points", {}))
     bars = {point.name: point.bar for point in points}

@@ -203,10 +203,11 @@ def _suit_rotation(stated: str, unit: str) -> Conversion:
 
 
 def find_length(document: Mapping[str, Any]) -> object:
-    """Return lengths.ground, or the first coordinate of a pin, as it is written."""
+    """Return lengths.ground, or a coordinate of its end or a pin, as it is written."""
     if "pins" in document:
         return document["pins"]["A"][0]
-    return document["lengths"]["ground"]
+    ground = document["lengths"]["ground"]
+    return ground["x"] if isinstance(ground, Mapping) else ground
 
 
 def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:

@@ -396,6 +396,17 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(loaded, name):
         assert units == {"x": "in", "y": "mm"}
 
 
+def test_a_ground_by_coordinates_is_dragged_by_them(session):
+    stated = {"x": "12 in", "y": "30 mm"}
+    session.change(lambda document: document.put(["lengths", "ground"], stated))
+    to = 0.33 + 0.05j
+    linkage = drag(session, "O4", to).scene.linkage
+    assert cmath.rect(linkage.ground, linkage.ground_angle) == approx(to, abs=PIXEL)
+    ground = session.now.plain["lengths"]["ground"]
+    assert [ground[axis].split()[-1] for axis in "xy"] == ["in", "mm"]
+    assert "ground_angle" not in session.now.plain["lengths"]
+
+
 def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session):
     length = abs(complex(*drag(session, "A", 0.08 + 0.09j).A[0]))
     assert length == approx(abs(0.08 + 0.09j), abs=PIXEL)

@@ -259,6 +259,60 @@ def test_a_drawing_that_is_none_is_refused(change, says):
         loads(DRAWN.replace(*change))
 
 
+CRANE = """\
+[lengths]
+ground = { x = "-120 mm", y = "-70 mm" }
+input = "455 mm"
+coupler = "124 mm"
+output = "570 mm"
+[drive]
+from = { bar = 1, drawn = ["433 mm", "-1768.2 mm"] }
+to = { bar = 4, from_pin = ["570 mm", "0 deg"] }
+[[loads]]
+bar = 2
+moment = "-50 kN m"
+[motion]
+theta_2 = ["-20 deg", "0 deg", "60 deg"]
+omega_2 = "0 rad/s"
+"""
+"""The boom of a crane on bar 2, whose cylinder pushes the pin of two links."""
+
+
+def test_a_ground_by_coordinates_and_a_place_drawn_on_it():
+    """The pin is where two circles meet, the force is that of virtual work."""
+    foot, O4 = 0.433 - 1.7682j, -0.12 - 0.07j
+
+    def stroke(angle):
+        d = 0.455 * np.exp(1j * angle) - O4
+        along = (0.57**2 + abs(d) ** 2 - 0.124**2) / (2.0 * abs(d))
+        pin = O4 + d / abs(d) * (along - 1j * np.sqrt(0.57**2 - along**2))
+        return abs(pin - foot)
+
+    scene = loads(CRANE)
+    here = solve(scene)
+    assert here.stroke == approx(stroke(here.theta_2), rel=1e-14)
+    ratio = (stroke(here.theta_2 + 1e-5) - stroke(here.theta_2 - 1e-5)) / 2e-5
+    assert here.drive_force == approx(50e3 / ratio, rel=1e-8)
+    assert loads(dump(scene)) == scene
+    assert scene.linkage.lengths == (hypot(0.12, 0.07), 0.455, 0.124, 0.57)
+    assert scene.linkage.ground_angle == math.atan2(-0.07, -0.12)
+
+
+@pytest.mark.parametrize(
+    "change, says",
+    [
+        ((', y = "-70 mm"', ""), "lengths.ground.y: is missing"),
+        (("[drive]", 'ground_angle = "1 deg"\n[drive]'), "x and y of the ground"),
+        (("bar = 1, drawn", "bar = 2, drawn"), "is a place of a moving bar"),
+        (('x = "-120 mm"', 'z = "1 mm", x = "-120 mm"'), "unknown key"),
+        (('"-120 mm", y = "-70 mm"', '"0 mm", y = "0 mm"'), "coordinates of O4"),
+    ],
+)
+def test_a_ground_by_coordinates_that_is_none_is_refused(change, says):
+    with raises(InputError, match=says):
+        loads(CRANE.replace(*change))
+
+
 def test_a_drawing_on_a_change_point_is_refused():
     with raises(InputError, match="lie in one line: at a change point"):
         from_pins((0, 0), (1, 0), (4, 0), (3, 0))

@@ -160,6 +160,12 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
     assert of_scene["rad/s"][0] == shown
 
 
+def test_a_ground_by_coordinates_has_their_unit():
+    one, other = {"x": "3 in", "y": "1 in"}, "3 in"
+    shown = [units_of_scene({"lengths": {"ground": ground}}) for ground in (one, other)]
+    assert shown[0] == shown[1]
+
+
 @pytest.mark.parametrize(
     "value, text", [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
 )
