@@ -38,34 +38,8 @@ class LoopSettings:
     """solref[0] in timesteps; None leaves solref, solimp and solver to MuJoCo."""
     impedance: float = 0.9999
     pad: float | None = None
-    weight_factor: float = 1.0
-    """Factor on body_invweight0 after compilation."""
     wheel: float = 1e5
     """Armature of the crank's joint, kg m^2: a flywheel that keeps the speed."""
-    carrier: "Servo | TurningWheel | None" = None
-    """What keeps the speed in place of that flywheel."""
-
-
-@dataclass(frozen=True)
-class Servo:
-    """Actuator on the crank, of torque position_gain (target - theta_2) + velocity_gain
-    (omega - omega_2).
-    """
-
-    position_gain: float
-    """N m/rad; 0: no target, the speed alone is kept."""
-    velocity_gain: float
-    """N m s/rad."""
-
-
-@dataclass(frozen=True)
-class TurningWheel:
-    """A second body that turns at omega, to which a joint equality holds the crank."""
-
-    armature: float
-    """kg m^2."""
-    weight_factor: float = 1.0
-    """Factor on dof_invweight0 after compilation."""
 
 
 class Loop:
@@ -131,7 +105,7 @@ class Loop:
             self.d * np.exp(1j * self.theta_1),
         ]
 
-    def write(self, settings, timestep, wheel, carrier=None, omega=0.0):
+    def write(self, settings, timestep, wheel):
         """Write the MJCF.
 
         Crank and coupler are in series, the rocker stands by itself, and a `connect`
@@ -187,21 +161,6 @@ class Loop:
                 f'biastype="affine" biasprm="1 0 0" gear="{push.real!r} {push.imag!r} '
                 f'0 0 0 {couple!r}"/>'
             )
-        body = equality = ""
-        if isinstance(carrier, TurningWheel):
-            body = (
-                '<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-                f'<joint name="wheel" axis="0 0 1" armature="{carrier.armature!r}"/>'
-                "</body>"
-            )
-            equality = f'<joint joint1="pin0" joint2="wheel" {softness}/>'
-        if isinstance(carrier, Servo):
-            kp, kv = carrier.position_gain, carrier.velocity_gain
-            integrates = 'dyntype="integrator"' if kp else ""
-            motors.append(
-                f'<general joint="pin0" {integrates} gaintype="fixed" gainprm="{kp!r}" '
-                f'biastype="affine" biasprm="{kv * omega!r} {-kp!r} {-kv!r}"/>'
-            )
         return f"""
         <mujoco>
           <option timestep="{timestep!r}" integrator="{settings.integrator}"
@@ -216,9 +175,8 @@ class Loop:
             <body name="bar2" pos="{ground.real!r} {ground.imag!r} 0">
               {bar(2)}{"".join(sites[2])}{closing_site(2)}
             </body>
-            {body}
           </worldbody>
-          <equality><connect site1="B2" site2="B1" {softness}/>{equality}</equality>
+          <equality><connect site1="B2" site2="B1" {softness}/></equality>
           <actuator>{"".join(motors)}</actuator>
         </mujoco>"""
 
@@ -244,43 +202,26 @@ class Simulation:
         self.omega = float(scene.motion.omega_2)
         assert float(scene.motion.alpha_2) == 0.0, "the flywheel keeps its speed"
         self.timestep = 2.0 * math.pi / settings.steps_per_revolution / abs(self.omega)
-        carried = settings.carrier is not None
-        self.model = self.compile(0.0 if carried else settings.wheel, settings.carrier)
+        self.model = self.compile(settings.wheel)
         self.data = mujoco.MjData(self.model)
         # a linkage that is driven elsewhere has no flywheel on its crank; pads stiffen
         # the closure next to one alone
         self.wheel_read = settings.wheel
-        if self.loop.drive != 2 and (settings.pad is None or carried):
+        if self.loop.drive != 2 and settings.pad is None:
             self.wheel_read = 0.0
         self.probed = self.compile(self.wheel_read)
         self.probe = mujoco.MjData(self.probed)
 
-    def compile(self, wheel, carrier=None):
-        """Compile the loop with a flywheel, or what else keeps the crank's speed."""
-        text = self.loop.write(
-            self.settings,
-            self.timestep,
-            wheel,
-            carrier,
-            self.omega,
-        )
-        model = mujoco.MjModel.from_xml_string(text)
-        model.body_invweight0[:] *= self.settings.weight_factor
-        if isinstance(carrier, TurningWheel):
-            model.dof_invweight0[:] *= carrier.weight_factor
-        return model
+    def compile(self, wheel):
+        """Compile the loop with a flywheel."""
+        text = self.loop.write(self.settings, self.timestep, wheel)
+        return mujoco.MjModel.from_xml_string(text)
 
     def start(self, theta_2):
-        """Close the loop at an angle of the crank; what keeps its speed is in step."""
+        """Close the loop at an angle of the crank."""
         angles, speeds = self.loop.start(theta_2, self.omega)
         self.data.qpos[:3] = angles[0], angles[1] - angles[0], angles[2]
         self.data.qvel[:3] = speeds[0], speeds[1] - speeds[0], speeds[2]
-        carrier = self.settings.carrier
-        if isinstance(carrier, TurningWheel):
-            self.data.qpos[3], self.data.qvel[3] = theta_2, self.omega
-        if isinstance(carrier, Servo) and carrier.position_gain:
-            self.data.act[:] = theta_2
-            self.data.ctrl[-1] = self.omega
 
     def run(self):
         """Step through the sweep and read states on the way."""
@@ -304,12 +245,7 @@ class Simulation:
         mujoco.mj_forward(self.model, self.data)
         alpha_2 = float(self.data.qacc[0])
         angles, speeds = _add_crank(self.data.qpos), _add_crank(self.data.qvel)
-        if self.settings.carrier is not None and self.loop.drive == 2:
-            # the drive is what carries the crank
-            acceleration, closing = self.data.qacc[:3], self.data.efc_force[:2]
-            drive = self.exerted()
-        else:
-            acceleration, closing, drive = self.probe_drive(angles, alpha_2)
+        acceleration, closing, drive = self.probe_drive(angles, alpha_2)
         turned = _add_crank(acceleration)
         forces = self.balance(angles, speeds, turned, closing, drive)
         return Sample(
@@ -318,14 +254,6 @@ class Simulation:
             alpha_2,
             forces,
         )
-
-    def exerted(self):
-        """Return the torque on the crank, N m: that of the servo, or the multiplier of
-        the equality with the wheel.
-        """
-        if isinstance(self.settings.carrier, Servo):
-            return float(self.data.actuator_force[-1])
-        return float(self.data.efc_force[3])  # after the three rows of `connect`
 
     def probe_drive(self, angles, alpha_2):
         """Find the drive that gives the crank its acceleration.

@@ -19,7 +19,7 @@ from fourbar_validation.cost import pictures, study
 from fourbar_validation.cost.conclusion import DEFAULT
 from fourbar_validation.cost.cost import write_subtitle
 from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP, design_curves
-from fourbar_validation.engines.mujoco import drives
+from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
 from fourbar_validation.report.svg import write_alone
 
@@ -71,7 +71,7 @@ def compute_row(text, steps, folder):
         steps_per_revolution=steps,
     )
     setup = study.CostStudy("page", SCENE, folder).setup(settled=True)
-    trial = setup.try_out(settings, drives.restore_defaults)
+    trial = setup.try_out(settings, restore_defaults)
     study._leave_out_first(trial)
     return compute_errors(SCENE, trial.at, trial.quantities)
 

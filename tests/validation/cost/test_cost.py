@@ -16,7 +16,6 @@ from click.testing import CliRunner
 from scipy.interpolate import make_interp_spline
 
 import fourbar
-from fourbar.mjcf import Settings
 from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_lab.contenders import CONTENDED_LINKAGE
@@ -33,7 +32,6 @@ from fourbar_validation.cost import conclusion, formulas, laws, pictures, study
 from fourbar_validation.cost import cost as command_module
 from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
-from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
@@ -53,11 +51,11 @@ def turning(omega=10.0, positions=36):
     )
 
 
-def tried(scene, closure=None, drive=None):
+def tried(scene):
     setup = TrialSetup(scene, command(scene))
 
     def error(settings):
-        trial = setup.try_out(settings, closure, drive)
+        trial = setup.try_out(settings)
         if trial.broken:
             return INFINITE_ERRORS
         return compute_errors(scene, trial.at, trial.quantities)
@@ -114,45 +112,16 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     assert fine.force == pytest.approx(7e-3, rel=0.3)
 
 
-def test_pads_do_what_an_edit_of_the_compiled_model_does():
-    plain, scene = replace(BEST, pad=None), turning()
-    edited = tried(scene, lambda text, _: drives.Softened(text, 1e-8))(plain).worst
-    padded, soft = (tried(scene)(replace(BEST, pad=pad)).worst for pad in (1e-4, None))
-    assert padded == pytest.approx(edited, rel=0.5) and padded < soft / 30.0
+def test_pads_stiffen_the_closure():
+    error = tried(turning())
+    padded, soft = (error(replace(BEST, pad=pad)).worst for pad in (1e-4, None))
+    assert padded < soft / 30.0
 
 
 def test_only_tolerance_0_is_tight_with_a_heavy_flywheel():
     error = tried(turning())
     heavy = replace(BEST, flywheel=1e8)
     assert error(replace(heavy, tolerance=1e-8)).worst > 10.0 * error(heavy).worst
-
-
-PLAIN_DRIVE = replace(BEST, flywheel=1.0)
-"""An explicit step, a drive without flywheel: the pads do not help, and the plain
-closure's softness is left.
-"""
-FIRST_ORDER = Settings(
-    steps_per_revolution=6280,
-    integrator="implicitfast",
-    time_constant_steps=3.0,
-    flywheel=1.0,
-)
-"""First order: 0.13 omega h and more."""
-
-
-@pytest.mark.parametrize(
-    ("build", "settings", "allowed"),
-    [
-        (drives.GentleVelocityActuator, PLAIN_DRIVE, 2e-4),
-        (drives.GentleServo, PLAIN_DRIVE, 2e-4),
-        (drives.WheelEquality, PLAIN_DRIVE, 2e-4),
-        (drives.StiffWheelEquality, PLAIN_DRIVE, 2e-4),
-        (drives.Servo, FIRST_ORDER, 2e-3),
-        (drives.VelocityActuator, FIRST_ORDER, 1e-2),
-    ],
-)
-def test_every_drive_exerts_the_torque_of_the_formulas(build, settings, allowed):
-    assert tried(turning(), drive=build)(settings).worst <= allowed
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.mjcf import Settings
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
-from fourbar_validation.engines.mujoco.trial import Build, Trial, TrialSetup
+from fourbar_validation.engines.mujoco.trial import Edit, Trial, TrialSetup
 
 INTERVALS_READ = 180
 """Intervals of the sweep at which a run is read at least."""
@@ -46,18 +46,13 @@ class JudgedSetup(TrialSetup):
         self.before = before
         self._denser: JudgedSetup | None = None
 
-    def try_out(
-        self,
-        settings: Settings,
-        closure: Build | None = None,
-        drive: Build | None = None,
-    ) -> Trial:
+    def try_out(self, settings: Settings, edit: Edit | None = None) -> Trial:
         """Run through the scene with as many positions as there are steps."""
         if self.intervals > self.steps(settings) or self.intervals >= DENSEST_INTERVALS:
-            return super().try_out(settings, closure, drive)
+            return super().try_out(settings, edit)
         if self._denser is None:
             self._denser = JudgedSetup(self.stated, 4 * self.intervals, self.before)
-        return self._denser.try_out(settings, closure, drive)
+        return self._denser.try_out(settings, edit)
 
 
 def add_positions(command: Command, intervals: int) -> Command:

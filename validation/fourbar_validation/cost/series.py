@@ -6,13 +6,11 @@ The other settings are the recommended ones or MuJoCo's defaults.
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene
-from fourbar_validation.engines.mujoco import drives
-from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.trial import TRIAL_FLYWHEEL, Build
+from fourbar_validation.engines.mujoco.defaults import restore_defaults
+from fourbar_validation.engines.mujoco.trial import TRIAL_FLYWHEEL, Edit
 
 STEPS_PER_TURN = (20, 40, 80, 160, 320, 640, 1280, 2560)
 _MORE_STEPS = (*STEPS_PER_TURN, 5120, 10240)
@@ -28,7 +26,6 @@ _SAGGING = 0.999
 _MANY_STEPS = 10240
 """Steps per revolution at which a time constant of ten steps is too short to sag."""
 SOLVER_TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
-_REGULARISATIONS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8)
 _PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
 """rad/s at which gravity and loads outweigh inertia, and the loop sags under them."""
@@ -48,10 +45,8 @@ class Spot:
 
     label: str
     settings: Settings
-    closure: Build | None = None
-    """Builds every loop of a trial, if the closure is under test."""
-    drive: Build | None = None
-    """Builds the loop that is stepped, if no flywheel carries it."""
+    edit: Edit | None = None
+    """Changes the text of every loop of a trial."""
     x: float = math.nan
     """The value of the curve's setting, where it is not the steps."""
 
@@ -86,19 +81,17 @@ def make_curve(
     label: str,
     values: Iterable[float],
     settings: Callable[[float], Settings],
-    closure: Build | None = None,
-    drive: Build | None = None,
+    edit: Edit | None = None,
 ) -> Curve:
     """Make a curve over the values of a setting, each with its label and settings."""
-    spots = [Spot(label.format(x), settings(x), closure, drive, x) for x in values]
+    spots = [Spot(label.format(x), settings(x), edit, x) for x in values]
     return Curve(name, tuple(spots))
 
 
 def _trace_steps(
     name: str,
     settings: Settings,
-    closure: Build | None = None,
-    drive: Build | None = None,
+    edit: Edit | None = None,
     steps: Iterable[int] = STEPS_PER_TURN,
     held: float | None = None,
 ) -> Curve:
@@ -116,7 +109,7 @@ def _trace_steps(
             tc = held * n
         return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
 
-    return make_curve(name, "{:g} steps a revolution", steps, at, closure, drive)
+    return make_curve(name, "{:g} steps a revolution", steps, at, edit)
 
 
 def design_curves(scene: Scene) -> list[Curve]:
@@ -146,8 +139,10 @@ def design_curves(scene: Scene) -> list[Curve]:
             )
         )
     curves.append(_trace_steps("RK4, no pads, tc = 10 steps", WITHOUT_PADS))
-    curves += [*_vary_softness(), *_vary_sag(), *_vary_tolerance()]
-    return curves + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
+    for factor in (1e2, 1e4, 1e6, 1e8):
+        settings = replace(BEST, flywheel=factor)
+        curves.append(_trace_steps(f"RK4, flywheel {factor:g}", settings))
+    return [*curves, *_vary_softness(), *_vary_sag(), *_vary_tolerance()]
 
 
 WITHOUT_PADS = replace(BEST, pad=None, time_constant_steps=10.0)
@@ -168,7 +163,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
     curve = _trace_steps(
         f"{integrator}, MuJoCo's defaults",
         settings,
-        drives.restore_defaults,
+        restore_defaults,
         steps=_choose_ladder(integrator),
     )
     spots = list(curve.spots)
@@ -178,7 +173,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
             Spot(
                 "MuJoCo's defaults",
                 replace(settings, steps_per_revolution=n),
-                drives.restore_defaults,
+                restore_defaults,
                 x=n,
             )
         )
@@ -198,15 +193,6 @@ def _vary_softness() -> list[Curve]:
         )
         for f in _PADS
     )
-    edited = (
-        Spot(
-            f"body_invweight0 x {factor:g}",
-            replace(BEST, pad=None),
-            partial(_soften, factor),
-            x=factor,
-        )
-        for factor in _REGULARISATIONS
-    )
     by_tc = make_curve(
         "softness tc",
         "tc = {:g} steps",
@@ -216,17 +202,8 @@ def _vary_softness() -> list[Curve]:
     return [
         Curve("softness d", _list_impedances()),
         by_tc,
-        Curve("regularisation edited", tuple(edited)),
         Curve("pads", tuple(pads)),
     ]
-
-
-def _soften(
-    factor: float,
-    text: str,
-    _: float,
-) -> ClosedLoop:
-    return drives.Softened(text, factor)
 
 
 def _list_impedances() -> tuple[Spot, ...]:
@@ -273,27 +250,4 @@ def _vary_tolerance() -> list[Curve]:
                 lambda x, s=settings: replace(s, tolerance=x),  # type: ignore[misc]
             )
         )
-    return curves
-
-
-def _vary_drives() -> list[Curve]:
-    """List each drive with the integrator that carries it."""
-    light = replace(BEST, flywheel=1.0)
-    fast = replace(light, integrator="implicitfast", time_constant_steps=3.0)
-    curves = [
-        _trace_steps(f"RK4, flywheel {f:g}", replace(BEST, flywheel=f))
-        for f in (1e2, 1e4, 1e6, 1e8)
-    ]
-    tried: list[tuple[str, Build]] = [
-        ("joint equality, RK4", drives.WheelEquality),
-        ("joint equality, softness edited, RK4", drives.StiffWheelEquality),
-        ("servo, implicitfast", drives.Servo),
-        ("gentle servo, RK4", drives.GentleServo),
-        ("velocity actuator, implicitfast", drives.VelocityActuator),
-        ("gentle velocity actuator, RK4", drives.GentleVelocityActuator),
-    ]
-    for name, drive in tried:
-        explicit = name.endswith("RK4")
-        settings, steps = (light, STEPS_PER_TURN) if explicit else (fast, _MORE_STEPS)
-        curves.append(_trace_steps(name, settings, drive=drive, steps=steps))
     return curves

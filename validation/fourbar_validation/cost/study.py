@@ -44,7 +44,7 @@ TIMED_READINGS = 50
 ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 IMPEDANCES_AT_ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-STUDY_VERSION = 9
+STUDY_VERSION = 10
 """Version of what is tried; parts made with another version are made again."""
 EXACT_MOTION = "exact"
 STEPPED_MOTION = "stepped"
@@ -222,20 +222,14 @@ class CostStudy:
 
         The timings are interleaved with those of the others.
         """
-        trials = [
-            setup.try_out(spot.settings, spot.closure, spot.drive) for spot in spots
-        ]
+        trials = [setup.try_out(spot.settings, spot.edit) for spot in spots]
         readings = [trial.readings for trial in trials]
         if settled:
             for trial in trials:
                 _leave_out_first(trial)
         clocks: dict[tuple[str, int], Callable[[], float]] = {}
         for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
-            time_steps, time_readings = setup.make_clocks(
-                spot.settings,
-                spot.closure,
-                spot.drive,
-            )
+            time_steps, time_readings = setup.make_clocks(spot.settings, spot.edit)
             steps = min(trial.steps, MOST_STEPS_TIMED) or 1
             clocks["step", number] = partial(_time_each, time_steps, steps)
             clocks["reading", number] = partial(

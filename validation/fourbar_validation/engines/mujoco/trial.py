@@ -7,7 +7,7 @@ measured:
     error ~ h^ORDER_OF_RK4 until a floor              -> h, the timestep
 
 The scene is assembled once by the engine itself; each trial compiles the generated MJCF
-anew, with the drive to be tried, and reports its own motion, torque and pin forces.
+anew and reports its own motion, torque and pin forces.
 
 A run that is no more precise than wanted has the settings of the laws, confirmed by the
 error that the engine predicts from its own residuals, never by what the formulas say:
@@ -68,8 +68,8 @@ rounded in proportion to it.
 """
 _MOST_READINGS = 100
 """Readings that are timed at once, at most."""
-Build = Callable[[str, float], ClosedLoop]
-"""Function from the MJCF text and the speed to keep (rad/s) to a loop."""
+Edit = Callable[[str], str]
+"""Function that changes the text of an MJCF."""
 
 
 def guess(error: float) -> tuple[float, float]:
@@ -207,8 +207,7 @@ class TrialSetup:
         self,
         settings: Settings,
         timestep: float,
-        closure: Build | None = None,
-        drive: Build | None = None,
+        edit: Edit | None = None,
     ) -> tuple[ClosedLoop, ClosedLoop | None]:
         """Build the loop that is stepped.
 
@@ -217,15 +216,18 @@ class TrialSetup:
         other forces. Pads stiffen the closure of a crank with a flywheel alone, so with
         pads the second loop has a light one; otherwise it is the linkage by itself.
         """
-        text = self.text(settings, timestep)
-        loop = (drive or closure or _keep_text)(text, self.omega)
+
+        def build(built: Settings) -> ClosedLoop:
+            text = self.text(built, timestep)
+            return ClosedLoop(text if edit is None else edit(text))
+
+        loop = build(settings)
         if self.scene.drive_bar == 2:
             return loop, None
         flywheel = 0.0
-        if settings.pad is not None and drive is None:
+        if settings.pad is not None:
             flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
-        light = self.text(replace(settings, flywheel=flywheel), timestep)
-        return loop, (closure or _keep_text)(light, self.omega)
+        return loop, build(replace(settings, flywheel=flywheel))
 
     def motion_segment(self, segment: list[int]) -> SteadySegment:
         """Choose how the input moves through a segment."""
@@ -258,20 +260,14 @@ class TrialSetup:
             total += round(run.time(run.stop) / run.timestep(settings))
         return total
 
-    def try_out(
-        self,
-        settings: Settings,
-        closure: Build | None = None,
-        drive: Build | None = None,
-    ) -> Trial:
+    def try_out(self, settings: Settings, edit: Edit | None = None) -> Trial:
         """Run through every segment that assembles.
 
         The state read for a position is that of the nearest step.
 
         Parameters
         ----------
-        closure : builds every loop from its text: how the four-bar is closed.
-        drive : builds the loop that is stepped, if no flywheel carries it.
+        edit : changes the text of every loop: how the four-bar is closed.
         """
         samples = [index for segment in self.segments for index in segment]
         names = (*MADE, name_driving(self.scene), *PIN_FORCES)
@@ -284,7 +280,7 @@ class TrialSetup:
             self._run(
                 segment,
                 settings,
-                (closure, drive),
+                edit,
                 {name: x[rows] for name, x in out.items()},
                 trial,
             )
@@ -299,13 +295,13 @@ class TrialSetup:
         self,
         segment: list[int],
         settings: Settings,
-        builds: tuple[Build | None, Build | None],
+        edit: Edit | None,
         out: dict[str, Array],
         trial: Trial,
     ) -> None:
         motion_segment = self.motion_segment(segment)
         timestep = motion_segment.run.timestep(settings)
-        loop, light = self.build_loops(settings, timestep, *builds)
+        loop, light = self.build_loops(settings, timestep, edit)
         run = SimulatedRun(
             self.scene,
             loop,
@@ -342,8 +338,7 @@ class TrialSetup:
     def make_clocks(
         self,
         settings: Settings,
-        closure: Build | None = None,
-        drive: Build | None = None,
+        edit: Edit | None = None,
     ) -> tuple[Callable[[int], float], Callable[[int], float]]:
         """Return two functions of a count: CPU time in s of steps, and of readings.
 
@@ -352,7 +347,7 @@ class TrialSetup:
         segment = max(self.segments, key=len)
         motion_segment = self.motion_segment(segment)
         timestep = motion_segment.run.timestep(settings)
-        loop, light = self.build_loops(settings, timestep, closure, drive)
+        loop, light = self.build_loops(settings, timestep, edit)
         start = self.start[segment[0]]
         run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
         data = loop.data
@@ -382,10 +377,6 @@ class TrialSetup:
             return time.process_time() - began
 
         return time_steps, time_readings
-
-
-def _keep_text(text: str, _: float) -> ClosedLoop:
-    return ClosedLoop(text)
 
 
 MOST_SIMULATIONS = 6
