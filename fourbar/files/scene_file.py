@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -40,12 +41,11 @@ from fourbar.quantities import Array
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
 from fourbar.scene.motion import (
-    COMMAND_NAMES,
+    BAR_OF_ANGLE,
     DEFAULT_STEPS,
     LAW_KINDS,
+    SIDES,
     SINE_LAW,
-    SPLINES,
-    STROKE_COMMAND,
     Free,
     FromLimit,
     Law,
@@ -435,52 +435,22 @@ def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 
 def _read_motion(read: Reader, value: object) -> Motion:
-    numbers = [name for names in COMMAND_NAMES.values() for name in names]
+    places = (*BAR_OF_ANGLE, "stroke")
     entry = read.table(
-        "motion",
-        value,
-        (*numbers, *STROKE_COMMAND, "side", "branch", "free", "law"),
+        "motion", value, (*Motion.numbers, "side", "branch", "free", "law")
     )
-    stated = [name for name in numbers if name in entry]
-    arguments: dict[str, Any] = {
-        "branch": BRANCH_OF_NAME[
-            read.choice("motion.branch", entry.get("branch", "open"), BRANCH_OF_NAME)
-        ],
-    }
-    if of_stroke := [name for name in (*STROKE_COMMAND, "side") if name in entry]:
-        for name in (*stated, *(name for name in ("free", "law") if name in entry)):
-            raise read.refuse(
-                f"motion.{name}",
-                entry[name],
-                f"{of_stroke[0]} commands a cylinder, and nothing else is",
-            )
-        place, speed, acceleration = STROKE_COMMAND
-        unit = "m"
-        arguments["side"] = read.choice(
-            "motion.side",
-            entry.get("side"),
-            ("left", "right"),
-        )
-    else:
-        bar = int(stated[0][-1]) if stated else 2
-        for name in stated:
-            if int(name[-1]) != bar:
-                allowed = f"{stated[0]} commands bar {bar}; one bar is commanded"
-                raise read.refuse(f"motion.{name}", entry[name], allowed)
-        place, speed, acceleration = COMMAND_NAMES[bar]
-        unit = "rad"
-    if place in entry or of_stroke:
-        arguments[place] = _read_commanded(
-            read,
-            f"motion.{place}",
-            entry.get(place),
-            unit,
-        )
-    for name, per in ((speed, "s"), (acceleration, "s^2")):
+    arguments: dict[str, Any] = {}
+    for name, by in Motion.numbers.items():
         if name in entry:
-            is_list = isinstance(entry[name], list)
-            reading: Any = read.quantities if is_list else read.quantity
-            arguments[name] = reading(f"motion.{name}", entry[name], f"{unit}/{per}")
+            reading: Any = read.quantity
+            if name in places:
+                reading = partial(_read_commanded, read)
+            elif isinstance(entry[name], list):
+                reading = read.quantities
+            arguments[name] = reading(f"motion.{name}", entry[name], by.unit)
+    for name, words in (("branch", BRANCH_OF_NAME), ("side", SIDES)):
+        if name in entry:
+            arguments[name] = read.choice(f"motion.{name}", entry[name], words)
     if "free" in entry:
         free = read_described(read, "motion.free", entry["free"], Free, {})
         arguments["free"] = free
@@ -500,40 +470,16 @@ def _read_steps(read: Reader, key: str, entry: Mapping[str, Any]) -> int:
 
 
 def _read_law(read: Reader, value: object) -> Law | Rise | Sine:
+    """Read a table; a sine; or a rise, a dwell, a fall and a rest by a standard law."""
     key = "motion.law"
+    law: Any = Law
+    entry = value
     if isinstance(value, dict) and "kind" in value:
-        return _read_standard_law(read, key, value)
-    columns = [name for names in COMMAND_NAMES.values() for name in names]
-    entry = read.table(key, value, ("time", *columns, "steps", "ends"))
-    angles = [names[0] for names in COMMAND_NAMES.values()]
-    stated = [name for name in angles if name in entry] or angles[:1]
-    numbers: dict[str, Any] = {}
-    for name in stated:
-        numbers[name] = read.quantities(f"{key}.{name}", entry.get(name), "rad")
-    for rate, unit in (("omega", "rad/s"), ("alpha", "rad/s^2")):
-        for name in [name for name in columns if name.startswith(rate)]:
-            if name not in entry:
-                continue
-            if name[-1] != stated[0][-1]:
-                allowed = f"{stated[0]} commands bar {stated[0][-1]}; one bar is"
-                raise read.refuse(f"{key}.{name}", entry[name], allowed)
-            numbers[rate] = read.quantities(f"{key}.{name}", entry[name], unit)
-    if "omega" in numbers and "ends" in entry:
-        allowed = "must be left out: the speeds state what the ends do"
-        raise read.refuse(f"{key}.ends", entry["ends"], allowed)
-    times = read.quantities(f"{key}.time", entry.get("time"), "s")
-    steps = _read_steps(read, key, entry)
-    ends = read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES)
-    return Law(times, steps=steps, ends=ends, **numbers)
-
-
-def _read_standard_law(read: Reader, key: str, value: Mapping[str, Any]) -> Rise | Sine:
-    """Read a sine, or a rise, a dwell, a fall and a rest by a standard law."""
-    kind = read.choice(f"{key}.kind", value["kind"], LAW_KINDS)
-    law: Any = Sine if kind == SINE_LAW else Rise
-    entry = dict(value)
-    if law is Sine:
-        del entry["kind"]
+        kind = read.choice(f"{key}.kind", value["kind"], LAW_KINDS)
+        law = Rise
+        if kind == SINE_LAW:
+            law = Sine
+            entry = {name: number for name, number in value.items() if name != "kind"}
     return read_described(read, key, entry, law, {})  # type: ignore[no-any-return]
 
 

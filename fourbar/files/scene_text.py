@@ -263,21 +263,8 @@ def _write_quantities(numbers: float | Array, unit: str) -> Any:
 
 
 def _write_law(law: Law | Rise | Sine) -> dict[str, Any]:
-    if not isinstance(law, Law):
-        return {"kind": law.kind, **write_described(law)}
-    columns = {
-        "time": (law.time, "s"),
-        f"theta_{law.bar}": (law.angle, "rad"),
-        f"omega_{law.bar}": (law.omega, "rad/s"),
-        f"alpha_{law.bar}": (law.alpha, "rad/s^2"),
-    }
-    entry: dict[str, Any] = {
-        name: [write_quantity(x, unit) for x in numbers]
-        for name, (numbers, unit) in columns.items()
-        if numbers is not None
-    }
-    ends = {"ends": law.ends} if law.omega is None else {}
-    return {**entry, "steps": law.steps, **ends}
+    kind = {} if isinstance(law, Law) else {"kind": law.kind}
+    return {**kind, **write_described(law)}
 
 
 def _write_toml_table(name: str, entries: dict[str, Any]) -> str:

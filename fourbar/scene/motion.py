@@ -129,24 +129,19 @@ def _find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
 
     Raises InputError for two bars.
     """
-    stated = [
-        bar
-        for bar, (angle, speed, acceleration) in numbers.items()
-        if not (
-            angle is None
-            and speed is None
-            and type(acceleration) is float
-            and acceleration == 0.0
-        )
-    ]
-    if len(stated) > 1:
-        bars = " and ".join(f"of bar {bar}" for bar in stated)
-        raise InputError(
-            key,
-            bars,
-            "is the command of one bar: theta, omega and alpha of bar 2, 3 or 4",
-        )
-    return stated[0] if stated else None
+    stated = {
+        name: number
+        for bar, of_bar in numbers.items()
+        for name, number in zip(COMMAND_NAMES[bar], of_bar, strict=True)
+        if number is not None
+        and not (name.startswith("alpha") and type(number) is float and not number)
+    }
+    bars = [int(name[-1]) for name in stated]
+    for bar, (name, number) in zip(bars, stated.items(), strict=True):
+        if bar != bars[0]:
+            allowed = f"{next(iter(stated))} commands bar {bars[0]}; one bar is"
+            raise InputError(f"{key}.{name}", number, f"{allowed} commanded")
+    return bars[0] if bars else None
 
 
 class _OverTime:
@@ -157,8 +152,10 @@ class _OverTime:
     @property
     def bar(self: Any) -> int:
         """Number of the bar whose angle the law gives: 2, 3 or 4."""
-        angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
-        stated = {bar: (angle, None, 0.0) for bar, angle in angles.items()}
+        stated = {
+            bar: tuple(getattr(self, name, None) for name in names)
+            for bar, names in COMMAND_NAMES.items()
+        }
         return _find_bar("motion.law", stated) or 2
 
     def times(self: Any) -> Array:
@@ -183,8 +180,8 @@ class Law(Described, _OverTime):
     ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and
         acceleration at the end are those at the start; the angle may have gained whole
         turns). It is of angles alone.
-    omega, alpha : one speed and one acceleration of the commanded bar for each time,
-        rad/s and rad/s^2; alpha needs omega.
+    omega_2, alpha_2, ... : one speed and one acceleration of the commanded bar for each
+        time, rad/s and rad/s^2; accelerations need speeds.
     """
 
     time: Annotated[tuple[float, ...], Listed("s")]
@@ -193,8 +190,12 @@ class Law(Described, _OverTime):
     ends: Annotated[str, OneOf((*SPLINES,))] = "free"
     theta_3: Annotated[tuple[float, ...] | None, Listed("rad")] = None
     theta_4: Annotated[tuple[float, ...] | None, Listed("rad")] = None
-    omega: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
-    alpha: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
+    omega_2: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
+    omega_3: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
+    omega_4: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
+    alpha_2: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
+    alpha_3: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
+    alpha_4: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
     stated_at: ClassVar[str] = "motion.law"
 
     def __post_init__(self) -> None:
@@ -233,10 +234,19 @@ class Law(Described, _OverTime):
         return self.omega is None
 
     @property
-    def angle(self) -> tuple[float, ...]:
+    def angle(self) -> Any:
         """Angles of the law's bar at its times, rad."""
-        angles: tuple[float, ...] = getattr(self, f"theta_{self.bar}")
-        return angles
+        return getattr(self, f"theta_{self.bar}")
+
+    @property
+    def omega(self) -> Any:
+        """Speeds of the law's bar at its times, rad/s, or None."""
+        return getattr(self, f"omega_{self.bar}")
+
+    @property
+    def alpha(self) -> Any:
+        """Accelerations of the law's bar at its times, rad/s^2, or None."""
+        return getattr(self, f"alpha_{self.bar}")
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Compute angle, speed and acceleration of the law's bar at times, each (n,).
@@ -545,12 +555,10 @@ class Motion:
         names = COMMAND_NAMES[bar]
         numbers = angles[bar]
         if stroke is not None or side is not None or stroke_speed is not None:
-            if (
-                stroke is None
-                or stated is not None
-                or law is not None
-                or free is not None
-            ):
+            if stroke is None:
+                allowed = "is missing: side and stroke_speed are of a stroke"
+                raise InputError("motion.stroke", None, allowed)
+            if stated is not None or law is not None or free is not None:
                 raise InputError(
                     "motion.stroke",
                     stroke,
