@@ -54,7 +54,6 @@ from .show.duty import bearing_load as bearing_load
 from .show.duty import motor_duty as motor_duty
 from .show.duty import shaking_force as shaking_force
 from .show.duty import shaking_moment as shaking_moment
-from .show.notebook import in_units as in_units
 from .show.units import units as units
 from .solution import Solution as Solution
 from .solving import solve as solve

@@ -147,7 +147,7 @@ _without_loads_option = click.option(
     metavar="NAME",
     help=(
         "Figure: overview, linkage, coupler, kinematics, points, torque, forces,"
-        " hodograph, energy, transmission, shaking, ratios, centres, freebody, bars,"
+        " energy, transmission, shaking, ratios, centres, freebody, bars,"
         " sensitivity or stroke."
     ),
 )

@@ -175,8 +175,8 @@ class Scene:
         Parameters
         ----------
         figure : "overview", "linkage", "coupler", "kinematics", "points", "torque",
-            "stroke", "forces", "hodograph", "energy", "transmission", "shaking",
-            "ratios", "centres", "freebody", "bars" or "sensitivity".
+            "stroke", "forces", "energy", "transmission", "shaking", "ratios",
+            "centres", "freebody", "bars" or "sensitivity".
         position : what is commanded where linkage and free bodies are drawn, rad or m;
             left out: the scene's own.
         units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI

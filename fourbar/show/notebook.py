@@ -3,7 +3,7 @@
 from base64 import b64encode
 from html import escape
 
-from fourbar.errors import FourBarError, expect
+from fourbar.errors import FourBarError
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene
@@ -11,22 +11,21 @@ from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.driving import describe_drive
 from fourbar.show.plot import draw_figure
 from fourbar.show.tables import list_columns, write_with_unit
-from fourbar.show.units import units as read_units
 from fourbar.show.units import write_ends
-from fourbar.solution import DEGREES, SI, Conversion, Solution
+from fourbar.solution import SI, Solution
 from fourbar.writing import describe_extent, make_html
 
 POSITIONS_AT_EITHER_END = 5
 """Positions shown at either end of a long sweep."""
 
 
-def show_scene(scene: Scene, units: Conversion = SI) -> str:
+def show_scene(scene: Scene) -> str:
     """Draw the linkage above what the scene states.
 
     The drawing is that of `scene.plot("linkage")`.
     """
     try:
-        svg = draw_figure(scene, "linkage", units=units)._repr_svg_()
+        svg = draw_figure(scene, "linkage")._repr_svg_()
         drawn = b64encode(svg.encode()).decode()
         picture = (
             '<img alt="The linkage" style="width:24em"'
@@ -35,23 +34,23 @@ def show_scene(scene: Scene, units: Conversion = SI) -> str:
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
     title = scene.title or "Four-bar linkage"
-    return picture + make_html(title, (), _list_facts(scene, units))
+    return picture + make_html(title, (), _list_facts(scene))
 
 
-def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
+def _list_facts(scene: Scene) -> list[tuple[str, str]]:
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
     bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     for number, (name, length) in enumerate(bars, 1):
-        text = write_with_unit(length, "m", units)
+        text = write_with_unit(length, "m", SI)
         if number in MOVING_BARS and (mass := scene.linkage.bar(number).mass):
-            text = f"{text}, {write_with_unit(mass, 'kg', units)}"
+            text = f"{text}, {write_with_unit(mass, 'kg', SI)}"
         facts.append((name, text))
     speed = "positions only"
     if motion.speed is not None:
-        omega = write_ends(motion.speed, lambda x: write_with_unit(x, "rad/s", units))
+        omega = write_ends(motion.speed, lambda x: write_with_unit(x, "rad/s", SI))
         alpha = write_ends(
-            motion.acceleration, lambda x: write_with_unit(x, "rad/s^2", units)
+            motion.acceleration, lambda x: write_with_unit(x, "rad/s^2", SI)
         )
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [
@@ -65,40 +64,15 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
     ]
 
 
-def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
-    """Show the first and last positions as a table; angles in degrees by default."""
+def show_solution(solution: Solution) -> str:
+    """Show the first and last positions as a table; angles in degrees."""
     extent = describe_extent(solution.theta_2)
     if solution.theta_2.ndim == 2:
         return make_html(f"{solution.title or 'Study'}: {extent}", (), ())
-    cells = list_columns(solution, units)
+    cells = list_columns(solution)
     rows = [*zip(*cells.values(), strict=True)]
     more = len(rows) - 2 * POSITIONS_AT_EITHER_END
     if more > 0:
         between = slice(POSITIONS_AT_EITHER_END, -POSITIONS_AT_EITHER_END)
         rows[between] = [(f"… {more} more …",)]
     return make_html(f"{solution.title or 'Solution'}: {extent}", [*cells], rows)
-
-
-class InUnits:
-    """A scene or a solution that a notebook shows in other units."""
-
-    def __init__(self, shown: Scene | Solution, units: str) -> None:
-        expect("shown", shown, Scene, Solution)
-        self.shown: Scene | Solution = shown
-        self.units: Conversion = read_units(units)
-
-    def _repr_html_(self) -> str:
-        if isinstance(self.shown, Solution):
-            return show_solution(self.shown, {**DEGREES, **self.units})
-        return show_scene(self.shown, self.units)
-
-
-def in_units(shown: "Scene | Solution", units: str) -> InUnits:
-    """Return a scene or a solution that a notebook shows in other units.
-
-    `units` is "imperial", or a list like "mm N.mm".
-
-    Raises InputError for a word that is no unit of a result, and for two units of one
-    dimension.
-    """
-    return InUnits(shown, units)

@@ -355,7 +355,7 @@ def test_analyze_says_it_in_every_form(changes, words, tmp_path, capfd):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("figure", ["overview", "torque", "forces", "hodograph"])
+@pytest.mark.parametrize("figure", ["overview", "torque", "forces", "shaking"])
 def test_figures_without_a_single_force_are_drawn_without_a_word(figure, tmp_path):
     scene = Scene(PARALLELOGRAM, Motion(np.linspace(0.3, 2.0, 5), 1.0), 3)
     with warnings.catch_warnings():

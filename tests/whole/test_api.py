@@ -168,7 +168,6 @@ def calls():
         ("instant_centres",): (link, np.array([1.0]), 1),
         ("point_coefficients",): (link, np.array([1.0]), 1, 3, 0.1j),
         ("bearing_load",): (solution, "A"),
-        ("in_units",): (scene, "mm"),
         ("internal_forces",): (scene, solution, 2, (0.0, 0.05)),
         ("units",): ("mm",),
         ("load",): (str(DOCS.parent / "models" / "thesis.toml"),),

@@ -1,4 +1,4 @@
-"""Curves over what is commanded or over time, and hodographs.
+"""Curves over what is commanded or over time.
 
 Angles and rates, points, torque, energy and transmission angle are drawn.
 """
@@ -43,7 +43,6 @@ from fourbar.show.units import choose_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.projections.polar import PolarAxes
 
 
 ORDINARY_PERCENTILE = 95.0
@@ -621,104 +620,3 @@ def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
     first = math.ceil((low - start) / 360.0)
     last = math.floor((high - start) / 360.0)
     return [start + 360.0 * turn for turn in range(first, last + 1)]
-
-
-DOT_SPACING = 60.0
-"""Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
-MOST_DOTS_OF_A_CURVE = 12
-"""... or, over time or a stroke, a round number that gives no more than these."""
-_LONG_NUMBERS = 2000.0
-"""Smallest number too wide for four of its kind along a radius."""
-
-
-def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
-    """Draw the tips of a force's vectors from one origin.
-
-    An open dot is the start of the sweep; dots stand every 60 deg.
-    """
-    from matplotlib.ticker import MaxNLocator
-
-    force = getattr(view.sweep, name)
-    look = choose_force_line(name)
-    direction = np.arctan2(force[:, 1], force[:, 0])
-    size_here = np.hypot(*force.T)
-    limit = choose_limit([size_here])
-    top = limit or 1.08 * largest_magnitude(size_here) or 1.0
-    factor, unit = choose_unit(top, "N", view.units)
-    poles = find_poles(view)
-    over = view.axis.values
-    every, apart = _choose_spacing(view)
-    from_start = over - over[0]
-    dots = []
-    for mark in np.unique(np.round(from_start / every).astype(int)):
-        distances = np.abs(from_start - every * mark)
-        dots.append(int(np.argmin(distances)))
-    # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by
-    # the longer arc
-    finite = np.isfinite(direction)
-    free = _find_free_direction(direction[finite])
-    direction[finite] = np.unwrap(direction[finite])
-    size = np.where(size_here <= top, size_here, np.nan) if limit else size_here
-    plot_between_poles(axes, direction, factor * size, poles, **look)
-    axes.plot(
-        direction[dots],
-        factor * size[dots],
-        "o",
-        ms=2.8,
-        color=look["color"],
-        ls="none",
-    )
-    first = int(np.argmax(np.isfinite(size)))
-    start = {**RING_MARK, "mec": look["color"]}
-    axes.plot(
-        direction[[first]],
-        factor * size[[first]],
-        "o",
-        ms=4.6,
-        mew=1.1,
-        zorder=5,
-        **start,
-    )
-    if limit and largest_magnitude(size_here) > limit:
-        note(
-            view,
-            f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.",
-        )
-    axes.set_rlim(0.0, factor * top)
-    axes.set_thetagrids(range(0, 360, 45))
-    axes.tick_params(pad=0.5)
-    many = 4 if factor * top < _LONG_NUMBERS else 2
-    ticks = MaxNLocator(many).tick_values(0.0, factor * top)
-    axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
-    axes.set_rlabel_position(free)
-    axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
-    axes.set_title(f"{look['label']} ({unit})", pad=12)
-    note(
-        view,
-        f"Hodographs: open dot at the start, dots every {apart}; angles are directions"
-        " in the x-y plane.",
-    )
-
-
-def _choose_spacing(view: View) -> tuple[float, str]:
-    """Return the distance of the dots in the axis's unit, and the same in words."""
-    axis = view.axis
-    if axis.unit == "°":
-        return DOT_SPACING, f"{DOT_SPACING:g}° of {axis.symbol}"
-    duration = float(axis.values[-1] - axis.values[0]) or 1.0
-    step = 10.0 ** math.floor(math.log10(duration))
-    every = next(
-        share * step
-        for share in (0.1, 0.2, 0.5, 1.0)
-        if duration <= MOST_DOTS_OF_A_CURVE * share * step
-    )
-    return every, f"{every:g}{axis.unit}"
-
-
-def _find_free_direction(directions: Array) -> float:
-    """Find the multiple of 22.5 deg that lies furthest from the curve."""
-    candidates = np.radians(np.arange(16) * 22.5)
-    turned = np.exp(1j * (directions - candidates[:, None]))
-    distances = np.abs(np.angle(turned)).min(axis=1, initial=math.pi)
-    freest = candidates[int(np.argmax(distances))]
-    return float(np.degrees(freest))

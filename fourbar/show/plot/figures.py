@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.show.columns import explain_static
 from fourbar.show.motion_curves import describe_motion
@@ -113,12 +112,6 @@ def _draw_rows(*painters: Callable[[Any, View], None]) -> _Painter:
     return paint
 
 
-def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
-    for axes, name in zip(panels, PIN_FORCES, strict=True):
-        curves.draw_hodograph(axes, shown, name)
-
-
 FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
     "overview": (_draw_overview, (7.7, 9.2), False),
     "linkage": (
@@ -136,7 +129,6 @@ FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
     "torque": (_draw_one_panel(curves.draw_drive), (5.6, 3.2), True),
     "stroke": (_draw_one_panel(curves.draw_stroke), (5.6, 3.2), False),
     "forces": (_draw_one_panel(curves.draw_forces), (5.6, 3.2), True),
-    "hodograph": (_draw_hodographs, (6.4, 6.6), True),
     "energy": (_draw_one_panel(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_draw_one_panel(draw_transmission), (5.6, 3.2), False),
     "shaking": (
@@ -160,9 +152,7 @@ FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
 }
 """Painter of each figure, size of one branch in inches, and need of omega_2."""
 TAKERS = {
-    "position": tuple(
-        name for name in FIGURES if name not in ("hodograph", "bars", "sensitivity")
-    ),
+    "position": tuple(name for name in FIGURES if name not in ("bars", "sensitivity")),
     "dimensions": ("overview", "linkage", "points"),
 }
 """Figures in which one position is marked, and in which bars are numbered."""

@@ -1,4 +1,4 @@
-"""Results in other units: table, CSV, JSON, data frame, plot, page, notebook."""
+"""Results in other units: table, CSV, JSON, data frame, plot, page."""
 
 import csv
 import io
@@ -14,7 +14,6 @@ import fourbar
 from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
-from fourbar.show import notebook
 from fourbar.show.units import units, units_of_scene, write_digits
 from tests.support.scenes import crank_rocker
 
@@ -135,16 +134,13 @@ def test_units_are_read_as_people_write_them():
 
 
 @pytest.mark.slow
-def test_plots_and_notebooks_say_theirs():
+def test_plots_say_theirs():
     from fourbar.show.plot.figures import draw_figure
 
     scene, imperial = crank_rocker(), units("imperial")
     for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
         axes = draw_figure(scene, name, units=imperial).figure.subfigs[0].axes[0]
         assert axes.get_ylabel() == label
-    assert " in" in notebook.in_units(scene, "imperial")._repr_html_()
-    table = notebook.in_units(solve(scene), "imperial")._repr_html_()
-    assert "lbf in" in table and "deg" in table and "N m" not in table
 
 
 @pytest.mark.parametrize(

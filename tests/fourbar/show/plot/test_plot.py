@@ -220,7 +220,7 @@ CLEAR_FIGURES = [
     (by_law(), "torque"),
     *zip(
         map(commanding, cycle(COMMANDS.values())),
-        ("freebody", "hodograph", "transmission", "kinematics", "sensitivity"),
+        ("freebody", "shaking", "transmission", "kinematics", "sensitivity"),
         strict=False,
     ),
 ]
@@ -477,7 +477,7 @@ WITHOUT_SPEED = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 30)))
 REFUSED = [
     (CRANK_ROCKER, {}, "must"),
     (CRANK_ROCKER, {"figure": "pie"}, "must"),
-    (CRANK_ROCKER, {"figure": "hodograph", "position": 1.0}, "must be left out of"),
+    (CRANK_ROCKER, {"figure": "bars", "position": 1.0}, "must be left out of"),
     (CRANK_ROCKER, {"figure": "torque", "dimensions": True}, "must be left out of"),
     (CRANK_ROCKER, {"figure": "energy"}, "free motion"),
     (CRANK_ROCKER, {"figure": "stroke"}, "needs a linear drive"),
