@@ -32,12 +32,13 @@ def write_paths(solution: Solution, units: Conversion) -> list[str]:
         )
         turned, angle = find_unit_in("rad", units)
         factor, place = choose_unit(1.0, unit, units)
+        (direction,) = drop_rounding(np.array([path.direction]), np.pi)
         first, last = (f"{factor * end + 0.0:.6g}" for end in path.ends)
         lines += [
             f"path of {clean_line(point)}: x from {x[0]} to {x[1]} {length}, y from"
             f" {y[0]} to {y[1]} {length}",
             f"{_INDENT}straightness {across} {length}, stroke {along} {length} along"
-            f" {angle * path.direction:.6g} {turned},",
+            f" {angle * direction:.6g} {turned},",
             f"{_INDENT}from {name} = {first} to {last} {place}",
         ]
     return lines

@@ -50,12 +50,17 @@ TOLERANCE_SCHEMA = "fourbar-tolerance/1"
 def list_shown_parts(spreads: Tolerances) -> list[str]:
     """List torque, magnitudes of pin forces and the scene's points.
 
-    If the scene states no speed, angles replace torque and forces.
+    If the scene states no speed, or nothing loads its drive at any position, angles
+    replace torque and forces.
     """
     points = [
         f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"
     ]
-    drive = [name for name in (COUPLE.value, LINE.value) if name in spreads.spreads]
+    drive = [
+        name
+        for name in (COUPLE.value, LINE.value)
+        if name in spreads.spreads and np.any(spreads.spreads[name].nominal)
+    ]
     return [
         *(
             [*drive, *(f"|{name}|" for name in PIN_FORCES)]

@@ -172,6 +172,18 @@ def test_the_rounding_of_a_path_is_printed_as_zero():
     assert first.startswith("path of P: x from -13.8919 to 0.00000 mm, ")
 
 
+def test_a_direction_that_is_rounding_is_printed_as_zero():
+    """Chebyshev's lambda is symmetric about 180 deg, where its path is level."""
+    scene = loads(
+        '[lengths]\nground = "2 m"\ninput = "1 m"\n'
+        'coupler = "2.5 m"\noutput = "2.5 m"\n'
+        '[motion]\ntheta_2 = { from = "90 deg", to = "270 deg", steps = 360 }\n'
+        '[points]\nP = { bar = 3, from_pin = ["5 m", "0 deg"] }\n'
+    )
+    _, straight, _ = write_paths(solve(scene), units("m deg"))
+    assert straight.endswith("stroke 4.00000 m along 0 deg,")
+
+
 @pytest.mark.slow
 def test_a_release_is_integrated_once_for_its_path(monkeypatch):
     """The crank swings as far beyond the rest of its spring as it is let go before."""

@@ -19,7 +19,7 @@ from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, u
 from fourbar.cli import status
 from fourbar.files import dump, loads
 from fourbar.formulas.mobility import choose_range, limit_positions
-from fourbar.show.tolerances import describe_parted
+from fourbar.show.tolerances import describe_parted, list_shown_parts
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
 from tests.support.scenes import crank_rocker
@@ -172,6 +172,13 @@ def test_what_the_study_refuses(stated, options, words):
 
 
 @pytest.mark.slow
+def test_angles_stand_in_place_of_forces_where_nothing_loads_the_drive():
+    linkage = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+    stated = Tolerance("lengths.input", 5e-5)
+    moving = Scene(linkage, Motion(Sweep(0.3, 6.0, 6), 10.0), tolerances=(stated,))
+    assert list_shown_parts(tolerances(moving, 8)) == ["theta_3", "theta_4"]
+
+
 def test_the_command_prints_draws_and_writes(tmp_path, capsys):
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")

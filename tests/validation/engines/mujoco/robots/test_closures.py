@@ -257,7 +257,43 @@ def test_a_ball_joint_and_a_floating_body_are_named():
         " size=\"1\"/></body></worldbody><equality><connect body1='a' anchor='0 0"
         " 0'/></equality></mujoco>"
     )
-    assert "float floats freely" in closure_of(loose).reason
+    assert closure_of(loose).reason == "float floats freely"
+
+
+FLOATING = """
+<mujoco><worldbody>
+<body name="left" pos="-.5 0 0"><joint name="j2" axis="0 1 0"/>
+ <geom type="capsule" size=".02" fromto="0 0 0 .5 0 .3"/><site name="C" pos=".5 0 .3"/>
+ {inside}</body>
+<body name="right" pos=".5 0 0"><joint name="j4" axis="0 1 0"/>
+ <geom type="capsule" size=".02" fromto="0 0 0 -.5 0 .3"/>
+ <site name="D" pos="-.5 0 .3"/></body>{outside}
+</worldbody><equality>{pin}
+<connect name="at_D" site1="D" site2="r"/></equality></mujoco>
+"""
+TOP = """
+<body name="top" pos="{pos}">{joint}
+ <geom type="capsule" size=".02" fromto="-.4 0 0 .4 0 0"/>
+ <site name="l" pos="-.4 0 0"/><site name="r" pos=".4 0 0"/></body>
+"""
+
+
+def test_a_body_that_floats_between_two_pins_is_told_its_hinge():
+    """With the hinge it is the four-bar of the bars that are drawn, m."""
+    free = TOP.format(pos="0 0 .3", joint='<freejoint name="free"/>')
+    pin = '<connect name="at_C" site1="C" site2="l"/>'
+    for closure in report_of(
+        FLOATING.format(inside="", outside=free, pin=pin)
+    ).closures:
+        assert closure.reason == (
+            "free floats freely: with top inside left, on a hinge in place of its free"
+            " joint and of at_C, at_D closes the loop"
+        )
+    hinge = '<joint name="j3" axis="0 1 0" pos="-.4 0 0"/>'
+    typed = TOP.format(pos=".9 0 .3", joint=hinge)
+    loop = loop_of(FLOATING.format(inside=typed, outside="", pin=""))
+    side = math.hypot(0.5, 0.3)
+    assert loop.lengths == pytest.approx((1.0, side, 0.8, side), rel=1e-12)
 
 
 def test_two_connects_along_one_axis_are_one_pin():

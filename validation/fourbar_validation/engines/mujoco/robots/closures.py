@@ -356,7 +356,7 @@ class _Finder:
         is_pin = self._is_pin(number)
         reason = (
             self._find_ball_in_a_plane(chain, is_pin=is_pin)
-            or self._find_other_joint(chain)
+            or self._find_other_joint(number, chain)
             or self._find_skew_axes(chain)
         )
         if reason:
@@ -398,15 +398,38 @@ class _Finder:
             " alike and makes it a four-bar"
         )
 
-    def _find_other_joint(self, chain: _Chain) -> str:
+    def _find_other_joint(self, number: int, chain: _Chain) -> str:
         words = {
-            FREE_JOINT: "floats freely",
+            FREE_JOINT: f"floats freely{self._suggest_hinge(number, chain)}",
             BALL: f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})",
             SLIDE: f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})",
         }
         for joint, kind in chain.others.items():
             return f"{name_joint(self.model, joint)} {words[kind]}"
         return ""
+
+    def _suggest_hinge(self, number: int, chain: _Chain) -> str:
+        """Say what to type for a body that floats between two pins; empty if none does.
+
+        One of the pins becomes a hinge, and the other closes the loop.
+        """
+        model = self.model
+        floating = {int(model.jnt_bodyid[joint]) for joint in chain.others}
+        pins = {}
+        for pin in sorted([number, *self._list_others(number)]):
+            ends = [int(body) for body in find_tied_bodies(model, pin)]
+            if self._is_pin(pin) and len(floating.intersection(ends)) == 1:
+                pins[pin] = ends
+        if len(floating) != 1 or len(pins) != 2:
+            return ""
+        ((first, ends), (second, _)) = pins.items()
+        (body,) = floating
+        (holder,) = {*ends} - floating
+        return (
+            f": with {name_body(model, body)} inside {name_body(model, holder)}, on a"
+            f" hinge in place of its free joint and of {self._name(first)},"
+            f" {self._name(second)} closes the loop"
+        )
 
     def _measure_axes(self, chain: _Chain) -> tuple[float | None, str]:
         """Return the largest angle between two hinges' axes, rad, and which two."""
