@@ -38,7 +38,6 @@ from fourbar.edit.redirect import REDIRECT_ENDING, REDIRECT_PAGE, Redirect
 from fourbar.edit.server import (
     GONE,
     LARGEST_REQUEST,
-    MOST_CONNECTIONS,
     MOST_WAITING,
     Workbench,
 )
@@ -155,55 +154,47 @@ async def told(line, request=None):
 
 
 def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
+    """A browser names its origin, and another address of this machine is refused."""
+
     async def ask(made, address):
-        root, port = address[: address.rindex("/", 0, -1) + 1], port_of(address)
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
+        root, port = address[: address.rindex("/", 0, -1) + 1], port_of(address)
+        other, live = int(port) ^ 1, address + "live"
         fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
         assert fetched.code == 200 and b"Crank-rocker" in fetched.body
         assert fetched.headers["Referrer-Policy"] == "no-referrer"
         assert fetched.headers["Cache-Control"] == "no-store"
-        inside = address.split("/")[3] + "/scene.toml"
-        for place in (
-            "",
-            "x" * 43 + "/",
-            "x/",
-            "../scene.toml",
-            "%2e%2e/scene.toml",
-            inside,
+        wrong_token = root + "x" * 43 + "/"
+        own_origin = {"Origin": root[:-1]}
+        for place, headers, code in (
+            (root, {}, 404),
+            (wrong_token, {}, 404),
+            (root + "../scene.toml", {}, 404),
+            (root + "%2e%2e/scene.toml", {}, 404),
+            (address + "scene.toml", {}, 404),
+            (address + "report", {}, 404),
+            (address, {"Host": f"example.org:{port}"}, 403),
+            (address, {"Host": "127.0.0.1"}, 403),
+            (address, {"Host": f"127.0.0.1:{other}"}, 403),
+            (address, {"Host": f"localhost:{port}"}, 200),
+            *(
+                (place, {"Origin": origin}, 403)
+                for place in (address, live)
+                for origin in (
+                    "http://example.org",
+                    "null",
+                    f"https://127.0.0.1:{port}",
+                    f"http://127.0.0.1:{other}",
+                )
+            ),
+            (live, {}, 403),
+            (wrong_token + "live", own_origin, 404),
+            (live, own_origin, 400),  # as it should be, but no WebSocket
         ):
-            assert await status(root + place) == 404, place
-        assert await status(address + "report") == 404
-        for host in (
-            f"example.org:{port}",
-            "example.org",
-            "127.0.0.1",
-            f"127.0.0.1:{int(port) ^ 1}",
-        ):
-            assert await status(address, headers={"Host": host}) == 403, host
-        assert await status(address, headers={"Host": f"localhost:{port}"}) == 200
-        for origin in (
-            "http://example.org",
-            "null",
-            f"https://127.0.0.1:{port}",
-            f"http://127.0.0.1:{int(port) ^ 1}",
-        ):
-            assert await status(address, headers={"Origin": origin}) == 403, origin
-            assert await status(address + "live", headers={"Origin": origin}) == 403, (
-                origin
-            )
-        assert await status(address + "live") == 403  # no browser leaves it out
-        assert (
-            await status(root + "x" * 43 + "/live", headers={"Origin": root[:-1]})
-            == 404
-        )
-        assert (
-            await status(address + "live", headers={"Origin": root[:-1]}) == 400
-        )  # as it should be, but no WebSocket
+            assert await status(place, headers=headers) == code, (place, headers)
         assert await status(address, method="POST", body="x") == 405
         assert not made.pages
-        with raises(
-            ConnectionRefusedError
-        ):  # as is every other address of this machine
+        with raises(ConnectionRefusedError):
             socket.create_connection(("127.0.0.2", int(port)), timeout=1.0)
 
     bench(ask)
@@ -243,29 +234,17 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(b
         solved = []
         do = made.session.do
         made.session.do = lambda asked: solved.append(asked) or do(asked)
-        for size in range(100):
-            request = {
-                "do": "set",
-                "path": ["lengths", "input"],
-                "value": f"{101 + 0.1 * size:.1f} mm",
-                "gesture": "g",
-            }
-            line.write_message(
-                json.dumps(request | {"id": "mine" if size == 99 else "old"})
-            )
-        about = await told(line)
+
+        async def send(requests):
+            """Send requests at once, and return the answer to the last of them."""
+            for request in requests[:-1]:
+                line.write_message(json.dumps(request | {"id": "old"}))
+            return await told(line, requests[-1])
+
+        lengths = [f"{101 + 0.1 * size:.1f} mm" for size in range(100)]
+        about = await send([set_input(x) | {"gesture": "g"} for x in lengths])
         assert 'input = "110.9 mm"' in about["text"] and len(solved) < 60
-        for number in range(3 * MOST_WAITING):
-            line.write_message(
-                json.dumps(
-                    {
-                        "do": "units",
-                        "units": "SI",
-                        "id": "mine" if number == 299 else "old",
-                    }
-                )
-            )
-        await told(line)
+        await send([{"do": "units", "units": "SI"}] * 3 * MOST_WAITING)
         assert len(made.waiting) <= MOST_WAITING
 
     bench(ask)
@@ -517,12 +496,11 @@ def processor_time(process):
 
 @pytest.mark.slow
 @pytest.mark.linux
-@pytest.mark.parametrize(
-    "files",
-    [256, 40],
-    ids=["within its limit of files", "beyond its limit of files"],
-)
-def test_half_open_connections_neither_stop_the_server_nor_stay(path, files):
+@pytest.mark.parametrize("files, connections", [(256, 377), (40, 120)])
+def test_half_open_connections_neither_stop_the_server_nor_stay(
+    path, files, connections
+):
+    """Within its limit of files it goes on, and beyond it when they have gone."""
     import resource
 
     # imported before the limit holds: the server alone is tried
@@ -535,21 +513,14 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
 """
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most), most))
-    idle = []
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with ExitStack() as stack:
         command = [sys.executable, "-c", program, str(path)]
-        process = stack.enter_context(
-            subprocess.Popen(
-                command,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-            )
-        )
+        process = stack.enter_context(subprocess.Popen(command, **streams))
         stack.callback(process.kill)
         address = process.stdout.readline().strip()
         before = processor_time(process)
-        idle = half_open(address, 377 if files == 256 else 120)
+        idle = half_open(address, connections)
         for connection in idle:
             stack.callback(connection.close)
         time.sleep(2.0)
@@ -570,25 +541,6 @@ server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
         process.send_signal(2)
         error = process.communicate(timeout=20)[1]
     assert error == "" and '"105 mm"' in path.read_text()
-
-
-@pytest.mark.slow
-def test_the_oldest_connection_gives_way_and_a_page_stays(bench):
-    async def ask(made, address):
-        line = await page(address)
-        await told(line, {"do": "hello"})
-        idle = await asyncio.to_thread(half_open, address, 2 * MOST_CONNECTIONS)
-        await asyncio.sleep(0.2)
-        assert await asyncio.to_thread(idle[0].recv, 100) == b""
-        assert (
-            len([stream for stream in made.entrance.streams if not stream.closed()])
-            <= MOST_CONNECTIONS
-        )
-        assert (await told(line, {"do": "hello"}))["file"] == "scene.toml"
-        for connection in idle:
-            connection.close()
-
-    bench(ask)
 
 
 def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server():

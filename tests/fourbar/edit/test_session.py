@@ -38,6 +38,7 @@ from fourbar.edit.session import (
     MOST_SOLVED_ANEW,
     Session,
 )
+from tests.support.rows import read_rows
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
@@ -212,56 +213,45 @@ def test_what_a_pair_consists_of_is_read_from_the_declarations():
     }
 
 
-TWICE = [[0, 0]] * 4
 NO_PICTURE = "must be a PNG, JPEG or SVG picture"
 REFUSED = [
-    (set_to("lengths/input", "100 kg"), '"kg" does not convert to m'),
-    (set_to("lengths/input", ""), "is missing"),
-    (set_to("lengths/ground", "9 m"), "lengths"),
-    (set_to("motion/theta_2/steps", "many"), "must be a whole number"),
+    *read_rows("""
+{} | must be one of set
+{"do": "set"} | cannot be done
+{"do": "set", "path": [], "value": "1"} | cannot be done
+{"do": "drag"} | cannot be done
+{"do": "text", "text": "lengths = 3"} | lengths
+{"do": "undo"} | no further state
+{"do": "redo"} | no further state
+{"do": "units", "units": "parsec"} | units
+{"do": "export", "format": "../x"} | must
+{"do": "restate", "path": ["lengths"], "by": "xy"} | cannot be done
+{"do": "restate", "path": ["no"], "by": "xy"} | must
+{"do": "pressure", "pressure": "210"} | pressure
+{"do": "pressure", "pressure": "-1 bar"} | pressure
+{"do": "pressure", "pressure": "3 mm"} | pressure
+{"do": "command", "command": "stroke"} | needs a cylinder
+{"do": "command", "command": "theta_1"} | must be one of
+{"do": "command", "command": ""} | must be one of
+{"do": "draw", "pins": [[0, 0], [1, 1]], "unit": "in", "grain": 1e-6} | cannot
+{"do": "draw", "pins": [[0, 0], [0, 0], [1, 1], [2, 0]], "unit": "in", "grain": 1} | p
+{"do": "draw", "pins": [[0, 0], [1, 0], [NaN, 1], [3, 0]], "unit": "in", "grain": 1} | n
+{"do": "draw", "pins": [["a", 0], [1, 0], [2, 1], [3, 0]], "unit": "in", "grain": 1} | n
+{"do": "draw", "pins": [[0, 0], [3, 4], [9, 9], [8, 0]], "unit": "lb", "grain": 1} | u
+{"do": "set", "path": ["lengths", "input"], "value": "100 kg"} | does not convert to m
+{"do": "set", "path": ["lengths", "input"], "value": ""} | is missing
+{"do": "set", "path": ["lengths", "ground"], "value": "9 m"} | lengths
+{"do": "set", "path": ["motion", "theta_2", "steps"], "value": "many"} | a whole number
+{"do": "set", "path": ["drive", "bar"], "value": "7"} | must be 2 (input), 3 (coupler)
+{"do": "set", "path": ["nothing", "here"], "value": "1"} | unknown key
+"""),
     (
-        set_to("motion/theta_2/steps", str(MOST_SOLVED_ANEW)),
+        json.dumps(set_to("motion/theta_2/steps", str(MOST_SOLVED_ANEW))),
         f"motion.theta_2.steps: must be below {MOST_SOLVED_ANEW} in the workbench",
     ),
-    (set_to("drive/bar", "7"), "must be 2 (input), 3 (coupler) or 4 (output)"),
-    (set_to("nothing/here", "1"), "unknown key"),
-    ({}, ""),
-    ({"do": "set"}, ""),
-    ({"do": "set", "path": [], "value": "1"}, ""),
-    ({"do": "drag"}, ""),
-    (
-        {
-            "do": "drag",
-            "what": "O2",
-            "to": [0, 0],
-            "grain": 1.0,
-            "theta_2": 0.0,
-            "branch": 1,
-        },
-        "",
-    ),
-    ({"do": "text", "text": "lengths = 3"}, ""),
-    ({"do": "undo"}, ""),
-    ({"do": "redo"}, ""),
-    ({"do": "units", "units": "parsec"}, ""),
-    ({"do": "export", "format": "../x"}, ""),
-    ({"do": "restate", "path": ["lengths"], "by": "xy"}, ""),
-    ({"do": "restate", "path": ["no"], "by": "xy"}, ""),
-    *(
-        ({"do": "pressure", "pressure": wrong}, "pressure")
-        for wrong in ("210", "-1 bar", "3 mm")
-    ),
-    ({"do": "command", "command": "stroke"}, "needs a cylinder"),
-    ({"do": "command", "command": "theta_1"}, "must be one of"),
-    ({"do": "command", "command": ""}, "must be one of"),
-    (drawn(TWICE), ""),
-    (drawn([[0, 0], [1, 1]]), ""),
-    (drawn([["a", 0]] * 4), ""),
-    (drawn([[0, 0], [1, 0], [math.nan, 1], [3, 0]]), ""),
-    (drawn(unit="lb"), ""),
-    (pictured("text/html", b"<svg>"), NO_PICTURE),
-    (pictured("image/png", b"<html>"), NO_PICTURE),
-    (pictured("", b""), NO_PICTURE),
+    (json.dumps(pictured("text/html", b"<svg>")), NO_PICTURE),
+    (json.dumps(pictured("image/png", b"<html>")), NO_PICTURE),
+    (json.dumps(pictured("", b"")), NO_PICTURE),
 ]
 """Requests, and words of their refusal."""
 
@@ -269,7 +259,7 @@ REFUSED = [
 @pytest.mark.parametrize("asked, words", REFUSED)
 def test_what_is_refused_leaves_the_last_good_state(session, asked, words):
     text, files = session.now.text, {*session.path.parent.iterdir()}
-    assert words in session.do(asked)["refused"]
+    assert words in session.do(json.loads(asked))["refused"]
     assert session.now.text == session.document.text() == text
     assert {*session.path.parent.iterdir()} == files
     assert session.pressure is None and session.now.scene.picture is None
@@ -654,30 +644,33 @@ def test_a_session_goes_on_where_it_stopped(session):
     assert not again.state_file.exists()
 
 
-DAMAGES = {
-    "another schema": (".*", '{"schema": "fourbar-edit/1", "token": "short"}'),
-    "no object": (".*", "3"),
-    "nested deeply": (".*", "[" * 100_000),
-    "cut off": ('"texts".*', '"texts": ["'),
-    "infinite": ('"place": 1', '"place": Infinity'),
-    "a place beyond": ('"place": 1', '"place": 9'),
-    "a place before": ('"place": 1', '"place": -1'),
-    "no texts": (r'"texts": \[', '"texts": 3, "others": ['),
-    "no scene": (r"\[lengths\]", "[length]"),
-    "a pressure of nothing": ('"pressure": ""', '"pressure": "3 mm"'),
-    "units of nothing": ('"units": "as the file"', '"units": "parsec"'),
-    "a reference to nothing": ('"reference": "start"', '"reference": "state 7"'),
-    "kept is a list": ('"kept": {', '"kept": [], "others": {'),
-}
-"""Patterns in the text of a state, and what stands in their place."""
+DAMAGES = read_rows(r"""
+another schema | .* | {"schema": "fourbar-edit/1", "token": "short"}
+no object | .* | 3
+cut off | "texts".* | "texts": ["
+infinite | "place": 1 | "place": Infinity
+a place beyond | "place": 1 | "place": 9
+a place before | "place": 1 | "place": -1
+no texts | "texts": \[ | "texts": 3, "others": [
+no scene | \[lengths\] | [length]
+a pressure of nothing | "pressure": "" | "pressure": "3 mm"
+units of nothing | "units": "as the file" | "units": "parsec"
+a reference to nothing | "reference": "start" | "reference": "state 7"
+kept is a list | "kept": { | "kept": [], "others": {
+""")
+"""What is wrong, a pattern in the text of a state, and what stands in its place."""
 
 
-@pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_state_file_is_one_line(session, name):
+@pytest.mark.parametrize(
+    "pattern, damage",
+    [*(row[1:] for row in DAMAGES), (".*", "[" * 100_000)],
+    ids=[*(row[0] for row in DAMAGES), "nested deeply"],
+)
+def test_a_damaged_state_file_is_one_line(session, pattern, damage):
     ask(session, set_to("lengths/input", "105 mm"))
     session.write_state_file()
     before = session.state_file.read_text()
-    damaged, replaced = re.subn(*DAMAGES[name], before, flags=re.DOTALL)
+    damaged, replaced = re.subn(pattern, damage, before, flags=re.DOTALL)
     assert replaced
     session.state_file.write_text(damaged)
     words = r"cannot be read as a state of the workbench .* remove it"

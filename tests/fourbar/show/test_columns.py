@@ -17,6 +17,7 @@ from fourbar.show.columns import choose_columns
 from fourbar.show.derived import derive
 from fourbar.show.tables import print_positions
 from fourbar.solution import DEGREES
+from tests.support.rows import read_rows
 from tests.support.scenes import TURN
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -58,16 +59,16 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     assert shown == approx(1e3 * torque.values)
 
 
-@pytest.mark.parametrize(
-    "name, says",
-    [
-        ("tork", 'did you mean "torque"'),
-        ("F12_z", "F12_x is a component"),
-        ("torque_x", "unknown"),
-        ("P/F12", "is a place: P_x or P_y"),
-        ("drive_force", "unknown"),
-    ],
-)
+UNKNOWN = read_rows("""
+tork | did you mean "torque"
+F12_z | F12_x is a component
+torque_x | unknown
+P/F12 | is a place: P_x or P_y
+drive_force | unknown
+""")
+
+
+@pytest.mark.parametrize("name, says", UNKNOWN)
 def test_an_unknown_column_is_refused_with_those_there_are(name, says):
     with raises(InputError, match=says):
         columns(TURN, name)

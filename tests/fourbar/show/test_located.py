@@ -14,6 +14,7 @@ from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -86,29 +87,27 @@ def test_every_position_with_a_value_is_located(name, value, places, motion):
     )
 
 
-def test_an_extreme_that_touches_the_value_is_a_position():
-    """B_y is flat at 90 deg, where the transmission angle has a corner."""
-    sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
-    for name, value in (("B_y", "0.5 m"), ("transmission", "90 deg")):
-        found = locate(parallelogram(sweep), name, value).places
-        assert found == approx([pi / 2], abs=TOUCHED)
+EXTREMES = read_rows("""
+B_y | 0.5 m | 90
+transmission | 90 deg | 90
+B_y | max | 90
+v_B_x | min | 90
+B_x-B_y | min | 135
+theta_4 | max | 178
+transmission | max | 90
+""")
+"""Columns, their values, and the angle of the input, deg."""
 
 
-@pytest.mark.parametrize(
-    "name, side, place",
-    [
-        ("B_y", "max", pi / 2),
-        ("v_B_x", "min", pi / 2),
-        ("B_x-B_y", "min", 3 * pi / 4),
-        ("theta_4", "max", radians(178.0)),
-        ("transmission", "max", pi / 2),
-    ],
-)
-def test_the_least_and_the_greatest_value_are_located(name, side, place):
-    """Between the steps by sines, and at the end of what grows all the way."""
+@pytest.mark.parametrize("name, value, place", EXTREMES)
+def test_the_least_and_the_greatest_value_are_located(name, value, place):
+    """Between the steps by sines, and at the end of what grows all the way.
+
+    B_y is flat at 90 deg, where the transmission angle has a corner.
+    """
     sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
-    found = locate(parallelogram(sweep), name, side).places
-    assert found == approx([place], abs=TOUCHED)
+    found = locate(parallelogram(sweep), name, value).places
+    assert found == approx([radians(float(place))], abs=TOUCHED)
 
 
 def test_the_ends_of_a_motion_are_positions_and_one_position_is_one():
@@ -156,20 +155,23 @@ def test_a_release_has_a_value_at_times():
     assert np.degrees(at.angle) == approx([-50.0, -130.0], abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    "name, value, kind, words",
-    [
-        ("B_y", "0.6 m", NotAssembledError, "no position has it; B_y goes from 0 to"),
-        ("omega_4", "1 rad/s", NotAssembledError, "constant; omega_4 is 1 rad/s"),
-        ("omega_4", "max", NotAssembledError, "constant; omega_4 is 1 rad/s"),
-        ("tork", "1 N m", InputError, '--at = .tork.: unknown; did you mean "torque"'),
-        ("B_y", "0.6", InputError, 'unit is missing; did you mean "0.6 m"'),
-        ("B_y", "6 s", InputError, "--at"),
-        ("omega_4/omega_2", "1 s", InputError, "--at"),
-        ("B_x-theta_2", "1 m", InputError, "difference is of two columns of one kind"),
-    ],
-)
-def test_what_no_position_has_is_refused_with_the_range(name, value, kind, words):
+REFUSED = read_rows("""
+B_y | 0.6 m | no position has it; B_y goes from 0 to
+omega_4 | 1 rad/s | constant; omega_4 is 1 rad/s
+omega_4 | max | constant; omega_4 is 1 rad/s
+tork | 1 N m | --at = .tork.: unknown; did you mean "torque"
+B_y | 0.6 | unit is missing; did you mean "0.6 m"
+B_y | 6 s | --at
+omega_4/omega_2 | 1 s | --at
+B_x-theta_2 | 1 m | difference is of two columns of one kind
+""")
+
+
+@pytest.mark.parametrize("name, value, words", REFUSED)
+def test_what_no_position_has_is_refused_with_the_range(name, value, words):
+    kind = (
+        NotAssembledError if "omega_4 is" in words or "no pos" in words else InputError
+    )
     with raises(kind, match=words):
         locate(parallelogram(), name, value)
 

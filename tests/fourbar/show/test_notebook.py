@@ -193,5 +193,7 @@ def test_the_slope_of_a_size_is_its_difference():
     close = 1e-6 * np.abs(slope).max()
     assert slopes.of("|F12|", "lengths.input") == pytest.approx(slope, abs=close)
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
-        with raises(InputError, match="is not known here"):
+        with raises(InputError, match=r"is not known here; known: .*F12"):
             slopes.of(wrong, "lengths.input")
+    with raises(InputError, match=r"is not known here; known: .*lengths\.input"):
+        slopes.of("torque", "lengths.inptu")

@@ -4,7 +4,6 @@ import base64
 import math
 import time
 from dataclasses import replace
-from itertools import pairwise
 from math import atan2, pi
 from pathlib import Path
 
@@ -22,22 +21,28 @@ from fourbar.show.tolerances import PAGE_SAMPLES
 from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
-pytest.importorskip(
-    "selenium", reason="pages are driven by selenium: pip install selenium"
-)
-
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
+
+
 ROOT = Path(__file__).parents[3]
+
+
 PRINTED_DEG = 6e-4
 """Angles are shown with three decimals of a degree."""
+
+
 SPREAD_PRINTED = 6e-3
 """Of the worst case: numbers next to it are shown with the digits that it has, three
 significant ones.
 """
+
+
 ROUNDED = 1e-12
 """m: a point of the page is its angle's cosine and sine times a length of half a metre.
 """
+
+
 PIXEL = 0.01
 """Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far
 below what is seen.
@@ -89,6 +94,13 @@ def state_of(driver, expression):
     return driver.execute_script(f"return {expression};")
 
 
+POINTS = """
+const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
+  .map(m => [Number(m[1]), Number(m[2])]);
+"""
+"""Script of the points of a path, px."""
+
+
 @pytest.mark.slow
 def test_numbers_are_shown_in_the_units_of_the_page(browse):
     scene = crank_rocker()
@@ -97,20 +109,14 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse):
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / pi]
     assert shown(driver, "torque", "F43_x", "omega_4") == approx(expected, rel=PRINTED)
     text = driver.find_element("tag name", "body").text
-    assert "N mm" in text and "kN" in text and "rpm" in text and "rad/s²" in text
-    labels = [
-        option.text
-        for option in driver.find_elements("css selector", "#quantity option")
-    ]
-    assert {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"} <= set(
-        labels
-    )
+    for unit in ("N mm", "kN", "rpm", "rad/s²"):
+        assert unit in text
+    options = driver.find_elements("css selector", "#quantity option")
+    labels = {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"}
+    assert labels <= {option.text for option in options}
     assert len(driver.find_elements("css selector", "#traces .b2, #traces .b4")) == 2
-    top = max(
-        number(text.text)
-        for text in driver.find_elements("css selector", "#chart text")[-3:]
-        if text.text
-    )
+    texts = driver.find_elements("css selector", "#chart text")[-3:]
+    top = max(number(text.text) for text in texts if text.text)
     assert top == approx(1e3 * s.torque.max(), rel=0.01)
 
 
@@ -120,17 +126,20 @@ def turning(browse):
     return browse(animate.write_page(crank_rocker())), solve(crank_rocker())
 
 
-@pytest.mark.slow
-def test_each_step_shows_the_numbers_of_its_position(turning):
+def test_each_step_and_each_branch_shows_the_numbers_of_its_position(turning):
     driver, s = turning
     assert driver.title == "crank-rocker"
     angles = ("theta_2", "theta_3", "theta_4", "omega_3", "alpha_4")
+    forces = ("torque", "F12_x", "F43_x", "F14_y", "F32_y")
     for row in (0, 1, 2, 3):
-        require_shown(driver, s, row, *angles, "torque", "F12_x", "F43_x", "F14_y")
+        require_shown(driver, s, row, *angles, *forces)
         driver.find_element("id", "forward").click()
     driver.find_element("id", "back").click()
     require_shown(driver, s, 3, "torque")
     assert "torque" in state_of(driver, "document.getElementById('live').textContent")
+    driver.execute_script("chooseBranch(-1)")
+    crossed = s.scene.motion.replace(branch=-1)
+    require_shown(driver, solve(replace(s.scene, motion=crossed)), 3, *forces)
 
 
 @pytest.mark.slow
@@ -207,6 +216,8 @@ def test_a_free_motion_plays_once_in_its_own_time(browse):
 
 
 STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
+
+
 OUTPUT = Motion(theta_4=Sweep(1.75, 2.95, 40), omega_4=4.0)
 """Its ends do not assemble."""
 
@@ -244,31 +255,6 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [360, 400, 480, 1280])
-def test_the_numbers_of_an_axis_stand_clear_and_a_stroke_stays_in_its_column(
-    browse, width
-):
-    drive = fourbar.LinearDrive(
-        Place(1, (1.45, math.radians(-160.0))), Place(2, (0.29, 0.17))
-    )
-    motion = Motion(stroke=Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left")
-    scene = Scene(uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
-    driver = browse(animate.write_page(scene), width)
-    wide, room = driver.execute_script(
-        "const box = document.querySelector('.slider output'); return [box.scrollWidth,"
-        " box.clientWidth]"
-    )
-    assert wide <= room
-    boxes = driver.execute_script(
-        "return [...chart.querySelectorAll('text')].filter(t =>"
-        " t.textContent.endsWith('mm')).map(t => t.getBoundingClientRect()).map(box =>"
-        " [box.left, box.right])"
-    )
-    assert len(boxes) > 2, boxes
-    assert all(after - before > 3.0 for (_, before), (after, _) in pairwise(boxes))
-
-
-@pytest.mark.slow
 def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(browse):
     """A linkage of three bars that swing, on both branches.
 
@@ -276,61 +262,42 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(brow
     """
     scene = thesis(Sweep(0.0, 2.0 * pi, 72))
     driver = browse(animate.write_page(scene))
-    assert (
-        driver.find_element("id", "type").text == fourbar.classify(scene.linkage).name
-    )
+    named = driver.find_element("id", "type").text
+    assert named == fourbar.classify(scene.linkage).name
+    moved = "pointMotion(i, POINTS.find(point => point[0] === 'G3'))"
+    rows = f"grid.map((_, i) => at(i) && [at(i).A, at(i).B, ...{moved}])"
     for sign in (1, -1):
         driver.execute_script("chooseBranch(arguments[0])", sign)
         s = solve(replace(scene, motion=scene.motion.replace(branch=sign)))
-        drawn = state_of(driver, "grid.map((_, i) => at(i) && [at(i).A, at(i).B])")
-        assert [pair is not None for pair in drawn] == s.assembled.tolist()
+        drawn = state_of(driver, rows)
+        assert [row is not None for row in drawn] == s.assembled.tolist()
         here = np.flatnonzero(s.assembled)
-        assert_allclose(
-            [drawn[i] for i in here],
-            np.stack([s.A, s.B], axis=1)[here],
-            rtol=0.0,
-            atol=ROUNDED,
-        )
-        moved = state_of(
-            driver,
-            "grid.map((_, i) => pointMotion(i, POINTS.find(point => point[0] ==="
-            " 'G3')))",
-        )
-        for k, vectors in enumerate((s.v_G3, s.a_G3)):
-            assert_allclose(
-                [moved[i][k] for i in here], vectors[here], rtol=1e-9, atol=1e-9
-            )
+        for k, (vectors, close) in enumerate(
+            ((s.A, ROUNDED), (s.B, ROUNDED), (s.v_G3, 1e-9), (s.a_G3, 1e-9))
+        ):
+            page = [drawn[i][k] for i in here]
+            assert_allclose(page, vectors[here], rtol=close, atol=close)
 
 
 @pytest.mark.slow
 def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path):
-    scene = crank_rocker(
-        title="a\\nb", motion=Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
-    )
+    motion = Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
+    scene = crank_rocker(title="a\\nb", motion=motion)
     driver = browse(animate.write_page(scene))
-    assert (
-        "at ω₂ = 10 rad/s the mechanism takes 0.03 s."
-        in driver.find_element("id", "pace").text
-    )
+    said = "at ω₂ = 10 rad/s the mechanism takes 0.03 s."
+    assert said in driver.find_element("id", "pace").text
     assert loads(state_of(driver, "sceneFile()")).motion.branch == 1
     driver.execute_script("chooseBranch(-1)")
-    driver.execute_cdp_cmd(
-        "Browser.setDownloadBehavior",
-        {"behavior": "allow", "downloadPath": str(tmp_path)},
-    )
+    folder = {"behavior": "allow", "downloadPath": str(tmp_path)}
+    driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
     driver.find_element("id", "download").click()
     until = time.monotonic() + 10.0
-    saved_file = tmp_path / "linkage.toml"
-    while (
-        not (saved_file.exists() and saved_file.stat().st_size)
-        and time.monotonic() < until
-    ):  # made empty at first
+    file = tmp_path / "linkage.toml"  # made empty at first
+    while not (file.exists() and file.stat().st_size) and time.monotonic() < until:
         time.sleep(0.02)
-    saved = loads(saved_file.read_text())
-    assert saved.linkage == scene.linkage
-    assert saved.loads == scene.loads
-    assert saved.title == "a\\nb"
-    assert saved.motion.branch == -1
+    saved = loads(file.read_text())
+    assert (saved.linkage, saved.loads) == (scene.linkage, scene.loads)
+    assert (saved.title, saved.motion.branch) == ("a\\nb", -1)
     assert saved.motion.angle.tolist() == scene.motion.angle.tolist()
 
 
@@ -341,57 +308,37 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
         loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity())
     )
     driver = browse(animate.write_page(scene))
-    driver.execute_script("go(20)")
+    driver.execute_script("go(20); toggle('show-v'); toggle('show-a')")
     s = solve(scene)
-    script = """
-        const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
-          .map(m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k]);
-        return [...document.querySelectorAll("path.act")]
-          .map(e => [e.getAttribute("class"), points(e)]);
+    theta_3, theta_4 = s.theta_3[20], s.theta_4[20]
+    script = f"""{POINTS}
+        return [...document.querySelectorAll("path.act")].map(e => [
+          e.getAttribute("class"),
+          points(e).map(p => [(p[0] - view.x) / view.k, (view.y - p[1]) / view.k])]);
     """
     acting = dict(driver.execute_script(script))
-    zigzag, arrow = acting["act act-spring"], acting["act act-force"]
-    end = s.B[20] + (0.08 - 0.22) * np.array(
-        [math.cos(s.theta_4[20]), math.sin(s.theta_4[20])]
-    )
-    assert_allclose(zigzag[-1], end, atol=1e-4)
-    angle = s.theta_3[20] + 1.0
-    assert_allclose(
-        arrow[0],
-        s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]),
-        atol=1e-4,
-    )
-    towards = np.subtract(arrow[1], arrow[0])
-    assert atan2(towards[1], towards[0]) == approx(s.theta_3[20] + 0.5, abs=0.01)
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
-    names = (
-        'return ["1", "3"].map(k => [parts.label[k].textContent,'
-        " parts.label[k].style.display])"
-    )
-    assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
-    driver.execute_script("toggle('show-v'); toggle('show-a')")
-    arrows = driver.execute_script("""
-        const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
-          .map(m => [Number(m[1]), -Number(m[2])]);
-        return [...document.querySelectorAll("#motion path.act")].map(points);
-    """)
+    along = np.array([math.cos(theta_4), math.sin(theta_4)])
+    end = s.B[20] + (0.08 - 0.22) * along
+    assert_allclose(acting["act act-spring"][-1], end, atol=1e-4)
+    tail, tip = np.array(acting["act act-force"])
+    off = 0.03 * np.array([math.cos(theta_3 + 1.0), math.sin(theta_3 + 1.0)])
+    assert_allclose(tail, s.G3[20] + off, atol=1e-4)
+    assert atan2(*(tip - tail)[::-1]) == approx(theta_3 + 0.5, abs=0.01)
+    script = f'{POINTS}return [...document.querySelectorAll("#motion path.act")]'
+    arrows = np.array(driver.execute_script(script + ".map(points)"))
     assert len(arrows) == 2 * 5
-    shafts = np.diff(arrows, axis=1)[:, 0]
-    for (x, y), expected in zip(shafts[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
-        assert atan2(y, x) == approx(atan2(*expected[::-1]), abs=0.001)
+    for arrow, expected in zip(arrows[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
+        x, y = arrow[1] - arrow[0]
+        assert atan2(-y, x) == approx(atan2(*expected[::-1]), abs=0.001)
+    names = (
+        "['1', '3'].map(k => parts.label[k]).map(e => [e.textContent, e.style.display])"
+    )
+    assert state_of(driver, names) == [["1", "none"], ["3", ""]]
     driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
-    assert [text for text, _ in driver.execute_script(names)] == [
-        "1: 300 mm",
-        "3: 250 mm",
-    ]
+    words = [text for text, _ in state_of(driver, names)]
+    assert words == ["1: 300 mm", "3: 250 mm"]
     assert not driver.find_elements("css selector", "#acting *, #under .act")
-
-
-def test_the_branch_switches_the_picture_and_the_numbers(turning):
-    driver, s = turning
-    driver.execute_script("chooseBranch(-1)")
-    crossed = s.scene.motion.replace(branch=-1)
-    require_shown(driver, solve(replace(s.scene, motion=crossed)), 0, "torque", "F32_y")
 
 
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
@@ -402,23 +349,21 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
         e.value = arguments[0];
         e.dispatchEvent(new Event("change"));
         go(50);
+        const bar = document.querySelector("#force-scale line");
+        return Number(bar.getAttribute("x2")) - Number(bar.getAttribute("x1"));
     """
-    driver.execute_script(choose, scaling)
+    length = driver.execute_script(choose, scaling)
     script = """
         const shaft = document.getElementById("arrow-" + arguments[0]);
         const n = k => Number(shaft.getAttribute(k));
         const tip = shaft.nextElementSibling.getAttribute("d").match(/M(\\S+) ([^L]+)/);
         return [Number(tip[1]) - n("x1"), n("y1") - Number(tip[2])];
     """
-    length = """const e = document.querySelector("#force-scale line");
-        return Number(e.getAttribute("x2")) - Number(e.getAttribute("x1"))"""
-    bar = driver.execute_script(length)
-    newtons = float(
-        driver.find_element("css selector", "#force-scale text").text.split()[0]
-    )
+    text = driver.find_element("css selector", "#force-scale text").text
+    scale = length / float(text.split()[0])
     for name in ("F12", "F32", "F43", "F14"):
         drawn = np.array(driver.execute_script(script, name))
-        assert_allclose(drawn, getattr(s, name)[50] * bar / newtons, atol=PIXEL)
+        assert_allclose(drawn, getattr(s, name)[50] * scale, atol=PIXEL)
 
 
 @pytest.mark.slow
@@ -580,7 +525,11 @@ return labels.flatMap(([a, p], n) => [...labels.slice(n + 1), ...boxes(marks)]
 """Labels that stand on another one, or on a pin or mark, by more than the space around
 letters, px.
 """
+
+
 GALLERY = sorted((ROOT / "models" / "gallery").glob("*.toml"))
+
+
 CROWDED = (ROOT / "models" / "thesis.toml", ROOT / "models" / "crank_rocker.toml")
 
 
@@ -673,42 +622,32 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
     driver = browse(animate.write_page(scene, units=units("N.mm")), 360)
     study = fourbar.tolerances(scene, PAGE_SAMPLES)
     driver.execute_script("go(20)")
-    rows = {
-        row.find_element("tag name", "th").text: [
-            number(cell.text.replace("±", "")) for cell in cells
-        ]
-        for row in driver.find_elements(
-            "css selector", "#spreads tbody tr, #shares tbody tr"
-        )
-        for cells in [row.find_elements("tag name", "td")]
-    }
+    rows = {}
+    for row in driver.find_elements(
+        "css selector", "#spreads tbody tr, #shares tbody tr"
+    ):
+        heading, *cells = row.find_elements("css selector", "th, td")
+        rows[heading.text] = [number(cell.text.replace("±", "")) for cell in cells]
+    names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
     for label, part, factor in (
         ("torque, N mm", "torque", 1e3),
         ("|F₄₃|, N", "|F43|", 1.0),
         ("P_x, mm", "P_x", 1e3),
     ):
         spread = study.spreads[part]
-        names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
-        expected = np.array([getattr(spread, name)[20] * factor for name in names])
-        assert_allclose(
-            rows[label],
-            expected,
-            rtol=0,
-            atol=SPREAD_PRINTED * spread.worst[20] * factor,
-        )
+        expected = [factor * getattr(spread, name)[20] for name in names]
+        close = SPREAD_PRINTED * factor * spread.worst[20]
+        assert_allclose(rows[label], expected, rtol=0, atol=close)
     shares = study.spreads["torque"].shares[:, 20]
-    assert [rows[tolerance.key][0] for tolerance in loose] == approx(
-        100 * shares / shares.sum(), abs=0.51
-    )
+    shown_shares = [rows[tolerance.key][0] for tolerance in loose]
+    assert shown_shares == approx(100 * shares / shares.sum(), abs=0.51)
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     box = driver.find_element("css selector", "#bands .band").rect
     assert box["height"] > 40 and box["width"] > 200
     driver.execute_script("chooseBranch(-1)")
     assert not driver.find_element("id", "spreads").is_displayed()
-    assert (
-        "belong to the branch of the scene"
-        in driver.find_element("id", "tolerance-note").text
-    )
+    note = driver.find_element("id", "tolerance-note").text
+    assert "belong to the branch of the scene" in note
 
 
 @pytest.mark.slow
@@ -723,27 +662,36 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "names, head, mass, inertia",
+    "names, head, mass, length",
     [
-        ("imperial", "mass lb inertia lb in²", 0.45359237, 0.45359237 * 0.0254**2),
+        ("imperial", "mass lb inertia lb in²", 0.45359237, 0.0254),
         ("mm N", "mass kg inertia kg m²", 1.0, 1.0),
     ],
 )
 def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
-    browse, names, head, mass, inertia
+    browse, names, head, mass, length
 ):
-    """`mass`, `inertia`: the units of the heads in kg and kg m^2."""
+    """`mass`, `length`: the units of the heads in kg and m."""
     scene = crank_rocker()
     driver = browse(animate.write_page(scene, units=units(names)))
+    assert not driver.find_element("id", "bars").is_displayed()
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     table = driver.find_element("id", "bars")
     assert head in table.text
+    drawn = 0.001 if names == "mm N" else length
     rows = table.find_elements("css selector", "tbody tr")
-    for moving, row in zip((2, 3, 4), rows[1:], strict=True):
-        bar = scene.linkage.bar(moving)
-        cells = [number(cell.text) for cell in row.find_elements("tag name", "td")[1:3]]
-        stated = [bar.mass / mass, bar.moment_of_inertia / inertia]
-        assert cells == approx(stated, rel=PRINTED)
+    for bar, row in zip(scene.linkage.moving, rows[1:], strict=True):
+        *cells, centre = (cell.text for cell in row.find_elements("tag name", "td")[:4])
+        stated = [
+            bar.length / drawn,
+            bar.mass / mass,
+            bar.moment_of_inertia / (mass * length**2),
+        ]
+        assert [number(cell) for cell in cells] == approx(stated, rel=PRINTED)
+        to_centre = bar.to_centre / drawn
+        assert [number(part) for part in centre.split(", ")] == approx(
+            [to_centre.real, to_centre.imag], rel=PRINTED, abs=PRINTED
+        )
 
 
 CLEAR_OF_ITS_BAR = """
@@ -763,10 +711,8 @@ return least;
 
 
 @pytest.mark.slow
-def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(browse):
-    scene = crank_rocker()
-    driver = browse(animate.write_page(scene), dark=True)
-    assert not driver.find_element("id", "bars").is_displayed()
+def test_a_printed_page_is_one_sheet_with_lengths_and_the_chart_s_name(browse):
+    driver = browse(animate.write_page(crank_rocker()), dark=True)
     printed = driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
     pdf = base64.b64decode(printed["data"])
     assert pdf.count(b"/Type /Page\n") == 1
@@ -774,27 +720,15 @@ def test_a_printed_page_is_one_sheet_with_lengths_bars_and_the_chart_s_name(brow
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     driver.execute_script("window.dispatchEvent(new Event('beforeprint'))")
     labels = driver.find_element("id", "labels").text
-    for bar, length in enumerate((300, 100, 250, 220), start=1):
-        assert f"{bar}: {length} mm" in labels
+    for text in ("1: 300 mm", "2: 100 mm", "3: 250 mm", "4: 220 mm"):
+        assert text in labels
     assert driver.find_element("id", "plotted").text == "torque on bar 2, N m"
     for bar in (2, 3, 4):  # no length stands on its bar, at no position
         for row in (60, 140, 300):
             clear = driver.execute_script(CLEAR_OF_ITS_BAR, bar, row)
             assert clear > 3.0, (bar, row)
-    rows = driver.find_elements("css selector", "#bars tbody tr")
-    cells = [row.find_elements("tag name", "td") for row in rows]
-    for moving, row in zip((2, 3, 4), cells[1:], strict=True):
-        bar = scene.linkage.bar(moving)
-        shown_numbers = [number(cell.text) for cell in row[:3]]
-        stated = [1e3 * bar.length, bar.mass, bar.moment_of_inertia]
-        assert shown_numbers == approx(stated, rel=PRINTED)
-        along, off = (number(part) for part in row[3].text.split(", "))
-        centre = 1e3 * bar.to_centre
-        assert (along, off) == approx(
-            (centre.real, centre.imag), rel=PRINTED, abs=PRINTED
-        )
-    background = "return getComputedStyle(document.body).backgroundColor"
-    assert driver.execute_script(background) == "rgb(255, 255, 255)"
+    background = "getComputedStyle(document.body).backgroundColor"
+    assert state_of(driver, background) == "rgb(255, 255, 255)"
     hidden = ("play", "show-labels", "quantity", "download")
     assert not any(driver.find_element("id", name).is_displayed() for name in hidden)
 

@@ -15,6 +15,7 @@ from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.show.units import units, units_of_scene, write_digits
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 PURE = (
@@ -103,22 +104,19 @@ def test_the_table_names_its_units(capsys):
     assert torque == approx(list(1000.0 * solve(load(MODEL)).torque), rel=1e-4)
 
 
-WRITE_LBF = "write lbf for pounds-force"
+REFUSED = read_rows("""
+furlong | unit
+mm in | unit
+N.mm J | unit
+m^2 | unit
+mm lb-in | did you mean "lbf-in"
+inches pounds | write lbf for pounds-force
+in lb | write lbf for pounds-force
+mm lbs deg | write lbf for pounds-force
+""")
 
 
-@pytest.mark.parametrize(
-    "text, words",
-    [
-        ("furlong", "unit"),
-        ("mm in", "unit"),
-        ("N.mm J", "unit"),
-        ("m^2", "unit"),
-        ("mm lb-in", 'lb-in.*did you mean "lbf-in"'),
-        ("inches pounds", WRITE_LBF),
-        ("in lb", WRITE_LBF),
-        ("mm lbs deg", WRITE_LBF),
-    ],
-)
+@pytest.mark.parametrize("text, words", REFUSED)
 def test_what_is_no_list_of_units_is_refused(text, words, capsys):
     with raises(InputError, match=words):
         units(text)

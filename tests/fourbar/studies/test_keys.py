@@ -20,6 +20,7 @@ from fourbar.studies.spread import tolerances
 from tests.oracle.oracles import judge_by
 from tests.oracle.test_derived import failing
 from tests.oracle.variants import DRAWN_SETTING, is_coordinate
+from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
 
 PIN_KEYS = tuple(f"pins.{pin}.{axis}" for pin in PINS for axis in (0, 1))
@@ -279,48 +280,41 @@ CENTRE_ON_PIN = f"""{DRAWING}
 mass = "1 kg"
 centre = {{ drawn = ["-10 mm", "-10 mm"] }}
 """
-FROM_PIN = "points.P.from_pin.0 (the distance) and points.P.from_pin.1 (the angle)"
-NO_PLACE = "the scene has no [pins], in whose drawing a place has coordinates; it has"
-NO_PARTS = "no number has the components x and y; it has"
-STATES = "no [pins]; it states lengths: lengths."
-REFUSED = [
-    (DRAWING + ACTS, "pins.C.0", 'unknown key; did you mean "pins.'),
-    (DRAWING + ACTS, "pins.A.2", 'unknown key; did you mean "pins.A.'),
-    (DRAWING + ACTS, "pins.A", "is more than one number; vary pins.A.0, pins.A.1"),
-    (DRAWING + ACTS, "pins.B.1 lengths.coupler", "follows from pins.B.1, which varies"),
-    (DRAWING + ACTS, "pins.O2.0 lengths.ground_angle", "follows from pins.O2.0, which"),
-    (BY_LENGTHS, "pins.A.0", STATES),
-    (BY_LENGTHS, "points.P.drawn.0", f"{NO_PLACE} {FROM_PIN}"),
-    (BY_LENGTHS, "points.P.from_pin.x", f"{NO_PARTS} {FROM_PIN}"),
-    (
-        BY_LENGTHS,
-        "loads.0.force.y",
-        f"{NO_PARTS} loads.0.force.0 (the magnitude) and loads.0.force.1 (the angle)",
-    ),
-    (BY_LENGTHS, "points.P.from_pn.1", 'did you mean "points.P.from_pin.1"?'),
-    (PLACED, "pins.A.y", 'did you mean "pins.A.1"?'),
-    (PLACED, "points.P.drawn.y", 'did you mean "points.P.drawn.1"?'),
-    (PLACED, "points.PP.drawn.1", 'did you mean "points.P.drawn.1"?'),
-    (PLACED, "points.P.drawn", "vary points.P.drawn.0, points.P."),
-    (PLACED, "points.P.from_pin.0 points.P.drawn.0", "follows from points.P.drawn.0"),
-    (
-        PLACED,
-        "bars.coupler.centre.1 bars.coupler.centre.drawn.0",
-        "follows from bars.coupler.centre.drawn.0, which",
-    ),
-    (
-        CENTRE_ON_PIN,
-        "bars.input.centre.drawn.0",
-        "it has bars.input.centre.0 (the distance) and",
-    ),
-]
-"""Scene files, keys that cannot vary there, and words of the line that says so."""
+TEXTS = {
+    "pins": DRAWING + ACTS,
+    "lengths": BY_LENGTHS,
+    "places": PLACED,
+    "centre": CENTRE_ON_PIN,
+}
+REFUSED = read_rows("""
+pins | pins.C.0 | unknown key; did you mean "pins.
+pins | pins.A.2 | unknown key; did you mean "pins.A.
+pins | pins.A | is more than one number; vary pins.A.0, pins.A.1
+pins | pins.B.1 lengths.coupler | follows from pins.B.1, which varies too
+pins | pins.O2.0 lengths.ground_angle | follows from pins.O2.0, which varies too
+lengths | pins.A.0 | no [pins]; it states lengths: lengths.
+lengths | points.P.drawn.0 | no [pins], in whose drawing a place has coordinates; it has
+lengths | points.P.drawn.0 | points.P.from_pin.0 (the distance) and points.P.from_pin.1
+lengths | points.P.from_pin.x | has the components x and y; it has points.P.from_pin.0
+lengths | points.P.from_pin.x | points.P.from_pin.1 (the angle)
+lengths | loads.0.force.y | has the components x and y; it has loads.0.force.0
+lengths | loads.0.force.y | (the magnitude) and loads.0.force.1 (the angle)
+lengths | points.P.from_pn.1 | did you mean "points.P.from_pin.1"?
+places | pins.A.y | did you mean "pins.A.1"?
+places | points.P.drawn.y | did you mean "points.P.drawn.1"?
+places | points.PP.drawn.1 | did you mean "points.P.drawn.1"?
+places | points.P.drawn | is more than one number; vary points.P.drawn.0, points.P.
+places | points.P.from_pin.0 points.P.drawn.0 | follows from points.P.drawn.0, which
+places | bars.coupler.centre.1 bars.coupler.centre.drawn.0 | centre.drawn.0, which
+centre | bars.input.centre.drawn.0 | it has bars.input.centre.0 (the distance) and
+""")
+"""Scenes, keys that cannot vary there, and words of the line that says so."""
 
 
-@pytest.mark.parametrize("text, keys, words", REFUSED)
-def test_a_key_that_cannot_vary_gets_one_line_that_names_others(text, keys, words):
+@pytest.mark.parametrize("name, keys, words", REFUSED)
+def test_a_key_that_cannot_vary_gets_one_line_that_names_others(name, keys, words):
     with raises(InputError) as caught:
-        vary(loads(text), {key: [0.0] for key in keys.split()})
+        vary(loads(TEXTS[name]), {key: [0.0] for key in keys.split()})
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -328,7 +322,7 @@ def test_a_key_that_cannot_vary_gets_one_line_that_names_others(text, keys, word
     "text, stated, words",
     [
         (DRAWING, '"pins.C.0" = "0.1 mm"', 'unknown key; did you mean "pins.'),
-        (LENGTHS, '"pins.A.0" = "0.1 mm"', STATES),
+        (LENGTHS, '"pins.A.0" = "0.1 mm"', "no [pins]; it states lengths: lengths."),
         (
             DRAWING,
             '"pins.A.0" = "1 mm"\n"lengths.input" = "1 mm"',

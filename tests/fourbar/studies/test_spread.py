@@ -22,6 +22,7 @@ from fourbar.formulas.mobility import choose_range, limit_positions
 from fourbar.show.tolerances import describe_parted, list_shown_parts
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
@@ -123,21 +124,21 @@ def test_tolerances_of_a_file_come_back_as_they_were():
     assert loads(dump(scene)).tolerances == scene.tolerances
 
 
-@pytest.mark.parametrize(
-    "line, words",
-    [
-        ('"lengths.input" = "150 mm"', "less than the number itself, 0.1 m"),
-        ('"lengths.input" = ["40 mm", "sigma"]', "three sigma of it must be less"),
-        ('"lengths.inptu" = "1 mm"', 'did you mean "lengths.input"'),
-        ('"lengths.input" = "1 deg"', '"deg" does not convert to m'),
-        ('"lengths.input" = 0.1', "with a unit"),
-        ('"lengths.input" = ["1 mm", "normal"]', '"sigma"]'),
-        ('"lengths.input" = "0 mm"', "> 0"),
-        ('"bars.input.inertia" = "1 kg m^2"', "follows the length"),
-        ('"bars.input.centre" = "1 mm"', "is more than one number"),
-        ('"motion.theta_2" = "1 deg"', "a commanded value has no tolerance"),
-    ],
-)
+BAD = read_rows("""
+"lengths.input" = "150 mm" | less than the number itself, 0.1 m
+"lengths.input" = ["40 mm", "sigma"] | three sigma of it must be less
+"lengths.inptu" = "1 mm" | did you mean "lengths.input"
+"lengths.input" = "1 deg" | "deg" does not convert to m
+"lengths.input" = 0.1 | with a unit
+"lengths.input" = ["1 mm", "normal"] | "sigma"]
+"lengths.input" = "0 mm" | > 0
+"bars.input.inertia" = "1 kg m^2" | follows the length
+"bars.input.centre" = "1 mm" | is more than one number
+"motion.theta_2" = "1 deg" | a commanded value has no tolerance
+""")
+
+
+@pytest.mark.parametrize("line, words", BAD)
 def test_a_bad_tolerance_is_one_line(line, words):
     with raises(InputError) as error:
         loads(MODEL + "[tolerances]\n" + line, "s.toml")

@@ -3,6 +3,7 @@
 What no scene takes has a status.
 """
 
+import json
 import tomllib
 from dataclasses import replace
 
@@ -37,6 +38,7 @@ from fourbar.scene.motion import Free, FromLimit, Law
 from fourbar.scene.numbers import Point
 from fourbar.studies.keys import list_entries, read_place, replace_place
 from fourbar.studies.study import vary
+from tests.support.rows import read_rows
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
 ACTED_ON = loads("""
@@ -223,51 +225,40 @@ def test_a_law_and_a_path_through_change_points(case, key, numbers):
             assert_array_equal(getattr(solution, name)[member], expected)
 
 
-REFUSED = {
-    "a slip of the pen": ({"lengths.inptu": [1.0]}, 'did you mean "lengths.input"?'),
-    "an effect that does not act": ({"effects.viscous.O2": [1.0]}, "unknown key"),
-    "a pair": (
-        {"bars.coupler.centre": [0.1]},
-        "vary bars.coupler.centre.0, bars.coupler.centre.1",
-    ),
-    "a bar's number": ({"drive.bar": [2, 3]}, "is the same for every member"),
-    "the branch": ({"motion.branch": [1, -1]}, "is the same for every member"),
-    "two lengths": (
-        {"lengths.input": [0.1, 0.2], "lengths.output": [0.2, 0.2, 0.2]},
-        "lengths.input has 2",
-    ),
-    "two lengths, of angles": (
-        {"lengths.input": [0.1, 0.2], "motion.theta_2": np.ones((3, 2))},
-        "has 2",
-    ),
-    "words": ({"lengths.input": ["ten"]}, "there is no finite number"),
-    "no unit": ({"lengths.input": ["10"]}, "the unit is missing"),
-    "truths": ({"lengths.input": [True]}, "must be an array of numbers"),
-    "rows of different lengths": (
-        {"lengths.input": [[0.1], [0.1, 0.2]]},
-        "must be an array of numbers",
-    ),
-    "nothing": ({"lengths.input": []}, "at least one"),
-    "a table": ({"lengths.input": np.ones((2, 2))}, "must have the shape (m,)"),
-}
-
-OTHER_MOTIONS = {
-    "no angle": (Motion(None, 1.0), "a study states it"),
-    "a limit": (Motion(FromLimit(1, 0.1), 1.0), "a study states it"),
-    "a release": (Motion(1.0, free=Free(1.0, 10)), "is integrated for one linkage"),
-}
+REFUSED = read_rows("""
+{"lengths.inptu": [1.0]} | did you mean "lengths.input"?
+{"effects.viscous.O2": [1.0]} | unknown key
+{"bars.coupler.centre": [0.1]} | vary bars.coupler.centre.0, bars.coupler.centre.1
+{"drive.bar": [2, 3]} | is the same for every member
+{"motion.branch": [1, -1]} | is the same for every member
+{"lengths.input": [0.1, 0.2], "lengths.output": [0.2, 0.2, 0.2]} | lengths.input has 2
+{"lengths.input": [0.1, 0.2], "motion.theta_2": [[1, 1], [1, 1], [1, 1]]} | has 2
+{"lengths.input": ["ten"]} | there is no finite number
+{"lengths.input": ["10"]} | the unit is missing
+{"lengths.input": [true]} | must be an array of numbers
+{"lengths.input": [[0.1], [0.1, 0.2]]} | must be an array of numbers
+{"lengths.input": []} | at least one
+{"lengths.input": [[1, 1], [1, 1]]} | must have the shape (m,)
+""")
+"""Values of the members, and words of their refusal."""
+OTHER_MOTIONS = [
+    (Motion(None, 1.0), "a study states it"),
+    (Motion(FromLimit(1, 0.1), 1.0), "a study states it"),
+    (Motion(1.0, free=Free(1.0, 10)), "is integrated for one linkage"),
+]
+MASSES = {"bars.coupler.mass": [1.0, 2.0]}
 
 
-@pytest.mark.parametrize("name", [*REFUSED, *OTHER_MOTIONS])
-def test_what_cannot_vary_is_refused_in_one_line(name):
-    case, values = scene(), {"bars.coupler.mass": [1.0, 2.0]}
-    if name in REFUSED:
-        values, words = REFUSED[name]
-    else:
-        motion, words = OTHER_MOTIONS[name]
-        case = replace(case, motion=motion)
+@pytest.mark.parametrize(
+    "motion, values, words",
+    [
+        *((Motion(ANGLES, 3.0), json.loads(values), said) for values, said in REFUSED),
+        *((motion, MASSES, said) for motion, said in OTHER_MOTIONS),
+    ],
+)
+def test_what_cannot_vary_is_refused_in_one_line(motion, values, words):
     with raises(InputError) as caught:
-        vary(case, values)
+        vary(replace(scene(), motion=motion), values)
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
