@@ -40,6 +40,8 @@ JUDGED_BY = {
     ),
     "fourbar/test_solving.py": "fourbar/evaluation: case",
     "fourbar/show/test_located.py": "fourbar/studies: course",
+    "fourbar/show/test_columns.py": "fourbar/show: derived",
+    "fourbar/show/test_position.py": "fourbar/show: change_point",
     "fourbar/show/test_summary.py": "fourbar/show: driving motion_curves",
     "fourbar/studies/test_paths.py": "fourbar/show: paths",
     # parts of one document or picture

@@ -99,7 +99,11 @@ def judged(read):
     """Judges numbers that are written as a table."""
 
     def judge(scene, *numbers, tolerance=None):
-        return judge_table(scene, read(write(*numbers)), tolerance)
+        return judge_table(
+            scene,
+            read(write(*numbers)),
+            tolerance,
+        )
 
     return judge
 
@@ -211,21 +215,20 @@ def gravity(*field):
 
 
 def loads_times(factor, number=None):
-    """Multiply the load of this number, or every one; those times 0 are left out."""
+    """Multiply the load of this number, or every one."""
 
     def scale(i, load):
         if number not in (i, None):
             return load
         size, angle = load.force or (0.0, 0.0)
-        force = (factor * size, angle) if load.force else None
-        return replace(load, force=force, moment=factor * load.moment)
+        return replace(
+            load,
+            force=(factor * size, angle),
+            moment=factor * load.moment,
+        )
 
     def change(scene):
-        loads = [
-            scale(i, load)
-            for i, load in enumerate(scene.loads, 1)
-            if factor or number not in (i, None)
-        ]
+        loads = (scale(i, load) for i, load in enumerate(scene.loads, 1))
         return replace(scene, loads=tuple(loads))
 
     return solved(change)
@@ -247,7 +250,11 @@ def centred(change):
 
     def change_bar(bar):
         r, phi = bar.mass_centre
-        x, y = change(bar.length, r * math.cos(phi), r * math.sin(phi))
+        x, y = change(
+            bar.length,
+            r * math.cos(phi),
+            r * math.sin(phi),
+        )
         return replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
 
     return change_bar
@@ -256,7 +263,11 @@ def centred(change):
 def weigh(bar, mass=1.0, inertia=1.0):
     """Multiply mass and moment of inertia about G."""
     inertia *= bar.moment_of_inertia
-    return replace(bar, mass=mass * bar.mass, inertia=inertia)
+    return replace(
+        bar,
+        mass=mass * bar.mass,
+        inertia=inertia,
+    )
 
 
 def scaled(**factors):
@@ -297,7 +308,11 @@ def inertial(by_mass, by_inertia):
 
     def planted(scene):
         numbers = right(scene)
-        still = right(scene, speed=0.0, acceleration=0.0)
+        still = right(
+            scene,
+            speed=0.0,
+            acceleration=0.0,
+        )
         points = bars(scaled(inertia=0.0))(scene)
         for name in FORCES:
             of_masses = by_mass * (points[name] - still[name])
@@ -354,9 +369,22 @@ OF_A_BAR = {
     "mass left out": scaled(mass=0.0),
     "mass and moment of inertia left out": scaled(mass=0.0, inertia=0.0),
 }
-LENGTHS = {"ground": 1.01, "input": 0.98, "coupler": 1.001, "output": 0.95}
-DIFFERENCES = {"forward": (0, 1, 2), "backward": (-2, -1, 0), "central": (-1, 0, 1)}
-FACTORS = {"missing": 0.0, "doubled": 2.0, "reversed": -1.0}
+LENGTHS = {
+    "ground": 1.01,
+    "input": 0.98,
+    "coupler": 1.001,
+    "output": 0.95,
+}
+DIFFERENCES = {
+    "forward": (0, 1, 2),
+    "backward": (-2, -1, 0),
+    "central": (-1, 0, 1),
+}
+FACTORS = {
+    "missing": 0.0,
+    "doubled": 2.0,
+    "reversed": -1.0,
+}
 IN_THESIS = {
     "numbers in N cm where N m was announced": units("torque", factor=1e2),
     "kgf": units(*PINS, factor=1 / 9.80665),
@@ -378,7 +406,11 @@ IN_THESIS = {
     "I alpha in kg cm^2/s^2": inertial(1.0, 100.0),
     "I alpha with the wrong sign": inertial(1.0, -1.0),
     "m a and I alpha in kg mm/s^2": inertial(1e3, 1e3),
-    "every number is 0.37 times ours": units("F12", "F14", factor=0.37),
+    "every number is 0.37 times ours": units(
+        "F12",
+        "F14",
+        factor=0.37,
+    ),
     **{f"the loads are {done}": loads_times(x) for done, x in FACTORS.items()},
     **{
         f"load {i} (bar {load.bar}) is {done}": loads_times(x, i)
@@ -403,7 +435,11 @@ IN_CRANK_ROCKER = {
         lambda right: {"torque": np.abs(right["torque"])}
     ),
     "F_ij given for F_ji": units("F32", factor=-1.0),
-    "degrees where radians": units("theta_3", "theta_4", factor=180 / math.pi),
+    "degrees where radians": units(
+        "theta_3",
+        "theta_4",
+        factor=180 / math.pi,
+    ),
     "y reversed": units(*PINS, factor=(1.0, -1.0)),
     "gravity is missing": gravity(),
     "gravity is reversed": gravity(-9.81),
@@ -502,7 +538,11 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text():
     """
 
     def kind(text):
-        return re.sub(r"input|coupler|output|load \d|bar \d", "ONE", text)
+        return re.sub(
+            r"input|coupler|output|load \d|bar \d",
+            "ONE",
+            text,
+        )
 
     cases = [kind(words) for planted in MISTAKES.values() for words in planted]
     listed = list(list_column_mistakes())
@@ -522,7 +562,11 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text():
 def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     digits, judged, read
 ):
-    numbers = units("torque", "F12", factor=1.0 / 9.81)(OURS)
+    numbers = units(
+        "torque",
+        "F12",
+        factor=1.0 / 9.81,
+    )(OURS)
     (explanation,) = judged(OURS, numbers, ("torque", "F12"), digits).explanations
     assert explanation.quantities == ("torque", "F12")
     angles = {"theta_2": numbers["theta_2"], "theta_4 [deg]": numbers["theta_4"]}
@@ -534,7 +578,11 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
 @pytest.mark.slow
 def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     numbers = right(OURS)
-    slip = numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)
+    slip = numbers["torque"] * np.where(
+        np.arange(12) == 5,
+        -1.0,
+        1.0,
+    )
     assert not judged(OURS, numbers | {"torque": slip}, ("torque",)).explanations
     rounded = [float(f"{x:.5f}") for x in np.radians(numbers["theta_2"])]
     numbers["theta_2"] = np.array(rounded)
@@ -595,7 +643,12 @@ def test_a_quantity_of_no_known_scale_is_not_judged_by_another():
     assert judged == TERMS_OF_UNIT.keys() == POWER.keys()
     for quantity in ("time", "wheel"):
         with pytest.raises(KeyError):
-            scale_of(quantity, OURS, solve(OURS), np.ones(1))
+            scale_of(
+                quantity,
+                OURS,
+                solve(OURS),
+                np.ones(1),
+            )
 
 
 @pytest.mark.parametrize("letter", "xy")
@@ -636,7 +689,11 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, c
 STRAIGHT = Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))
 REFUSED_MOTIONS = [
     (
-        {"theta_2": 1.0, "omega_2": 2.0, "free": fourbar.Free(1.0, 10)},
+        {
+            "theta_2": 1.0,
+            "omega_2": 2.0,
+            "free": fourbar.Free(1.0, 10),
+        },
         "not judged while released",
     ),
     ({"law": STRAIGHT}, "at the scene's own positions"),
@@ -665,7 +722,11 @@ def test_nonsense_and_a_single_number_are_explained_by_nothing(judged):
     assert judged(OURS, wild, FORCES).explanations == []
     one = {name: values[:1] for name, values in numbers.items()}
     one["torque"] = 1.01 * one["torque"]
-    judgement = judged(OURS, one, ("torque", "omega_4"))
+    judgement = judged(
+        OURS,
+        one,
+        ("torque", "omega_4"),
+    )
     assert len(judgement.differing) == 1 and not judgement.explanations
 
 
@@ -793,7 +854,11 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
         column = table.values[key]
         off = {**table.values, key: column + FAR_OFF * np.nanmax(np.abs(column))}
         exact = {**table.rounding, key: np.zeros(len(column))}
-        theirs = replace(table, values=off, rounding=exact)
+        theirs = replace(
+            table,
+            values=off,
+            rounding=exact,
+        )
         assert list_differing(scene, theirs) == {key}
 
 
@@ -834,7 +899,12 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
 
     def judge(*options):
         forms = (f"--json={document}", f"--junit={suites}")
-        code, printed, _ = check(THESIS, text, *forms, *options)
+        code, printed, _ = check(
+            THESIS,
+            text,
+            *forms,
+            *options,
+        )
         cases = ET.parse(suites).getroot().iter("testcase")
         failing = [one.get("name") for one in cases if one.find("failure") is not None]
         return code, printed, json.loads(document.read_text()), failing
@@ -881,7 +951,14 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(re
         "omega_2": np.linspace(2.0, 9.0, 12),
         "alpha_2": np.linspace(-30.0, 40.0, 12),
     }
-    log = right(OURS, speed=rates["omega_2"], acceleration=rates["alpha_2"]) | rates
+    log = (
+        right(
+            OURS,
+            speed=rates["omega_2"],
+            acceleration=rates["alpha_2"],
+        )
+        | rates
+    )
     still = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
 
     def judge(scene, *names):
@@ -904,7 +981,11 @@ def torques(read):
     """Reads theta_2 of a crank-rocker in whole degrees and its torque in a form."""
     degrees = np.arange(0.0, 360.0, 30.0)
     at = command(OURS).part(slice(len(degrees)))._replace(angle=np.radians(degrees))
-    torque = solve(OURS, "force", at=at).torque
+    torque = solve(
+        OURS,
+        "force",
+        at=at,
+    ).torque
     rows = np.transpose([degrees, torque]).tolist()
 
     def read_form(head, row="{theta:.0f},{torque:.9e}"):
@@ -1006,14 +1087,39 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     input_mass, output_mass = (7850.0 * 0.05 * 0.025 * x for x in (1.0, 2.33))
     linkage = fourbar.FourBar(
         2.22,
-        fourbar.Bar(1.0, input_mass, 0.82),
-        fourbar.Bar(2.06, 219.95674411, 10.35, (1.6476, math.radians(-18.7352))),
-        fourbar.Bar(2.33, output_mass, 50.13),
+        fourbar.Bar(
+            1.0,
+            input_mass,
+            0.82,
+        ),
+        fourbar.Bar(
+            2.06,
+            219.95674411,
+            10.35,
+            (1.6476, math.radians(-18.7352)),
+        ),
+        fourbar.Bar(
+            2.33,
+            output_mass,
+            50.13,
+        ),
     )
-    load = fourbar.Load(3, (100.0, math.pi / 2.0), from_pin=(3.06, math.radians(-31.0)))
-    motion = fourbar.Motion(math.radians(60.0), 10.0, 5.0)
+    load = fourbar.Load(
+        3,
+        (100.0, math.pi / 2.0),
+        from_pin=(3.06, math.radians(-31.0)),
+    )
+    motion = fourbar.Motion(
+        math.radians(60.0),
+        10.0,
+        5.0,
+    )
     code, printed, _ = check(
-        Scene(linkage, motion, loads=(load,)),
+        Scene(
+            linkage,
+            motion,
+            loads=(load,),
+        ),
         "theta_2 [deg],torque [N m],F12 [N],F32 [N],F43 [N],F14 [N]\n"
         "60,14271.89,23647.43,24055.14,7798.85,7515.91\n",
     )
@@ -1141,8 +1247,18 @@ def test_a_table_with_mistakes_and_few_right_digits_is_told_both(sign, check):
     assert ("sign reversed" in printed) == (sign < 0.0)
     (named,) = re.findall("that apart, all agree within (1e-[0-9]+): --rtol", printed)
     assert 1e-8 <= float(named) <= 1e-7
-    code, printed, _ = check(OURS, table, "--rtol", named)
+    code, printed, _ = check(
+        OURS,
+        table,
+        "--rtol",
+        named,
+    )
     assert code == FAILED and "explains" in printed
     less = str(0.01 * float(named))
-    code, printed, _ = check(OURS, table, "--rtol", less)
+    code, printed, _ = check(
+        OURS,
+        table,
+        "--rtol",
+        less,
+    )
     assert code == FAILED and NO_CAUSE in printed

@@ -76,7 +76,12 @@ def commanding(bar, first, last, steps=8):
 
 def at_angles(angles):
     """Return the command of `commanding` at these angles."""
-    return Command(np.array(angles), np.ones(len(angles), np.int8), 2.0, -1.0)
+    return Command(
+        np.array(angles),
+        np.ones(len(angles), np.int8),
+        2.0,
+        -1.0,
+    )
 
 
 @pytest.mark.parametrize(("bar", "ends"), [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
@@ -88,13 +93,28 @@ def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
     solution = fourbar.solve(at)
     assert set(solution.status) == {"ok"}
     name = f"theta_{bar}"
-    good = judged(scene, name, angles, solution.torque)
+    good = judged(
+        scene,
+        name,
+        angles,
+        solution.torque,
+    )
     assert good.status == HOLDS and good.compared == len(angles)
-    bad = judged(scene, name, angles, -solution.torque)
+    bad = judged(
+        scene,
+        name,
+        angles,
+        -solution.torque,
+    )
     assert bad.status == FAILED
     assert bad.explanations[0].text.startswith("sign reversed")
     fast = at.motion.replace(speed=2.0 * 30.0 / math.pi)
-    slip = judged(scene, name, angles, fourbar.solve(replace(at, motion=fast)).torque)
+    slip = judged(
+        scene,
+        name,
+        angles,
+        fourbar.solve(replace(at, motion=fast)).torque,
+    )
     words = f"omega_{bar} in rev/min taken for rad/s"
     assert words in [one.text for one in slip.explanations]
 
@@ -116,7 +136,13 @@ def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
     right = fourbar.solve(scene)
     off = right.torque * (1.0 + 1e-9 * (np.arange(25) == 7))
     for torque, lines in ((right.torque, []), (off, [9])):
-        found = judged(scene, "theta_4", right.theta_4, torque, "{:.2f}")
+        found = judged(
+            scene,
+            "theta_4",
+            right.theta_4,
+            torque,
+            "{:.2f}",
+        )
         assert [finding.line for finding in found.differing] == lines
 
 
@@ -129,7 +155,14 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judge
     limits = np.sort(fourbar.solve(scene, "position").theta_4[[0, -1]])
     theta_4 = np.radians(np.arange(*np.ceil(np.degrees(limits)), 5.0))
     assert len(theta_4) > 3
-    table = read(tabulate("theta_4", theta_4, theta_4, "{:.0f}"))
+    table = read(
+        tabulate(
+            "theta_4",
+            theta_4,
+            theta_4,
+            "{:.0f}",
+        )
+    )
     angles = find_row_commands(scene, table).at.angle
     apart = np.angle(np.exp(1j * (angles - find_crank(scene, theta_4, side))))
     np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
@@ -145,7 +178,13 @@ def test_the_rounding_of_another_bars_angle_is_allowed_for(judged):
     right = fourbar.solve(scene, at=at_angles([1.2, 1.7, 2.4]))
     for off, code in ((0.0, HOLDS), (1e-5, FAILED)):
         torque = right.torque * (1.0 + off)
-        found = judged(scene, "theta_4", right.theta_4, torque, "{:.6f}")
+        found = judged(
+            scene,
+            "theta_4",
+            right.theta_4,
+            torque,
+            "{:.6f}",
+        )
         assert found.status == code
 
 
@@ -153,7 +192,13 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
     scene = commanding(2, 0.0, 360.0)
     theta_4 = np.radians([120.0, 140.0])
     with pytest.raises(InputError) as caught:
-        judged(scene, "theta_4", theta_4, theta_4, "{:.0f}")
+        judged(
+            scene,
+            "theta_4",
+            theta_4,
+            theta_4,
+            "{:.0f}",
+        )
     error = str(caught.value)
     both = np.degrees(find_crank(scene, theta_4[:1], 1.0)) % 360.0
     assert f"{both[0]:.6g}" in error and "add a column theta_2" in error
@@ -184,7 +229,13 @@ def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
 
 def test_an_angle_that_is_never_reached_has_no_motion(judged):
     angles = np.radians([10.0, 130.0])
-    found = judged(commanding(2, 60.0, 220.0), "theta_4", angles, angles, "{:.0f}")
+    found = judged(
+        commanding(2, 60.0, 220.0),
+        "theta_4",
+        angles,
+        angles,
+        "{:.0f}",
+    )
     assert found.not_assembled == [2]
 
 
@@ -203,7 +254,12 @@ def test_the_word_angle_means_what_the_scene_commands(name, commanded, angle, re
 def test_a_command_of_a_stroke_is_refused(judged):
     stroke = fourbar.Motion(stroke=0.25, side="left")
     with pytest.raises(LimitError, match="takes a command of an angle alone"):
-        judged(crank_rocker(motion=stroke, drive=CYLINDER), "theta_2", [1.0], [1.0])
+        judged(
+            crank_rocker(motion=stroke, drive=CYLINDER),
+            "theta_2",
+            [1.0],
+            [1.0],
+        )
 
 
 def test_a_table_without_an_angle_names_the_commanded_one(read):

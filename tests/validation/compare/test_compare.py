@@ -73,7 +73,12 @@ def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
     predicted, verdict, allowed
 ):
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
-    worst = judge_quantity(1e-15, 1e-12, 0.0, predicted=expected)
+    worst = judge_quantity(
+        1e-15,
+        1e-12,
+        0.0,
+        predicted=expected,
+    )
     assert (worst.position, worst.verdict) == (1, verdict)
     assert worst.allowed == pytest.approx(allowed, abs=0)
 
@@ -134,9 +139,26 @@ def compare(predicted, nearby=None, **changed):
     """
     names = ("theta_3", "theta_4", "alpha_2", "torque")
     numbers = {name: getattr(SOLUTION, name) for name in names} | changed
-    answer = Answer("e", "exact", SOLUTION.at, SOLUTION.assembled, numbers)
-    held = Demands(EQUIVALENCE, names, predicted, nearby)
-    rows = Comparison("s", SCENE, answer, SOLUTION, held).rows()
+    answer = Answer(
+        "e",
+        "exact",
+        SOLUTION.at,
+        SOLUTION.assembled,
+        numbers,
+    )
+    held = Demands(
+        EQUIVALENCE,
+        names,
+        predicted,
+        nearby,
+    )
+    rows = Comparison(
+        "s",
+        SCENE,
+        answer,
+        SOLUTION,
+        held,
+    ).rows()
     return {row.quantity: row for row in rows}
 
 

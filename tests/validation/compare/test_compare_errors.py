@@ -38,7 +38,13 @@ def make_answer(assembled=ALL, **changed):
     """
     numbers = {name: np.array(FORMULAS[name]) for name in COMPARED_QUANTITIES} | changed
     left = {name: values for name, values in numbers.items() if values is not None}
-    return Answer("other", "exact", FORMULAS.at, assembled, left)
+    return Answer(
+        "other",
+        "exact",
+        FORMULAS.at,
+        assembled,
+        left,
+    )
 
 
 def compare(
@@ -46,7 +52,13 @@ def compare(
 ):
     """Return the rows of an answer by quantity."""
     demands = Demands(EQUIVALENCE, demanded, **held)
-    comparison = Comparison("scene", scene, answer, formulas, demands)
+    comparison = Comparison(
+        "scene",
+        scene,
+        answer,
+        formulas,
+        demands,
+    )
     closure = [comparison.closure()] if "theta_3" in answer.quantities else []
     return {row.quantity: row for row in [*comparison.rows(), *closure]}
 
@@ -113,7 +125,12 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
     longer = crank_rocker(linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
     solution = fourbar.solve(longer, "position")
     assert not solution.assembled.all() and solution.assembled.any()
-    answer = Answer("other", "exact", solution.at, np.ones(len(solution), dtype=bool))
+    answer = Answer(
+        "other",
+        "exact",
+        solution.at,
+        np.ones(len(solution), dtype=bool),
+    )
     assert compare(answer, longer, solution, ())["assembled"].failed
 
 
@@ -136,7 +153,14 @@ def test_neither_side_chooses_what_it_is_allowed(shrunk):
         for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
             del answer.quantities[name]
         held = Demands(EQUIVALENCE, ("torque",))
-        alone = Comparison("scene", SCENE, answer, formulas, held, FORMULAS).rows()
+        alone = Comparison(
+            "scene",
+            SCENE,
+            answer,
+            formulas,
+            held,
+            FORMULAS,
+        ).rows()
         assert [r for r in alone if r.quantity == "torque"] == [row]
 
 
@@ -158,7 +182,13 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
     pytest.importorskip("flint")
     answer.quantities = right | {"torque": right["torque"] * (1.0 + 1e-8)}
     predict = partial(predict_from_data, scene, formulas.at)
-    rows = compare(answer, scene, formulas, ("torque",), predicted=predict)
+    rows = compare(
+        answer,
+        scene,
+        formulas,
+        ("torque",),
+        predicted=predict,
+    )
     assert list_failing(rows) == {"torque"}
 
 
@@ -180,7 +210,14 @@ def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold():
     """
     blind = replace(FORMULAS, condition=np.full(POSITIONS, 1e-14))
     held = Demands(EQUIVALENCE, ("omega_3", "F12"))
-    compared = Comparison("", SCENE, make_answer(), blind, held, blind).rows()
+    compared = Comparison(
+        "",
+        SCENE,
+        make_answer(),
+        blind,
+        held,
+        blind,
+    ).rows()
     rows = {row.quantity: row for row in compared}
     assert rows["F12"].verdict == UNDECIDED
     assert rows["undecided"].failed and rows["undecided"].allowed == 0.5

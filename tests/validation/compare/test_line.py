@@ -80,7 +80,12 @@ def test_what_is_stated_of_a_line_is_judged(what):
 
 
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it():
-    scene = driven(1, 4, 1, (fourbar.Gravity(),))
+    scene = driven(
+        1,
+        4,
+        1,
+        (fourbar.Gravity(),),
+    )
     outside = GuestClient("outside", Program(("none",)), Hello("outside"))
     for engine, words in (
         (BallArithmetic(), "a drive that exerts a force"),

@@ -223,7 +223,13 @@ def test_formulas_without_an_answer_fail():
     answer = Echo().answer(scene, commanded)
     positions = fourbar.solve(scene, "position", at=commanded)
     demands = Demands(EQUIVALENCE, ("torque",))
-    rows = Comparison("", scene, answer, positions, demands).rows()
+    rows = Comparison(
+        "",
+        scene,
+        answer,
+        positions,
+        demands,
+    ).rows()
     (row,) = [row for row in rows if row.quantity == "torque"]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
 
@@ -278,7 +284,12 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch):
     forward = {name: (Refusing, *rest) for name, (_, *rest) in free.FORWARD.items()}
     monkeypatch.setattr(free, "FORWARD", forward)
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
-    page = judge_for_report("free", scene, (), draw=False)
+    page = judge_for_report(
+        "free",
+        scene,
+        (),
+        draw=False,
+    )
     sentence = (
         "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2"
         " refuse"
@@ -303,7 +314,12 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
         changed(quantity="F12", verdict=UNDECIDED, error=NAN),
         changed(quantity="F14", verdict=FAILS, error=NAN),
     ]
-    tags = {"torque": [], "all": ["skipped"], "F12": ["skipped"], "F14": ["failure"]}
+    tags = {
+        "torque": [],
+        "all": ["skipped"],
+        "F12": ["skipped"],
+        "F14": ["failure"],
+    }
     assert junit([ROW, *others], [ROW, *others]) == (tags, ["4", "1", "2"])
     worse, _ = junit([ROW], [changed(verdict=REFUSES, error=NAN)])
     assert worse["torque"] == ["failure"]
@@ -362,7 +378,16 @@ def test_one_rule_of_agreement(error, allowed, mask, verdict, worst):
     places, bound = np.array([1.0, 2.0, 3.0]), np.asarray(allowed)
     where = None if mask is None else np.array(mask)
     key = ("a", "b", "c")
-    row = Row.judged(key, "F12", np.array(error), bound, "", places, 1.0, where)
+    row = Row.judged(
+        key,
+        "F12",
+        np.array(error),
+        bound,
+        "",
+        places,
+        1.0,
+        where,
+    )
     assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)
     lone = Row.judged(
         key, "F12", error[worst], float(bound.flat[worst % bound.size]), ""

@@ -28,7 +28,12 @@ ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 def solve_with_scale(name, scene):
     """Return the solution of a scene, and the scale of one of its quantities."""
     solution = solve(scene)
-    return solution, scale_of(name, scene, solution, solution[name])
+    return solution, scale_of(
+        name,
+        scene,
+        solution,
+        solution[name],
+    )
 
 
 LOW, HIGH = sorted(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < 3.0)
@@ -123,7 +128,12 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
     solution = solve(scene)
     names = ("torque", "F12")
     expected = find_scale_of_answer(names, scene, solution)
-    bare = replace(solution, a_G2=None, a_G3=None, a_G4=None)
+    bare = replace(
+        solution,
+        a_G2=None,
+        a_G3=None,
+        a_G4=None,
+    )
     scale = find_scale_of_answer(names, scene, bare)
     assert expected is not None and scale is not None
     np.testing.assert_allclose(scale.cancellation, expected.cancellation, rtol=1e-12)

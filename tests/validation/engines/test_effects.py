@@ -34,8 +34,18 @@ from tests.support.shares import slow_but
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
 ACTING = {
     "gravity": Gravity(9.81, 0.3),
-    "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
-    "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+    "viscous": Viscous.at(
+        O2=0.02,
+        A=0.03,
+        B=0.04,
+        O4=0.05,
+    ),
+    "friction": Friction.at(
+        O2=0.02,
+        A=0.03,
+        B=0.04,
+        O4=0.05,
+    ),
     "pin_friction": PinFriction.at(
         O2=(0.2, 0.01),
         A=(0.3, 0.01),
@@ -45,12 +55,48 @@ ACTING = {
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
         (
-            Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05, 3.0),
-            Spring(Place(2, (0.05, 0.5)), Place(3, (0.1, 0.3)), 50.0, 0.05, 1.0),
-            Spring.gas(Place(1, (0.2, 2.0)), Place(3, (0.05, 1.0)), 0.5, 0.3, 4.0, 7.0),
-            Spring(Place(1, (0.15, -0.6)), Place(4, (0.1, 0.4)), 0.0, preload=-2.0),
-            Spring(Place(1, (0.12, -2.0)), Place(2, (0.05, 0.4)), 30.0, 0.0, 2.0),
-            Spring(Place(1, (0.0, 0.0)), Place(3, (0.1, 0.3)), 90.0, 0.15, acts="push"),
+            Spring(
+                Place(1, (0.1, -1.5)),
+                Place(4, (0.08, 0.2)),
+                200.0,
+                0.05,
+                3.0,
+            ),
+            Spring(
+                Place(2, (0.05, 0.5)),
+                Place(3, (0.1, 0.3)),
+                50.0,
+                0.05,
+                1.0,
+            ),
+            Spring.gas(
+                Place(1, (0.2, 2.0)),
+                Place(3, (0.05, 1.0)),
+                0.5,
+                0.3,
+                4.0,
+                7.0,
+            ),
+            Spring(
+                Place(1, (0.15, -0.6)),
+                Place(4, (0.1, 0.4)),
+                0.0,
+                preload=-2.0,
+            ),
+            Spring(
+                Place(1, (0.12, -2.0)),
+                Place(2, (0.05, 0.4)),
+                30.0,
+                0.0,
+                2.0,
+            ),
+            Spring(
+                Place(1, (0.0, 0.0)),
+                Place(3, (0.1, 0.3)),
+                90.0,
+                0.15,
+                acts="push",
+            ),
             Spring(
                 Place(1, (0.0, 0.0)),
                 Place(4, (0.1, 0.3)),
@@ -62,7 +108,13 @@ ACTING = {
         )
     ),
     "flywheel": Flywheel(0.02, 2),
-    "load": Load(4, (3.0, 0.7), from_centre=(0.05, 1.0), moment=0.2, frame="bar"),
+    "load": Load(
+        4,
+        (3.0, 0.7),
+        from_centre=(0.05, 1.0),
+        moment=0.2,
+        frame="bar",
+    ),
     "load over theta_2": Load(
         3,
         (4.0, 0.7),

@@ -48,52 +48,38 @@ def test_a_term_of_an_effect_runs_where_a_scene_names_it_and_nowhere_else():
 
 
 def compiled(*names):
+    """Return the compiled model with these effects, its rows, and what it disables."""
     effects = tuple(ACTING[name] for name in names)
-    return mujoco.MjModel.from_xml_string(
-        write_mjcf(crank_rocker(loads=(), effects=effects))
-    )
-
-
-def rows(model):
+    text = write_mjcf(crank_rocker(loads=(), effects=effects))
+    model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    return int(data.nefc)
-
-
-def disabled(model):
-    flags = mujoco.mjtDisableBit
-    return {
+    disabled = {
         name.removeprefix("mjDSBL_").lower()
-        for name in flags.__members__
-        if name != "mjNDISABLE"
-        and model.opt.disableflags & int(flags.__members__[name])
+        for name, flag in mujoco.mjtDisableBit.__members__.items()
+        if name != "mjNDISABLE" and model.opt.disableflags & int(flag)
     }
+    return model, data.nefc, disabled
 
 
 BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
 
 
 def test_the_bare_model_has_the_closed_loop_and_nothing_else():
-    model = compiled()
-    assert (
-        model.nv,
-        model.neq,
-        model.nu,
-        model.ntendon,
-        model.nsensor,
-        model.njnt,
-    ) == (3, 1, 1, 0, 0, 3)
-    assert rows(model) == 3  # connect has three, the third of them empty in the plane
-    assert disabled(model) == BARE
-    assert (
-        not model.opt.gravity.any()
-        and not model.dof_damping.any()
-        and not model.dof_frictionloss.any()
-    )
-    assert not (
-        model.opt.enableflags or model.geom_contype.any() or model.jnt_limited.any()
-    )
+    model, rows, disabled = compiled()
+    counts = (model.nv, model.neq, model.nu, model.ntendon, model.nsensor, model.njnt)
+    assert counts == (3, 1, 1, 0, 0, 3)
+    assert rows == 3  # connect has three, the third of them empty in the plane
+    assert disabled == BARE and not model.opt.enableflags
+    for acting in (
+        model.opt.gravity,
+        model.dof_damping,
+        model.dof_frictionloss,
+        model.geom_contype,
+        model.jnt_limited,
+    ):
+        assert not acting.any()
 
 
 @pytest.mark.parametrize(
@@ -116,10 +102,9 @@ def test_the_bare_model_has_the_closed_loop_and_nothing_else():
 def test_each_effect_adds_what_it_needs_and_no_more(
     name, enabled, more_rows, tendons, actuators
 ):
-    model = compiled(name)
+    model, rows, disabled = compiled(name)
     assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, actuators, 0)
-    assert disabled(model) == BARE - enabled
-    assert rows(model) == 3 + more_rows
+    assert disabled == BARE - enabled and rows == 3 + more_rows
     assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring
 
 

@@ -64,14 +64,40 @@ PRINTED = 5e-10
 SIX = np.linspace(0.1, 6.0, 6)
 """Angles of the input, rad."""
 LOADS = (
-    Load(2, (10.0, 1.0), arm=(0.05, 2.0), moment=-0.15),
-    Load(3, (4.0, 0.3), from_centre=(0.1, 0.5), moment=0.3, frame="bar"),
-    Load(4, (3.0, 0.1), arm=(0.02, 2.0), moment=1.0),
+    Load(
+        2,
+        (10.0, 1.0),
+        arm=(0.05, 2.0),
+        moment=-0.15,
+    ),
+    Load(
+        3,
+        (4.0, 0.3),
+        from_centre=(0.1, 0.5),
+        moment=0.3,
+        frame="bar",
+    ),
+    Load(
+        4,
+        (3.0, 0.1),
+        arm=(0.02, 2.0),
+        moment=1.0,
+    ),
 )
 EFFECTS = (
     Gravity(),
-    Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1),
-    Friction.at(O2=0.2, A=0.5, B=0.7, O4=0.1),
+    Viscous.at(
+        O2=0.1,
+        A=0.2,
+        B=0.3,
+        O4=0.1,
+    ),
+    Friction.at(
+        O2=0.2,
+        A=0.5,
+        B=0.7,
+        O4=0.1,
+    ),
 )
 MECHANISMS = {  # ground, input, coupler, output
     "crank-rocker": (0.3, 0.1, 0.25, 0.22),
@@ -101,7 +127,13 @@ def bars(lengths, ground_angle=0.4):
     two, three, four = (
         Bar(x, 1.0 + x, 0.3 * x * x, (0.6 * x, 0.5 + x)) for x in moving
     )
-    return FourBar(d, two, three, four, ground_angle)
+    return FourBar(
+        d,
+        two,
+        three,
+        four,
+        ground_angle,
+    )
 
 
 CRANK_ROCKER = bars(MECHANISMS["crank-rocker"])
@@ -127,7 +159,13 @@ def failures(name, case, every=1):
         return [("refusal", answer.refusal)]
     right = solve(case, "force", at=commanded)
     demands = Demands(EQUIVALENCE, COMPARED_QUANTITIES)
-    comparison = Comparison("scene", case, answer, right, demands)
+    comparison = Comparison(
+        "scene",
+        case,
+        answer,
+        right,
+        demands,
+    )
     rows = [*comparison.rows(), comparison.closure()]
     assert {"F12", "torque" if case.drive is None else "stroke_speed"} <= {
         row.quantity for row in rows
@@ -167,7 +205,12 @@ def at_once(drive, branch):
 def driven(one, other, branch, effects):
     """A crank-rocker with a cylinder between places of two bars."""
     drive = LinearDrive(Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7)))
-    motion = Motion(np.linspace(0.1, 6.2, 25), 10.0, 5.0, branch)
+    motion = Motion(
+        np.linspace(0.1, 6.2, 25),
+        10.0,
+        5.0,
+        branch,
+    )
     return crank_rocker(motion=motion, drive=drive, effects=effects)
 
 
@@ -244,7 +287,12 @@ def with_bar(number, **values):
     """A crank-rocker with another mass, inertia or mass centre of one bar."""
     bars = {2: Bar(0.1, 0.2), 3: Bar(0.25, 0.5), 4: Bar(0.22, 0.4)}
     bars[number] = Bar(bars[number].length, **values)
-    return Scene(FourBar(0.3, *bars.values()), Motion(SIX, 10.0, 3.0), 2, LOADS)
+    return Scene(
+        FourBar(0.3, *bars.values()),
+        Motion(SIX, 10.0, 3.0),
+        2,
+        LOADS,
+    )
 
 
 MASSLESS = {"mass": 0.0}, {"mass": 0.0, "inertia": 0.1}
@@ -290,7 +338,14 @@ def test_light_bars_are_held_or_refused(name):
 def test_the_floor_of_mujoco_is_where_it_is_stated_to_be(mass, inertia):
     floor = LIGHTEST.boundary
     lightest = Bar(0.22, mass * floor, inertia * floor)
-    case = Scene(FourBar(0.3, Bar(0.1, 1.0), Bar(0.25, 1.0), lightest))
+    case = Scene(
+        FourBar(
+            0.3,
+            Bar(0.1, 1.0),
+            Bar(0.25, 1.0),
+            lightest,
+        )
+    )
     refusal = MujocoInverse().answer(case, command(case)).refusal
     if mass == inertia:
         assert refusal is None
@@ -309,7 +364,12 @@ def test_simbody_loses_a_constraint_where_the_limit_says(name, monkeypatch):
     """
     from fourbar_lab.engines import opensim
 
-    linkage = FourBar(0.3, Bar(0.25, 0.2), Bar(0.22, 0.5), Bar(0.3, 0.4))
+    linkage = FourBar(
+        0.3,
+        Bar(0.25, 0.2),
+        Bar(0.22, 0.5),
+        Bar(0.3, 0.4),
+    )
     beyond = at_limit(linkage, 1e-13)
     assert failures(name, at_limit(linkage, 1e-6)) == []
     assert "drops" in failures(name, beyond)[0][1]
@@ -406,7 +466,12 @@ def commanded(what, branch):
     value, speed, acceleration = COMMANDED[what]
     if what in CYLINDERS:
         drive, side = CYLINDERS[what]
-        motion = Motion(stroke=value, stroke_speed=speed, side=side, branch=branch)
+        motion = Motion(
+            stroke=value,
+            stroke_speed=speed,
+            side=side,
+            branch=branch,
+        )
         motion = motion.replace(acceleration=acceleration)
         return crank_rocker(motion=motion, drive=drive)
     bar = what[-1]
@@ -505,7 +570,13 @@ def test_a_scene_before_leaves_nothing_behind(kind):
     """An engine keeps one tree for all its scenes."""
     motion = Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
     plain = Scene(CRANK_ROCKER, motion)
-    loaded = Scene(replace(CRANK_ROCKER, ground=0.31), motion, 4, LOADS, EFFECTS)
+    loaded = Scene(
+        replace(CRANK_ROCKER, ground=0.31),
+        motion,
+        4,
+        LOADS,
+        EFFECTS,
+    )
     kept = Exact("kept", partial(keep_tree, kind))
     kept.answer(loaded, command(loaded))
     after, fresh = (
@@ -530,7 +601,13 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
     link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
-        case = Scene(link, motion, drive, (), (Gravity(), friction))
+        case = Scene(
+            link,
+            motion,
+            drive,
+            (),
+            (Gravity(), friction),
+        )
         engine, bodies = (
             answered(name, case).quantities["torque"][0]
             for name in ("pinocchio-inverse", "free-body")

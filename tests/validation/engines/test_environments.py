@@ -6,7 +6,6 @@ Read from engines.toml, installed once, and judged side by side.
 import shutil
 import sys
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -84,7 +83,12 @@ def made_once():
             return ran(line)
         if made:
             shutil.copytree(made[0], folder, symlinks=True)
-            return Ended("", "", failed=False, last="")
+            return Ended(
+                "",
+                "",
+                failed=False,
+                last="",
+            )
         made.append(folder.parent / "kept")
         ended = ran(line)
         shutil.copytree(folder, made[0], symlinks=True)
@@ -151,7 +155,7 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
     lines = []
 
     def fails_at_pip(line):
-        lines.append(list(map(str, line)))
+        lines.append([*map(str, line)])
         return Ended(
             "",
             "",
@@ -169,35 +173,31 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
     assert filled[-2:] == ["install", "x"]
 
 
+OURS = {engine.name: engine for engine in ENGINES}
+
+
+def start_like(name, **stated):
+    """Start an entry whose adapter is one of ours."""
+    return start_engine(Entry("mine", adapter=name, **stated), like=OURS[name])
+
+
 @pytest.mark.slow
-def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here():
-    (ours,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
-    guest = start_engine(Entry("mine", adapter="mujoco-simulated"), like=ours)
-    assert (guest.name, guest.tolerance) == ("mine", ours.tolerance)
+def test_an_engine_of_ours_is_held_as_here_and_asked_for_its_steps_or_an_error():
+    pytest.importorskip("mujoco")
+    simulated = "mujoco-simulated"
+    guest = start_like(simulated, steps=(48, 96))
+    assert (guest.name, guest.tolerance) == ("mine", OURS[simulated].tolerance)
     assert guest.through_time and guest.residuals
     assert guest.version and not guest.generated
-
-
-@pytest.mark.slow
-def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting():
-    pytest.importorskip("mujoco")
-    simulated, free_body = (
-        next(engine for engine in ENGINES if engine.name == name)
-        for name in ("mujoco-simulated", "free-body")
-    )
-    entry = Entry("mine", adapter="mujoco-simulated", steps=(48, 96))
-    guest = start_engine(entry, like=simulated)
     (wanted,) = adjust_engines([guest], 1e-3)
-    refused = start_engine(replace(entry, setting="fast"), like=simulated)
-    exact = start_engine(Entry("free", adapter="free-body"), like=free_body)
-    (as_ever,) = adjust_engines([exact], 1e-3)
+    refused = start_like(simulated, steps=(48, 96), setting="fast")
+    (as_ever,) = adjust_engines([start_like("free-body")], 1e-3)
     stepped, precise, unable, free = (
         engine.start().answer(SCENE, list_positions(SCENE))
         for engine in (guest, wanted, refused, as_ever)
     )
-    assert stepped.setting == "RK4 96/rev"
+    assert stepped.setting == "RK4 96/rev" != precise.setting
     assert precise.evidence["wanted_error"] == 1e-3
-    assert precise.setting != "RK4 96/rev"
     assert unable.refusal == "the engine's hello does not list 'fast' in settings"
     assert free.setting == "exact"
 

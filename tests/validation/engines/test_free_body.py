@@ -30,7 +30,12 @@ EPS = 2.0**-52
 DIGITS = 50.0 * EPS
 """Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles.
 """
-RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
+RECTANGLE = fourbar.FourBar(
+    0.3,
+    fourbar.Bar(0.1),
+    fourbar.Bar(0.3),
+    fourbar.Bar(0.1),
+)
 
 
 def answered(scene):
@@ -86,9 +91,21 @@ def test_a_lever_of_an_upright_rectangle(drive, torque, F12, F32, F43, F14):
     The bars are upright and 0.1 m long, and the coupler a two-force bar.
     """
     load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
-    got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
+    got = answered(
+        Scene(
+            RECTANGLE,
+            fourbar.Motion(math.pi / 2, 0.0),
+            drive,
+            (load,),
+        )
+    )
     assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
-    for name, force in {"F12": F12, "F32": F32, "F43": F43, "F14": F14}.items():
+    for name, force in {
+        "F12": F12,
+        "F32": F32,
+        "F43": F43,
+        "F14": F14,
+    }.items():
         assert got[name][0] == pytest.approx(force, abs=1e-13), name
 
 
@@ -143,7 +160,12 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect):
     braked, free = (
         answered(crank_rocker(effects=effects)) for effects in ((effect,), ())
     )
-    omega = {1: 0.0, 2: 10.0, 3: braked["omega_3"], 4: braked["omega_4"]}
+    omega = {
+        1: 0.0,
+        2: 10.0,
+        3: braked["omega_3"],
+        4: braked["omega_4"],
+    }
     loss = 0.0
     for pin, *numbers in getattr(effect, PIN_NUMBERS[effect.key]):
         i, j = PINS[pin]

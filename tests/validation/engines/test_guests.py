@@ -379,7 +379,16 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
     hello = guests.Hello("sprung", effects=("springs",))
     client = guests.GuestClient("sprung", guests.Program(("none",)), hello)
     ends = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
-    springs = fourbar.Springs((fourbar.Spring(*ends, 200.0, 0.05, acts=acts),))
+    springs = fourbar.Springs(
+        (
+            fourbar.Spring(
+                *ends,
+                200.0,
+                0.05,
+                acts=acts,
+            ),
+        )
+    )
     needs = guests._find_needs(crank_rocker(loads=(), effects=(springs,)))
     missing = "the engine's hello does not list one_sided in effects"
     assert client._explain_refusal(needs) == (missing if acts else "")

@@ -257,7 +257,12 @@ def test_torques_that_the_errata_state():
 def test_open_loops_that_the_errata_state():
     """Closure of the angles as printed, in the thesis's polygon, cm."""
     file = FOLDER / "data" / "positions.csv"
-    rows = np.loadtxt(file, delimiter=",", skiprows=1, usecols=range(5))
+    rows = np.loadtxt(
+        file,
+        delimiter=",",
+        skiprows=1,
+        usecols=range(5),
+    )
     d, a, b, c = BAR_LENGTHS
     unit = np.exp(1j * np.radians(rows)).T
 

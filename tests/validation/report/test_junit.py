@@ -67,7 +67,12 @@ def test_every_failure_is_a_case_after_many_that_hold():
 
 
 def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance():
-    shares = {"F12": 0.2, "F32": 0.9, "F43": 0.5, "torque": 0.3}
+    shares = {
+        "F12": 0.2,
+        "F32": 0.9,
+        "F43": 0.5,
+        "torque": 0.3,
+    }
     rows = [
         replace(ROW, quantity=name, error=share * 1e-14)
         for name, share in shares.items()

@@ -72,7 +72,12 @@ SOLUTION = fourbar.solve(SCENE, "force")
 def demo(*, draw=True):
     """A small scene as two exact engines and the free bodies judge it."""
     engines = [engine for engine in ENGINES if not engine.through_time]
-    return judge_for_report("demo", SCENE, engines, draw=draw)
+    return judge_for_report(
+        "demo",
+        SCENE,
+        engines,
+        draw=draw,
+    )
 
 
 def copies(count, *, failing=0):
@@ -140,7 +145,13 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
 @pytest.mark.slow
 def test_nothing_is_fetched_and_a_section_of_another_module_is_linked():
     pictures = {"scene-000": "iVBORw0KGgo="}
-    section = Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])
+    section = Section(
+        "hard",
+        "Hard cases",
+        "As predicted.",
+        ["family"],
+        [["toggle"]],
+    )
     parts = {"pictures": pictures, "no_pictures": "none", "sections": [section]}
     _, text = report(copies(2), **parts)
     for part in ('<a href="#hard">Hard cases</a>', '<h2 id="hard">', ">toggle</th>"):
@@ -215,7 +226,12 @@ def test_every_kind_of_scene_is_drawn(motion, pictures):
 
 def test_an_engine_that_is_missing_is_reported_as_failing():
     absent = replace(ENGINES[0], start=lambda: import_module("tests.absent"))
-    record = judge_for_report("demo", crank_rocker(), (absent,), draw=False)
+    record = judge_for_report(
+        "demo",
+        crank_rocker(),
+        (absent,),
+        draw=False,
+    )
     summary, text = report([record])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
@@ -298,9 +314,28 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     Our own rows are one.
     """
     simulated = ("first", "mujoco-simulated", "RK4", "F12")
-    row = Row(*simulated, error, allowed, AGREES, "", math.radians(40.0), 1.0)
-    share = replace(row, quantity="undecided", error=0.4, allowed=0.5, theta_2=math.nan)
-    identity = replace(row, engine="formulas", quantity="torque", error=0.0)
+    row = Row(
+        *simulated,
+        error,
+        allowed,
+        AGREES,
+        "",
+        math.radians(40.0),
+        1.0,
+    )
+    share = replace(
+        row,
+        quantity="undecided",
+        error=0.4,
+        allowed=0.5,
+        theta_2=math.nan,
+    )
+    identity = replace(
+        row,
+        engine="formulas",
+        quantity="torque",
+        error=0.0,
+    )
     rows, left_out = [row, share, identity], ["equilibria: too near"]
     summary = summary_of([record_of("first", rows, left_out=left_out)])
     first, second = summary.engines
@@ -337,8 +372,18 @@ def test_the_picture_shows_the_pin_force_that_fails():
     sizes = {name: magnitude(SOLUTION[name]).max() for name in PIN_FORCES}
     largest, other = max(sizes, key=sizes.get), min(sizes, key=sizes.get)
     numbers = {name: SOLUTION[name] for name in ("torque", *PIN_FORCES)}
-    answer = Answer("free-body", "exact", command(SCENE), quantities=numbers)
-    record = Record("demo", SCENE, solution=SOLUTION, answers=[answer])
+    answer = Answer(
+        "free-body",
+        "exact",
+        command(SCENE),
+        quantities=numbers,
+    )
+    record = Record(
+        "demo",
+        SCENE,
+        solution=SOLUTION,
+        answers=[answer],
+    )
     assert f"|{largest}|" in (draw_scene_figure(record) or "")
     record.rows = [
         fail(replace(OF_MINE, quantity=other), error=0.5),
@@ -349,7 +394,12 @@ def test_the_picture_shows_the_pin_force_that_fails():
 
 
 def record_of(name, rows, **parts):
-    return Record(name, title=name, rows=rows, **parts)
+    return Record(
+        name,
+        title=name,
+        rows=rows,
+        **parts,
+    )
 
 
 def fail(row, error=1e-3):
@@ -374,7 +424,16 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
         causes = {"mine": [sign, swapped] if k < 3 else [swapped]}
         scenes.append(record_of(of_scene.scene, [of_scene, *wrong], causes=causes))
     died = "exit status 3: Cannot find module 'x'"
-    scenes[0].rows.append(Row.unmeasured("scene 00", "theirs", "", "all", FAILS, died))
+    scenes[0].rows.append(
+        Row.unmeasured(
+            "scene 00",
+            "theirs",
+            "",
+            "all",
+            FAILS,
+            died,
+        )
+    )
     summary = summary_of(scenes)
     assert [str(cause) for cause in summary.overview.causes] == [
         f"mine: {swapped}: 23 scenes; worst scene 00 120 deg",
@@ -392,10 +451,28 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
 def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
     numbers = {"torque": SOLUTION.torque, "F43": -SOLUTION.F43}
-    answer = Answer("mine", "exact", SOLUTION.at, SOLUTION.assembled, numbers)
-    row = replace(OF_MINE, quantity="F43", error=2.0, allowed=1e-6, verdict=FAILS)
+    answer = Answer(
+        "mine",
+        "exact",
+        SOLUTION.at,
+        SOLUTION.assembled,
+        numbers,
+    )
+    row = replace(
+        OF_MINE,
+        quantity="F43",
+        error=2.0,
+        allowed=1e-6,
+        verdict=FAILS,
+    )
     largest = int(np.argmax(np.max(np.abs(SOLUTION.F43), axis=0)))
-    record = Record("s", SCENE, rows=[row], solution=SOLUTION, answers=[answer])
+    record = Record(
+        "s",
+        SCENE,
+        rows=[row],
+        solution=SOLUTION,
+        answers=[answer],
+    )
     drawn = draw_scene_figure(record) or ""
     assert f"F43 {'xy'[largest]} (N)" in drawn and "allowed to mine" in drawn
     held = replace(record, rows=[replace(row, verdict=AGREES, allowed=1e-14)])
@@ -410,8 +487,21 @@ def find_cause(*rows, **parts):
 
 
 RIGHT = [replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")]
-OPEN = replace(OF_MINE, quantity="assembled", error=9.0, allowed=0.0, verdict=FAILS)
-DEAD = Row.unmeasured("a", "mine", "", "all", FAILS, "exit status 3 after 4 s")
+OPEN = replace(
+    OF_MINE,
+    quantity="assembled",
+    error=9.0,
+    allowed=0.0,
+    verdict=FAILS,
+)
+DEAD = Row.unmeasured(
+    "a",
+    "mine",
+    "",
+    "all",
+    FAILS,
+    "exit status 3 after 4 s",
+)
 UNKNOWN = "no known mistake explains it"
 CAUSES = [
     ([fail(OF_MINE)], f"torque differs, pin forces and motion agree; {UNKNOWN}"),
@@ -482,7 +572,14 @@ def test_an_engine_that_broke_down_alone_is_named_without_a_quantity():
 
 
 def refuse(scene, reason):
-    return Row.unmeasured(scene, "theirs", "", "all", REFUSES, reason)
+    return Row.unmeasured(
+        scene,
+        "theirs",
+        "",
+        "all",
+        REFUSES,
+        reason,
+    )
 
 
 def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
@@ -540,7 +637,15 @@ def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whol
     monkeypatch.setenv("COLUMNS", columns)
     scene = "thesis_printed_inertias"
     key = (scene, "mujoco-simulated", "RK4", "limit_positions")
-    row = Row(*key, 3.14, 1e-9, FAILS, "", theta_2, 0.3)
+    row = Row(
+        *key,
+        3.14,
+        1e-9,
+        FAILS,
+        "",
+        theta_2,
+        0.3,
+    )
     text = printed(summary_of([record_of(scene, [row])]), verbose=True)
     cells = ["limit_positions", "3.1e+00", "1.0e-09", "3.1e+09", at]
     shown = re.findall("^   mujoco-simulated(.*)", text, re.MULTILINE)

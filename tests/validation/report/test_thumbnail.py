@@ -19,8 +19,18 @@ WHOLE = fourbar.solve(PLAIN, "force")
 
 def list_marks(scene, solution, torque, *at):
     """Return the places of the marks of an engine's torque in a scene's picture."""
-    answer = Answer("free-body", "exact", *at, quantities={"torque": torque})
-    record = Record("scene", scene, solution=solution, answers=[answer])
+    answer = Answer(
+        "free-body",
+        "exact",
+        *at,
+        quantities={"torque": torque},
+    )
+    record = Record(
+        "scene",
+        scene,
+        solution=solution,
+        answers=[answer],
+    )
     drawn = draw_thumbnail(record)
     assert ">torque on bar 2</text>" in drawn
     marks = re.findall(r'mark" cx="([\d.]+)" cy="([\d.]+)"', drawn)
@@ -38,7 +48,12 @@ def test_no_mark_stands_where_nothing_is_judged():
     assert np.flatnonzero(~judged).tolist() == [0, 18, 36]
     torque = np.where(judged, solution.torque, -1e3)
     assert (WHOLE.status_code == OK).all()
-    everywhere = list_marks(PLAIN, WHOLE, WHOLE.torque, command(PLAIN))
+    everywhere = list_marks(
+        PLAIN,
+        WHOLE,
+        WHOLE.torque,
+        command(PLAIN),
+    )
     assert len(list_marks(scene, solution, torque)) == len(everywhere) - 1
 
 

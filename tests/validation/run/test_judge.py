@@ -46,7 +46,13 @@ class Echo:
     def answer(self, scene, command):
         s = fourbar.solve(scene, at=with_signs(scene.linkage, command))
         numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
-        answer = Answer("echo", "exact", command, np.array(s.assembled), numbers)
+        answer = Answer(
+            "echo",
+            "exact",
+            command,
+            np.array(s.assembled),
+            numbers,
+        )
         self.spoil(answer)
         return answer
 
@@ -70,7 +76,12 @@ class AnswersAnyway(Echo):
 
 
 def rows_of(adapter, scene=None, tolerance=EQUIVALENCE, **held):
-    engine = Engine("echo", adapter, tolerance, **held)
+    engine = Engine(
+        "echo",
+        adapter,
+        tolerance,
+        **held,
+    )
     record = judge("scene", scene or crank_rocker(), [engine])
     return {row.quantity: row for row in record.rows if row.engine == "echo"}
 
@@ -167,7 +178,12 @@ class SlightlyOff(Echo):
 
 
 def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it():
-    rows = rows_of(SlightlyOff, None, FULL_ACCURACY, answers_nearby=True)
+    rows = rows_of(
+        SlightlyOff,
+        None,
+        FULL_ACCURACY,
+        answers_nearby=True,
+    )
     assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
 
 
@@ -182,8 +198,18 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     commanded = command(scene)
     engine = next(engine for engine in ENGINES if engine.residuals)
     ones = np.ones(len(commanded.theta_2))
-    answer = Answer(engine.name, "RK4", commanded, predicted={"torque": ones})
-    predicted = make_prediction(engine, scene, commanded, answer)
+    answer = Answer(
+        engine.name,
+        "RK4",
+        commanded,
+        predicted={"torque": ones},
+    )
+    predicted = make_prediction(
+        engine,
+        scene,
+        commanded,
+        answer,
+    )
     assert predicted("torque", ones.astype(bool))[0] == 1.0
     answer.alarms.append("the loop is open")
     assert make_prediction(engine, scene, commanded, answer) is None

@@ -33,7 +33,13 @@ POSITIONS = np.array([0.14, 1.75, 4.03, 4.73])
 
 def bars(d, a, b, c, theta_1=0.0, r=None):
     far = None if r is None else (r, 0.35)
-    return FourBar(d, Bar(a, 0.01), Bar(b, 1.0, centre=far), Bar(c, 0.5), theta_1)
+    return FourBar(
+        d,
+        Bar(a, 0.01),
+        Bar(b, 1.0, centre=far),
+        Bar(c, 0.5),
+        theta_1,
+    )
 
 
 ORDINARY, TINY = (0.2, 0.08, 0.18, 0.15), (20e-6, 8e-6, 18e-6, 15e-6)
@@ -142,7 +148,12 @@ def test_moments_about_far_centres_are_right_to_full_accuracy():
     reasons = ""
     for index in far:
         scene = replace(suite.scene(index), loads=())
-        rows = judge(names[index], scene, [right, wrong], order=False).rows
+        rows = judge(
+            names[index],
+            scene,
+            [right, wrong],
+            order=False,
+        ).rows
         failed = {(row.engine, row.quantity) for row in rows if row.failed}
         torques = {(wrong.name, "torque"), (wrong.name, "torque_inertia")}
         assert failed and failed <= torques

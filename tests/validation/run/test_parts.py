@@ -194,6 +194,13 @@ def test_a_part_is_k_of_n(text):
 
 
 def test_a_part_has_no_verdict_to_compare(run, capsys):
-    run("out", "--part", "1/3", "--against", "accepted", code=BAD_INPUT)
+    run(
+        "out",
+        "--part",
+        "1/3",
+        "--against",
+        "accepted",
+        code=BAD_INPUT,
+    )
     said = " ".join(capsys.readouterr().err.split())
     assert "--against" in said and "collect the parts first" in said

@@ -95,7 +95,12 @@ def test_every_engine_is_judged_through_limits_and_change_points(coupler):
     first = int(np.flatnonzero(np.diff(solution.branch))[0])
     for engine in free.FORWARD:
         passed = row(page.rows, engine, "theta_2")
-        spread = find_spread_by_energy(scene, solution, first, engine)
+        spread = find_spread_by_energy(
+            scene,
+            solution,
+            first,
+            engine,
+        )
         assert spread < MOST_SPREAD[coupler][engine], (engine, spread)
         assert passed.error < BEFORE_THE_LINE + spread, passed
     before = scene.motion.replace(free=fourbar.Free(first / 100.0, first))

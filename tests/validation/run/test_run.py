@@ -96,7 +96,12 @@ def test_whoever_breaks_down_alone_is_blamed(broken):
         return error if not broken or broken in names else Record(job.name)
 
     engines = [Engine(name, FreeBody, EQUIVALENCE) for name in ("mine", "other")]
-    job = Job(Few(("a",)), 0, engines, draw=False)
+    job = Job(
+        Few(("a",)),
+        0,
+        engines,
+        draw=False,
+    )
     (row,) = _judge_by_engine(job, error, attempt).rows
     assert row.engine == (broken or FORMULAS)
     assert row.reason == "ZeroDivisionError: division by zero"

@@ -23,7 +23,12 @@ def list_done(folder, identity):
 
 
 def test_a_run_goes_on_from_its_own_parts(tmp_path):
-    fill(tmp_path, "one", 0, 2)
+    fill(
+        tmp_path,
+        "one",
+        0,
+        2,
+    )
     assert list_done(tmp_path, "one") == ({0, 2}, [])
     with Store(tmp_path, {"suite": "one"}).held() as store:
         assert store.read(2) == [{"task": 2}]
@@ -33,7 +38,12 @@ WRONG_PARTS = {"is of another run", "is another part", "is no file"}
 
 
 def test_only_a_part_of_this_run_in_its_place_is_taken(tmp_path):
-    parts = fill(tmp_path / "here", "one", 0, 2)
+    parts = fill(
+        tmp_path / "here",
+        "one",
+        0,
+        2,
+    )
     foreign = fill(tmp_path / "there", "two", 1) / "000001"
     foreign.rename(parts / "000001")
     (parts / "000002").rename(parts / "000003")

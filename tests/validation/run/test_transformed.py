@@ -31,7 +31,13 @@ EVERYTHING = (
 )
 LOADS = (
     fourbar.Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
-    fourbar.Load(3, (2.0, -1.4), from_pin=(0.1, 0.3), frame="bar", moment=-0.2),
+    fourbar.Load(
+        3,
+        (2.0, -1.4),
+        from_pin=(0.1, 0.3),
+        frame="bar",
+        moment=-0.2,
+    ),
     fourbar.Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
 )
 AT_A_POINT = fourbar.PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
@@ -75,7 +81,12 @@ def list_held(scene):
 @pytest.mark.parametrize(("first", "fit"), [(0.8 + 1e-5, 2), (3.0, 3)])
 def test_a_spring_whose_ends_nearly_meet_is_not_judged_there(first, fit):
     """The rounding of its ends turns its line; at the other positions it is judged."""
-    spring = fourbar.Spring(Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0)), 80.0, 0.05)
+    spring = fourbar.Spring(
+        Place(1, (0.1, 0.8)),
+        Place(2, (0.1, 0.0)),
+        80.0,
+        0.05,
+    )
     scene = crank_rocker(
         motion=fourbar.Motion([first, 2.0, 2.5], 10.0),
         loads=(),
@@ -193,7 +204,12 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
     motion = fourbar.Motion(fourbar.Sweep(0.9, 5.9, 7), 1.3)
     springs = fourbar.Torsion.at(A=(0.4, 0.3, 0.2))
     for d, many in ((0.3 + 4 * np.spacing(0.3), 1), (0.31, 0)):
-        linkage = make_linkage(d, 0.1, 0.25, 0.15)
+        linkage = make_linkage(
+            d,
+            0.1,
+            0.25,
+            0.15,
+        )
         question, rows = ask(fourbar.Scene(linkage, motion, effects=(springs,)))
         assert bool(rows) == (many == 0)
         assert sum("wound" in line for line in question.left_out) == many

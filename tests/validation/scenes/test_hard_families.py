@@ -154,7 +154,12 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
 def ask_nearby(scene, solution, command=None):
     """Ask the balls again, within the rounding of every theta_2."""
     command = command or fourbar.command(scene)
-    nearby = make_answer_nearby(HARD_ENGINES[0], scene, command, solution)
+    nearby = make_answer_nearby(
+        HARD_ENGINES[0],
+        scene,
+        command,
+        solution,
+    )
     return nearby(np.ones(len(command.angle), dtype=bool))
 
 
@@ -238,10 +243,21 @@ def judge_spoiled(scene, part, predictor):
             s = fourbar.solve(scene, at=command)
             numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
             numbers["F32"] *= 1.0 + part
-            return Answer(self.name, "exact", command, s.assembled, numbers)
+            return Answer(
+                self.name,
+                "exact",
+                command,
+                s.assembled,
+                numbers,
+            )
 
     tolerance = FULL_ACCURACY if predictor else EQUIVALENCE
-    engine = Engine("spoiled", Spoiled, tolerance, predictor=predictor)
+    engine = Engine(
+        "spoiled",
+        Spoiled,
+        tolerance,
+        predictor=predictor,
+    )
     rows = judge("scene", scene, [engine]).rows
     (row,) = [row for row in rows if (row.engine, row.quantity) == ("spoiled", "F32")]
     return row.verdict, row.allowed

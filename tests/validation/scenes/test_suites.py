@@ -98,7 +98,12 @@ def test_the_default_suite_uses_every_capability():
     ids=[SUITE.name(i) for i in range(len(SUITE))],
 )
 def test_every_scene_of_it_holds(index):
-    rows = judge(SUITE.name(index), SUITE.scene(index), [FREE_BODY], order=False).rows
+    rows = judge(
+        SUITE.name(index),
+        SUITE.scene(index),
+        [FREE_BODY],
+        order=False,
+    ).rows
     assert not [row for row in rows if row.failed]
     assert any(row.compared and row.engine == FREE_BODY.name for row in rows)
 
