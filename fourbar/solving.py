@@ -357,32 +357,20 @@ def _require_command_at(commanded: Command) -> None:
     angle, branch, speed, acceleration, _, time, origin = commanded
     expect(f"at.{theta}", angle, np.ndarray)
     n = angle.size
+    expect("at.origin", origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
     arrays: dict[str, Any] = {theta: angle, "branch": branch}
-    optional: dict[str, Any] = {"time": time}
-    rates: dict[str, Any] = {alpha: acceleration, omega: speed}
-    kinds = (LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
-    expect("at.origin", origin, *kinds)
-    if isinstance(origin, LimitOrigin):
-        require("at.origin.remainder", origin.remainder)
-    elif isinstance(origin, StrokeOrigin):
-        arrays["origin.stroke"] = origin.stroke
-        optional["origin.lost"] = origin.lost
-        for name in ("condition", "acceleration", "speed"):
-            rates[f"origin.{name}"] = getattr(origin, name)
-    elif origin is not None:
-        arrays |= {f"origin.{key}": x for key, x in origin._asdict().items()}
-    arrays |= {key: value for key, value in optional.items() if value is not None}
+    if time is not None:
+        arrays["time"] = time
     for key, value in arrays.items():
         expect(f"at.{key}", value, np.ndarray)
-        shape = (n, 3) if key == "origin.lost" else (n,)
-        if value.shape != shape or value.dtype.kind not in "iuf":
-            raise InputError(f"at.{key}", value, f"must be numbers, shape {shape}")
+        if value.shape != (n,) or value.dtype.kind not in "iuf":
+            raise InputError(f"at.{key}", value, f"must be numbers, shape {(n,)}")
     are_branches = branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()
     if not are_branches:
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    for key, value in rates.items():
-        if value is not None or not key.endswith(("speed", omega)):
-            _require_rate(key, value, n)
+    if speed is not None:
+        _require_rate(omega, speed, n)
+    _require_rate(alpha, acceleration, n)
 
 
 def _require_rate(name: str, value: Any, n: int) -> None:

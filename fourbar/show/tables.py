@@ -12,10 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS, Array
+from fourbar.quantities import (
+    ANGLES,
+    DERIVED_NAMES,
+    OK,
+    PIN_FORCES,
+    Array,
+    find_derived,
+)
 from fourbar.show.acting import list_arm_notes
-from fourbar.show.columns import Column
-from fourbar.show.derived import derive, list_derived_names
+from fourbar.show.columns import Column, read_column
+from fourbar.show.derived import list_derived_names
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.lines import wrap_line
 from fourbar.show.units import drop_rounding, write_cell
@@ -25,9 +32,8 @@ from fourbar.solution import (
     Solution,
     compute_times,
     find_unit_in,
-    find_unit_of_quantity,
     has_size,
-    shift_to_drawing,
+    is_scalar,
 )
 
 if TYPE_CHECKING:
@@ -122,16 +128,12 @@ def print_positions(
     every : show every so many positions; left out: as `width` says.
     """
     step = every or (1 if width is None else _choose_step(len(solution)))
-    cells = None
-    if columns:
-        cells = {
-            f"{column.name}\n{column.label(units)}": write_cells(
-                column.shown(units),
-                _choose_form(column.unit),
-            )
-            for column in columns
-        }
-    shown, left_out = make_table(solution, width, units, every=step, cells=cells)
+    cells = dict[str, list[str]]()
+    for column in columns:
+        cells |= _write_column(column, column.name, units)
+    shown, left_out = make_table(
+        solution, width, units, every=step, cells=cells or None
+    )
     told = [] if solution.scene is None else list_arm_notes(solution.scene)
     notes = [line for note in told for line in wrap_line(note)]
     if step > 1:
@@ -180,75 +182,70 @@ def list_columns(
     shown: dict[str, list[str]] = {}
     if (solution.status_code != OK).any():
         shown["status\n"] = [status.replace("_", " ") for status in solution.status]
-
-    def add(name: str, unit: str, values: Array | None) -> None:
-        assert values is not None
-        label, factor = find_unit_in(unit, units)
-        heading = "" if unit == "1" else label
-        shown[f"{name}\n{heading}"] = write_cells(values * factor, _choose_form(unit))
-
-    if solution.time is not None:
-        add("time", "s", solution.time)
-    add("theta_2", "rad", solution.theta_2)
     drive = read_drive_demand(solution)
-    if drive.values is not None:
-        if solution.time is None:  # released, it has no drive: its torque is rounding
-            add(drive.symbol, drive.unit, drive.values)
-            add("power", "W", solution.power)
-        for name in PIN_FORCES:
-            x, y = getattr(solution, name).T
-            add(f"|{name}|", "N", np.hypot(x, y))
-    for name, unit, values in _list_motion(solution):
-        add(name, unit, values)
-    shown["sin mu\n"] = write_cells(solution.sin_mu)
-    if solution.time is None and drive.values is not None and drive.error is not None:
-        heading = f"digits\nof {drive.symbol[0]}"
-        shown[heading] = _count_torque_digits(drive.values, drive.error)
-    time = compute_times(solution.scene, solution.at)
-    if time is not None:
-        add("time", "s", time)
-    for name in list_derived_names(solution):
-        for part, values in _list_columns_of(solution, name).items():
-            add(part, find_unit_of_quantity(name), values)
+    headings = {drive.keys.value: drive.symbol, "sin_mu": "sin mu"}
+    vectors = filter(has_size, (*PIN_FORCES, *DERIVED_NAMES))
+    headings |= {name: f"|{name}|" for name in vectors}
+    for name in _list_names(solution):
+        column = read_column(solution.scene, solution, name)
+        shown |= _write_column(column, headings.get(name, name), units)
+        if name != "sin_mu" or solution.time is not None or drive.error is None:
+            continue
+        assert drive.values is not None
+        digits = _count_torque_digits(drive.values, drive.error)
+        shown[f"digits\nof {drive.symbol[0]}"] = digits
     return shown
 
 
-def _list_motion(solution: Solution) -> Iterator[tuple[str, str, Array]]:
-    """List the points' coordinates, and angles and rates of the bars.
+def _write_column(
+    column: Column, heading: str, units: Conversion
+) -> dict[str, list[str]]:
+    """Write the cells of a column, by its heading with the unit."""
+    cells = write_cells(column.shown(units), _choose_form(column.unit))
+    return {f"{heading}\n{column.label(units)}": cells}
 
-    An entry has name, SI unit and values.
-    """
-    for name, place in solution.points.items():
-        x, y = shift_to_drawing(solution, place).T
-        yield f"{name}_x", "m", x
-        yield f"{name}_y", "m", y
-    for start, vectors in (("v_", solution.velocity), ("a_", solution.acceleration)):
-        for name, vector in vectors.items():
-            unit = find_unit_of_quantity(start + name)
-            yield f"{start}{name}_x", unit, vector[:, 0]
-            yield f"{start}{name}_y", unit, vector[:, 1]
-    for name in ANGLES:
-        yield name, "rad", getattr(solution, name)
+
+def _list_names(solution: Solution) -> Iterator[str]:
+    """List the names of the columns of a table, most wanted first."""
+    drive = read_drive_demand(solution)
+    over_time = solution.time is not None
+    if over_time:
+        yield "time"
+    yield "theta_2"
+    if drive.values is not None:
+        if not over_time:  # released, it has no drive: its torque is rounding
+            yield from (drive.keys.value, "power")
+        yield from PIN_FORCES
+    of_points = {
+        "": solution.points,
+        "v_": solution.velocity,
+        "a_": solution.acceleration,
+    }
+    for start, vectors in of_points.items():
+        for name in vectors:
+            yield from (f"{start}{name}_x", f"{start}{name}_y")
     others = [bar for bar in "234" if bar != solution.commanded[-1]]
-    speeds = [f"omega_{bar}" for bar in others]
-    accelerations = [f"alpha_{bar}" for bar in others]
-    for name in ("stroke", "stroke_speed", *speeds, *accelerations):
-        values = getattr(solution, name)
-        if values is not None:
-            yield name, UNITS[name], values
+    rates = [f"{rate}_{bar}" for rate in ("omega", "alpha") for bar in others]
+    for name in (*ANGLES, "stroke", "stroke_speed", *rates):
+        if getattr(solution, name) is not None:
+            yield name
+    yield "sin_mu"
+    if not over_time and compute_times(solution.scene, solution.at) is not None:
+        yield "time"
+    yield from _list_derived_columns(solution, drive.values is not None)
 
 
-def _list_columns_of(solution: Solution, name: str) -> dict[str, Array]:
-    """List a derived quantity as columns: components, of a force the size first."""
-    values = derive(solution, name)
-    if values is None:
-        return {}
-    if values.ndim == 1:
-        return {name: values}
-    sizes = np.hypot(values[:, 0], values[:, 1])
-    x, y = drop_rounding(values, sizes[:, None]).T
-    size = {f"|{name}|": sizes} if has_size(name) else {}
-    return {**size, f"{name}_x": x, f"{name}_y": y}
+def _list_derived_columns(solution: Solution, has_forces: bool) -> Iterator[str]:
+    """List the derived quantities as columns: components, of a force the size first."""
+    for name in list_derived_names(solution):
+        quantity = find_derived(name)
+        assert quantity is not None
+        if quantity.stage == "force" and not has_forces:
+            continue
+        if has_size(name) or is_scalar(name):
+            yield name
+        if not is_scalar(name):
+            yield from (f"{name}_x", f"{name}_y")
 
 
 def _choose_form(unit: str) -> str:
