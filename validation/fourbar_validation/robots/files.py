@@ -202,7 +202,6 @@ class _RobotReading:
                 f"{', '.join(closing)} of <gazebo> may close loops, but are no URDF: "
                 '"gz sdf -p FILE > robot.sdf" writes an SDF that has them'
             )
-            return
         self.notes.append(
             "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
             "FILE --mimic JOINT judges one; to close another, save it as MJCF "

@@ -305,6 +305,10 @@ def test_two_connects_along_one_axis_are_one_pin():
     assert one.loop is not None
     assert one.loop.closures == (0, 1)
     assert other.loop is not None
+    (loop,) = require_loops(report.closures)
+    assert loop.name == one.name
+    said = f"{other.name} holds the same pin, and acts with {one.name}"
+    assert loop.remarks == (said,)
 
 
 def test_a_joint_equality_is_a_mimic():

@@ -138,8 +138,20 @@ def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
 
 
 def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
-    """Return the four-bars among closures; an InputError says why there are none."""
-    loops = [one.loop for one in closures if one.loop is not None]
+    """Return the four-bars among closures; an InputError says why there are none.
+
+    Of equalities that hold one pin together the first stands for all.
+    """
+    loops: dict[frozenset[int], RobotLoop] = {}
+    for closure in closures:
+        loop = closure.loop
+        if loop is None:
+            continue
+        pin = frozenset(loop.closures)
+        known = loops.setdefault(pin, loop)
+        if known is not loop:
+            remark = f"{loop.name} holds the same pin, and acts with {known.name}"
+            loops[pin] = replace(known, remarks=(*known.remarks, remark))
     if not loops:
         why = "the file has no equality that closes a loop"
         if len(closures) == 1:
@@ -147,7 +159,7 @@ def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
         elif closures:
             why = f"fourbar-validation loops says why of its {len(closures)} equalities"
         raise InputError("MJCF", None, f"has no planar four-bar: {why}")
-    return loops
+    return [*loops.values()]
 
 
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
