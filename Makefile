@@ -17,13 +17,13 @@ validate: setup
 	@echo "validate: what six digits of torque and pin forces cost MuJoCo, some seconds"
 	$(BIN)/python -m validation advise models/crank_rocker.toml --error 1e-6
 
-# the contributor's loop: some three minutes on two idle cores
+# the contributor's loop: some two minutes on two idle cores. Three processes, as a test
+# waits now and then for what it started
 test: check
-	@echo "test: the quick tests, some three minutes"
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+	@echo "test: the quick tests, some two minutes"
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow"
 
 # every test that is not of a night
-# three at a time on two cores: a fifth of the time a test waits for what it started
 test-all: check
 	$(BIN)/python -m pytest -n 3 --dist worksteal
 

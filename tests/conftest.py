@@ -36,10 +36,6 @@ FLAGS = (
     "--hide-scrollbars",
 )
 
-# Modules and tests are kept to the end: looking for garbage among them takes a sixth of
-# the time in which they are loaded.
-gc.disable()
-
 HERE = {"posix": hasattr(os, "fork"), "linux": sys.platform == "linux"}
 
 
@@ -53,9 +49,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason=f"of {system} alone"))
 
 
-def pytest_collection_finish() -> None:
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Modules and tests are kept to the end: looking for garbage among them takes a
+    sixth of the time in which they are loaded.
+    """
+    gc.disable()
+    collected = yield
     gc.freeze()
     gc.enable()
+    return collected
 
 
 @pytest.fixture

@@ -446,6 +446,7 @@ def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch)
             run("analyze", THESIS)
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     def full(_):
         raise OSError(28, "No space left on device")

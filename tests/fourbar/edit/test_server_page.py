@@ -536,7 +536,7 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
             assert abs(rows[0] - rows[1] / 2) <= 1, model
             assert page.text("compared") == ""  # nothing changed
             assert page.run(SHARE) >= 0.5, model
-            for row in range(0, rows[1], rows[1] // 8):
+            for row in range(0, rows[1], rows[1] // 4):
                 page.run(f"go({row})")
                 assert page.run(OVERLAPS) == [], (model, row)
             wide = page.value("document.documentElement.scrollWidth")

@@ -187,6 +187,7 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
         locate(scene, "torque", "0.5 N m")
 
 
+@pytest.mark.slow
 def test_a_column_with_poles_says_that_it_grows_without_bound():
     """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
     scene = crank_rocker(motion=fourbar.Motion())

@@ -361,6 +361,7 @@ SWEPT = Sweep(radians(20.0), radians(140.0), 60)
 
 
 @pytest.mark.parametrize("branch", slow_but({1}, [1, -1]))
+@pytest.mark.slow
 def test_what_a_sweep_does_not_reach_is_told_apart(branch):
     """The other assembly has the same angles and an equilibrium among them."""
     equilibria = equilibrium(springy_table(theta_2=SWEPT, branch=branch))

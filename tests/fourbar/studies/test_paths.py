@@ -125,6 +125,7 @@ TRAINER = ((50.0, 8.0, 33.0, 34.0), 12.0, 167.0)
 @pytest.mark.parametrize(
     "lengths, distance, angle", slow_but({TRAINER}, [CUTTER, TRAINER])
 )
+@pytest.mark.slow
 def test_a_wide_curve_is_no_narrower_than_by_a_scan(lengths, distance, angle):
     """Of an oval the width turns slowly, and every side of it decides."""
     ground, crank, coupler, output = lengths

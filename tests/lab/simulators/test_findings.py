@@ -75,6 +75,7 @@ def test_a_script_that_breaks_down_is_not_fixed(code, state, tmp_path):
     assert finding.run(Path(sys.executable), seconds) == state
 
 
+@pytest.mark.slow
 def test_the_command_says_what_could_not_run(monkeypatch, tmp_path):
     script = tmp_path / "one.py"
     script.write_text(

@@ -37,6 +37,7 @@ from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.costs import point
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
+from tests.support.shares import slow_but
 
 
 def turning(omega=10.0, positions=36):
@@ -85,6 +86,7 @@ def test_each_integrator_shows_its_order(integrator, order, steps):
     assert abs(exponent - order) <= max(2.0 * sigma, laws.WITHIN), points
 
 
+@pytest.mark.slow
 def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc():
     plain = replace(BEST, pad=None, time_constant_steps=10.0)
     fast, slow = tried(turning()), tried(turning(0.1))
@@ -487,7 +489,7 @@ def drive_by(drive):
     return replace(turning(), drive=CYLINDER, drive_bar=None)
 
 
-@pytest.mark.parametrize("drive", [2, 3, 4, "cylinder"])
+@pytest.mark.parametrize("drive", slow_but({3}, [2, 3, 4, "cylinder"]))
 def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     """More steps than positions of the scene are judged between the steps as well."""
     step, reading = 2e-6, 3e-5

@@ -46,6 +46,7 @@ from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.engine_limits import compile_body
 from tests.support.scenes import crank_rocker, thesis
+from tests.support.shares import slow_but
 from tests.validation.engines.test_effects import ACTING, scene
 
 ENGINE = {
@@ -482,7 +483,7 @@ def commanded(what, branch):
 
 @each_engine
 @pytest.mark.parametrize("what", COMMANDED)
-@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("branch", slow_but({-1}, [1, -1]))
 def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
     name, what, branch, monkeypatch
 ):

@@ -309,6 +309,7 @@ def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch, mark)
 
 
 @pytest.mark.linux
+@pytest.mark.slow
 def test_what_is_killed_from_outside_is_asked_again(tmp_path):
     """Once."""
     lives = tmp_path / "lives"

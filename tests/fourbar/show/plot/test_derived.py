@@ -43,6 +43,7 @@ def test_the_shaking_force_is_drawn_with_its_components():
         assert shown == approx(values, rel=1e-9, abs=1e-9 * np.abs(force).max())
 
 
+@pytest.mark.slow
 def test_ratios_are_those_of_the_speeds_and_no_line_crosses_a_dead_centre():
     lines = list_lines("ratios")
     s = solve(SCENE)

@@ -321,6 +321,7 @@ def test_drawn_curves_are_those_of_the_solution(scene, label):
         assert panel.get_xlim() == approx((over.min(), over.max()))
 
 
+@pytest.mark.slow
 def test_bars_are_drawn_to_scale_at_the_requested_position():
     axes = composed(crank_rocker(), "linkage", position=1.3).axes[0]
     bars = [
@@ -607,6 +608,7 @@ def test_one_position_of_another_command_stands_in_its_range():
 
 
 @pytest.mark.parametrize("bar", slow_but({3}, [2, 3]))
+@pytest.mark.slow
 def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis(bar):
     """Bars 2 and 3 stretched: cosine rule for O2, B, O4, where theta_3 = theta_2."""
     d, a, b, c = CRANK_ROCKER.linkage.lengths
