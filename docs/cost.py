@@ -55,15 +55,15 @@ def list_hard_points() -> Iterator[tuple[Array, Array, str]]:
 
     There are three kinds of them.
     """
-    for approach in list_approaches():
-        solution = solve(approach.scene, "force")
-        condition = find_condition(SHOWN, approach.scene.linkage, solution)
-        commanded = command(approach.scene).theta_2
+    for scene in list_approaches():
+        solution = solve(scene, "force")
+        condition = find_condition(SHOWN, scene.linkage, solution)
+        commanded = command(scene).theta_2
         order = np.argsort(commanded)
         for engine in HARD_ENGINES:
             if engine.through_time:
                 continue
-            curve = list_errors(approach.scene, SHOWN, engine)
+            curve = list_errors(scene, SHOWN, engine)
             if curve is not None:
                 rows = order[np.searchsorted(commanded, curve[0], sorter=order)]
                 yield condition[rows], curve[1], engine.name

@@ -67,6 +67,8 @@ SOLVED = 100_000
 """Positions where every array is allocated, and for the error bars. The numbers of
 error bars take ten times as long.
 """
+ROUNDS = 5
+"""Rounds in which what is timed takes turns; of each the median counts."""
 SINGLE_CALLS = 20
 """Calls of one position each."""
 _PER_SCENE = 50_000
@@ -292,7 +294,6 @@ def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     show_default=True,
     type=click.IntRange(1000),
 )
-@click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
 @click.option(
     "--largest",
     default=1_000_000,
@@ -308,7 +309,6 @@ def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 )
 def bench(
     positions: int,
-    rounds: int,
     largest: int,
     picture: Path | None,
 ) -> int:
@@ -319,7 +319,7 @@ def bench(
 
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
         # read when numpy is loaded: too late in this process
-        arguments = ["--positions", positions, "--rounds", rounds, "--largest", largest]
+        arguments = ["--positions", positions, "--largest", largest]
         arguments += ["--picture", picture] if picture is not None else []
         line = [sys.executable, "-m", "fourbar_lab", "bench", *map(str, arguments)]
         status = subprocess.run(
@@ -328,7 +328,7 @@ def bench(
             check=False,
         ).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
-    measurement = measure_speed(positions, rounds, largest)
+    measurement = measure_speed(positions, largest)
     rows: list[tuple[str, ...]] = []
     broken: list[str] = []
     for what, measured in measurement.rows.items():
@@ -357,7 +357,7 @@ def bench(
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
     title = (
-        f"{positions} positions, one core, medians of {rounds} interleaved rounds;"
+        f"{positions} positions, one core, medians of {ROUNDS} interleaved rounds;"
         f" {name_machine()}"
     )
     console.print(
@@ -385,8 +385,8 @@ def bench(
 
 def measure_speed(
     positions: int,
-    rounds: int,
     largest: int,
+    rounds: int = ROUNDS,
 ) -> Measured:
     """Measure the ratios of SPEED_LIMITS, ns per position, and times by how many."""
     scene = make_example()

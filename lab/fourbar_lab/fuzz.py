@@ -1,27 +1,26 @@
 """Random scenes through files, formulas and exact engines.
 
-What fails is made smaller and kept. Even numbers are ordinary scenes, odd ones
-adversarial; scene i depends on the seed and i alone.
+What fails is made smaller and kept. Even numbers are ordinary scenes, odd ones of the
+families of hard positions; scene i depends on the seed and i alone.
 """
 
 import json
-import math
 import re
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import FourBarError
 from fourbar.files import dump, loads, save
 from fourbar.scene import Command, Scene, command, with_signs
 from fourbar.solution import Solution
 from fourbar_lab import LAB_FOLDER
+from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, compute_closing_margin
@@ -33,49 +32,13 @@ from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
-from fourbar_validation.scenes.random import (
-    PUSHED,
-    DrawnLinkage,
-    RandomFamily,
-    Ranges,
-    draw_chance,
-    draw_decades,
-    draw_product,
-    draw_uniform,
-)
 
-POSITIONS_OF_A_SCENE = 2
-_DRAWN_SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
-"""Lengths, masses, speeds and loads: ordinary, adversarial."""
-ORDINARY_RANGES = Ranges(
-    pushed=PUSHED,
-    mass=_DRAWN_SIZES[False],
-    inertia=draw_uniform(0.02, 0.4),
-    centre=draw_uniform(-1.0, 2.0),
-    centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
-    load=draw_uniform(-1.0, 1.0),
-    without_force=0.2,
-    speed=draw_chance(0.95, _DRAWN_SIZES[False]),
-    viscous=0.2,
-    friction=0.1,
+ORDINARY = "random"
+"""Family of the scenes with even numbers."""
+ADVERSARIAL = tuple(
+    family for family in FAMILY_DRAWERS if family not in (ORDINARY, "strokes")
 )
-RANGES = {
-    False: ORDINARY_RANGES,
-    True: replace(
-        ORDINARY_RANGES,
-        mass=draw_chance(0.85, _DRAWN_SIZES[True]),
-        inertia=draw_chance(0.85, ORDINARY_RANGES.inertia),
-        centre=draw_product(
-            ORDINARY_RANGES.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)
-        ),
-        ground_angle=lambda rng: float(
-            rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])
-        ),
-        load=draw_product(ORDINARY_RANGES.load, _DRAWN_SIZES[True]),
-        speed=draw_chance(0.95, _DRAWN_SIZES[True]),
-    ),
-}
-"""Distributions from which the scenes are drawn: ordinary, adversarial."""
+"""Families of those with odd numbers, in turn; a stroke commands no angle."""
 COUNTEREXAMPLES = (
     Path("results/counterexamples")
     if CHECKOUT is None
@@ -104,101 +67,9 @@ WORKER_LOST = "worker:"
 
 
 def draw_fuzz_scene(seed: int, index: int) -> Scene:
-    """Draw a scene, anew until its lengths can close at all."""
-    rng = np.random.default_rng([seed, index])
-    while True:
-        try:
-            scene = FUZZED_FAMILIES[index % 2 == 1].draw(rng)
-        except InputError:
-            continue
-        if rng.random() < 1.0 / 3.0:
-            alpha = float(rng.uniform(-10.0, 10.0))
-        else:
-            alpha = scene.motion.alpha_2
-        return replace(scene, motion=scene.motion.replace(acceleration=alpha))
-
-
-def _draw_fuzzed_linkage(hard: bool, rng: np.random.Generator) -> DrawnLinkage:
-    size = _DRAWN_SIZES[hard](rng)
-    lengths = tuple(float(x * size) for x in _draw_fuzzed_lengths(rng, hard))
-    return (
-        lengths,
-        lambda rng, linkage: (
-            linkage.ground_angle + _draw_fuzzed_angles(rng, hard, lengths)
-        ),
-    )
-
-
-FUZZED_FAMILIES = {
-    hard: RandomFamily(partial(_draw_fuzzed_linkage, hard), RANGES[hard])
-    for hard in (False, True)
-}
-"""Families of the scenes: ordinary, adversarial."""
-
-
-def _draw_fuzzed_lengths(rng: np.random.Generator, hard: bool) -> Any:
-    """Draw the lengths (ground, input, coupler, output) in m.
-
-    Some hard ones are equal, in extreme ratios, or near s + l = p + q.
-    """
-    choice = rng.random() if hard else 1.0
-    x = rng.uniform(0.1, 1.0, 4)
-    if choice < 0.1:
-        return (x[0], x[1], x[0], x[1])
-    if choice < 0.2:
-        if rng.random() < 0.5:
-            return (x[0], x[1], x[1], x[0])
-        return (x[0], x[0], x[1], x[1])
-    if choice < 0.35:
-        return (
-            x[0],
-            x[1],
-            x[2],
-            x[0]
-            + x[1]
-            - x[2]
-            + float(rng.choice([0.0, 1.0, -1.0])) * 10.0 ** rng.uniform(-15, -3),
-        )
-    if choice < 0.6:
-        small = 10.0 ** rng.uniform(-6, 0, 2)
-        k = rng.permutation(4)
-        x[k[0]] *= small[0]
-        if rng.random() < 0.3:
-            x[k[1]] *= small[1]
-    return x
-
-
-def _draw_fuzzed_angles(
-    rng: np.random.Generator,
-    hard: bool,
-    lengths: tuple[float, ...],
-) -> Any:
-    """Draw angles theta_2 - theta_1 of one scene, rad.
-
-    Some hard ones are near a limit position or a change point, or many turns away.
-    """
-    psi = rng.uniform(-3.2, 3.2, POSITIONS_OF_A_SCENE)
-    if not hard:
-        return psi
-    d, a, b, c = lengths
-    choice = rng.random()
-    if choice < 0.5:
-        if rng.random() < 0.5:
-            diagonal = b + c
-        else:
-            diagonal = abs(b - c)
-        cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
-        base = math.acos(min(1.0, max(-1.0, cosine)))
-        psi = float(rng.choice([-1.0, 1.0])) * base + rng.choice(
-            [-1.0, 1.0], POSITIONS_OF_A_SCENE
-        ) * 10.0 ** rng.uniform(-14, -1, POSITIONS_OF_A_SCENE)
-    elif choice < 0.6:
-        psi = float(rng.choice([0.0, math.pi])) + rng.choice(
-            [-1.0, 0.0, 1.0], POSITIONS_OF_A_SCENE
-        ) * 10.0 ** rng.uniform(-9, -1, POSITIONS_OF_A_SCENE)
-    elif choice < 0.65:
-        psi = psi + 2 * math.pi * rng.integers(-1000, 1000)
-    return psi
+    """Draw a scene of one position by its number alone."""
+    family = ADVERSARIAL[index // 2 % len(ADVERSARIAL)] if index % 2 else ORDINARY
+    return FAMILY_DRAWERS[family](np.random.default_rng([seed, index]))
 
 
 def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:

@@ -280,13 +280,7 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
 
 @click.command()
 @click.option("--module", type=click.Choice(MODULES), help="Only this one.")
-@click.option(
-    "--most",
-    default=0,
-    type=click.IntRange(0),
-    help="At most this many of each module.",
-)
-def mutants_command(module: str | None, most: int) -> int:
+def mutants_command(module: str | None) -> int:
     """Change operators and numbers of the formulas, one at a time.
 
     95 % of those that matter must fail the harness. A change matters that alters a
@@ -310,15 +304,6 @@ def mutants_command(module: str | None, most: int) -> int:
     missed = list[str]()
     for name in [module] if module else MODULES:
         chosen = list(compile_mutants(import_module(f"fourbar.formulas.{name}")))
-        if most and len(chosen) > most:
-            chosen = [
-                chosen[i]
-                for i in np.random.default_rng(0).choice(
-                    len(chosen),
-                    most,
-                    replace=False,
-                )
-            ]
         verdicts = [
             judge_mutant(mutant, tried) for mutant in track(chosen, name, console=shown)
         ]

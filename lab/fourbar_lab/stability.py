@@ -76,7 +76,8 @@ def judge_sample(
         warnings.simplefilter("always")
         solution = solve_position(scene, angle)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
-    exact = compute_reference(scene, find_command_sign(scene), angle)
+    sign = int(with_signs(scene.linkage, command(scene)).branch[0])
+    exact = compute_reference(scene, sign, angle)
     if exact is None:
         tally.not_assembled += 1
         if math.isfinite(solution[drive]):
@@ -153,11 +154,6 @@ def judge_samples(
                 f"{family} {number}",
             )
     return tally
-
-
-def find_command_sign(scene: Scene) -> int:
-    """Find the sign of the sine of the scene's command at its first position."""
-    return int(with_signs(scene.linkage, command(scene)).branch[0])
 
 
 def _feed_back(scene: Scene, bar: int) -> Scene | None:

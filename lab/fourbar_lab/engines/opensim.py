@@ -364,7 +364,12 @@ class _OpenSimBars(Loaded):
                 self.state.getTime()
             )  # Simbody computes again what depends on it
             self.model.realizeAcceleration(self.state)
-            couple = self._couple_of_command()
+            couple = float(
+                self.joint[DIRECTION_JOINTS[self.commanded]]
+                .calcReactionOnChildExpressedInGround(self.state)
+                .get(0)
+                .get(2)
+            )
             force = self._compute_closing_force()
             drive = drive + couple / leverage
             closing = closing + force
@@ -409,14 +414,6 @@ class _OpenSimBars(Loaded):
             .calcReactionOnChildExpressedInGround(self.state)
             .get(1)
             .to_numpy()[:2]
-        )
-
-    def _couple_of_command(self) -> float:
-        return float(
-            self.joint[DIRECTION_JOINTS[self.commanded]]
-            .calcReactionOnChildExpressedInGround(self.state)
-            .get(0)
-            .get(2)
         )
 
     def _compute_closing_force(self) -> Array:

@@ -132,7 +132,8 @@ class Judgement:
                 allowed[finding.quantity] = max(so_far, finding.allowed)
         fewest: dict[int, list[str]] = {}
         for quantity, most in allowed.items():
-            fewest.setdefault(_count_compared_digits(most), []).append(quantity)
+            digits = max(0, math.floor(-math.log10(max(most, EPS))))
+            fewest.setdefault(digits, []).append(quantity)
         if len(fewest) == 1:
             (digits,) = fewest
             return f"{digits} digit{'s' if digits != 1 else ''}"
@@ -149,11 +150,6 @@ class Judgement:
             for quantity in explanation.quantities
         }
         return explained >= {finding.quantity for finding in self.differing}
-
-
-def _count_compared_digits(allowed: float) -> int:
-    """Count the digits that an allowed relative error leaves to compare by."""
-    return max(0, math.floor(-math.log10(max(allowed, EPS))))
 
 
 def _require_information(judge: Judge) -> None:
@@ -278,14 +274,6 @@ def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
         "explanations": [asdict(explanation) for explanation in judgement.explanations],
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-def write_junit(judgement: Judgement, name: str) -> str:
-    """Return a JUnit document of one case per quantity.
-
-    A case is a failure if a number differs, and skipped if none could be judged.
-    """
-    return write_document(judgement.sentence(), _list_cases_of_table(judgement, name))
 
 
 def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]:
@@ -436,7 +424,8 @@ def check_command(
     if json is not None:
         write_text(json, write_judgement_json(judgement, table))
     if junit is not None:
-        write_text(junit, write_junit(judgement, theirs.name))
+        cases = _list_cases_of_table(judgement, theirs.name)
+        write_text(junit, write_document(judgement.sentence(), cases))
     show_judgement(judgement, table, theirs.name)
     return judgement.status
 

@@ -264,10 +264,6 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             explained.add(name)
 
 
-def _predict_key(predict: Predict, key: str, judge: Judge) -> Array | None:
-    return Mistake("", predict).prediction(key, judge.right)
-
-
 def _name_factors(name: str, factor: float) -> Iterator[tuple[float, str, float]]:
     """Yield the plain factor near a fitted one, and the fitted one.
 
@@ -353,7 +349,7 @@ def _try_lengths(judge: Judge) -> Iterator[Mistake]:
     def compute_residual(predict: Predict) -> Array:
         parts = []
         for key in keys:
-            predicted = _predict_key(predict, key, judge)
+            predicted = Mistake("", predict).prediction(key, judge.right)
             if predicted is not None:
                 theirs = judge.table.values[key]
                 parts.append(_compute_residual(judge, key, theirs, predicted))

@@ -60,11 +60,6 @@ def square(ball: Ball) -> Ball:
     return ball * ball
 
 
-def dot_product(u: ComplexBall, v: ComplexBall) -> Ball:
-    """Return u_x v_x + u_y v_y."""
-    return (u.conjugate() * v).real
-
-
 BITS = 320
 """Working precision. 50 digits are 167 bits; the rest is what the worst sample (a limit
 position at 1e-20) cancels.
@@ -100,7 +95,14 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
         "c": c,
         "theta_1": link.ground_angle,
     }
-    values |= _list_commanded(scene, angle)
+    motion = scene.motion
+    position, speed, acceleration = motion.names
+    omega, alpha = motion.find_rates(np.array([angle]))
+    values |= {
+        position: angle,
+        speed: 0.0 if omega is None else np.ravel(omega)[0],
+        acceleration: np.ravel(alpha)[0],
+    }
     if scene.drive is not None:
         for name, (_, point) in zip(LINE_ENDS, scene.drive.ends, strict=False):
             values |= _collect_place(scene, point, name, f"{name}_angle")
@@ -116,18 +118,6 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     for effect in scene.effects:
         values |= _collect_effect(scene, effect)
     return values
-
-
-def _list_commanded(scene: Scene, angle: float) -> dict[str, float]:
-    """Collect what is commanded: a position, its speed and its acceleration."""
-    motion = scene.motion
-    position, speed, acceleration = motion.names
-    omega, alpha = motion.find_rates(np.array([angle]))
-    return {
-        position: angle,
-        speed: 0.0 if omega is None else np.ravel(omega)[0],
-        acceleration: np.ravel(alpha)[0],
-    }
 
 
 def _collect_load(scene: Scene, k: int) -> dict[str, float]:
@@ -785,7 +775,7 @@ class _BallLine(NamedTuple):
         total = acb(0)
         for k, sense in self.sense.items():
             total += sense * (foot[k] + acb(0, omega[k]) * self.arms[k])
-        return dot_product(self.line, total)
+        return (self.line.conjugate() * total).real
 
     def push(self, bar: int, centre: ComplexBall) -> tuple[Ball, Ball, Ball]:
         """Force (x, y) and moment about the mass centre of a bar, per newton."""

@@ -176,13 +176,9 @@ class Differences:
         return _count_new_rows(self.table[self.table.verdict_new != ""])
 
     @property
-    def _shared(self) -> "DataFrame":
-        return self.table[~self.table.kind.isin(_OF_ONE_RUN)]
-
-    @property
     def shared(self) -> int:
         """Return how many rows stand in both runs, whatever question they answer."""
-        return len(self._shared)
+        return len(self.table[~self.table.kind.isin(_OF_ONE_RUN)])
 
     @property
     def _counterparts(self) -> Counts:

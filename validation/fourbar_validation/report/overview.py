@@ -132,7 +132,9 @@ class Cause:
     @property
     def place(self) -> str:
         """Return the scene and the position where it is worst."""
-        return _name_place(self.worst)
+        if math.isnan(self.worst.theta_2):
+            return self.worst.scene
+        return f"{self.worst.scene} {math.degrees(self.worst.theta_2):.4g} deg"
 
     def __str__(self) -> str:
         count = f"{self.scenes} scene{'s' if self.scenes > 1 else ''}"
@@ -146,15 +148,6 @@ class _SimilarScenes:
     scenes: int
     worst: Row
     used: float
-
-
-def _name_place(row: Row) -> str:
-    """Write the scene of a row and its position."""
-    if math.isnan(row.theta_2):
-        where = ""
-    else:
-        where = f" {math.degrees(row.theta_2):.4g} deg"
-    return f"{row.scene}{where}"
 
 
 def _name_whole(row: Row) -> str:

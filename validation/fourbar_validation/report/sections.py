@@ -12,15 +12,6 @@ from fourbar_validation.scenes.hard_families import HARD_FAMILIES
 
 HARD_FOLDER, _COST = "hard", "cost"
 """Folders of the hard cases and of the study, in OUT."""
-_ALT = (
-    "Error of each engine over the distance to a toggle, a pole of T4 and a change"
-    " point"
-)
-HARD_CAPTION = (
-    "Error against the formulas, relative to the value itself, towards a singular"
-    " position. Dotted: the law K eps/condition. Band: what rounding was computed to do"
-    " there, up to ten times that; above it a row fails."
-)
 _MUST = (
     "each family of singular and extreme linkages must come out as its statement says. "
 )
@@ -47,14 +38,12 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     """Collect the hard cases and the study of cost, if there are any.
 
     The former are of this run or in OUT/hard, the latter in OUT/cost. Those of this run
-    have their picture, and the limits of the engines with them.
+    have the limits of the engines with them.
     """
     results = out / HARD_FOLDER / "results.csv"
     sections = []
     if hard is not None:
-        from fourbar_validation.report.hard_picture import draw_picture
-
-        sections += [collect_hard_cases(hard, draw_picture()), _list_declared_limits()]
+        sections += [collect_hard_cases(hard), _list_declared_limits()]
     elif results.is_file() and (out / HARD_FOLDER / "report.html").is_file():
         section = collect_hard_cases(read_columns(results))
         links = [(f"{HARD_FOLDER}/report.html",) * 2]
@@ -69,11 +58,8 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     return [*sections, *(_read_study(folder) for folder in folders[:MOST_STUDIES])]
 
 
-def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
-    """Collect the section on a run of the hard suite.
-
-    `picture` is the inline SVG of `fourbar_validation.report.hard_picture`.
-    """
+def collect_hard_cases(rows: Iterable[Row]) -> Section:
+    """Collect the section on a run of the hard suite."""
     counts = {family.name: Counts() for family in HARD_FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in HARD_FAMILIES}
     for row in rows:
@@ -93,20 +79,9 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
         if scenes[family.name]
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
-    if picture:
-        figures = [SectionFigure(_ALT, HARD_CAPTION, svg=picture)]
-    else:
-        figures = []
-    return Section(
-        HARD_FOLDER,
-        "Hard cases",
-        _MUST.capitalize(),
-        headings,
-        table,
-        figures,
-        (),
-        (1, 2 + len(VERDICTS)),
-    )
+    text = _MUST.capitalize()
+    numbers = (1, 2 + len(VERDICTS))
+    return Section(HARD_FOLDER, "Hard cases", text, headings, table, numbers=numbers)
 
 
 def _list_declared_limits() -> Section:

@@ -174,7 +174,8 @@ class _Balance:
         """Add a force at a point."""
         self.force = self.force + sense * force
         self.forces = self.forces + magnitude(force)
-        self.moment = self.moment + sense * _compute_cross(point, force)
+        turning = point[..., 0] * force[..., 1] - point[..., 1] * force[..., 0]
+        self.moment = self.moment + sense * turning
         self.carry(force, point)
 
     def carry(self, force: Array, point: Array) -> None:
@@ -315,10 +316,6 @@ def _check_power(
         divide(np.abs(solution.power - works), np.abs(works)),
         judged,
     )
-
-
-def _compute_cross(u: Array, v: Array) -> Array:
-    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
 
 
 def check_status(question: Question) -> Iterator[Row]:

@@ -271,7 +271,15 @@ def _take_plain_positions(question: Question) -> _Few:
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     command = at.part(positions).as_doubles()
     link = scene.linkage
-    bars = [_make_bar_of_numbers(bar) for bar in link.moving]
+    bars = [
+        Bar(
+            bar.length,
+            find_mass(bar),
+            find_inertia(bar),
+            find_centre(bar),
+        )
+        for bar in link.moving
+    ]
     few = Scene(
         _put_bars(link, bars, link.ground, link.ground_angle),
         Motion(),
@@ -333,16 +341,6 @@ def _solve_from_first(
         # write into are given; "scaled" demands the same digits
         return solve(begun, "force", at=command)
     return solve(begun, at=command, out=out)
-
-
-def _make_bar_of_numbers(bar: Bar) -> Bar:
-    """Return a bar whose mass, inertia and centre are numbers."""
-    return Bar(
-        bar.length,
-        find_mass(bar),
-        find_inertia(bar),
-        find_centre(bar),
-    )
 
 
 @dataclass(frozen=True)
@@ -469,15 +467,11 @@ def _convert_springs(
                 end=to.place(spring.end, linkage),
                 length=to.length * spring.length,
                 preload=to.length * spring.preload,
-                stroke=_scale_stroke(spring.stroke, to.length),
+                stroke=(None if spring.stroke is None else to.length * spring.stroke),
             )
             for spring in effect.springs
         )
     )
-
-
-def _scale_stroke(stroke: float | None, factor: float) -> float | None:
-    return None if stroke is None else factor * stroke
 
 
 def _convert_torsion(

@@ -69,18 +69,6 @@ def _find_frame(model: mujoco.MjModel, actuator: int) -> int:
     return int(frame if frame >= 0 else site)
 
 
-def _split_load(
-    model: mujoco.MjModel,
-    actuator: int,
-) -> tuple[int, int, tuple[float, float]]:
-    """Return an actuator, its site, and its force of size one in the plane.
-
-    The force is in the site's axes.
-    """
-    x, y = model.actuator_gear[actuator, :2].tolist()
-    return actuator, _find_frame(model, actuator), (x, y)
-
-
 def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Compile a text and evaluate it at keyframe 0."""
     model = mujoco.MjModel.from_xml_string(text)
@@ -114,7 +102,8 @@ class ClosedLoop(Assembled):
             if name.startswith("load_"):
                 body = model.site_bodyid[model.actuator_trnid[load, 0]]
                 bearers = _CARRIED_BY[model.body(body).name]
-                self._borne.append((*_split_load(model, load), bearers))
+                force = tuple(model.actuator_gear[load, :2].tolist())
+                self._borne.append((load, _find_frame(model, load), force, bearers))
         # MuJoCo's own memory: to look a row up anew costs more than to copy it
         self._carried = {}
         for name, body in self.body.items():
