@@ -1,7 +1,4 @@
-"""Where dry friction reverses.
-
-Found where geometry says, jumping by what statics says, judged on both sides of it.
-"""
+"""Where dry friction reverses, engines are judged on both sides of it."""
 
 import math
 from dataclasses import replace
@@ -11,14 +8,10 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction
-from fourbar.scene import Scene, command
+from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
-from fourbar_validation.compare.reversals import (
-    break_curve,
-    find_reversals,
-    mark_reversing,
-)
+from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 
@@ -27,64 +20,11 @@ FRICTION = 0.5
 LINKAGE = fourbar.FourBar(
     D, fourbar.Bar(A, 0.2), fourbar.Bar(B, 0.5), fourbar.Bar(C, 0.4)
 )
-ROUNDING = 1e-13
-"""rad; near the reversal the speed that vanishes carries some hundred roundings."""
 
 
 def scene(pin, start=0.1):
     motion = Motion(Sweep(start, start + 2 * math.pi, 36), 10.0)
     return Scene(LINKAGE, motion, effects=(Friction.at(**{pin: FRICTION}),))
-
-
-def reverse(pin, start=0.1):
-    """Return the solution of a scene, and its reversals."""
-    posed = scene(pin, start)
-    solution = solve(posed)
-    return solution, find_reversals(posed, command(posed), solution)
-
-
-def dead_centres():
-    """theta_2 where bars 2 and 3 lie in one line, by the cosine rule.
-
-    There the rocker turns back.
-    """
-    stretched = math.acos(((A + B) ** 2 + D**2 - C**2) / (2 * (A + B) * D))
-    folded = math.acos(((B - A) ** 2 + D**2 - C**2) / (2 * (B - A) * D)) + math.pi
-    return [stretched, folded]
-
-
-@pytest.mark.parametrize(
-    ("pin", "start", "places"),
-    [
-        ("O4", 0.1, dead_centres()),
-        ("B", 0.1, [math.pi, 2 * math.pi]),
-        ("B", math.pi - 1e-12, [math.pi, 2 * math.pi]),
-        ("O2", 0.1, []),
-    ],
-)
-def test_they_are_where_geometry_puts_them(pin, start, places):
-    """The rocker turns at its dead centres.
-
-    Bars 3 and 4 turn together where A lies on the line of centres. A sweep that begins
-    1e-12 rad before is not at rest there.
-    """
-    _, reversals = reverse(pin, start)
-    found = [reversal.theta_2 for reversal in reversals]
-    assert found == pytest.approx(places, abs=ROUNDING)
-    assert {reversal.pin for reversal in reversals} <= {pin}
-
-
-def test_the_jump_is_that_of_statics():
-    """The couple on bar 4 changes by 2 f.
-
-    Bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|.
-    """
-    for reversal in reverse("O4")[1]:
-        sine = abs(float(reversal.before.sin_mu[0]))
-        due = 2 * FRICTION / (C * sine)
-        assert reversal.jump("F43") == pytest.approx(due, rel=1e-9)
-        assert reversal.jump("torque") < 1e-9  # its power f |slip| is continuous
-        assert "O4" in str(reversal) and "jumps from" in str(reversal)
 
 
 @pytest.mark.parametrize("start", [0.1, 0.0])
@@ -98,22 +38,6 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start):
     assert [row for row in record.rows if not row.passed] == []
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)
-    assert len(record.reversals) == (
-        2 if start else 1
-    )  # the ends of a sweep that starts in one have a single side
-
-
-def test_a_curve_is_not_drawn_across_the_jump():
-    solution, reversals = reverse("O4")
-    x, y = break_curve(
-        solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0]
-    )
-    gaps = np.flatnonzero(np.isnan(y))
-    assert len(gaps) == len(reversals) == 2 and len(x) == len(y) == len(solution) + 6
-    for gap, reversal in zip(gaps, reversals, strict=True):
-        assert x[gap - 1] == x[gap + 1] == reversal.theta_2
-        assert abs(y[gap + 1] - y[gap - 1]) > 0.1
-    assert (np.diff(x) >= 0).all()
 
 
 def test_only_a_pin_that_hardly_slips_reverses():

@@ -18,7 +18,6 @@ from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.reversals import break_curve
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -195,7 +194,7 @@ def _draw_values(
     answers: list[Answer],
     record: Record,
 ) -> None:
-    """Draw the formulas as a band, broken at reversals, and each engine's marks.
+    """Draw the formulas as a band, and each engine's marks.
 
     The marks stand at positions of their own.
     """
@@ -204,17 +203,7 @@ def _draw_values(
     values = _take_plain(quantity, getattr(solution, quantity), axis)
     ours = np.where(good, values, np.nan)
     base = _choose_base(solution, None)
-    reversals = record.reversals
-    line = ours
-    if reversals:
-        theta_2, line = break_curve(
-            solution.theta_2,
-            ours,
-            reversals,
-            lambda side: _take_plain(quantity, getattr(side, quantity), axis),
-        )
-        base = np.degrees(theta_2)
-    axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
+    axes.plot(base, ours, color=BAND, lw=5, solid_capstyle="butt")
     for turn, answer in enumerate(answers):
         theirs = _take_plain(quantity, answer.quantities[quantity], axis)
         phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)

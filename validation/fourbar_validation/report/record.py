@@ -9,7 +9,6 @@ from typing import Any
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.reversals import Reversal
 from fourbar_validation.compare.rows import COLUMN_TYPES, FORMULAS, Row, sort_rows
 
 
@@ -39,8 +38,6 @@ class Record:
     rows: list[Row] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    reversal_texts: list[str] = field(default_factory=list)
-    """Positions where dry friction reverses and the pin forces jump, in words."""
     independence: dict[str, tuple[str, str]] = field(default_factory=dict)
     """engine: (shared with the formulas, found alone)."""
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -60,7 +57,6 @@ class Record:
     """Small SVG of linkage and torque, or None."""
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
-    reversals: list[Reversal] = field(default_factory=list)
 
     def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
@@ -76,13 +72,11 @@ class Record:
                 for answer in self.answers
                 if answer.evidence
             },
-            reversal_texts=[str(reversal) for reversal in self.reversals],
             figure=figure,
             thumbnail=thumbnail,
             scene=None,
             solution=None,
             answers=[],
-            reversals=[],
         )
 
     def kept_all(self) -> dict[str, Any]:
@@ -91,7 +85,7 @@ class Record:
         The rows are sorted.
         """
         kept = asdict(replace(self, rows=[]))
-        for name in ("scene", "solution", "answers", "reversals"):
+        for name in ("scene", "solution", "answers"):
             del kept[name]
         return kept | {
             "rows": [

@@ -82,11 +82,6 @@ CHECKS = (
     Check(check_status),
     Check(check_law),
     Check(check_transformed),
-    Check(
-        Question.find_reversals,
-        what="reversals of dry friction",
-        needs_theta_2="they are drawn over theta_2",
-    ),
     Check(compare_answers, compares=True),
     Check(
         check_mjcf,

@@ -18,11 +18,7 @@ from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
 from fourbar_validation.compare.compare import Scales
-from fourbar_validation.compare.reversals import (
-    Reversal,
-    find_reversals,
-    mark_reversing,
-)
+from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import (
     FORMULAS,
     Row,
@@ -82,8 +78,6 @@ class Question:
     against: dict[str, list[str]] = field(default_factory=dict)
     """Quantities in which engines agree with each other against the formulas."""
     timings: list[Timing] = field(default_factory=list)
-    reversals: list[Reversal] = field(default_factory=list)
-    """Positions where dry friction reverses and the pin forces jump."""
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
     """Answer of each engine, by its name, and the seconds that it took."""
     scales: Scales = field(default_factory=dict)
@@ -158,11 +152,6 @@ class Question:
                 self.answered[engine.name] = answer, time.perf_counter() - begin
         return self.answered[engine.name][0]
 
-    def find_reversals(self) -> tuple[()]:
-        """Find where dry friction reverses; what is drawn there is no comparison."""
-        self.reversals = find_reversals(self.scene, self.at, self.solution)
-        return ()
-
     def reversing(self, slip: float) -> Mask:
         """Mark where dry friction reverses.
 
@@ -236,7 +225,6 @@ class Question:
             against=self.against,
             solution=self.solution,
             answers=[answer for answer, _ in answered],
-            reversals=self.reversals,
         )
 
     def attempt(
