@@ -144,16 +144,8 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
 
 @pytest.mark.slow
 def test_nothing_is_fetched_and_a_section_of_another_module_is_linked():
-    pictures = {"scene-000": "iVBORw0KGgo="}
-    section = Section(
-        "hard",
-        "Hard cases",
-        "As predicted.",
-        ["family"],
-        [["toggle"]],
-    )
-    parts = {"pictures": pictures, "no_pictures": "none", "sections": [section]}
-    _, text = report(copies(2), **parts)
+    section = Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])
+    _, text = report(copies(2), sections=[section])
     for part in ('<a href="#hard">Hard cases</a>', '<h2 id="hard">', ">toggle</th>"):
         assert part in text
     text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)

@@ -3,7 +3,7 @@
 Every number leads to its row in results.csv, which the page carries.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -112,8 +112,6 @@ class _SceneView:
     """(quantity, engine): the comparison that used most of its allowance."""
     worst: dict[str, _Cell]
     """engine: its comparison that used most."""
-    picture: str | None
-    """Base64 of a PNG of the MJCF."""
 
     @property
     def drawn(self) -> list[str]:
@@ -138,9 +136,6 @@ class _SceneView:
 def write_html(
     summary: Summary,
     first_lines: dict[str, int],
-    *,
-    pictures: Mapping[str, str] | None = None,
-    no_pictures: str = "",
     sections: Sequence[Section] = (),
 ) -> str:
     """Write the report as one page that fetches nothing.
@@ -148,14 +143,12 @@ def write_html(
     Parameters
     ----------
     first_lines : the line of results.csv at which the rows of each scene start.
-    pictures : base64 of a PNG by scene: the MJCF as MuJoCo draws it.
-    no_pictures : why there are none.
     sections : further parts, for example of the hard cases.
     """
     from markupsafe import Markup
 
     views = [
-        _make_scene_view(scene, first_lines.get(scene.name, 2), pictures or {})
+        _make_scene_view(scene, first_lines.get(scene.name, 2))
         for scene in summary.shown
     ]
     csv = write_rows(cell.row for view in views for cell in view.cells)
@@ -184,7 +177,6 @@ def write_html(
         figures={
             scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure
         },  # drawn by our own code
-        no_pictures=no_pictures,
         sections=sections,
         independence=[
             (engine, *texts) for engine, texts in sorted(summary.independence.items())
@@ -230,7 +222,6 @@ def write_summary_page(summary: Summary) -> str:
 def _make_scene_view(
     scene: Record,
     first_line: int,
-    pictures: Mapping[str, str],
 ) -> _SceneView:
     rows = sort_rows(scene.rows)
     cells = [
@@ -262,7 +253,6 @@ def _make_scene_view(
         quantities,
         by_place,
         worst,
-        pictures.get(scene.name),
     )
 
 

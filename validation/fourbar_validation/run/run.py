@@ -4,13 +4,11 @@ The results are streamed to disk, and the pictures drawn.
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
-from fourbar.errors import FourBarError
-from fourbar.mjcf import write_mjcf
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import ResultsWriter, read_columns
 from fourbar_validation.compare.rows import (
@@ -21,7 +19,6 @@ from fourbar_validation.compare.rows import (
     write_csv_rows,
 )
 from fourbar_validation.engines.guests import number_guests
-from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.history import (
     collect_history,
@@ -154,21 +151,13 @@ def write_outcome(
         overview.weaker = [f"{rule}" for rule in weakened]
         overview.baseline = before.describe()
     write_text(out / "report.md", write_summary_page(summary))
-    generated = any(engine.generated for engine in engines)
-    models, why_not = _picture_models(suite, shown) if generated else ({}, "")
     sections = collect_sections(
         read_columns(out / PARQUET_FILE) if isinstance(suite, Hard) else None, out
     )
     if options.against is not None:
         sections += collect_history(before.table.parent)
     STYLE_NUMBERS.update(number_guests(engines))
-    page = write_html(
-        summary,
-        first_lines,
-        pictures=models,
-        no_pictures=why_not,
-        sections=sections,
-    )
+    page = write_html(summary, first_lines, sections)
     write_text(out / "report.html", page)
     return summary
 
@@ -236,22 +225,6 @@ def _redraw(
         draw=True,
     )
     return job
-
-
-def _picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str], str]:
-    """Picture the MJCF of some scenes by MuJoCo, as base64 PNGs by name.
-
-    The reason is returned if there are none.
-    """
-    texts = {}
-    for index in scenes:
-        try:
-            texts[suite.name(index)] = write_mjcf(suite.scene(index))
-        except (
-            FourBarError
-        ):  # bars without mass, a motion law: the engines' own rows say so
-            continue
-    return render_pictures(texts)
 
 
 @contextmanager
