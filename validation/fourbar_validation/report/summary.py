@@ -286,14 +286,15 @@ class Summary:
     @property
     def lines(self) -> list[OverviewLine]:
         """Return the engines of the first screen, with their names and versions."""
+        versions = {name: self._find_version(name) for name in self._engines}
+        return self.overview.name_lines(versions)
+
+    def _find_version(self, engine: str) -> str:
+        """Return the version to be shown with an engine; empty if its name has it."""
         versions = {name.lower(): version for name, version in self.versions.items()}
-        of_engines = {}
-        for name in self._engines:
-            version = versions.get(name.partition("-")[0], "")
-            of_engines[name] = self.stated.get(name, version)
-            if name.endswith(f" {of_engines[name]}"):
-                of_engines[name] = ""
-        return self.overview.name_lines(of_engines)
+        ours = versions.get(engine.partition("-")[0], "")
+        version = self.stated.get(engine, ours)
+        return "" if engine.endswith(f" {version}") else version
 
     @property
     def loosest(self) -> str:
@@ -326,15 +327,8 @@ class Summary:
     @property
     def engines(self) -> list[_EngineLine]:
         """Return every independent engine by name, then our own consistency."""
-        versions = {name.lower(): version for name, version in self.versions.items()}
         for line in self._engines.values():
-            version = self.stated.get(
-                line.name, versions.get(line.name.partition("-")[0], "")
-            )
-            if line.name.endswith(f" {version}"):
-                line.version = ""
-            else:
-                line.version = version
+            line.version = self._find_version(line.name)
             if line.name == OWN_CONSISTENCY:
                 engine = FORMULAS
             else:

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import (
     Effect,
@@ -30,7 +29,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, copy_with
-from fourbar.quantities import OK, PIN_FORCES, STAGE_OF, UNITS, Array
+from fourbar.quantities import OK, PIN_FORCES, UNITS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
@@ -153,22 +152,12 @@ class _Few:
             sizes.sum_terms_of(self.quantities),
         )
 
-    @cached_property
-    def _signs(self) -> NDArray[np.int8]:
-        """Return the signs of the commanded bar's own sine, (n,)."""
-        return with_signs(self.scene.linkage, self.command).branch
-
     def solve(self, scene: Scene, **changed: Any) -> Solution:
-        """Solve another scene at the same positions for the quantities compared.
+        """Solve another scene at the same positions.
 
         Some entries of the command are changed.
         """
-        command = self.command._replace(**changed)
-        return _solve_from_first(scene, command, self._make_arrays())
-
-    def solve_forces(self, scene: Scene) -> Solution:
-        """Solve another scene at the same positions for forces and torques alone."""
-        return _solve_from_first(scene, self.command, self._make_arrays(self.forces))
+        return _solve_from_first(scene, self.command._replace(**changed))
 
     def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
         """Solve another scene whose loop lies on the same side, or on the other.
@@ -179,16 +168,9 @@ class _Few:
         them, and the rounding of the lengths decides whether there are any: the sign is
         the same in both scenes, the name of the assembly need not be.
         """
-        signed = self.command._replace(branch=sense * self._signs, **changed)
-        command = with_signs(scene.linkage, signed)
-        return _solve_from_first(scene, command, self._make_arrays())
-
-    def _make_arrays(self, rows: slice = slice(None)) -> dict[str, Array]:
-        """Make arrays to solve some of the quantities into; the command is given."""
-        pairs = zip(self.quantities[rows], self.numbers[rows], strict=True)
-        return {
-            name: np.empty_like(values) for name, values in pairs if name in STAGE_OF
-        }
+        signs = with_signs(self.scene.linkage, self.command).branch
+        signed = self.command._replace(branch=sense * signs, **changed)
+        return _solve_from_first(scene, with_signs(scene.linkage, signed))
 
     def compare(self, convert: Callable[[str], Array]) -> Array:
         """Compare all quantities with those of another scene, converted; (q, n)."""
@@ -319,28 +301,19 @@ def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
     return long
 
 
-def _solve_from_first(
-    scene: Scene,
-    command: Command,
-    out: dict[str, Array] | None = None,
-) -> Solution:
+def _solve_from_first(scene: Scene, command: Command) -> Solution:
     """Solve a scene whose motion begins at the first position.
 
-    Springs count their turns from there. `out`: arrays to write into, as of `solve`.
+    Springs count their turns from there.
     """
-    begun = scene
     if scene.counts_turns:
         branch = int(command.branch[0])
         begin: Any = {
             f"theta_{command.bar}": float(command.angle[0]),
             "branch": branch,
         }
-        begun = copy_with(scene, motion=Motion(**begin))
-    if out is None or len(command.angle) == 1:
-        # a single position is solved in Python's own numbers, but not where arrays to
-        # write into are given; "scaled" demands the same digits
-        return solve(begun, "force", at=command)
-    return solve(begun, at=command, out=out)
+        scene = copy_with(scene, motion=Motion(**begin))
+    return solve(scene, "force", at=command)
 
 
 @dataclass(frozen=True)
@@ -357,6 +330,14 @@ class _SceneConversion:
     """Angle that is added to directions in the world, rad."""
     exchanged: bool = False
     """Read from the other end."""
+
+    def number(self, bar: int) -> int:
+        """Convert the number of a bar."""
+        return _OTHER_BAR[bar] if self.exchanged else bar
+
+    def pin(self, pin: str) -> str:
+        """Convert the name of a pin."""
+        return OTHER_PIN[pin] if self.exchanged else pin
 
     def pair(self, pair: tuple[float, float]) -> tuple[float, float]:
         """Convert a place or an arm of fixed direction from its bar's line."""
@@ -401,10 +382,6 @@ def _convert_load(
     linkage: FourBar,
 ) -> Load:
     force = None
-    if to.exchanged:
-        bar = _OTHER_BAR[load.bar]
-    else:
-        bar = load.bar
     places: dict[str, Any] = {}
     if load.force is not None:
         # a direction from the bar's line turns with the coupler's line
@@ -419,7 +396,7 @@ def _convert_load(
     elif load.place is not None:
         places["from_pin"] = to.place(load.place, linkage).from_pin
     moment = to.length * to.length * to.sense * load.moment
-    return Load(bar, force, **places, moment=moment, frame=load.frame)
+    return Load(to.number(load.bar), force, **places, moment=moment, frame=load.frame)
 
 
 def _convert_gravity(
@@ -437,9 +414,7 @@ def _convert_couples(
 ) -> Any:
     """Convert damping and dry friction, whose couples have no sense of their own."""
     square = to.length * to.length
-    converted = {}
-    for pin, number in effect.rows:
-        converted[_name_pin(pin, to)] = square * number
+    converted = {to.pin(pin): square * number for pin, number in effect.rows}
     return type(effect).at(**converted)
 
 
@@ -448,10 +423,12 @@ def _convert_pin_friction(
     to: _SceneConversion,
     linkage: FourBar,
 ) -> PinFriction:
-    pins = []
-    for pin, coefficient, radius in effect.pins:
-        pins.append((_name_pin(pin, to), coefficient, to.length * radius))
-    return PinFriction(tuple(pins))
+    return PinFriction(
+        tuple(
+            (to.pin(pin), coefficient, to.length * radius)
+            for pin, coefficient, radius in effect.pins
+        )
+    )
 
 
 def _convert_springs(
@@ -467,7 +444,7 @@ def _convert_springs(
                 end=to.place(spring.end, linkage),
                 length=to.length * spring.length,
                 preload=to.length * spring.preload,
-                stroke=(None if spring.stroke is None else to.length * spring.stroke),
+                stroke=None if spring.stroke is None else to.length * spring.stroke,
             )
             for spring in effect.springs
         )
@@ -493,7 +470,7 @@ def _convert_torsion(
             line = -math.pi
         rows.append(
             (
-                _name_pin(pin, to),
+                to.pin(pin),
                 square * stiffness,
                 sense * rest + line,
                 square * sense * preload,
@@ -507,15 +484,8 @@ def _convert_flywheel(
     to: _SceneConversion,
     linkage: FourBar,
 ) -> Flywheel:
-    if to.exchanged:
-        bar = _OTHER_BAR[effect.bar]
-    else:
-        bar = effect.bar
-    return Flywheel(to.length * to.length * effect.inertia, bar)
-
-
-def _name_pin(pin: str, to: _SceneConversion) -> str:
-    return OTHER_PIN[pin] if to.exchanged else pin
+    inertia = to.length * to.length * effect.inertia
+    return Flywheel(inertia, to.number(effect.bar))
 
 
 _CONVERTED: dict[type[Effect], Callable[[Any, _SceneConversion, FourBar], Any]] = {
@@ -752,8 +722,8 @@ def _measure_sum(
     What a bare scene has, if there is one, is taken off.
     """
     names = few.quantities[few.forces]
-    solved = [few.solve_forces(part) for part in parts]
-    none = None if bare is None else few.solve_forces(bare)
+    solved = [few.solve(part) for part in parts]
+    none = None if bare is None else few.solve(bare)
     totals = []
     summed = []
     for name in names:
