@@ -329,7 +329,7 @@ PROCESSES = [
     ("fourbar_lab", "fuzz-files --count 1", HOLDS),
     ("fourbar_lab", "write --no-such-option", BAD_INPUT),
     ("validation", "published --no-such-option", BAD_INPUT),
-    ("fourbar_lab", "mutants --most -1", BAD_INPUT),
+    ("fourbar_lab", "mutants --module nobody", BAD_INPUT),
     ("fourbar_lab", "fuzz --scenes 0", BAD_INPUT),
     ("fourbar_lab", "faults --workers 0", BAD_INPUT),
     ("fourbar_lab", "stability --samples 0", BAD_INPUT),

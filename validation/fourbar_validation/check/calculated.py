@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.errors import FourBarError
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array, ComplexArray
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -492,34 +491,6 @@ class Calculation:
                 yield Change(f"the weight of bar {bar} is missing", less)
         for name, text, wrenches in self._list_bar_mistakes():
             yield Change(f"{name}: {text}", wrenches)
-        yield from self._exchange_bars()
-
-    def _exchange_bars(self) -> Iterator[Change]:
-        """Give a bar the mass of another one; exchange mass and inertia of two."""
-        bodies = {bar: self.motion.linkage.bar(bar) for bar in MOVING_BARS}
-        for bar, other in permutations(MOVING_BARS, 2):
-            names = BAR_NAMES[bar], BAR_NAMES[other]
-            of_mass = self._give_mass(bar, bodies[other])
-            yield Change(f"{names[0]}: mass of the {names[1]}", of_mass)
-            if bar < other:
-                both = of_mass.plus(self._give_mass(other, bodies[bar]))
-                less = find_inertia(bodies[other]) - find_inertia(bodies[bar])
-                both.couple(bar, -less * self.motion.alpha[bar])
-                both.couple(other, less * self.motion.alpha[other])
-                text = f"{names[0]} and {names[1]}: mass and inertia are exchanged"
-                yield Change(text, both)
-
-    def _give_mass(self, bar: int, body: Bar) -> BodyWrenches:
-        """Return what acts besides on a bar of another one's mass."""
-        mass = find_mass(self.motion.linkage.bar(bar))
-        more = find_mass(body) - mass
-        wrenches = self.none()
-        a_G = join(getattr(self.right, f"a_G{bar}"))
-        to_centre = self.motion.to_centre(bar)
-        wrenches.push(bar, -more * a_G, to_centre)
-        if mass:
-            wrenches.push(bar, more / mass * self.weights[bar], to_centre)
-        return wrenches
 
     def list_factors(self) -> Iterator[tuple[str, BodyWrenches]]:
         """List what may have a factor, with what it lets act on the bars."""

@@ -6,6 +6,7 @@ The numbers that each would make are held against the table.
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
@@ -180,6 +181,7 @@ def _difference(
 def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
     """List the problems that differ by numbers of the scene, or by the command."""
     yield from _list_other_commands(command)
+    yield from _exchange_bars(scene)
     yield from _move_centres(scene)
 
 
@@ -229,6 +231,23 @@ def _shift_by_half(values: Any, step: int) -> Any:
     ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
     extended = np.concatenate((ends[0], values, ends[1]))
     return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
+
+
+def _exchange_bars(scene: Scene) -> Iterator[Variant]:
+    """Give a bar the mass of another one; exchange mass and inertia of two."""
+    moving = list_moving(scene)
+    for (name, _), (other, second) in permutations(moving, 2):
+        mass = {f"bars.{name}.mass": second.mass}
+        yield Variant(f"{name}: mass of the {other}", mass)
+    for (name, bar), (other, second) in combinations(moving, 2):
+        exchanged = {
+            f"bars.{name}.mass": second.mass,
+            f"bars.{other}.mass": bar.mass,
+            f"bars.{name}.inertia": second.moment_of_inertia,
+            f"bars.{other}.inertia": bar.moment_of_inertia,
+        }
+        text = f"{name} and {other}: mass and inertia are exchanged"
+        yield Variant(text, exchanged)
 
 
 def _move_centres(scene: Scene) -> Iterator[Variant]:

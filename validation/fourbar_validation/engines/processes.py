@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import parent_process
@@ -147,7 +147,6 @@ class Ended(NamedTuple):
 def run_to_end(
     command: Sequence[object],
     *,
-    fine: Container[int] = (0,),
     folder: Path | None = None,
     seconds: float | None = None,
     variables: Mapping[str, str] | None = None,
@@ -177,7 +176,7 @@ def run_to_end(
     return Ended(
         done.stdout,
         done.stderr,
-        done.returncode not in fine,
+        done.returncode != 0,
         write_one_line(why),
     )
 

@@ -1,7 +1,6 @@
 """The hard cases: families of scenes that lie near singular positions.
 
-A family is a generator with named parameters and seeds, and one line on what must
-happen.
+A family is a generator, and one line on what must happen.
 """
 
 import math
@@ -186,15 +185,10 @@ def _list_both_sides(distances: tuple[float, ...]) -> Array:
     return np.array([*before, *reversed(towards)])
 
 
-def _approach_poles(
-    *,
-    bar: int,
-    distances: tuple[float, ...] = _POLE,
-    seeds: range = range(2),
-) -> Scenes:
+def _approach_poles(bar: int) -> Scenes:
     """Approach from both sides positions where the driven bar 3 or 4 stands still."""
-    offsets = _list_both_sides(distances)
-    for seed in seeds:
+    offsets = _list_both_sides(_POLE)
+    for seed in range(2):
         lengths = draw_lengths_of_type(TYPES_WITH_A_CRANK, seed)
         scene = dress(lengths, seed)
         if bar == 3:
@@ -206,14 +200,14 @@ def _approach_poles(
             yield f"{seed} {number}", near
 
 
-def _driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
+def _driven_output() -> Scenes:
     """Drive on bar 4 through a whole turn of the input.
 
     The turn leads across both positions where omega_4 = 0.
     """
-    for seed in seeds:
+    for seed in range(2):
         scene = dress(draw_lengths_of_type(TYPES_WITH_A_CRANK, seed), seed)
-        turn = Sweep(0.05, 0.05 + 2 * math.pi, steps)
+        turn = Sweep(0.05, 0.05 + 2 * math.pi, 180)
         for branch, name in BRANCH_NAMES.items():
             motion = Motion(turn, 3.0, 0.0, branch)
             yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
@@ -253,11 +247,7 @@ def sweep_change_point(*, steps: int = 145) -> Scenes:
             yield f"{kind} {name}", replace(scene, motion=motion)
 
 
-def _miss_grashof(
-    *,
-    gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12),
-    steps: int = 60,
-) -> Scenes:
+def _miss_grashof() -> Scenes:
     """Miss s + l = p + q by a hair on either side.
 
     The sweep passes close to where it would change.
@@ -265,11 +255,11 @@ def _miss_grashof(
     d = 0.4
     a = 0.1
     b = 0.25
-    for gap in gaps:
+    for gap in (1e-3, 1e-6, 1e-9, 1e-12):
         for sign in (1.0, -1.0):
             scene = dress((d, a, b, d + a - b + sign * gap))
             start = scene.linkage.ground_angle
-            sweep = Sweep(start, start + 2 * math.pi, steps)
+            sweep = Sweep(start, start + 2 * math.pi, 60)
             motion = scene.motion.replace(angle=sweep, acceleration=0.0)
             yield f"{sign * gap:+.0e}", replace(scene, motion=motion)
 
@@ -281,18 +271,18 @@ def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     return replace(scene, motion=motion)
 
 
-def _shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
+def _shorten_crank() -> Scenes:
     """Shorten the crank against the coupler, again and again."""
-    for k in exponents:
+    for k in range(-6, 0):
         crank = 0.25 * 10.0**k
         yield f"1e{k}", sweep_turn(dress((0.3, crank, 0.25, 0.22)))
 
 
-def _vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
+def _vary_mass_ratio() -> Scenes:
     """Make one bar heavier or lighter than the others by up to 1e6."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
-        for k in exponents:
+        for k in (-6, -3, 3, 6):
             times = 10.0**k
             inertia = bar.moment_of_inertia * times
             heavy = replace(bar, mass=bar.mass * times, inertia=inertia)
@@ -314,28 +304,28 @@ def _remove_inertia() -> Scenes:
     yield "all massless", replace_bars(base, **massless)
 
 
-def _move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
+def _move_centres_out() -> Scenes:
     """Put mass centres far outside the bar."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for name, bar in list_moving(base):
-        for k in times:
+        for k in (3.0, 100.0, 1e4):
             far = replace(bar, centre=(k * bar.length, 2.0))
             yield f"{name} {k:g}", replace_bars(base, **{name: far})
 
 
-def _scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
+def _scale_sizes() -> Scenes:
     """Scale the same shape from micrometres to a thousand kilometres."""
-    for k in exponents:
+    for k in range(-6, 7, 2):
         size = 10.0**k
         d, a, b, c = ORDINARY_LENGTHS
         lengths = (d * size, a * size, b * size, c * size)
         yield f"1e{k:+d} m", sweep_turn(dress(lengths))
 
 
-def _scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
+def _scale_speeds() -> Scenes:
     """Vary omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
-    for k in exponents:
+    for k in (-6, -3, 0, 3, 6):
         for sign, name in ((1.0, "+"), (-1.0, "-")):
             motion = base.motion.replace(speed=sign * 10.0**k)
             yield f"{name}1e{k:+d}", replace(base, motion=motion)
@@ -356,27 +346,22 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
         yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
 
 
-def _sweep_out_and_back(
-    *,
-    beyond: float = 0.5,
-    steps: int = 40,
-    seeds: range = range(2),
-) -> Scenes:
+def _sweep_out_and_back() -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
-    for seed in seeds:
+    for seed in range(2):
         lengths = draw_lengths_of_type(TYPES_WITH_A_ROCKER, seed)
         scene = dress(lengths, seed)
         (psi, stretched), *_ = find_collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
         inside = psi - outward * 0.6
-        outside = psi + outward * beyond
-        out = np.linspace(inside, outside, steps)
+        outside = psi + outward * 0.5
+        out = np.linspace(inside, outside, 40)
         angles = [*out, *out[::-1]]
         for branch, name in BRANCH_NAMES.items():
             yield f"{seed} {name}", set_angles(scene, angles, branch)
 
 
-def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
+def _drive_thesis_to_limits() -> Scenes:
     """Drive the thesis's double rocker from one limit position to the other.
 
     Bars are 20, 48, 55 and 20 cm long.
@@ -390,7 +375,7 @@ def _drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
     )
     (psi, _), *_ = find_collinear_3_4(linkage.lengths)
     theta_1 = linkage.ground_angle
-    sweep = Sweep(theta_1 + psi, theta_1 + 2 * math.pi - psi, steps)
+    sweep = Sweep(theta_1 + psi, theta_1 + 2 * math.pi - psi, 120)
     for branch, name in BRANCH_NAMES.items():
         yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
 
@@ -430,8 +415,8 @@ HARD_FAMILIES = tuple(
     for name, scenes in {
         "toggle": toggle,
         "toggle-near": lambda: toggle(distances=NEAR_DISTANCES),
-        "pole-T3": lambda: _approach_poles(bar=3),
-        "pole-T4": lambda: _approach_poles(bar=4),
+        "pole-T3": lambda: _approach_poles(3),
+        "pole-T4": lambda: _approach_poles(4),
         "driven-output": _driven_output,
         "change-point": approach_change_point,
         "change-point-through": sweep_change_point,
