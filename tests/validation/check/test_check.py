@@ -274,14 +274,20 @@ def scaled(**factors):
     return partial(weigh, **factors)
 
 
-def steiner(sign):
-    """Move the axis of the moment of inertia from G to the first pin, or back."""
+def steiner(bar):
+    """Move the axis of the moment of inertia from G to the first pin."""
+    added = bar.mass * bar.mass_centre[0] ** 2
+    return replace(bar, inertia=bar.moment_of_inertia + added)
 
-    def move(bar):
-        added = sign * bar.mass * bar.mass_centre[0] ** 2
-        return replace(bar, inertia=bar.moment_of_inertia + added)
 
-    return move
+def opposite(planted):
+    """Take off what a mistake adds; no bar has so little inertia."""
+
+    def less(scene):
+        numbers, more = right(scene), planted(scene)
+        return {name: 2.0 * numbers[name] - more[name] for name in numbers}
+
+    return less
 
 
 def about_end(bar):
@@ -358,17 +364,30 @@ def differences(*at):
     return planted
 
 
+def exchange_bars(scene):
+    """Exchange mass and moment of inertia of input and output."""
+    linkage = scene.linkage
+    pairs = {"input": linkage.output, "output": linkage.input}
+    moving = {
+        name: replace(
+            getattr(linkage, name), mass=other.mass, inertia=other.moment_of_inertia
+        )
+        for name, other in pairs.items()
+    }
+    return replace(scene, linkage=replace(linkage, **moving))
+
+
 RPM = math.pi / 30.0
 OF_A_BAR = {
     "mass centre measured from the wrong pin": centred(lambda d, x, y: (d - x, y)),
     "mass centre taken at mid-bar": centred(lambda d, x, y: (d / 2.0, 0.0)),
     "mass centre turned by 180 deg": centred(lambda d, x, y: (-x, -y)),
     "mass centre on the other side of the bar's line": centred(lambda d, x, y: (x, -y)),
-    "inertia about the pin": steiner(1.0),
-    "inertia about G used as the inertia about the pin": steiner(-1.0),
+    "inertia about the pin": steiner,
     "mass left out": scaled(mass=0.0),
     "mass and moment of inertia left out": scaled(mass=0.0, inertia=0.0),
 }
+WHOSE = (("coupler", ("coupler",)), ("every bar", ()))
 LENGTHS = {
     "ground": 1.01,
     "input": 0.98,
@@ -460,7 +479,13 @@ IN_CRANK_ROCKER = {
     **{
         f"{who}: {text}": bars(change, *names)
         for text, change in OF_A_BAR.items()
-        for who, names in (("coupler", ("coupler",)), ("every bar", ()))
+        for who, names in WHOSE
+    },
+    **{
+        f"{who}: inertia about G used as the inertia about the pin": opposite(
+            bars(steiner, *names)
+        )
+        for who, names in WHOSE
     },
     "m L^2/3, of a slender bar about its end": bars(about_end),
     "output: moment of inertia 0.83 times ours": bars(scaled(inertia=0.83), "output"),
@@ -468,6 +493,8 @@ IN_CRANK_ROCKER = {
         scaled(mass=1.2, inertia=1.2), "coupler"
     ),
     "coupler: mass 1.2 times ours": bars(scaled(mass=1.2), "coupler"),
+    "coupler: mass of the output": bars(scaled(mass=0.8), "coupler"),
+    "input and output: mass and inertia are exchanged": solved(exchange_bars),
     "m a and I alpha in kg cm/s^2": inertial(100.0, 100.0),
     "m a in kg mm/s^2": inertial(1e3, 1.0),
     "d'Alembert": inertial(-1.0, -1.0),
