@@ -21,7 +21,6 @@ from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS, Array
-from fourbar.scene import Command
 from fourbar.show.plot.style import format_of
 from fourbar.solving import solve
 from fourbar_lab.contenders import (
@@ -40,9 +39,7 @@ from fourbar_lab.contenders import (
 from fourbar_lab.starts import measure_starts
 from fourbar_validation.cost.formulas import make_bodies
 from fourbar_validation.cost.study import time_call
-from fourbar_validation.engines.description import ON_BARS
-from fourbar_validation.engines.plain_loop import PlainLoop
-from fourbar_validation.engines.registry import ENGINES, Engine, Later
+from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.sentences import make_words_table
@@ -82,21 +79,6 @@ WITH_ERROR_BARS = "solve with error bars"
 ONE_POSITION = "one position to forces"
 JUDGED_SCENE = "a scene judged by the exact engines"
 _JUDGED_BY_POSITION = "a judged scene / one position"
-_ASKED = 200
-"""Positions that an adapter and a plain loop answer."""
-
-
-_PLAIN_LOOPS = {
-    "Pinocchio": (
-        "pinocchio-inverse",
-        Later("fourbar_validation.engines.pinocchio_plain_loop:PinocchioLoop"),
-    ),
-    "MuJoCo": (
-        "mujoco-inverse",
-        Later("fourbar_validation.engines.mujoco.plain_loop:MujocoInverseLoop"),
-    ),
-}
-"""Engine, and what makes its plain loop, by its library."""
 
 
 class _SpeedLimit(NamedTuple):
@@ -190,14 +172,6 @@ SPEED_LIMITS = {
         170.0,
         "17 ms where a position takes 0.1 ms: a million scenes a night on one core",
     ),
-    **{
-        f"{library}'s adapter / a plain loop": _SpeedLimit(
-            "<=",
-            2.0,
-            "sure assembly and rows by name cost no more than the engine's own calls",
-        )
-        for library in _PLAIN_LOOPS
-    },
     "import fourbar / import numpy": _SpeedLimit(
         "<=",
         1.0,
@@ -450,7 +424,6 @@ def measure_speed(
         seconds, ratio = _time_judging(exact, scenes, single)
         rows[JUDGED_SCENE] = 1e9 * seconds
         rows[_JUDGED_BY_POSITION] = ratio
-        rows |= _compare_adapters(rounds)
     rows |= {
         name: rows[row.of] / rows[row.over]
         for name, row in SPEED_LIMITS.items()
@@ -466,59 +439,6 @@ def measure_speed(
         **measure_starts(),
     }
     return Measured(rows, by_positions, by_linkages, peers.not_run)
-
-
-def _compare_adapters(rounds: int) -> dict[str, float]:
-    """Return the time of each adapter over that of a plain loop of the same library.
-
-    Adapter and loop read the same quantities.
-    """
-    scene = make_example()
-    command = command_positions(_ASKED)
-    adapters = {engine.name: engine for engine in ENGINES}
-    actions: dict[str, Callable[[], object]] = {}
-    for library, (name, make_loop) in _PLAIN_LOOPS.items():
-        adapter = adapters[name].start()
-        actions[f"{library}'s adapter"] = partial(adapter.answer, scene, command)
-        actions[library] = partial(_read_plainly, make_loop(scene), command)
-    times = time_interleaved(actions, rounds)
-    return {
-        f"{library}'s adapter / a plain loop": (
-            times[f"{library}'s adapter"] / times[library]
-        )
-        for library in _PLAIN_LOOPS
-    }
-
-
-def _read_plainly(loop: PlainLoop, command: Command) -> list[object]:
-    """Run a plain loop, and return what is read of its library at each position.
-
-    Read are places, angles, speeds and accelerations, as the adapter reads them.
-    """
-    tree = loop.tree
-    inverse = loop.inverse
-    answered: list[object] = []
-
-    def inverse_and_read(q: Array, v: Array, a: Array) -> list[float]:
-        torques = inverse(q, v, a)
-        tree.moving(v, a)
-        answered.append(
-            (
-                tree.positions(),
-                [tree.angle(bar) for bar in (3, 4)],
-                (tree.rows @ v).tolist(),
-                (tree.rows @ a).tolist(),
-                tree.accelerations(ON_BARS.values()),
-            )
-        )
-        return torques
-
-    loop.inverse = inverse_and_read  # type: ignore[method-assign]
-    try:
-        loop.answer(command)
-    finally:
-        loop.inverse = inverse  # type: ignore[method-assign]
-    return answered
 
 
 def _time_judging(

@@ -7,7 +7,7 @@ setting and quantity; both files are written as the tasks are read.
 import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import fields
 from pathlib import Path
@@ -102,11 +102,12 @@ class ResultsWriter:
         """Keep rows until there are enough for a row group."""
         import pyarrow as pa
 
-        by_column = {
-            name: [number_or_null(getattr(row, name)) for row in rows]
-            for name in RESULT_COLUMNS
-        }
-        self._waiting.append(pa.table(by_column, schema=self._schema))
+        # NaN is no number: as null no greatest error is NaN by it
+        columns = [
+            pa.array([getattr(row, name) for row in rows], kind, from_pandas=True)
+            for name, kind in zip(RESULT_COLUMNS, self._schema.types, strict=True)
+        ]
+        self._waiting.append(pa.table(columns, schema=self._schema))
         self._rows_waiting += len(rows)
 
     def _write_group(self) -> None:
@@ -133,16 +134,6 @@ class ResultsWriter:
             (self.out / "results.csv").unlink(missing_ok=True)
 
 
-def number_or_null(value: object) -> object:
-    """Give a missing number as null.
-
-    No greatest error is NaN by it, and every reader takes it for none.
-    """
-    if isinstance(value, float) and math.isnan(value):
-        return None
-    return value
-
-
 def read_columns(path: Path) -> Iterator[Row]:
     """Read the rows of a results.parquet or results.csv, some thousands at a time."""
     for columns in _read_cells(path):
@@ -165,7 +156,7 @@ def _read_cells(path: Path) -> Iterator[list[list[Any]]]:
 
     Words that recur are kept once.
     """
-    for batch in _read_batches(path, list(COLUMN_TYPES)):
+    for batch in _read_batches(path, COLUMN_TYPES):
         words: dict[str, str] = {}
         yield [
             (
@@ -186,44 +177,29 @@ def count_rows(path: Path) -> int:
     return sum(len(column) for (column,) in _read_batches(path, ["scene"]))
 
 
-def _read_batches(path: Path, columns: list[str]) -> Iterator[list[Any]]:
+def _read_batches(path: Path, columns: Iterable[str]) -> Iterator[list[Any]]:
     """Read columns of Arrow, some thousands of rows at a time.
 
     Texts are columns of indices and words, as a word may be long and recur.
     """
-    with ExitStack() as files:
-        if path.suffix == ".parquet":
-            batches = _read_parquet
-        else:
-            batches = _open_csv
-        for batch in batches(path, columns, files):
-            yield [batch.column(name) for name in columns]
-
-
-def _read_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
-    import pyarrow.parquet as pq
-
-    texts = [name for name in columns if COLUMN_TYPES[name] is not float]
-    table = files.enter_context(pq.ParquetFile(path, read_dictionary=texts))
-    return table.iter_batches(BATCH_ROWS, columns=columns)
-
-
-def _open_csv(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow as pa
+    import pyarrow.parquet as pq
     from pyarrow import csv
 
-    word = pa.dictionary(pa.int32(), pa.string())
-    kinds = {
-        name: pa.float64() if COLUMN_TYPES[name] is float else word for name in columns
-    }
-    wanted = csv.ConvertOptions(column_types=kinds, include_columns=columns)
-    return files.enter_context(
-        csv.open_csv(
-            path,
-            parse_options=csv.ParseOptions(newlines_in_values=True),
-            convert_options=wanted,
-        )
-    )
+    names = list(columns)
+    texts = [name for name in names if COLUMN_TYPES[name] is not float]
+    with ExitStack() as files:
+        if path.suffix == ".parquet":
+            table = files.enter_context(pq.ParquetFile(path, read_dictionary=texts))
+            batches = table.iter_batches(BATCH_ROWS, columns=names)
+        else:
+            word = pa.dictionary(pa.int32(), pa.string())
+            kinds = {name: word if name in texts else pa.float64() for name in names}
+            wanted = csv.ConvertOptions(column_types=kinds, include_columns=names)
+            lines = csv.ParseOptions(newlines_in_values=True)
+            batches = files.enter_context(csv.open_csv(path, None, lines, wanted))
+        for batch in batches:
+            yield [batch.column(name) for name in names]
 
 
 def _read_words(column: Any, words: dict[str, str]) -> list[str]:
