@@ -49,12 +49,14 @@ def test_the_gap_is_that_of_the_stated_pose():
 
 
 def test_a_pose_is_read_from_pairs():
-    options = read_pose(("knee=20deg, hip=1rad", "slide=3mm"), "home", ("a,b",), "c")
+    pose = ("knee=20deg, hip=1rad", "slide=3mm")
+    stated = {"pose": pose, "key": "home", "hold": ("a,b",), "drive": "c"}
+    options = read_pose(stated)
     assert options.joints == {"knee": "20deg", "hip": "1rad", "slide": "3mm"}
     assert options.held == ("a", "b")
     assert (options.key, options.drive) == ("home", "c")
     with pytest.raises(InputError, match="must be like JOINT=20deg"):
-        read_pose(("knee",), None, (), None)
+        read_pose({**stated, "pose": ("knee",)})
 
 
 @pytest.mark.slow

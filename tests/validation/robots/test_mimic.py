@@ -187,10 +187,10 @@ def test_each_error_stands_with_its_name(
 @pytest.mark.slow
 def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path):
     best = measure_mimic(write(tmp_path), "s", KNEE).fitted[2]
-    polycoef = " ".join(f"{number!r}" for number in (*best.coefficients, 0.0))
+    polycoef = " ".join(f"{number!r}" for number in best.coefficients)
     again = measure_mimic(write(tmp_path, polycoef), "s", KNEE)
     assert again.file.angle == pytest.approx(best.angle, rel=1e-9)
-    opposite = " ".join(f"{-number!r}" for number in (*best.coefficients, 0.0))
+    opposite = " ".join(f"{-number!r}" for number in best.coefficients)
     turned = measure_mimic(write(tmp_path, opposite, axis=-1), "s", KNEE)
     assert turned.file.angle == pytest.approx(best.angle, rel=1e-9)
 
@@ -219,7 +219,7 @@ def test_least_squares_are_the_normal_equations():
     y = np.exp(x)
     powers = np.vander(x, 4, increasing=True)
     right = np.linalg.solve(powers.T @ powers, powers.T @ y)
-    np.testing.assert_allclose(fit_squares(x, y, 3), right, rtol=1e-10)
+    np.testing.assert_allclose(fit_squares(x, y, 3), [*right, 0.0], rtol=1e-10)
 
 
 def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):

@@ -6,6 +6,7 @@ A scene is made from one of them.
 import math
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import click
 
@@ -116,20 +117,17 @@ def _write_scene(made: LoopScene) -> str:
 )
 def robot_command(
     robot: Path,
-    pose: tuple[str, ...],
-    key: str | None,
-    hold: tuple[str, ...],
-    drive: str | None,
     assets: Path | None,
     loop: str | None,
     speed: str | None,
     out: Path | None,
+    **pose: Any,
 ) -> None:
     """List the closed loops of a robot's MJCF or SDF.
 
     The command says which loops are planar four-bars.
     """
-    options = read_pose(pose, key, hold, drive)
+    options = read_pose(pose)
     omega = read_number("--speed", speed, "rad/s")
     if out is None and speed is not None:
         raise click.UsageError("--speed goes with -o: it is that of the scene")

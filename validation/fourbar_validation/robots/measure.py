@@ -240,7 +240,7 @@ def read_measure_options(
             "must be a relative error, above 0 and below 1",
         )
     return MeasureOptions(
-        read_pose(robot["pose"], robot["key"], robot["hold"], robot["drive"]),
+        read_pose(robot),
         loop,
         read_number("--speed", robot["speed"], "rad/s"),
         read_number("--torque", robot.get("torque"), "N m"),

@@ -42,7 +42,7 @@ class _MimicError:
     """Largest errors of a polynomial over the motion."""
 
     coefficients: tuple[float, ...]
-    """a0, a1, ... of the leader counted from its zero, lowest power first."""
+    """a0 to a4 of the leader counted from its zero."""
     angle: float
     """rad."""
     ratio: float
@@ -199,9 +199,14 @@ def fit_squares(
     y: Array,
     degree: int,
 ) -> tuple[float, ...]:
-    """Fit a polynomial by least squares, lowest power first."""
-    power = np.polynomial.Polynomial.fit(x, y, degree).convert().coef
-    return tuple(np.pad(power, (0, degree + 1 - len(power))).tolist())
+    """Fit a polynomial by least squares."""
+    return _list_powers(np.polynomial.Polynomial.fit(x, y, degree).convert())
+
+
+def _list_powers(polynomial: np.polynomial.Polynomial) -> tuple[float, ...]:
+    """Return the coefficients of polycoef, (5,), lowest power first."""
+    missing = max(POLYNOMIAL_DEGREES) + 1 - len(polynomial.coef)
+    return tuple(np.pad(polynomial.coef, (0, missing)).tolist())
 
 
 def fit_minimax(
@@ -209,7 +214,7 @@ def fit_minimax(
     y: Array,
     degree: int,
 ) -> tuple[float, ...]:
-    """Fit a polynomial with the smallest largest error, lowest power first.
+    """Fit a polynomial with the smallest largest error.
 
     minimize t subject to |p(x_i) - y_i| <= t, a linear program in the coefficients of
     Chebyshev's polynomials.
@@ -241,11 +246,7 @@ def fit_minimax(
         method="highs",
     )
     fitted = np.polynomial.Chebyshev(size * best.x[:-1], domain=(low, high))
-    power = fitted.convert(kind=np.polynomial.Polynomial).coef
-    coefficients = np.zeros(degree + 1)
-    coefficients[: len(power)] = power
-    coefficients[0] += middle
-    return tuple(coefficients.tolist())
+    return _list_powers(fitted.convert(kind=np.polynomial.Polynomial) + middle)
 
 
 def show_mimic(report: _MimicReport) -> None:
@@ -273,8 +274,7 @@ def show_mimic(report: _MimicReport) -> None:
         strict=True,
     ):
         for fit, error in zip(_FITS, errors, strict=True):
-            missing = max(POLYNOMIAL_DEGREES) - degree
-            polycoef = _write_coefficients((*error.coefficients, *[0.0] * missing))
+            polycoef = _write_coefficients(error.coefficients)
             ratio = f"{error.ratio:.4g}"
             click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio))
             click.echo(f"{'':8}polycoef {polycoef}")

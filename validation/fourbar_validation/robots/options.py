@@ -1,6 +1,6 @@
 """Options that the commands about a robot's file have in common."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -87,30 +87,21 @@ torque_option = click.option(
 )
 
 
-def read_pose(
-    pose: tuple[str, ...],
-    key: str | None,
-    hold: tuple[str, ...],
-    drive: str | None,
-) -> PoseOptions:
-    """Read the values of `pose_options`.
+def read_pose(robot: Mapping[str, Any]) -> PoseOptions:
+    """Read the values of `pose_options`, by their names.
 
     Raises
     ------
     InputError : an entry of --pose that is no JOINT=ANGLE.
     """
     joints = {}
-    for entry in _split_at_commas(pose):
+    for entry in _split_at_commas(robot["pose"]):
         joint, equals, position = entry.partition("=")
         if not equals or not joint or not position:
             raise InputError("--pose", entry, "must be like JOINT=20deg")
         joints[joint.strip()] = position.strip()
-    return PoseOptions(
-        joints,
-        key,
-        tuple(_split_at_commas(hold)),
-        drive,
-    )
+    held = tuple(_split_at_commas(robot["hold"]))
+    return PoseOptions(joints, robot["key"], held, robot["drive"])
 
 
 def read_number(option: str, text: str | None, unit: str) -> float | None:

@@ -96,25 +96,20 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
     them follow the other. Of two tendons over a joint each the first one follows.
     """
     kind = mujoco.mjtEq(int(model.eq_type[equality]))
-    first = int(model.eq_obj1id[equality])
-    second = int(model.eq_obj2id[equality])
+    tied = (int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]))
     powers = model.eq_data[equality, :5].tolist()
-    if kind == mujoco.mjtEq.mjEQ_JOINT and second >= 0:
-        return [Follower(first, second, tuple(powers))]
-    if kind != mujoco.mjtEq.mjEQ_TENDON:
+    if kind == mujoco.mjtEq.mjEQ_JOINT:
+        ends, leaders = ({joint: 1.0} if joint >= 0 else {} for joint in tied)
+    elif kind == mujoco.mjtEq.mjEQ_TENDON:
+        ends, leaders = (list_tendon_joints(model, one) for one in tied)
+    else:
         return []
-    ends = list_tendon_joints(model, first)
-    if second < 0:
-        if len(ends) != 2 or not all(ends.values()):
-            return []
+    if tied[1] < 0 and len(ends) == 2 and all(ends.values()):
         pairs = zip(ends.items(), reversed(ends.items()), strict=True)
         return [
-            Follower(
-                joint, leader, (powers[0] / factor, -other / factor, 0.0, 0.0, 0.0)
-            )
+            Follower(joint, leader, (powers[0] / factor, -other / factor, 0, 0, 0))
             for (joint, factor), (leader, other) in pairs
         ]
-    leaders = list_tendon_joints(model, second)
     if len(ends) != 1 or len(leaders) != 1:
         return []
     ((joint, factor),) = ends.items()
@@ -126,7 +121,12 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
 
 
 def list_tendon_joints(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
-    """Return the coefficient of each joint of a fixed tendon; none of a spatial one."""
+    """Return the coefficient of each joint of a fixed tendon; none of a spatial one.
+
+    A tendon below 0 is none.
+    """
+    if tendon < 0:
+        return {}
     start = int(model.tendon_adr[tendon])
     wraps = range(start, start + int(model.tendon_num[tendon]))
     return {

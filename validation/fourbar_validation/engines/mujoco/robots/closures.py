@@ -297,11 +297,9 @@ class _Finder:
             return found
         ends = find_ends(self.model, self.data, number)
         gap: float | None = None
-        left: float | None = None
         if self._is_pin(number):
             normal = self.normals.get(number)
             gap = _measure_gap(find_ends(self.model, self.before, number), normal)
-            left = _measure_gap(ends, normal)
         chain = _Chain(self, ends[0].body, ends[1].body)
         loop, reason = self._recognise(number, name, chain)
         return replace(
@@ -316,7 +314,6 @@ class _Finder:
             ),
             misaligned=self._measure_axes(chain)[0],
             gap=gap,
-            left=left,
         )
 
     def _name(self, number: int) -> str:
@@ -723,7 +720,6 @@ class _Finder:
             stated_angles=(),
             qpos=self.data.qpos.copy(),
             held=tuple(j for j in range(self.model.njnt) if j not in moving),
-            motors=tuple(dict.fromkeys(actuator for _, actuator in motors)),
             other_equalities=(),
         )
         frame = LoopFrame(loop, self.data)

@@ -100,8 +100,6 @@ class RobotLoop:
     """Joint positions of the whole model in the pose, (nq,)."""
     held: tuple[int, ...]
     """Joints of the model that are no pin of this loop and stay where they are."""
-    motors: tuple[int, ...]
-    """Actuators that act on the loop's hinges."""
     other_equalities: tuple[int, ...]
     """Active equalities that act on its moving bars and are no closure of it."""
     remarks: tuple[str, ...] = ()
@@ -202,8 +200,6 @@ class RobotClosure:
     """Largest angle between two of its hinges' axes, rad; None: fewer than two."""
     gap: float | None = None
     """Distance of the two ends in the pose as stated, m; None where it has no ends."""
-    left: float | None = None
-    """The same after the loops were closed, m."""
     solref: tuple[float, ...] = ()
     solimp: tuple[float, ...] = ()
 
