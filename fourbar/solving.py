@@ -106,27 +106,26 @@ def solve(
     of_release: dict[str, Any] = {}
     if at is not None:
         _require_command_at(at)
-        commanded = at
     elif scene.motion.free is not None:
         from fourbar.evaluation.free_motion import release
 
         released = release(scene)
-        commanded = released.command
+        at = released.command
         of_release["change_points"] = released.change_points
         of_release["with_extremes"] = released.with_extremes
         of_release["command_at"] = released.command_at
     else:
-        commanded = command(scene)
-    request = SolveRequest.of(scene, commanded, stage, out)
+        at = command(scene)
+    request = SolveRequest.of(scene, at, stage, out)
     with np.errstate(all="ignore"):
-        if isinstance(commanded.origin, ReleaseOrigin):
-            results = _solve_released(scene, commanded.origin, request)
+        if isinstance(at.origin, ReleaseOrigin):
+            results = _solve_released(scene, at.origin, request)
         else:
-            case = _make_case(scene, commanded, request, side)
-            results = _solve_alone(case, commanded, request) or _solve_blocks(
-                case, commanded, request
+            case = _make_case(scene, at, request, side)
+            results = _solve_alone(case, at, request) or _solve_blocks(
+                case, at, request
             )
-    return make_solution(scene, commanded, results, solved=scene, **of_release)
+    return make_solution(scene, at, results, solved=scene, **of_release)
 
 
 class SolveRequest(NamedTuple):
@@ -145,7 +144,7 @@ class SolveRequest(NamedTuple):
     def of(
         cls,
         scene: Scene,
-        commanded: Command,
+        at: Command,
         stage: str | None,
         out: Mapping[str, Array] | None,
     ) -> Self:
@@ -154,11 +153,11 @@ class SolveRequest(NamedTuple):
         If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is
         the branch, are evaluated too.
         """
-        shape = commanded.angle.shape
+        shape = at.angle.shape
         points = tuple(point.name for point in scene.points)
         if out is None:
             if stage is None:
-                stage = "position" if commanded.speed is None else "force"
+                stage = "position" if at.speed is None else "force"
             if not isinstance(stage, str) or stage not in STAGES:
                 raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
             last_stage = STAGES.index(stage)
@@ -171,13 +170,13 @@ class SolveRequest(NamedTuple):
             wanted = out.keys()
             needed = {STAGES.index(stages[name]) for name in out}
             last_stage = max(needed, default=0)
-        if last_stage > 0 and commanded.speed is None:
+        if last_stage > 0 and at.speed is None:
             raise InputError(
-                f"motion.omega_{commanded.bar}",
+                f"motion.omega_{at.bar}",
                 None,
                 f"is needed for the stage {STAGES[last_stage]!r}",
             )
-        if commanded.bar != 2:
+        if at.bar != 2:
             wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
         return cls(shape, last_stage, wanted, out or {})
 
@@ -255,21 +254,19 @@ def _may_sign_differ(case: Case) -> bool:
 
 def _make_case(
     scene: Scene,
-    commanded: Command,
+    at: Command,
     request: SolveRequest,
     side: int,
 ) -> Case:
     """Make the case of one linkage, with effects that count turns from its start."""
-    case = Case.of(scene, commanded.bar, side)
+    case = Case.of(scene, at.bar, side)
     if not request.asks_forces or not scene.counts_turns:
         return case
     stated = command(scene)
-    return case.begin_with(stated if stated.bar == commanded.bar else commanded)
+    return case.begin_with(stated if stated.bar == at.bar else at)
 
 
-def _solve_alone(
-    case: Case, commanded: Command, request: SolveRequest
-) -> Results | None:
+def _solve_alone(case: Case, at: Command, request: SolveRequest) -> Results | None:
     """Solve a single position in plain numbers.
 
     Arrays of one entry cost several times as much. None for several positions, and
@@ -279,8 +276,8 @@ def _solve_alone(
     if request.shape != (1,) or request.out:
         return None
     # Python's own numbers halve a formula's time
-    angle: Any = commanded.angle.item()
-    position = commanded.part((0,))._replace(angle=angle)
+    angle: Any = at.angle.item()
+    position = at.part((0,))._replace(angle=angle)
     try:
         codes, values, _ = evaluate(case, position, request.last_stage, request.wanted)
     except ArithmeticError:
@@ -299,12 +296,12 @@ def _solve_alone(
     return results
 
 
-def _solve_blocks(case: Case, commanded: Command, request: SolveRequest) -> Results:
+def _solve_blocks(case: Case, at: Command, request: SolveRequest) -> Results:
     """Solve the positions of one linkage block by block."""
     results = Results(request)
     evaluated = None
-    for rows in split(len(commanded.angle), request.block):
-        block = commanded.part(rows)
+    for rows in split(len(at.angle), request.block):
+        block = at.part(rows)
         # kept until the next block is evaluated, so that its memory is used again
         evaluated = evaluate(case, block, request.last_stage, request.wanted)
         results.store(case, evaluated, (rows,))
@@ -318,11 +315,11 @@ def _solve_released(
 ) -> Results:
     """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
     results = Results(request)
-    for index, commanded, side in released.commands():
-        case = Case.of_released(scene, commanded.bar, side)
+    for index, at, side in released.commands():
+        case = Case.of_released(scene, at.bar, side)
         evaluated = evaluate_released(
             case,
-            commanded,
+            at,
             scene.drive,
             request.last_stage,
             request.wanted,
@@ -349,12 +346,12 @@ def _require_study(study: object, at: Command | None) -> ManyScenes:
     return study
 
 
-def _require_command_at(commanded: Command) -> None:
+def _require_command_at(at: Command) -> None:
     """Raise an InputError unless a command is well formed."""
-    expect("at", commanded, Command)
-    require_bar("at.bar", commanded.bar)
-    theta, omega, alpha = COMMAND_NAMES[commanded.bar]
-    angle, branch, speed, acceleration, _, time, origin = commanded
+    expect("at", at, Command)
+    require_bar("at.bar", at.bar)
+    theta, omega, alpha = COMMAND_NAMES[at.bar]
+    angle, branch, speed, acceleration, _, time, origin = at
     expect(f"at.{theta}", angle, np.ndarray)
     n = angle.size
     expect("at.origin", origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
@@ -421,7 +418,7 @@ def _list_evaluated(
 
 def make_solution(
     scene: Scene,
-    commanded: Command,
+    at: Command,
     results: Results,
     *,
     solved: Scene | None = None,
@@ -437,10 +434,10 @@ def make_solution(
     """
     codes = results.codes
     quantities_by_name = results.arrays
-    _unwrap_angles(quantities_by_name, commanded.bar)
-    if commanded.moves_stroke:
+    _unwrap_angles(quantities_by_name, at.bar)
+    if at.moves_stroke:
         # as commanded, wherever it has a value
-        for name, value in zip(commanded.names[:2], commanded.stated, strict=False):
+        for name, value in zip(at.names[:2], at.stated, strict=False):
             if name in quantities_by_name:
                 stroke = quantities_by_name[name]
                 stroke[...] = value + 0.0 * stroke
@@ -455,24 +452,24 @@ def make_solution(
         quantities = {
             name: array for name, array in quantities_by_name.items() if name in UNITS
         }
-    theta_2 = commanded.angle
-    if commanded.moves_stroke:
-        theta_2 = _turn_first(theta_2, commanded, quantities_by_name)
-    if commanded.bar != 2:
+    theta_2 = at.angle
+    if at.moves_stroke:
+        theta_2 = _turn_first(theta_2, at, quantities_by_name)
+    if at.bar != 2:
         theta_2 = quantities["theta_2"]
         quantities = {
             name: array for name, array in quantities.items() if name != "theta_2"
         }
-    branch = commanded.branch
+    branch = at.branch
     if results.sign_may_differ:
-        branch = _read_signs(scene, commanded, quantities.get("sin_mu"))
+        branch = _read_signs(scene, at, quantities.get("sin_mu"))
     return Solution.of(
         title=scene.title,
         drive_bar=scene.drive_bar,
         status_code=codes,
         branch=np.array(branch, dtype=np.int8),
         theta_2=theta_2,
-        time=commanded.time,
+        time=at.time,
         **quantities,
         points=of_points[""],
         velocity=of_points["v_"],
@@ -483,20 +480,20 @@ def make_solution(
         lengths=scene.linkage.lengths,
         drive=scene.settled_drive(),
         **of_release,
-        at=commanded,
+        at=at,
     )
 
 
-def _read_signs(scene: Scene, commanded: Command, sine: Array | None) -> Any:
+def _read_signs(scene: Scene, at: Command, sine: Array | None) -> Any:
     """Return the sign of sin(theta_4 - theta_3) at each position.
 
     The branch replaces the sign where the sine is zero or NaN. `sine`: None if it was
     not evaluated.
     """
     if sine is None:
-        angle, branch, *_ = commanded
-        return find_signs(scene.linkage, angle, branch, commanded.bar)
-    return np.where(np.abs(sine) > 0.0, np.sign(sine), commanded.branch)
+        angle, branch, *_ = at
+        return find_signs(scene.linkage, angle, branch, at.bar)
+    return np.where(np.abs(sine) > 0.0, np.sign(sine), at.branch)
 
 
 def _unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:

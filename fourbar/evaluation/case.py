@@ -220,7 +220,7 @@ class Case(NamedTuple):
 
     def assemble(
         self,
-        commanded: Command,
+        at: Command,
         half: HalfAngle,
         *,
         moving: bool = True,
@@ -230,20 +230,20 @@ class Case(NamedTuple):
         `moving`: False: positions only. Without a command, `compute_state` closes it.
         """
         path = self.path
-        q = commanded.angle
+        q = at.angle
         speed: Any = 0.0
         acceleration: Any = 0.0
-        branch = _condense_branch(commanded.branch)
+        branch = _condense_branch(at.branch)
         if moving:
-            acceleration = commanded.acceleration
-            if commanded.speed is not None:
-                speed = commanded.speed
+            acceleration = at.acceleration
+            if at.speed is not None:
+                speed = at.speed
             position, k, sine = path.close(
                 q,
                 half,
                 branch,
-                condition=commanded.condition,
-                margin=commanded.margin,
+                condition=at.condition,
+                margin=at.margin,
             )
         else:
             position = path.position(q, half, branch)
@@ -264,13 +264,13 @@ class Case(NamedTuple):
             path.passing,
         )
 
-    def at(self, commanded: Command, *, moving: bool = True) -> State:
+    def at(self, at: Command, *, moving: bool = True) -> State:
         """Compute the positions of a command, and their motion.
 
         `moving`: False: positions only.
         """
-        half, _ = self.half_angle(commanded)
-        return self.assemble(commanded, half, moving=moving)
+        half, _ = self.half_angle(at)
+        return self.assemble(at, half, moving=moving)
 
     @classmethod
     def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
@@ -303,9 +303,9 @@ class Case(NamedTuple):
         start = motion.part(int(np.argmax(assembled)))
         return self.begin_at(start._replace(speed=0.0, acceleration=0.0))
 
-    def half_angle(self, commanded: Command) -> tuple[HalfAngle, NDArray[np.intp]]:
+    def half_angle(self, at: Command) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those in many digits."""
-        q, remainder = commanded.angle, commanded.remainder
+        q, remainder = at.angle, at.remainder
         lengths = self.path.lengths
         half = self.path.half_angle(q)
         close: Any = remainder is not None
@@ -536,7 +536,7 @@ class _FreeBodies(NamedTuple):
         return actions.at_pins(pins)
 
 
-def compute_shown_state(scene: Scene, commanded: Command) -> State:
+def compute_shown_state(scene: Scene, at: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
-        return Case.of(scene, commanded.bar).at(commanded)
+        return Case.of(scene, at.bar).at(at)

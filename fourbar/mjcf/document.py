@@ -527,13 +527,13 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
 def find_start(scene: Scene) -> Start:
     """Find the start of the motion: the first position that assembles, as it moves."""
-    commanded = command(scene)
+    at = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
     solution = solve(
         scene,
         "velocity",
-        at=Command(commanded.theta_2, commanded.branch, speed, alpha),
+        at=Command(at.theta_2, at.branch, speed, alpha),
     )
     usable = np.flatnonzero(solution.status_code == OK)
     if not len(usable):
@@ -541,10 +541,10 @@ def find_start(scene: Scene) -> Start:
             "the linkage closes at none of the scene's positions: there is no keyframe"
             " to write"
         )
-    theta_2 = commanded.theta_2[usable]
+    theta_2 = at.theta_2[usable]
     first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
     theta = (
-        float(commanded.theta_2[first]),
+        float(at.theta_2[first]),
         float(solution.theta_3[first]),
         float(solution.theta_4[first]),
     )

@@ -744,14 +744,14 @@ def command_at(scene: Scene, places: Array) -> Command:
     return Command(angle, branch, speed, acceleration, bar, places)
 
 
-def with_signs(linkage: FourBar, commanded: Command) -> Command:
+def with_signs(linkage: FourBar, at: Command) -> Command:
     """Return a command as engines are told it, with signs in the place of assemblies.
 
     The sign is that of the bar's own sine at each position. It follows from the lengths
     and the angle alone. The function is its own inverse: of signs it makes assemblies.
     """
-    signs = find_signs(linkage, commanded.angle, commanded.branch, commanded.bar)
-    return commanded._replace(branch=signs)
+    signs = find_signs(linkage, at.angle, at.branch, at.bar)
+    return at._replace(branch=signs)
 
 
 def find_signs(
@@ -802,5 +802,5 @@ def command(scene: Scene) -> Command:
         origin = LimitOrigin(remainder)
     else:
         places = np.array(stated, dtype=float, ndmin=1)
-    commanded = command_at(scene, places)
-    return commanded if origin is None else commanded._replace(origin=origin)
+    at = command_at(scene, places)
+    return at if origin is None else at._replace(origin=origin)

@@ -190,15 +190,15 @@ def _collect_sweep(
     """Collect both branches over theta_2, or over another commanded quantity."""
     motion = scene.motion
     swept = list_sweep(scene)
-    commanded = command(scene)
+    stated = command(scene)
     thinned = thin_out(swept)
     start = None
     name = swept.commanded
-    if len(commanded.angle) == 1:
-        if commanded.moves_stroke:
-            away = thinned.places - commanded.places
+    if len(stated.angle) == 1:
+        if stated.moves_stroke:
+            away = thinned.places - stated.places
         else:
-            away = np.angle(np.exp(1j * (thinned.angle - commanded.angle[0])))
+            away = np.angle(np.exp(1j * (thinned.angle - stated.angle[0])))
         start = int(np.argmin(np.abs(away)))
     elif (drawn := find_drawn_place(scene)) is not None:
         start = int(np.argmin(np.abs(thinned.places - drawn)))

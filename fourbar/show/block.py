@@ -275,7 +275,7 @@ class _SceneBlock:
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
-        first, last = self.facts.commanded
+        first, last = self.facts.ends
         if abs(place) <= PLACE_ROUNDING * abs(last - first):
             place = 0.0
         text = self._value(
@@ -436,7 +436,7 @@ class _SceneBlock:
         """
         facts = self.facts
         bar = facts.solution.at.bar
-        first, last = facts.commanded
+        first, last = facts.ends
         if facts.kind == "turn":
             begin = f"{BAR_NAMES[bar]} turns fully"
         elif facts.kind == "list":
@@ -476,7 +476,7 @@ class _SceneBlock:
         stated = motion.angle is not None or motion.stroke is not None
         if stated or turns_fully(linkage, bar):
             return ""
-        first, last = self.facts.commanded
+        first, last = self.facts.ends
         inset = min(
             (first - low) % TURN
             for low, high in find_intervals(linkage, bar)
@@ -655,9 +655,7 @@ class _SceneBlock:
         ):
             over = "over the motion" if facts.kind == "law" else "over the sweep"
             if facts.kind == "turn":
-                turns = round(
-                    abs(facts.commanded[1] - facts.commanded[0]) / (2.0 * math.pi)
-                )
+                turns = round(abs(facts.ends[1] - facts.ends[0]) / (2.0 * math.pi))
                 over = "per turn" if turns == 1 else f"in {turns} turns"
             most = max(duty.energy_in, duty.energy_out)
             forward, back = (

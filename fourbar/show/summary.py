@@ -95,7 +95,7 @@ class Facts:
     """Curves over the motion, with what grows without bound."""
     counts: dict[str, int]
     """Number of positions of each status."""
-    commanded: tuple[float, float]
+    ends: tuple[float, float]
     """First and last commanded angle or stroke. It is a time for a motion law or a
     released motion.
     """
@@ -181,7 +181,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         kind=kind,
         motion=motion,
         counts=_count_statuses(solution),
-        commanded=(float(places[0]), float(places[-1])),
+        ends=(float(places[0]), float(places[-1])),
         angles={bar: find_range(f"theta_{bar}") for bar in MOVING_BARS},
         transmission=_find_transmission(motion),
         drive=drive,

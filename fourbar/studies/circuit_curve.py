@@ -110,10 +110,10 @@ def of_input(scene: Scene) -> Command:
 
     The motion may command another bar or a stroke.
     """
-    commanded = command(scene)
-    if commanded.commanded == "theta_2":
-        return commanded
-    solution = solve(scene, "position", at=commanded)
+    at = command(scene)
+    if at.commanded == "theta_2":
+        return at
+    solution = solve(scene, "position", at=at)
     closes = solution.assembled
     theta_2 = solution.theta_2[closes]
     assembly = find_signs(scene.linkage, theta_2, solution.branch[closes])
@@ -136,14 +136,14 @@ class CircuitCurve:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.case = scene, Case.of(scene)
-        commanded, linkage = of_input(scene), scene.linkage
-        self.case = self.case.begin_with(commanded) if scene.counts_turns else self.case
+        at, linkage = of_input(scene), scene.linkage
+        self.case = self.case.begin_with(at) if scene.counts_turns else self.case
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
         """The lengths by a unit near them. No product of them leaves the range of
         doubles.
         """
-        number = find_circuit(linkage, commanded.theta_2, commanded.branch)
+        number = find_circuit(linkage, at.theta_2, at.branch)
         if (number < 0).all():
             raise NotAssembledError(say_nowhere(scene))
         self.circuit = circuits(linkage)[number[number >= 0][0]]
@@ -157,14 +157,12 @@ class CircuitCurve:
         """Number of positions of a row."""
         self.branches = self.circuit.branches
         if self.assembly:
-            self.branches = (int(commanded.branch[0]),)
+            self.branches = (int(at.branch[0]),)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
-        self.commanded = commanded
+        self.at = at
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
         self.sweep = (
-            (float(commanded.theta_2.min()), float(commanded.theta_2.max()))
-            if stated
-            else None
+            (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
         )
         self.singular = [
             (point - self.theta_1 + turn, 0.0 if point == self.theta_1 else math.pi)
@@ -212,10 +210,8 @@ class CircuitCurve:
 
         The sign changes at a limit or a change point between two positions.
         """
-        places = self.commanded.theta_2 - self.theta_1
-        signs = find_signs(
-            self.scene.linkage, self.commanded.angle, self.commanded.branch
-        )
+        places = self.at.theta_2 - self.theta_1
+        signs = find_signs(self.scene.linkage, self.at.angle, self.at.branch)
         between = np.array([self.low, self.high, *(psi for psi, _ in self.singular)])
         changes = np.flatnonzero(np.diff(signs)) + 1
         bounds = [0, *changes.tolist(), len(signs)]

@@ -310,10 +310,10 @@ def sensitivity(scene: Scene) -> Sensitivity:
             scene.motion.angle,
             "has no sensitivities: the limit moves with the lengths",
         )
-    commanded = command(scene)
+    at = command(scene)
     solution = solve(scene)
     entries = list_entries(scene)
-    moving = commanded.speed is not None
+    moving = at.speed is not None
     if not moving:  # positions depend on these alone
         of_positions = ("pins", "lengths", "points", "drive")
         entries = {
@@ -324,7 +324,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     keys = {
         theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)
     } | entries
-    most = float(commanded.places.max()) if commanded.moves_stroke else np.nan
+    most = float(at.places.max()) if at.moves_stroke else np.nan
     numbers = [
         most if key == theta else read_number(scene, entry)
         for key, entry in keys.items()
@@ -351,7 +351,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     }
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
-        _, decided = Case.of(scene, commanded.bar).half_angle(commanded)
+        _, decided = Case.of(scene, at.bar).half_angle(at)
         status[decided] = STATUS_NAMES[
             SINGULAR
         ]  # doubles cannot tell the factors from zero
@@ -368,7 +368,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
         for start in range(0, len(regular), POSITIONS_AT_ONCE):
             index = regular[start : start + POSITIONS_AT_ONCE]
             derived, marks = _compute_derivatives(
-                seeded, keys, commanded, index, by.keys(), moving
+                seeded, keys, at, index, by.keys(), moving
             )
             is_ok = solution.status_code[index] == OK
             status[index[marks[AT_FREE_LENGTH] & is_ok]] = AT_FREE_LENGTH
@@ -445,16 +445,16 @@ def _compute_derivatives(
             return number + _make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
-    commanded = {
+    of_command = {
         name: seeded(f"motion.{name}", number)
         for name, number in zip(stated.names, stated.stated, strict=True)
     }
-    q, speed, acceleration, condition = compute_bar_motion(scene, *commanded.values())
+    q, speed, acceleration, condition = compute_bar_motion(scene, *of_command.values())
     case = Case.of(scene, stated.bar)
     case = case._replace(path=_SlopedPath(*case.path))
     motion = Command(q, stated.branch[index].astype(float), speed, acceleration)
     state = case.assemble(motion, case.path.half_angle(q), moving=moving)
-    quantities = {**list_kinematics(case, state, names), **commanded}
+    quantities = {**list_kinematics(case, state, names), **of_command}
     quantities["condition"] = quantities["condition"] * condition
     held, off = np.zeros((2, len(index)), dtype=bool)
     if moving:

@@ -208,7 +208,7 @@ def _mark_wound(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
     scene = curve.scene
     if curve.sweep is None or not scene.counts_turns:
         return wound
-    stated = curve.commanded
+    stated = curve.at
     assembled = solve(scene, "position", at=stated).assembled
     first = stated.theta_2[assembled][:1]
     for row in np.flatnonzero(curve.reached(points)):
@@ -224,26 +224,24 @@ def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
 
     For a single position, or a released linkage, these are those of the circuit.
     """
-    commanded = of_input(scene)
-    if len(commanded.theta_2) == 1:
+    at = of_input(scene)
+    if len(at.theta_2) == 1:
         if turns_fully(scene.linkage):
             theta_2 = default_places(replace(scene, motion=Motion()))
         else:
             low, high = circuit.theta_2
             margin = min(ANGLE_FROM_LIMITS, 0.25 * (high - low))
             theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
-        commanded = Command(
+        at = Command(
             theta_2,
-            np.full(theta_2.shape, commanded.branch[0], dtype=np.int8),
+            np.full(theta_2.shape, at.branch[0], dtype=np.int8),
             0.0,
             0.0,
         )
     return solve(
         scene,
         "force",
-        at=Command(
-            commanded.theta_2, commanded.branch, 0.0, 0.0, origin=commanded.origin
-        ),
+        at=Command(at.theta_2, at.branch, 0.0, 0.0, origin=at.origin),
     )
 
 

@@ -70,8 +70,8 @@ class Study:
 
         Parameters and errors are those of `fourbar.solve`.
         """
-        commanded = self.at
-        request = SolveRequest.of(self.scene, commanded, stage, out)
+        at = self.at
+        request = SolveRequest.of(self.scene, at, stage, out)
         results = Results(request)
         evaluated = None
         m, n = request.shape
@@ -81,15 +81,15 @@ class Study:
                 begins = self.begin(rows) if request.asks_forces else self.scene
                 for columns in split(n, block):
                     scene = self.members(rows, columns.stop - columns.start, begins)
-                    case = Case.of(scene, commanded.bar, side).beside(self.scene)
-                    positions = _take_members(commanded, rows, columns)
+                    case = Case.of(scene, at.bar, side).beside(self.scene)
+                    positions = _take_members(at, rows, columns)
                     # kept until the next block is evaluated, so that its memory is used
                     # again
                     evaluated = evaluate(
                         case, positions, request.last_stage, request.wanted
                     )
                     results.store(case, evaluated, (rows, columns))
-        solution = make_solution(self.columns(), commanded, results)
+        solution = make_solution(self.columns(), at, results)
         self.refuse(results)
         return solution
 
@@ -123,20 +123,20 @@ class Study:
         A motion begins where the member first assembles.
         """
         scene = self.scene
-        commanded = self.at
+        at = self.at
         if not scene.counts_turns:
             return scene
         count = rows.stop - rows.start
-        n = commanded.angle.shape[1]
-        flat = _take_members(commanded, rows, slice(0, n))
-        half, _ = Case.of(self.members(rows, n, scene), commanded.bar).half_angle(flat)
+        n = at.angle.shape[1]
+        flat = _take_members(at, rows, slice(0, n))
+        half, _ = Case.of(self.members(rows, n, scene), at.bar).half_angle(flat)
         assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, n)
         first = np.argmax(assembled, axis=1)
-        begins = assembled.any(axis=1) & (np.ptp(commanded.branch[rows], axis=1) == 0)
-        angle = np.where(begins, commanded.angle[rows][np.arange(count), first], np.nan)
-        start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, commanded.bar)
+        begins = assembled.any(axis=1) & (np.ptp(at.branch[rows], axis=1) == 0)
+        angle = np.where(begins, at.angle[rows][np.arange(count), first], np.nan)
+        start = Command(angle, at.branch[rows, 0], 0.0, 0.0, at.bar)
         counted = (
-            Case.of(self.members(rows, 1, scene), commanded.bar)
+            Case.of(self.members(rows, 1, scene), at.bar)
             .beside(self.scene)
             .begin_at(start)
             .terms[len(scene.loads) :]
@@ -156,7 +156,7 @@ class Study:
             array[self.invalid] = np.nan
 
 
-def _take_members(commanded: Command, rows: slice, columns: slice) -> Command:
+def _take_members(at: Command, rows: slice, columns: slice) -> Command:
     """Take some positions of some members, one after the other, (k,)."""
     count = columns.stop - columns.start
 
@@ -167,7 +167,7 @@ def _take_members(commanded: Command, rows: slice, columns: slice) -> Command:
             return _repeat(value[rows, 0], count)
         return value[rows, columns].reshape(-1, *value.shape[2:])
 
-    return commanded.with_arrays(flat)
+    return at.with_arrays(flat)
 
 
 def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
@@ -267,13 +267,13 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         for bar in BAR_NAMES:
             invalid = invalid | (drawing.vector(bar) == 0.0)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
-    commanded = _list_commands(scene, numbers, angles, m)
+    at = _list_commands(scene, numbers, angles, m)
     rates = {f"motion.{name}" for name in scene.motion.names[1:]}
     return Study(
         scene,
         {key: array for key, array in numbers.items() if key not in rates},
         invalid,
-        commanded,
+        at,
     )
 
 
@@ -351,6 +351,6 @@ def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
             motion.angle,
             "depends on the linkage; a study states it: (n,) or (m, n) angles",
         )
-    commanded = command(scene)
-    angles: Array = commanded.stated[0]
+    at = command(scene)
+    angles: Array = at.stated[0]
     return angles[None, :]

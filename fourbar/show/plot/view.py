@@ -81,9 +81,9 @@ class View:
     def rests(self) -> bool:
         """Return True if each position is one at rest: nothing has a speed or power."""
         motion = self.scene.motion
-        commanded = motion.law is None and motion.free is None
+        prescribed = motion.law is None and motion.free is None
         return (
-            commanded
+            prescribed
             and self.moves
             and not (np.any(motion.speed) or np.any(motion.acceleration))
         )
