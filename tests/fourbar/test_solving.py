@@ -3,7 +3,6 @@
 Where the status is ok every requested quantity is a number.
 """
 
-import cmath
 import json
 import math
 import warnings
@@ -369,39 +368,6 @@ def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path):
     with raises(InputError, match=said):
         draw(scene, tmp_path / "figure.svg", "freebody")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("theta_2", [0.4, 2.0, 5.1])
-def test_a_payload_is_part_of_its_bar_by_the_sums_of_the_page(theta_2):
-    """The same as a load m_p (g - a_P) at its centre with the couple -I_p alpha_4."""
-    motion = Motion(theta_2, 10.0, 5.0)
-    scene = crank_rocker(motion=motion, loads=(Load(3, moment=-0.2),))
-    output = scene.linkage.output
-    mass, inertia, place = 0.8, 0.003, complex(0.15, 0.06)
-    m, centre = output.mass, output.to_centre
-    of_both = (m * centre + mass * place) / (m + mass)
-    around = m * abs(centre - of_both) ** 2 + mass * abs(place - of_both) ** 2
-    carrying = Bar(
-        output.length,
-        m + mass,
-        output.moment_of_inertia + inertia + around,
-        (abs(of_both), cmath.phase(of_both)),
-    )
-    point = fourbar.Point("P", 4, (abs(place), cmath.phase(place)))
-    unloaded = solve(replace(scene, points=(point,)))
-    a_P = complex(*unloaded.acceleration["P"][0])
-    force = mass * (complex(0.0, -9.81) - a_P)
-    load = Load(
-        4,
-        (abs(force), cmath.phase(force)),
-        from_pin=point.from_pin,
-        moment=-inertia * float(unloaded.alpha_4[0]),
-    )
-    loaded = solve(replace(scene, loads=(*scene.loads, load)))
-    whole = solve(replace(scene, linkage=replace(scene.linkage, output=carrying)))
-    assert whole.torque == approx(loaded.torque, rel=1e-12)
-    for name in ("F12", "F32", "F43", "F14"):
-        assert getattr(whole, name) == approx(getattr(loaded, name), rel=1e-12)
 
 
 def test_friction_beyond_the_range_of_doubles_is_no_crash():

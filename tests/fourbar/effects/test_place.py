@@ -4,7 +4,6 @@ Places of bars in every form, loads at them, and the cases that people brought.
 """
 
 import cmath
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -36,17 +35,6 @@ def test_a_weight_hung_at_the_tip_of_the_rocker():
 def test_a_pull_at_the_tip_of_massless_bars():
     torque = solve(loads(PULL)).torque
     assert torque[0] == approx(1.656231, abs=PRINTED)
-
-
-def test_an_arm_in_world_axes_keeps_its_lever_about_G():
-    """It is the force at G and a couple, which is how the thesis has it."""
-    size, direction, arm, angle = 10.0, 0.3, 0.05, 4.6
-    couple = arm * size * math.sin(direction - angle)
-    with_arm = crank_rocker(loads=(Load(2, (size, direction), arm=(arm, angle)),))
-    at_G = crank_rocker(loads=(Load(2, (size, direction), moment=couple),))
-    one, other = solve(with_arm), solve(at_G)
-    assert_allclose(one.torque, other.torque, rtol=ROUND_OFF)
-    assert_allclose(one.F43, other.F43, rtol=1e-10)
 
 
 def test_a_member_of_a_study_moves_its_load_with_the_point_and_with_the_centre():

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx, raises
+from scipy.optimize import brentq
 
 import fourbar
 from fourbar import (
@@ -161,50 +162,26 @@ def test_what_is_not_released_is_refused(motion, says):
         release(replace(SWING, motion=motion))
 
 
-def integrate_to_line(scene):
-    """Find when bars 3 and 4 of a released scene are first collinear, s.
-
-    The search is a bisection.
-    """
-    coarse = solve(scene, "position")
-    row = int(np.argmax(coarse.branch != coarse.branch[0]))
-    low, high = coarse.time[row - 1], coarse.time[row]
-    sign = coarse.branch[0]
-    for _ in range(6):
-        inside = np.linspace(low, high, 33)
-        times = np.concatenate([[0.0], inside])
-        start = fourbar.command(scene)
-        released = integrate(
-            scene.linkage,
-            (*scene.loads, *scene.effects),
-            float(start.theta_2[0]),
-            scene.motion.omega_2 or 0.0,
-            int(start.branch[0]),
-            times,
-        )
-        branch = solve(scene, "position", at=released.command).branch[1:]
-        place = int(np.argmax(branch != sign))
-        low, high = inside[place - 1], inside[place]
-    return float(0.5 * (low + high))
-
-
 @pytest.mark.slow
-def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch):
+def test_pin_forces_pass_a_limit_position_smoothly():
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there.
 
     The angle of bar 4 does, by which free bodies are told to move.
     """
-    line = integrate_to_line(SWING)
+    coarse = solve(SWING, "position")
+
+    def find_sine(time):
+        at = coarse.command_at(np.array([time]))
+        return solve(SWING, "position", at=at).sin_mu[0]
+
+    row = int(np.argmax(coarse.branch != coarse.branch[0]))
+    line = brentq(find_sine, *coarse.time[row - 1 : row + 1], xtol=1e-15)
     distances = np.logspace(-14, -2, 49)
     evenly = np.linspace(0.0, 1.2, 121)
     dense = line + np.concatenate([-distances[::-1], [0.0], distances])
     times = np.unique(np.concatenate([evenly, dense]))
-    true = free_motion.integrate
-    monkeypatch.setattr(
-        free_motion, "integrate", lambda *args, **how: true(*args[:-1], times, **how)
-    )
-    s = solve(SWING, "force")
-    assert set(s.status) == {"ok"} and np.array_equal(s.time, times)
+    s = solve(SWING, "force", at=coarse.command_at(times))
+    assert set(s.status) == {"ok"}
     assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12
     assert not np.any(s.torque)
     F = np.stack([getattr(s, name) for name in PINS], axis=1)

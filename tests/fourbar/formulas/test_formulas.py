@@ -79,13 +79,6 @@ def test_plain_numbers_stay_plain(computed, value, kind):
     assert type(computed) is kind and computed == value
 
 
-def test_arrays_broadcast():
-    column, row = np.array([[1.0], [2.0]]), np.array([3.0, 4.0, 5.0])
-    for x, y in ((column, row), (column, 3.0), (3.0, row)):
-        assert np.array_equal(vector(x, y), x + 1j * np.asarray(y))
-    assert np.array_equal(power_of_two(np.array([0.7, 1.0, 3.0])), [1.0, 2.0, 4.0])
-
-
 def hard_doubles(seed, count):
     """p, q, r, s > 0 with p + q and r + s equal, or apart by a rounding or a few."""
     rng = np.random.default_rng(seed)

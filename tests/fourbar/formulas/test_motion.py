@@ -3,7 +3,6 @@
 What is exact or has no value near limits and change points is tested too.
 """
 
-import cmath
 import math
 from math import pi
 
@@ -79,37 +78,6 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths):
     assert moving.omega(3) == approx(np.full(5, near), abs=1e-14)
     beside = compute_state(link, pi + after + 1e-13, 1)
     assert not find_singular(beside.position).any()
-
-
-@pytest.mark.parametrize(
-    "lengths, branch",
-    [((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1), ((0.2, 0.2, 0.2, 0.2), 1)],
-)
-@pytest.mark.parametrize("half_turn", [0, 1])
-@pytest.mark.parametrize("theta_1", [0.0, 0.4])
-def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
-    lengths, branch, half_turn, theta_1
-):
-    """A parallelogram's coupler lies as its ground and bar 4 as bar 2.
-
-    A folded kite has B on O2.
-    """
-    link = bare(*lengths, theta_1)
-    theta_2 = theta_1 + pi * half_turn + np.array([1e-9, 0.5, 2.0])
-    moving = compute_state(link, theta_2, branch, 2.0, 3.0)
-    u1, u2 = np.full(3, cmath.exp(1j * theta_1)), moving.position.u2
-    parallelogram = lengths[1] == lengths[3]
-    directions = (u1, u2) if parallelogram else (-u2, -u1)
-    speeds, growths = ((0.0, 2.0), (0.0, 3.0))
-    if not parallelogram:
-        speeds, growths = speeds[::-1], growths[::-1]
-    for k, bar in enumerate((3, 4)):
-        assert moving.direction(bar) == approx(directions[k], abs=EPS)
-        assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
-        assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
-    # between the bars: the angle of input and ground
-    sines, right = moving.position.sin_mu, np.sin(theta_2 - theta_1)
-    assert abs(sines) == approx(abs(right), rel=8 * EPS, abs=2 * EPS)
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])

@@ -101,19 +101,6 @@ def test_extremes_keep_their_digits_near_a_change_point(gap):
         assert abs(extremes.least - least) <= 8 * EPS * least
 
 
-def test_speeds_follow_from_the_lever_of_the_coupler_and_power_is_kept():
-    for drawn in random_positions(23, 40):
-        moving = drawn.moving(3.0)
-        theta_3, theta_4 = (np.angle(moving.direction(bar))[0] for bar in (3, 4))
-        lever_in = drawn.bars.input.length * sin(drawn.theta_2[0] - theta_3)
-        lever_out = drawn.bars.output.length * sin(theta_4 - theta_3)
-        rounding = 256 * EPS * (drawn.bars.input.length + drawn.bars.output.length)
-        ratio = derive_at("omega_4/omega_2", *drawn)[0]
-        assert ratio * lever_out == approx(lever_in, abs=rounding / drawn.sine**2)
-        power = derive_at("mechanical_advantage", *drawn)[0] * moving.omega(4)
-        assert power == approx(3.0, rel=16 * EPS)
-
-
 def test_advantage_where_the_output_stands_and_where_the_input_does():
     folded = bare(2.0, 1.0, 1.0, 2.0)  # a kite with B on O2
     assert not np.isfinite(derive_at("mechanical_advantage", folded, 1.0, -1))

@@ -208,25 +208,6 @@ def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar)
     assert np.abs(moved.F12 - same.F12).max() < 1e-6
 
 
-@pytest.mark.slow
-def test_released_at_theta_4_it_passes_limits_of_theta_2_and_its_own():
-    rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
-    limit = limit_positions(rocker)[0]
-    towards = find_limit_angles(rocker, 4)[0] - limit.theta_4
-    ahead = math.copysign(1.0, sin(towards))
-    motion = Motion(
-        theta_4=limit.theta_4 - 0.1 * ahead,
-        omega_4=ahead,
-        branch=1 if sin(limit.theta_3 - limit.theta_2) > 0.0 else -1,
-        free=Free(20.0, 200),
-    )
-    solution = solve(Scene(rocker, motion))
-    assert len(solution) == 201 and solution.change_points == ()
-    assert set(solution.branch.tolist()) == {1, -1}
-    # at a limit of theta_4 sin(theta_3 - theta_2) changes its sign
-    assert set(np.sign(sine(solution, 4))) == {1.0, -1.0}
-
-
 TWO = """
 [lengths]
 ground = "30 cm"
