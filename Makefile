@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LONG := kills package oldest prereleases machines engines simulators problems
-LONG += benchmark free oracles faults fuzz accuracy suites
+LONG += benchmark oracles faults fuzz accuracy suites
 
 .PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
@@ -38,7 +38,7 @@ check: setup
 # everything that `make test-all` samples, in full; each part ends within one hour on
 # two cores. Minutes of two idle cores: kills at most 16, suites 6, package 3, oldest
 # and prereleases 8 each; from the processor's time of a share: machines 7 for each
-# kernel that the processor has, free 15, fuzz 14, accuracy 12, faults 6,
+# kernel that the processor has, fuzz 14, accuracy 12, faults 6,
 # oracles 7; the others below 5
 long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
@@ -70,9 +70,6 @@ long-problems:
 long-benchmark:
 	$(BIN)/python -m fourbar_lab benchmark
 	$(BIN)/python -m fourbar_lab findings
-long-free:
-	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 \
-		tests/fourbar/evaluation/test_free_motion_reference.py
 long-oracles:
 	ORACLE_SHARE=1 $(BIN)/python -m pytest -n 2 tests/oracle
 long-faults:

@@ -35,8 +35,8 @@ FOUR_BAR_CONVENTIONS = (
 )
 _ARCHIVE = "fourbar-problems-1.0"
 PROMISED = 1e-9
-"""Error of a released motion in 5 s, rad. test_free_motion_reference.py holds it;
-beyond them it is in proportion.
+"""Error of a released motion in 5 s, rad: a thousand times what test_free_motion.py
+allows its rates; beyond them it is in proportion.
 """
 _PROMISED_FOR = 5.0
 """s."""
