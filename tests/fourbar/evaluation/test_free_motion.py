@@ -32,7 +32,7 @@ from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import integrate
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS
-from fourbar.scene import Command
+from fourbar.scene import Command, with_signs
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from tests.support.scenes import bare
@@ -269,8 +269,13 @@ def test_rates_add_up_to_a_motion_that_needs_no_drive(name):
     nodes = np.add.outer(edges[:-1] + half, half * NODES)
     times = np.union1d(edges, nodes)
     released = release(scene)
-    s = solve(scene, "force", at=released.command_at(times))
+    told = released.command_at(times)
+    s = solve(scene, "force", at=told)
     compare_with_free_bodies(scene, s)
+    sine = np.sin(s.theta_4 - s.theta_3)
+    sure = np.abs(sine) > LEAST_SINE
+    signs = with_signs(linkage, told).branch
+    assert np.array_equal(signs[sure], np.sign(sine[sure]))
     at_edges, at_nodes = (np.searchsorted(times, part) for part in (edges, nodes))
     for bar, (value, rate) in product(
         MOVING_BARS, (("theta", "omega"), ("omega", "alpha"))
