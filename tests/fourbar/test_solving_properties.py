@@ -15,7 +15,13 @@ from fourbar import Load, Motion, Spring, solve
 from fourbar.effects import Place, Table
 from fourbar.formulas.mobility import choose_range, limit_positions
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
-from fourbar.quantities import PIN_FORCES, STAGE_OF
+from fourbar.quantities import (
+    NO_TORQUE,
+    NOT_ASSEMBLED,
+    PIN_FORCES,
+    SINGULAR,
+    STAGE_OF,
+)
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.engines.exact import find_refusal
 from tests.support.balls import answer_in_balls
@@ -174,6 +180,10 @@ def test_every_quantity_is_that_of_balls(name):
     scene = SCENES[name]
     s, exact = solve(scene, "error"), answer_in_balls(scene)
     ok = (s.status_code == 0) & (s.condition > LEAST_CONDITION)
+    regular = np.isfinite(exact.get("power", np.nan * s.theta_2))
+    regular &= exact["condition"] > LEAST_CONDITION
+    regular &= exact["drive_condition"] > LEAST_CONDITION
+    assert not set(s.status_code[regular]) & {SINGULAR, NOT_ASSEMBLED, NO_TORQUE}
     compared = [name for name in s.evaluated() if name in exact and name != "power"]
     assert len(compared) > 10
     for quantity in compared:

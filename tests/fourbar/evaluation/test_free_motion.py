@@ -126,10 +126,6 @@ BY_FREE_BODIES = 1e-12
 """Of the largest force, at one metre of a torque: an angle of bar 4 in doubles, and a
 system of 13 equations whose condition is below 1e4.
 """
-STEEPER = 2.0
-"""A slope at an instant over the steepest mean slope of a step of 10 ms: the forces
-bend little within one.
-"""
 
 
 @pytest.mark.slow
@@ -172,7 +168,7 @@ LEAST_SINE = 1e-2
 def compare_with_free_bodies(scene, s):
     """Compare pin forces with those of free bodies that are told so to move.
 
-    These need no drive. Return the forces and the size of the largest, N.
+    These need no drive.
     """
     F = np.stack([s[name] for name in PINS], axis=1)
     size = np.max(np.hypot(F[..., 0], F[..., 1]))
@@ -194,7 +190,6 @@ def compare_with_free_bodies(scene, s):
             assert (apart <= lost).all(), name
         # nothing drives the bar that is told
         assert (np.abs(answer.quantities["torque"]) <= lost).all()
-    return F, size
 
 
 @pytest.mark.slow
@@ -212,17 +207,13 @@ def test_pin_forces_pass_a_limit_position_smoothly():
     row = int(np.argmax(coarse.branch != coarse.branch[0]))
     line = brentq(find_sine, *coarse.time[row - 1 : row + 1], xtol=1e-15)
     distances = np.logspace(-14, -2, 49)
-    evenly = np.linspace(0.0, 1.2, 121)
     dense = line + np.concatenate([-distances[::-1], [0.0], distances])
-    times = np.unique(np.concatenate([evenly, dense]))
+    times = np.unique(np.concatenate([np.linspace(0.0, 1.2, 121), dense]))
     s = solve(SWING, "force", at=coarse.command_at(times))
     assert set(s.status) == {"ok"}
     assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12
     assert not np.any(s.torque)
-    F, size = compare_with_free_bodies(SWING, s)
-    change, steps = np.abs(np.diff(F, axis=0)).max(axis=(1, 2)), np.diff(times)
-    even = np.abs(np.diff(F[np.isin(times, evenly)], axis=0)).max() / 0.01
-    assert np.all(change <= STEEPER * even * steps + BY_FREE_BODIES * size)
+    compare_with_free_bodies(SWING, s)
 
 
 RELEASED = {
