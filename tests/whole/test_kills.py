@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 
 import fourbar_validation.run.plan
-from fourbar.errors import BROKEN, FourBarError, InputError
+from fourbar.errors import BROKEN, HOLDS, FourBarError, InputError
+from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
@@ -41,7 +42,7 @@ from fourbar_validation.scenes.suites import (
     Random,
     read_scene_files,
 )
-from tests.support.guests import list_processes, write_program
+from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
 from tests.support.unlucky import (
     Few,
@@ -250,27 +251,18 @@ results do not.
 """
 
 
+def words_of(out, count, workers, more=()):
+    words = f"run --random {count} --workers {workers} --engines free-body"
+    return [*words.split(), "--no-pictures", "--out", str(out), *more]
+
+
 def start(
     out, count, *program, workers=2 if FULL else 1, stderr=subprocess.DEVNULL, more=()
 ):
-    command = [
-        sys.executable,
-        *(program or PROGRAM),
-        "run",
-        "--random",
-        str(count),
-        "--workers",
-        str(workers),
-    ]
     return subprocess.Popen(
         [
-            *command,
-            "--engines",
-            "free-body",
-            "--no-pictures",
-            "--out",
-            str(out),
-            *more,
+            *(sys.executable, *(program or PROGRAM)),
+            *words_of(out, count, workers, more),
         ],
         cwd=Path(__file__).parents[2],
         stdout=subprocess.DEVNULL,
@@ -388,10 +380,10 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path, undisturbed
                 with suppress(ProcessLookupError):
                     os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
                     kills += 1
-        status = process.wait(timeout=200)
-        if status == BROKEN:  # it was killed while none was at work
-            status = start(out, COUNT, workers=2).wait(timeout=100)
-        assert status == 0
+        ended = process.wait(timeout=200)
+        if ended == BROKEN:  # it was killed while none was at work
+            ended = start(out, COUNT, workers=2).wait(timeout=100)
+        assert ended == HOLDS
         assert (out / "results.csv").read_bytes() == (
             undisturbed / "results.csv"
         ).read_bytes()
@@ -420,7 +412,10 @@ def test_a_guest_its_worker_and_its_run_killed_in_turn_change_no_byte(
     """Each is killed in the middle, with questions left to ask."""
     guest = [f"--guest={write_program(tmp_path, 'plain')}"]
     undisturbed = tmp_path / "undisturbed"
-    assert start(undisturbed, COUNT, more=guest).wait(timeout=100) == 0
+    with monkeypatch.context() as here:
+        judge_here(here)
+        assert status(words_of(undisturbed, COUNT, 1, guest)) == HOLDS
+    end_guests()
     mark = f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     for kill in range(KILLS):

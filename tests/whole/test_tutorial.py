@@ -15,7 +15,6 @@ import pytest
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar_validation.cli import status as harness
-from tests.support.here import judge_here
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -43,7 +42,6 @@ def test_a_page_does_and_prints_what_it_says(
     if page == "docs/recipes":
         pytest.importorskip("pinocchio", reason="a recipe needs it: pip install pin")
     monkeypatch.chdir(tmp_path)
-    judge_here(monkeypatch)
     (tmp_path / "models").symlink_to(ROOT / "models")
     names = {}
     printed = ""
