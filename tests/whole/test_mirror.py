@@ -46,10 +46,11 @@ JUDGED_BY = {
     "fourbar/studies/test_paths.py": "fourbar/show: paths",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
-    "fourbar/show/test_animate.py": "fourbar/show/plot: film frames",
+    "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
+    "fourbar/show/plot/test_curves.py": "fourbar/show/plot: derived paths",
     "fourbar/show/plot/test_plot.py": (
-        "fourbar/show/plot: curves figures freebody labels linkage studies style view"
+        "fourbar/show/plot: figures freebody labels linkage studies style view"
     ),
     # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": (
@@ -79,7 +80,7 @@ JUDGED_BY = {
     ),
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": (
-        "validation/engines/mujoco: drives monitor"
+        "validation/engines/mujoco: defaults monitor"
     ),
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": (

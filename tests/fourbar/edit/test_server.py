@@ -43,6 +43,7 @@ from fourbar.edit.server import (
 )
 from fourbar.edit.session import Session
 from fourbar.errors import InputError
+from tests.support.rows import read_rows
 
 CRANK_ROCKER = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 HUGE = 100_000_000
@@ -153,49 +154,55 @@ async def told(line, request=None):
     return await heard(line, lambda about: about.get("for") == "mine")
 
 
+ANSWERED = read_rows("""
+{root} | | 404
+{root}{token}/ | | 404
+{root}../scene.toml | | 404
+{root}%2e%2e/scene.toml | | 404
+{page}scene.toml | | 404
+{page}report | | 404
+{page} | Host: example.org:{port} | 403
+{page} | Host: example.org | 403
+{page} | Host: 127.0.0.1 | 403
+{page} | Host: 127.0.0.1:{other} | 403
+{page} | Host: localhost:{port} | 200
+{page} | Origin: http://example.org | 403
+{page} | Origin: null | 403
+{page} | Origin: https://127.0.0.1:{port} | 403
+{page} | Origin: http://127.0.0.1:{other} | 403
+{page}live | Origin: http://example.org | 403
+{page}live | Origin: null | 403
+{page}live | Origin: https://127.0.0.1:{port} | 403
+{page}live | Origin: http://127.0.0.1:{other} | 403
+{page}live | | 403
+{root}{token}/live | Origin: {own} | 404
+# as it should be, but no WebSocket
+{page}live | Origin: {own} | 400
+""")
+"""Addresses, a header of the request, and the status of the answer."""
+
+
 def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
     """A browser names its origin, and another address of this machine is refused."""
 
     async def ask(made, address):
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
-        root, port = address[: address.rindex("/", 0, -1) + 1], port_of(address)
-        other, live = int(port) ^ 1, address + "live"
+        root, port = address[: address.rindex("/", 0, -1) + 1], int(port_of(address))
         fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
         assert fetched.code == 200 and b"Crank-rocker" in fetched.body
         assert fetched.headers["Referrer-Policy"] == "no-referrer"
         assert fetched.headers["Cache-Control"] == "no-store"
-        wrong_token = root + "x" * 43 + "/"
-        own_origin = {"Origin": root[:-1]}
-        for place, headers, code in (
-            (root, {}, 404),
-            (wrong_token, {}, 404),
-            (root + "../scene.toml", {}, 404),
-            (root + "%2e%2e/scene.toml", {}, 404),
-            (address + "scene.toml", {}, 404),
-            (address + "report", {}, 404),
-            (address, {"Host": f"example.org:{port}"}, 403),
-            (address, {"Host": "127.0.0.1"}, 403),
-            (address, {"Host": f"127.0.0.1:{other}"}, 403),
-            (address, {"Host": f"localhost:{port}"}, 200),
-            *(
-                (place, {"Origin": origin}, 403)
-                for place in (address, live)
-                for origin in (
-                    "http://example.org",
-                    "null",
-                    f"https://127.0.0.1:{port}",
-                    f"http://127.0.0.1:{other}",
-                )
-            ),
-            (live, {}, 403),
-            (wrong_token + "live", own_origin, 404),
-            (live, own_origin, 400),  # as it should be, but no WebSocket
-        ):
-            assert await status(place, headers=headers) == code, (place, headers)
+        parts = {"root": root, "page": address, "own": root[:-1], "port": port}
+        parts |= {"other": port ^ 1, "token": "x" * 43}
+        for row in ANSWERED:
+            place, header, code = (cell.format(**parts) for cell in row)
+            name, _, value = header.partition(": ")
+            headers = {name: value} if name else {}
+            assert await status(place, headers=headers) == int(code), row
         assert await status(address, method="POST", body="x") == 405
         assert not made.pages
         with raises(ConnectionRefusedError):
-            socket.create_connection(("127.0.0.2", int(port)), timeout=1.0)
+            socket.create_connection(("127.0.0.2", port), timeout=1.0)
 
     bench(ask)
 

@@ -18,6 +18,7 @@ from fourbar import Tolerance, sensitivity, solve, tolerances, vary
 from fourbar.cli import status
 from fourbar.errors import DependencyError, InputError
 from fourbar.files.scene_text import write_new_scene
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker, thesis
 
 LENGTH_NAMES = ("ground", "input", "coupler", "output")
@@ -92,18 +93,18 @@ def test_showing_needs_numpy_alone():
     assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
 
 
-@pytest.mark.parametrize(
-    "lengths, words",
-    [
-        (("1 m", "2 m", "3 m", "40 m"), "never close"),
-        (("1 kg", "2 m", "3 m", "4 m"), "ground"),
-        (("1 m", "2 m", "-3 m", "4 m"), "coupler"),
-        (("1 m", "2 m", "3 m", "4"), "output.*unit is missing"),
-    ],
-)
+BAD = read_rows("""
+1 m, 2 m, 3 m, 40 m | never close
+1 kg, 2 m, 3 m, 4 m | ground
+1 m, 2 m, -3 m, 4 m | coupler
+1 m, 2 m, 3 m, 4 | output.*unit is missing
+""")
+
+
+@pytest.mark.parametrize("lengths, words", BAD)
 def test_a_new_scene_of_bad_lengths_is_refused(lengths, words):
     with raises(InputError, match=words):
-        write_new_scene(lengths)
+        write_new_scene(lengths.split(", "))
 
 
 def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):
@@ -117,29 +118,29 @@ def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "result, lines",
+    "result",
     [
-        (solve(LOOSE), []),
-        (solve(LOOSE, "position"), []),
-        (sensitivity(LOOSE), []),
-        (tolerances(LOOSE, 64), []),
-        (STUDY, []),
-        (solve(STUDY), ["status: 122 ok, 61 not_assembled"]),
+        lambda: solve(LOOSE),
+        lambda: solve(LOOSE, "position"),
+        lambda: sensitivity(LOOSE),
+        lambda: tolerances(LOOSE, 64),
+        lambda: STUDY,
+        lambda: solve(STUDY),
     ],
     ids=["solution", "positions", "slopes", "spread", "study", "solved study"],
 )
-def test_results_say_in_ten_lines_what_they_hold(result, lines):
-    text = repr(result)
+def test_results_say_in_ten_lines_what_they_hold(result):
+    text = repr(result())
     rows = text.splitlines()
     assert 2 <= len(rows) <= 10 and max(map(len, rows)) <= 150
     assert LOOSE.title in text and "61" in text
-    assert all(line in text for line in lines)
 
 
 def test_a_solution_says_its_range_and_how_many_positions_it_has():
     solution = solve(LOOSE)
     low, high = (f"{x:.6g}" for x in (solution.torque.min(), solution.torque.max()))
     assert f"torque: {low} to {high} N m" in repr(solution)
+    assert "status: 122 ok, 61 not_assembled" in repr(solve(STUDY))
     single = replace(LOOSE, motion=fourbar.Motion(1.0))
     one = solve(vary(single, {"lengths.input": 0.1}))
     for shown in (repr(one), one._repr_html_()):

@@ -2,7 +2,7 @@
 
 import math
 import time
-from dataclasses import replace
+import tomllib
 from itertools import pairwise
 from math import pi, sin, sqrt, tau
 from pathlib import Path
@@ -17,14 +17,14 @@ from scipy.special import ellipk
 import fourbar
 from fourbar import Bar, FourBar, Load, Motion, Scene, Sweep, Viscous, solve
 from fourbar.files import loads
+from fourbar.files.scene_file import read_tables
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command_at
-from fourbar.scene.motion import Law, Rise
 from fourbar.show.block import write_motor
 from fourbar.show.motion_curves import acts, describe_motion
 from fourbar.show.summary import summarize
 from fourbar.studies.internal_forces import largest_bending
-from tests.support.scenes import CYLINDER, bare, crank_rocker
+from tests.support.scenes import bare, crank_rocker
 from tests.support.shares import slow_but
 
 NODES, WEIGHTS = leggauss(600)
@@ -48,53 +48,75 @@ BETWEEN_STEPS = 1e-3
 """
 
 
-def rub(**torques):
-    return fourbar.Friction.at(**torques)
-
-
-WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
+WIPER = Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml"
 
 
 TURN = Motion(Sweep(0.1, 0.1 + tau, 12), 10.0)
 
 
-BACK = Motion(Sweep(2.6, 1.3, 12), -4.0)
-
-
-PULLED = Motion(stroke=Sweep(0.33, 0.17, 37), stroke_speed=-0.2, side="left")
-
-
 CORNERS = tuple(np.radians([0.0, 98.3, 101.3, 104.3, 360.0]))
-
-
-SPIKE = Load(
-    2, (-1.0, 0.3), moment=-0.05, table=fourbar.Table(CORNERS, (0.5, 0.5, 50, 0.5, 0.5))
-)
 
 
 MASSLESS = FourBar(0.3, *map(Bar, (0.1, 0.25, 0.22)))
 
-FALL = Rise("cycloidal", (1.0, 0.5), 0.3, 0.2, 0.005, 0.1, 12)
-SCENES = {
-    "wiper": (replace(WIPER, motion=WIPER.motion.replace(angle=TURN.angle)), "O4"),
-    "turn backwards": (crank_rocker(motion=TURN.replace(speed=-10.0)), ""),
-    "part of a turn": (crank_rocker(motion=BACK, drive_bar=4), ""),
-    "load with corners": (crank_rocker(motion=TURN, loads=(SPIKE,)), ""),
-    "fall in 5 ms": (crank_rocker(motion=Motion(law=FALL)), ""),
-    "law of a table": (
-        crank_rocker(
-            motion=Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), 20, "rest")),
-            effects=(rub(O2=0.05),),
-        ),
-        "O2",
-    ),
-    "stroke": (
-        crank_rocker(motion=PULLED, drive=CYLINDER, effects=(rub(O4=0.01),)),
-        "O4",
-    ),
-    "nothing acts": (Scene(MASSLESS, TURN), ""),
-}
-"""Scenes, and the pin at which dry friction acts."""
+SCENES = tomllib.loads("""
+["turn backwards"]
+motion.theta_2 = { from = "6 deg", to = "366 deg", steps = 12 }
+motion.omega_2 = "-10 rad/s"
+["part of a turn"]
+motion.theta_2 = { from = "2.6 rad", to = "1.3 rad", steps = 12 }
+motion.omega_2 = "-4 rad/s"
+drive.bar = 4
+["load with corners"]
+motion.theta_2 = { from = "6 deg", to = "366 deg", steps = 12 }
+motion.omega_2 = "10 rad/s"
+[["load with corners".loads]]
+bar = 2
+force = ["-1 N", "0.3 rad"]
+moment = "-0.05 N m"
+table.theta_2 = ["0 deg", "98.3 deg", "101.3 deg", "104.3 deg", "360 deg"]
+table.factor = [0.5, 0.5, 50.0, 0.5, 0.5]
+["fall in 5 ms".motion.law]
+kind = "cycloidal"
+theta_2 = "0.3 rad"
+rise = ["1 rad", "0.5 s"]
+dwell = "0.2 s"
+fall = "0.005 s"
+rest = "0.1 s"
+steps = 12
+["law of a table"]
+motion.law.time = ["0 s", "1 s", "2 s"]
+motion.law.theta_2 = ["0.3 rad", "2 rad", "1 rad"]
+motion.law.ends = "rest"
+motion.law.steps = 20
+effects.friction.O2 = "0.05 N m"
+["stroke"]
+motion.stroke = { from = "0.33 m", to = "0.17 m", steps = 37 }
+motion.stroke_speed = "-0.2 m/s"
+motion.side = "left"
+drive.from = { bar = 1, from_pin = ["0.25 m", "-160 deg"] }
+drive.to = { bar = 2, from_pin = ["0.09 m", "0.17 rad"] }
+effects.friction.O4 = "0.01 N m"
+["nothing acts"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
+motion.theta_2 = { from = "6 deg", to = "366 deg", steps = 12 }
+motion.omega_2 = "10 rad/s"
+["wiper"]
+motion.theta_2 = { from = "6 deg", to = "366 deg", steps = 12 }
+motion.omega_2 = "45 rpm"
+""")
+"""What the scenes state besides the crank-rocker."""
+CRANK_ROCKER = tomllib.loads(fourbar.dump(crank_rocker()))
+REVERSES = {"wiper": "O4", "law of a table": "O2", "stroke": "O4"}
+"""Pin at which dry friction acts."""
+
+
+def take_scene(name):
+    if name == "wiper":
+        whole = tomllib.loads(WIPER.read_text(encoding="utf-8"))
+    else:
+        whole = {} if name == "nothing acts" else CRANK_ROCKER
+    return read_tables({**whole, **SCENES[name]})
 
 
 def list_sizes(scene, s):
@@ -133,7 +155,7 @@ def scan(scene, ends, *corners):
     "name", slow_but({"turn backwards", "load with corners", "stroke"}, SCENES)
 )
 def test_facts_are_those_of_a_dense_scan(name):
-    scene, pin = SCENES[name]
+    scene, pin = take_scene(name), REVERSES.get(name, "")
     solution = solve(scene)
     facts = summarize(scene, solution)
     motion, panels = facts.motion, facts.motion.panels

@@ -1,0 +1,115 @@
+"""Curves of derived quantities and paths of points are what the solution has.
+
+A path runs along its curve: no false corner, through both branches.
+"""
+
+import numpy as np
+import pytest
+from pytest import approx
+
+import fourbar
+from fourbar import Gravity, Motion, Point, Sweep, solve
+from fourbar.files import loads
+from fourbar.show.derived import derive
+from fourbar.show.plot.figures import draw_figure
+from fourbar.show.plot.paths import trace
+from fourbar.show.plot.view import make_view
+from tests.support.scenes import crank_rocker
+from tests.support.texts import COORDINATES
+
+SCENE = crank_rocker(
+    motion=Motion(Sweep(0.0, 2.0 * np.pi, 120), 10.0), effects=(Gravity(),)
+)
+DEGREES = np.linspace(0.0, 360.0, 121)
+LONGEST = 2.0 / 150.0
+"""Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
+
+
+def list_lines(figure, scene=SCENE):
+    drawing = draw_figure(scene, figure, units=fourbar.units("m"))
+    lines = (line for axes in drawing.figure.axes for line in axes.lines)
+    return {
+        str(line.get_label()): np.asarray(line.get_xydata(), dtype=float)
+        for line in lines
+    }
+
+
+@pytest.mark.slow
+def test_the_shaking_force_is_drawn_with_its_components():
+    lines = list_lines("shaking")
+    force = derive(solve(SCENE), "shaking_force")
+    for name, values in {
+        "$|F|$": np.hypot(*force.T),
+        "$F_x$": force[:, 0],
+        "$F_y$": force[:, 1],
+    }.items():
+        shown = np.interp(DEGREES, *lines[name].T)
+        assert shown == approx(values, rel=1e-9, abs=1e-9 * np.abs(force).max())
+
+
+@pytest.mark.slow
+def test_ratios_are_those_of_the_speeds_and_no_line_crosses_a_dead_centre():
+    lines = list_lines("ratios")
+    s = solve(SCENE)
+    shown = np.interp(DEGREES, *lines["ω₄/ω₂"].T)
+    assert shown == approx(s.omega_4 / 10.0, abs=1e-9)
+    jumps = np.isnan(lines["T₄/T₂"][:, 1]).sum()
+    assert jumps == np.sum(np.diff(np.sign(s.omega_4)) != 0.0)
+
+
+@pytest.mark.slow
+def test_instant_centres_lie_on_the_lines_of_the_bars():
+    path = list_lines("centres")["$I_{24}$"]
+    theta_1 = SCENE.linkage.ground_angle
+    across = path @ np.array([-np.sin(theta_1), np.cos(theta_1)])
+    assert np.isfinite(across).sum() > 30
+    assert across[np.isfinite(across)] == approx(0.0, abs=1e-9)
+    here = make_view(SCENE).here
+    bar, away = here.B[0] - here.A[0], derive(here, "I24")[0] - here.A[0]
+    assert bar[0] * away[1] == approx(bar[1] * away[0], rel=1e-9)
+
+
+def measure_chords(path):
+    """Return the longest chord as a part of the extent.
+
+    The sharpest turn between two, deg, is returned too.
+    """
+    steps = np.diff(path, axis=0) @ np.array([1.0, 1.0j])
+    extent = float(np.ptp(path, axis=0).max())
+    turns = np.abs(np.angle(steps[1:] / steps[:-1]))
+    return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
+
+
+@pytest.mark.slow
+def test_the_whole_circuit_is_traced_without_a_corner_and_drawn():
+    """By degrees of the input this path has chords of 40 mm; its extent is 120 mm."""
+    view = make_view(loads(COORDINATES))
+    traced = trace(view)
+    assert traced.circuit
+    path = traced.path(traced.solution.points["E"])
+    assert path[0] == approx(path[-1])
+    longest, sharpest = measure_chords(path)
+    assert longest < LONGEST and sharpest < 30.0 and len(path) < 2000
+    away = path - view.here.points["E"][0]
+    assert np.hypot(*away.T).min() < 0.5 * LONGEST * np.ptp(path, axis=0).max()
+    # the curve of the formulas, by many more positions
+    curve = fourbar.coupler_curve(view.scene, "E", steps=200_000)
+    dense = np.stack([curve.x, curve.y], axis=1)
+    apart = np.hypot(*np.diff(dense, axis=0).T).max()
+    for point in path[:: len(path) // 40]:
+        assert np.hypot(*(dense - point).T).min() < apart
+    assert list_lines("coupler", view.scene)["E"] == approx(path)
+
+
+def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s():
+    points = Point("P", 3, (0.1, 0.7)), Point("Q", 4, (0.1, 0.0))
+    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.4, 3), 10.0), points=points)
+    view = make_view(scene)
+    traced = trace(view)
+    path = traced.path(traced.solution.points["P"])
+    assert not traced.circuit
+    assert path[[0, -1]] == approx(view.sweep.points["P"][[0, -1]])
+    assert measure_chords(path)[0] < LONGEST
+    drawn = list_lines("coupler", scene)
+    assert [name for name in drawn if name[0] != "_"] == ["$A$", "$B$", "P"]
+    assert drawn["P"] == approx(path)
