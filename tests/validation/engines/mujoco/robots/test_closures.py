@@ -44,7 +44,7 @@ CUTS = [*product(("A", "B", "O4"), ("anchor", "site")), ("B", "weld")]
 
 
 @pytest.mark.parametrize(("cut", "by"), CUTS)
-def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(cut, by):
+def test_a_loop_is_where_its_pins_are_wherever_it_is_cut(cut, by):
     planar = Planar(cut=cut, by=by)
     loop = loop_of(planar.text())
     assert np.allclose(loop.lengths, planar.lengths(), rtol=1e-12)
@@ -56,13 +56,6 @@ def test_a_loop_has_the_lengths_of_its_pins_wherever_it_is_cut(cut, by):
         pin: pin for pin in names
     }
     assert loop.misaligned == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize(("cut", "by"), CUTS)
-def test_bars_and_pins_are_where_the_file_puts_them(cut, by):
-    planar = Planar(cut=cut, by=by)
-    loop = loop_of(planar.text())
-    model = mujoco.MjModel.from_xml_string(planar.text())
     named = {bar: model.body(bodies[0]).name for bar, bodies in loop.bodies.items()}
     assert named == {1: "ground", 2: "input", 3: "coupler", 4: "output"}
     assert len(loop.bodies[3]) == (2 if by == "weld" else 1)
@@ -138,9 +131,6 @@ FIVE_BAR = """
 
 def test_five_hinges_are_a_four_bar_once_one_is_held():
     text = FIVE_BAR.format(more="")
-    reason = closure_of(text).reason
-    assert "five hinges and two freedoms" in reason
-    assert "--hold b (or c or d)" in reason
     loop = loop_of(text, held=("d",))
     model = mujoco.MjModel.from_xml_string(text)
     assert loop.lengths == pytest.approx(
@@ -151,24 +141,38 @@ def test_five_hinges_are_a_four_bar_once_one_is_held():
     assert model.joint("d").id in loop.held
 
 
-def test_the_joint_that_a_spring_holds_is_the_first_to_hold():
-    """The finger of an adaptive gripper."""
-    assert "--hold spring_link (or " in closure_of(ADAPTIVE).reason
-    stiff = FIVE_BAR.format(more="").replace(
-        'joint name="c"', 'joint name="c" stiffness="2"'
-    )
-    assert "--hold c (or b or d)" in closure_of(stiff).reason
+SPRUNG = FIVE_BAR.format(more="").replace(
+    'joint name="c"', 'joint name="c" stiffness="2"'
+)
+TWO_MOTORS = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
+UNNAMED = TWO_MOTORS.replace('name="one" ', "")
+NO_NAME = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
 
 
-def test_two_motors_are_named():
-    text = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
-    assert "driven by 2 motors (one, two)" in closure_of(text).reason
-    assert "--hold a (or c) makes it a four-bar" in closure_of(text).reason
-    unnamed = text.replace('name="one" ', "")
-    assert "driven by 2 motors (on a, two)" in closure_of(unnamed).reason
-    remarks = loop_of(text, held=("d",)).remarks
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            FIVE_BAR.format(more=""),
+            "five hinges and two freedoms; --hold b (or c or d)",
+        ),
+        (ADAPTIVE, "--hold spring_link (or "),
+        (SPRUNG, "--hold c (or b or d)"),
+        (TWO_MOTORS, "driven by 2 motors (one, two)"),
+        (TWO_MOTORS, "--hold a (or c) makes it a four-bar"),
+        (UNNAMED, "driven by 2 motors (on a, two)"),
+        (NO_NAME, "--hold b (or c or joint 3)"),
+    ],
+)
+def test_what_to_hold_is_said(text, words):
+    """The joint that a spring holds is the first, or those of motors are."""
+    assert words in closure_of(text).reason
+
+
+def test_of_two_motors_one_is_taken_as_driven():
+    remarks = loop_of(TWO_MOTORS, held=("d",)).remarks
     assert "motors act on a, c: a is taken as driven" in remarks[0]
-    assert not loop_of(text, held=("d",), drive="c").remarks
+    assert not loop_of(TWO_MOTORS, held=("d",), drive="c").remarks
 
 
 @pytest.mark.parametrize(
@@ -381,9 +385,7 @@ def test_a_hinge_that_another_loop_moves_is_the_driven_one():
 
 
 def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed():
-    text = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
-    assert "--hold b (or c or joint 3)" in closure_of(text).reason
-    assert loop_of(text, held=("joint 3",)).lengths == pytest.approx(
+    assert loop_of(NO_NAME, held=("joint 3",)).lengths == pytest.approx(
         loop_of(FIVE_BAR.format(more=""), held=("d",)).lengths
     )
 

@@ -194,26 +194,25 @@ def compare(text, made, speed=3.0):
     assert compared > 5
 
 
-@pytest.mark.parametrize(
-    "loop", ["right_finger-right_follower", "left_finger-left_follower"]
+ATTITUDE = GRIPPER.replace(
+    '<body name="palm" pos="0 0 0.5">', '<body name="palm" euler="20 40 60">'
 )
-def test_the_gripper_has_the_torques_and_forces_of_the_whole_robot(loop):
-    made = read(GRIPPER, loop=loop)
-    compare(GRIPPER, made)
+RIGHT = {
+    "right finger": (GRIPPER, {"loop": "right_finger-right_follower"}),
+    "left finger": (GRIPPER, {"loop": "left_finger-left_follower"}),
+    "in another attitude": (
+        ATTITUDE,
+        {"loop": "right_finger-right_follower", "joints": {"wrist": "30deg"}},
+    ),
+    "foot": (FOOT, {}),
+    "foot in a keyframe": (FOOT, {"key": "crouch"}),
+}
 
 
-def test_a_finger_in_another_attitude_has_them_too():
-    text = GRIPPER.replace(
-        '<body name="palm" pos="0 0 0.5">', '<body name="palm" euler="20 40 60">'
-    )
-    made = read(text, loop="right_finger-right_follower", joints={"wrist": "30deg"})
-    compare(text, made)
-
-
-@pytest.mark.parametrize("key", [None, "crouch"])
-def test_the_foot_has_the_torques_and_forces_of_the_whole_robot(key):
-    made = read(FOOT, key=key)
-    compare(FOOT, made)
+@pytest.mark.parametrize("name", RIGHT)
+def test_torques_and_forces_are_those_of_the_whole_robot(name):
+    text, asked = RIGHT[name]
+    compare(text, read(text, **asked))
 
 
 def test_what_hangs_on_a_bar_counts_as_it_stands():
