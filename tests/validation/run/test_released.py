@@ -153,7 +153,7 @@ def answering(monkeypatch, change):
 
 
 @pytest.mark.slow
-def test_an_engine_that_stops_or_is_nan_before_the_limit_or_behind_it_fails(
+def test_an_engine_that_stops_is_nan_or_drifts_unpredicted_fails(
     monkeypatch,
 ):
     def cut(answer):
@@ -164,10 +164,14 @@ def test_an_engine_that_stops_or_is_nan_before_the_limit_or_behind_it_fails(
         answer.theta_2[index] = np.nan
         return answer
 
+    def drift(answer):
+        """Be wrong by the same amount with either step: it predicts nothing of it."""
+        return replace(answer, theta_2=answer.theta_2 + 1e-3)
+
     (only,) = answering(monkeypatch, cut)
     assert only.verdict == FAILS and "20 of 101 instants" in only.reason
-    for index in (20, 60):
-        rows = answering(monkeypatch, partial(strike, index))
+    for change in (partial(strike, 20), partial(strike, 60), drift):
+        rows = answering(monkeypatch, change)
         assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
 
 
