@@ -179,6 +179,18 @@ class DependencyError(FourBarError):
     """A library that the request needs is not installed."""
 
 
+@contextmanager
+def needing(what: str, extra: str) -> Iterator[None]:
+    """Raise DependencyError where the body imports what is not installed.
+
+    `what`: needs it, as the error says. `extra`: brings it.
+    """
+    try:
+        yield
+    except ImportError:
+        raise DependencyError(f"{what}: {say_install(extra)}") from None
+
+
 def say_install(extra: str) -> str:
     """Return how to install an extra of this package from where the package came.
 

@@ -24,12 +24,11 @@ import numpy as np
 
 from fourbar.effects.effect import Actions, Effect, list_bodies
 from fourbar.errors import (
-    DependencyError,
     FourBarError,
     InputError,
     LimitError,
     expect,
-    say_install,
+    needing,
 )
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import angle
@@ -447,12 +446,8 @@ class _Run:
 
     def _integrate(self, reading: _Reading, start: float, y: Array, side: float) -> Any:
         """Integrate one stretch, to the end of the motion at most."""
-        try:
+        with needing("SciPy is needed for free motion", "studies"):
             from scipy.integrate import DOP853, solve_ivp
-        except ModuleNotFoundError:
-            raise DependencyError(
-                f"SciPy is needed for free motion: {say_install('studies')}"
-            ) from None
         run = self
         end = float(self.times[-1])
 

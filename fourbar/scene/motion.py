@@ -15,10 +15,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fourbar.errors import (
-    DependencyError,
     InputError,
     expect,
-    say_install,
+    needing,
     write_in_units,
 )
 from fourbar.formulas.mobility import TURN
@@ -255,12 +254,8 @@ class Law(Described, _OverTime):
 
         Raises DependencyError where SciPy is not installed.
         """
-        try:
+        with needing("SciPy is needed for a motion law", "studies"):
             from scipy.interpolate import CubicSpline
-        except ModuleNotFoundError:
-            raise DependencyError(
-                f"SciPy is needed for a motion law: {say_install('studies')}"
-            ) from None
         time = require_numbers("time", time)
         if self.omega is not None:
             rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]

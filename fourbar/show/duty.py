@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.effects.effect import Actions, list_bodies
-from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.errors import InputError, expect, needing
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import dot
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
@@ -420,12 +420,8 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
 
     Raises DependencyError where SciPy is not installed.
     """
-    try:
+    with needing("SciPy is needed for free motion", "studies"):
         from scipy.interpolate import CubicSpline
-    except ModuleNotFoundError:
-        raise DependencyError(
-            f"SciPy is needed for free motion: {say_install('studies')}"
-        ) from None
     scene = scene.settled()
     assembly = find_signs(scene.linkage, motion.theta_2, motion.branch)
     of_input = Command(motion.theta_2, assembly, motion.omega_2, 0.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.errors import InputError, expect, needing
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Scene, command
 from fourbar.solution import find_values, split_parts
@@ -291,12 +291,8 @@ def tolerances(
 
 def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -> Study:
     """Make the study of the samples, one member each."""
-    try:
+    with needing("SciPy is needed for tolerances", "studies"):
         from scipy.stats import norm, qmc
-    except ImportError:
-        raise DependencyError(
-            f"SciPy is needed for tolerances: {say_install('studies')}"
-        ) from None
     entries, stated, numbers = (
         list_entries(scene),
         read_numbers(scene),

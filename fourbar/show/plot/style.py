@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, clean_line, expect, say_install
+from fourbar.errors import InputError, clean_line, expect, needing
 from fourbar.quantities import Array
 from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Conversion
@@ -109,12 +109,8 @@ def apply_style() -> Iterator[None]:
 
     Raises DependencyError where matplotlib is not installed.
     """
-    try:
+    with needing("drawing needs matplotlib", "plot"):
         import matplotlib as mpl
-    except ImportError:
-        raise DependencyError(
-            f"drawing needs matplotlib: {say_install('plot')}"
-        ) from None
     with _ONE_AT_A_TIME, mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
         mpl.rcParams.update(
