@@ -147,8 +147,7 @@ _without_loads_option = click.option(
     metavar="NAME",
     help=(
         "Figure: overview, linkage, coupler, kinematics, points, torque, forces,"
-        " energy, transmission, shaking, ratios, centres, freebody, bars,"
-        " sensitivity or stroke."
+        " energy, transmission, shaking, ratios, centres, freebody, bars or stroke."
     ),
 )
 @click.option(

@@ -176,7 +176,7 @@ class Scene:
         ----------
         figure : "overview", "linkage", "coupler", "kinematics", "points", "torque",
             "stroke", "forces", "energy", "transmission", "shaking", "ratios",
-            "centres", "freebody", "bars" or "sensitivity".
+            "centres", "freebody" or "bars".
         position : what is commanded where linkage and free bodies are drawn, rad or m;
             left out: the scene's own.
         units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI

@@ -10,7 +10,7 @@ from fourbar.linkage import require
 from fourbar.scene import Scene
 from fourbar.show.columns import explain_static
 from fourbar.show.motion_curves import describe_motion
-from fourbar.show.plot import curves, derived, freebody, linkage, studies
+from fourbar.show.plot import curves, derived, freebody, linkage
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
@@ -148,11 +148,10 @@ FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
     ),
     "freebody": (freebody.draw_free_bodies, (9.6, 4.6), True),
     "bars": (freebody.draw_internal_forces, (9.6, 6.2), True),
-    "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Painter of each figure, size of one branch in inches, and need of omega_2."""
 TAKERS = {
-    "position": tuple(name for name in FIGURES if name not in ("bars", "sensitivity")),
+    "position": tuple(name for name in FIGURES if name != "bars"),
     "dimensions": ("overview", "linkage", "points"),
 }
 """Figures in which one position is marked, and in which bars are numbered."""

@@ -1,4 +1,4 @@
-"""Plots of studies: tolerance bands, shares of the variance, sensitivities.
+"""Plots of tolerances: bands and shares of the variance.
 
 Bands are drawn for torque, pin forces and points.
 """
@@ -11,7 +11,6 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import command
-from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION_STYLE,
     FAINT,
@@ -25,17 +24,14 @@ from fourbar.show.plot.style import (
     set_degree_ticks,
     shorten_text,
 )
-from fourbar.show.plot.view import View, axis_of
-from fourbar.show.studies import find_largest, list_shown, rank_numbers
+from fourbar.show.plot.view import axis_of
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
 from fourbar.show.units import choose_unit
-from fourbar.solution import SI, Conversion, find_unit_of_quantity
-from fourbar.studies.derivatives import sensitivity
+from fourbar.solution import SI, Conversion
 from fourbar.studies.spread import BAND_PERCENTILES, Tolerances
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import SubFigure
 
 _MOST_BANDS = 7
 """Torque, four pin forces, and the components of one point; the eighth is for shares.
@@ -47,12 +43,8 @@ _OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched. Towards a limit
 they grow without end.
 """
-_MOST_NUMBERS = 12
-"""Number of the most influential parameters shown; a chart of more is unreadable."""
 _BELOW = 30.0
 """Space that numbers and name of an axis take, typographic points."""
-_MOST_PANELS = 6
-"""Torque, the four pin forces, and a point."""
 
 
 def draw_tolerances(
@@ -187,57 +179,4 @@ def _draw_shares(
         bbox_transform=below,
         borderaxespad=0.0,
         fontsize=6.5,
-    )
-
-
-def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    """Draw one panel for each quantity over the same rows."""
-    derivatives = sensitivity(shown.scene)
-    names = list_shown(derivatives)[:_MOST_PANELS]
-    keys = rank_numbers(derivatives, names)[:_MOST_NUMBERS][::-1]
-    panels = figure.subplots(1, len(names), squeeze=False)[0]
-    for axes, name in zip(panels, names, strict=True):
-        changes = {row.key: abs(row.change) for row in derivatives.influences(name)}
-        sizes = np.array([changes.get(key, 0.0) for key in keys])
-        factor, unit = choose_unit(
-            sizes.max(initial=0.0),
-            find_unit_of_quantity(name),
-            shown.units,
-        )
-        axes.barh(
-            range(len(keys)),
-            factor * sizes,
-            height=0.62,
-            color=FORCE_COLOURS.get(name, INK),
-        )
-        axes.set_yticks(
-            range(len(keys)),
-            keys if axes is panels[0] else [""] * len(keys),
-            size=6.8,
-        )
-        axes.set(
-            ylim=(-0.6, len(keys) - 0.4),
-            title=shorten_text(name, 12),
-            xlabel=unit,
-        )
-        axes.grid(False, axis="y")
-        axes.locator_params(axis="x", nbins=3)
-        most, own_unit = choose_unit(
-            find_largest(derivatives, name),
-            find_unit_of_quantity(name),
-            shown.units,
-        )
-        text = f"largest\n{most * find_largest(derivatives, name):.3g} {own_unit}"
-        axes.text(
-            0.98,
-            0.02,
-            text,
-            transform=axes.transAxes,
-            ha="right",
-            va="bottom",
-            size=6.8,
-        )
-    shown.notes.append(
-        f"Bars: the largest change over the sweep {derivatives.describe_steps()};"
-        " pin forces by their magnitude."
     )

@@ -222,7 +222,7 @@ CLEAR_FIGURES = [
     (by_law(), "torque"),
     *zip(
         map(commanding, cycle(COMMANDS.values())),
-        ("freebody", "shaking", "transmission", "kinematics", "sensitivity"),
+        ("freebody", "shaking", "transmission", "kinematics", "points"),
         strict=False,
     ),
 ]
@@ -345,14 +345,6 @@ def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign():
     assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith(
         "At θ₂ = 135°. "
     )
-
-
-@pytest.mark.slow
-def test_the_sensitivities_have_the_units_asked_for_and_whole_names():
-    panels = composed(crank_rocker(), "sensitivity", units="imperial").axes
-    assert [axes.get_xlabel() for axes in panels[:2]] == ["lbf in", "lbf"]
-    largest = np.abs(solve(crank_rocker()).torque).max() / 0.112984829
-    assert f"{largest:.3g} lbf in" in panels[0].texts[0].get_text()
 
 
 @pytest.mark.slow
