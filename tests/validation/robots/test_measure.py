@@ -186,7 +186,10 @@ def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path):
     checked = call(check_mjcf, str(file), "-o", str(tmp_path))
     assert checked.return_value == 0, checked.output
     said = join_lines(checked)
-    assert "what the scene leaves out and the lengths that it reads as equal;" in said
+    assert (
+        "what the scene leaves out and the lengths that it reads as equal (the notes"
+        " name what is known of it);" in said
+    )
     assert "in line within the digits of the file (motor = 68.75 deg)" in said
     assert "note: lengths read as equal within the digits of the file: " in said
     assert "3.2 deg from a change point" in said

@@ -179,21 +179,9 @@ def _describe_loop(
             f" other: {names}"
         )
     left_out = find_left_out(loop)
-    if left_out > SCENE_ROUND_OFF:
-        size = f"{left_out:.1e}"
-    else:
-        size = f"less than {SCENE_ROUND_OFF:g}"
-    and_lengths = ""
-    within_digits = ""
-    if loop.rounding:
-        and_lengths = " and the lengths that it reads as equal"
-        within_digits = " within the digits of the file"
-    yield (
-        f"with rigid pins the robot differs from the formulas by {size} of the largest:"
-        f" what the scene leaves out{and_lengths}; MuJoCo differs from rigid pins by"
-        " its soft constraint"
-    )
+    yield _write_left_out(left_out, lengths_are_read=bool(loop.rounding))
     if loop.states.in_line:
+        within_digits = " within the digits of the file" if loop.rounding else ""
         places = ", ".join(map(write_degrees, loop.states.in_line))
         count = len(loop.states.in_line)
         yield (
@@ -240,6 +228,22 @@ def _describe_loop(
     yield from _describe_torn(loop)
     for remark in loop.remarks:
         yield f"note: {remark}"
+
+
+def _write_left_out(left_out: float, *, lengths_are_read: bool) -> str:
+    """Write how far rigid pins differ from the formulas, and why."""
+    size = f"less than {SCENE_ROUND_OFF:g}"
+    if left_out > SCENE_ROUND_OFF:
+        size = f"{left_out:.1e}"
+    reasons = "what the scene leaves out"
+    if lengths_are_read:
+        reasons += " and the lengths that it reads as equal"
+    if left_out > LEAST_LEFT_OUT:
+        reasons += " (the notes name what is known of it)"
+    return (
+        f"with rigid pins the robot differs from the formulas by {size} of the largest:"
+        f" {reasons}; MuJoCo differs from rigid pins by its soft constraint"
+    )
 
 
 def _write_held(loop: LoopMeasurement) -> str:
