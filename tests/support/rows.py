@@ -9,6 +9,6 @@ def read_rows(table: str) -> list[tuple[str, ...]]:
     rows = []
     for line in table.splitlines():
         if line and not line.startswith("#"):
-            cells = line.replace(" | | ", " |  | ").split(" | ")
+            cells = f"{line} ".replace(" | | ", " |  | ").split(" | ")
             rows.append(tuple(cell.strip() for cell in cells))
     return rows

@@ -514,16 +514,16 @@ def test_what_was_typed_stays_when_another_linkage_is_drawn(new):
     assert coupler.length == approx(INCH * math.hypot(11, 8), abs=INCH * 0.01)
 
 
-@pytest.mark.parametrize(
-    "length, force",
-    [
-        ("12 in", "lbf"),
-        ('12 1/2"', "lbf"),
-        ("1' 6\"", "lbf"),
-        ("1 ft", "lbf"),
-        ("300 mm", "N"),
-    ],
-)
+UNITS = read_rows("""
+12 in | lbf
+12 1/2" | lbf
+1' 6" | lbf
+1 ft | lbf
+300 mm | N
+""")
+
+
+@pytest.mark.parametrize("length, force", UNITS)
 def test_results_have_the_units_of_the_file_until_others_are_chosen(
     session, length, force
 ):

@@ -14,6 +14,7 @@ from fourbar.files import loads
 from fourbar.show.acting import list_drawn_notes, list_spring_notes
 from fourbar.show.block import write_block
 from fourbar.solution import DEGREES
+from tests.support.rows import read_rows
 from tests.support.scenes import bare
 
 HATCH = """
@@ -163,16 +164,16 @@ mass = "1 kg"
 """
 
 
-@pytest.mark.parametrize(
-    "start, stop, told",
-    [
-        ("drawn", "-170 deg", 'to = "190 deg" is the same direction, 20 deg from'),
-        ("-170 deg", "drawn", 'from = "190 deg" is the same direction, 20 deg from'),
-        ("drawn", "190 deg", ""),
-        ("drawn", "530 deg", ""),
-        ("169.9 deg", "-170 deg", ""),
-    ],
-)
+LONG_WAYS = read_rows("""
+drawn | -170 deg | to = "190 deg" is the same direction, 20 deg from
+-170 deg | drawn | from = "190 deg" is the same direction, 20 deg from
+drawn | 190 deg |
+drawn | 530 deg |
+169.9 deg | -170 deg |
+""")
+
+
+@pytest.mark.parametrize("start, stop, told", LONG_WAYS)
 def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told):
     """The input is drawn at 170 deg, or at -190 deg, to a ground at 180 deg."""
     text = DRAWN.replace("FROM", start).replace("TO", stop)

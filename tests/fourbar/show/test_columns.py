@@ -53,7 +53,9 @@ def test_a_ratio_of_speeds_does_not_ask_for_a_speed():
 
 
 def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
-    torque, ratio = choose_columns(TURN, solve(TURN), "torque/F12,F12/F14")
+    s = solve(TURN)
+    torque, ratio = choose_columns(TURN, s, "torque/F12,F12/F14")
+    assert ratio.values == approx(np.hypot(*s.F12.T) / np.hypot(*s.F14.T))
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     shown = torque.shown({"N m": ("N mm", 1e3)})
     assert shown == approx(1e3 * torque.values)

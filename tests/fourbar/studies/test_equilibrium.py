@@ -247,9 +247,14 @@ BACK = Sweep(radians(500.0), radians(-100.0), 300)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("swept", [FULL, HALF, BACK, None])
 @pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize("lengths", ONE_CHANGE_POINT)
+@pytest.mark.parametrize(
+    "lengths, swept",
+    [
+        *zip(ONE_CHANGE_POINT, (FULL, HALF, BACK, None), strict=True),
+        *zip(ONE_CHANGE_POINT, (BACK, None, FULL, HALF), strict=True),
+    ],
+)
 def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     lengths, branch, swept
 ):
