@@ -2,6 +2,7 @@
 
 import html
 import math
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -31,64 +32,88 @@ HARD = changed(condition=0.01, allowed=1e-13)
 ALARM = changed(quantity="watch", verdict=FAILS, error=NAN)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "kind"),
-    [
-        ([ROW], [ROW], Kind.SAME),
-        ([FAILING], [FAILING], Kind.STILL_FAILS),
-        ([ROW], [changed(error=ROW.error + 40 * EPS)], Kind.SAME),
-        ([ROW], [changed(error=60 * EPS)], Kind.GREW),
-        ([changed(allowed=1e-15)], [changed(error=60 * EPS)], Kind.WORSE),
-        ([HARD], [replace(HARD, error=3000 * EPS)], Kind.SAME),
-        ([HARD], [replace(HARD, error=6000 * EPS, allowed=1.0)], Kind.WORSE),
-        ([HARD], [replace(HARD, error=6000 * EPS, condition=1.0)], Kind.WORSE),
-        ([SIMULATED], [replace(SIMULATED, error=1.2e-6)], Kind.SAME),
-        ([SIMULATED], [replace(SIMULATED, error=1.3e-6)], Kind.GREW),
-        ([SIMULATED], [replace(SIMULATED, error=1.3e-5, allowed=1)], Kind.WORSE),
-        ([SIMULATED], [replace(SIMULATED, error=0.7e-6)], Kind.BETTER),
-        ([SIMULATED], [replace(SIMULATED, error=0.9e-6)], Kind.SAME),
-        ([ROW], [changed(verdict=DEGRADED)], Kind.VERDICT_WORSE),
-        ([ROW], [changed(verdict=REFUSES, error=NAN)], Kind.VERDICT_WORSE),
-        ([ROW], [changed(verdict=FAILS, error=NAN)], Kind.VERDICT_WORSE),
-        ([FAILING], [ROW], Kind.VERDICT_BETTER),
-        ([FAILING], [changed(verdict=FAILS, error=NAN)], Kind.WORSE),
-        ([ROW], [], Kind.GONE),
-        ([FAILING], [], Kind.GONE),
-        ([ALARM], [], Kind.GONE_FAILURE),
-        ([], [OTHER], Kind.NEW),
-        ([], [replace(OTHER, verdict=FAILS)], Kind.NEW_FAILURE),
-        ([ROW], [changed(setting="h/2", error=1.0)], Kind.NOT_COMPARED),
-        ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
-    ],
-)
-def test_each_kind_of_change(old, new, kind):
-    beside = changed(engine="formulas", error=0.0, allowed=0.0)
-    found = compare_rows((HERE, [*old, beside]), (HERE, [*new, beside]))
-    (line,) = found.table[found.table.engine == "engine"].itertuples()
-    assert line.kind == kind
-    regresses = kind in (Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE)
-    assert bool(found.regressed) == regresses
-    assert f"{1 + (kind == Kind.SAME)} {kind}" in render.write_verdict(found)
-    (shown,) = found.table[found.table.engine == "engine"].quantity
-    heading = f"{kind.capitalize()}: scene / engine / exact / {shown}"
-    told = kind in render.KINDS_SHOWN
-    assert (heading in render.write_differences(found)) == told
-    if kind == Kind.NEW_FAILURE and not old:
-        assert all(WHY in html.unescape(form(found)) for form in FORMS)
+KINDS = [
+    ([ROW], [ROW], Kind.SAME),
+    ([FAILING], [FAILING], Kind.STILL_FAILS),
+    ([ROW], [changed(error=ROW.error + 40 * EPS)], Kind.SAME),
+    ([ROW], [changed(error=60 * EPS)], Kind.GREW),
+    ([changed(allowed=1e-15)], [changed(error=60 * EPS)], Kind.WORSE),
+    ([HARD], [replace(HARD, error=3000 * EPS)], Kind.SAME),
+    ([HARD], [replace(HARD, error=6000 * EPS, allowed=1.0)], Kind.WORSE),
+    ([HARD], [replace(HARD, error=6000 * EPS, condition=1.0)], Kind.WORSE),
+    ([SIMULATED], [replace(SIMULATED, error=1.2e-6)], Kind.SAME),
+    ([SIMULATED], [replace(SIMULATED, error=1.3e-6)], Kind.GREW),
+    ([SIMULATED], [replace(SIMULATED, error=1.3e-5, allowed=1)], Kind.WORSE),
+    ([SIMULATED], [replace(SIMULATED, error=0.7e-6)], Kind.BETTER),
+    ([SIMULATED], [replace(SIMULATED, error=0.9e-6)], Kind.SAME),
+    ([ROW], [changed(verdict=DEGRADED)], Kind.VERDICT_WORSE),
+    ([ROW], [changed(verdict=REFUSES, error=NAN)], Kind.VERDICT_WORSE),
+    ([ROW], [changed(verdict=FAILS, error=NAN)], Kind.VERDICT_WORSE),
+    ([FAILING], [ROW], Kind.VERDICT_BETTER),
+    ([FAILING], [changed(verdict=FAILS, error=NAN)], Kind.WORSE),
+    ([ROW], [], Kind.GONE),
+    ([FAILING], [], Kind.GONE),
+    ([ALARM], [], Kind.GONE_FAILURE),
+    ([], [OTHER], Kind.NEW),
+    ([], [replace(OTHER, verdict=FAILS)], Kind.NEW_FAILURE),
+    ([ROW], [changed(setting="h/2", error=1.0)], Kind.NOT_COMPARED),
+    ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
+]
+"""Rows of the old and of the new run, and what happened: each line in its own scene."""
+
+
+@pytest.fixture(scope="module")
+def compared():
+    """The runs that have all these rows, and an identity in each scene."""
+    runs = ([], [])
+    for number, (*both, _) in enumerate(KINDS):
+        beside = changed(engine="formulas", error=0.0, allowed=0.0)
+        for run, rows in zip(runs, both, strict=True):
+            scene = f"case {number}"
+            run += [replace(row, scene=scene) for row in (*rows, beside)]
+    return compare_rows(*((HERE, run) for run in runs))
+
+
+@pytest.mark.parametrize("number", range(len(KINDS)))
+def test_each_kind_of_change(number, compared):
+    lines = compared.table[compared.table.scene == f"case {number}"]
+    (kind,) = lines[lines.engine == "engine"].kind
+    assert kind == KINDS[number][-1]
+
+
+def test_kinds_are_counted_and_shown(compared):
+    counts = Counter(kind for *_, kind in KINDS)
+    regressing = (Kind.VERDICT_WORSE, Kind.WORSE, Kind.GONE, Kind.NEW_FAILURE)
+    assert compared.regressed == sum(counts[kind] for kind in regressing)
+    counts[Kind.SAME] += len(KINDS)
+    verdict, text = render.write_verdict(compared), render.write_differences(compared)
+    for kind, count in counts.items():
+        assert f" {count} {kind}" in verdict
+        shown = f"\n{kind.capitalize()}: case " in f"\n{text}"
+        assert shown == (kind != Kind.SAME)
+    assert all(WHY in html.unescape(form(compared)) for form in FORMS)
 
 
 def test_settings_are_paired_only_where_each_run_has_one_of_its_own():
     first, second = (changed(setting=name) for name in ("h", "h/2"))
     third, none = (changed(setting=name) for name in ("h/4", "-"))
-    for old, new in (
+    unpaired = [
         ([first], [second, third]),
         ([first, second], [third]),
         ([first], [none]),
         ([none], [first]),
         ([first], [replace(second, quantity="F12")]),
         ([first], [replace(second, engine="formulas")]),
-    ):
-        assert {*kinds(old, new)} == {Kind.GONE, Kind.NEW}
+    ]
+    old, new = (
+        [
+            replace(row, scene=f"case {number}")
+            for number, both in enumerate(unpaired)
+            for row in both[side]
+        ]
+        for side in (0, 1)
+    )
+    assert {*kinds(old, new)} == {Kind.GONE, Kind.NEW}
     assert kinds([first, second], [third, second]) == [Kind.NOT_COMPARED, Kind.SAME]
 
 
