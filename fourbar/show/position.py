@@ -15,7 +15,12 @@ from fourbar.show.change_point import NoSideError, find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
 from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
-from fourbar.solution import Conversion, Solution, find_values
+from fourbar.solution import (
+    Conversion,
+    Solution,
+    find_unit_of_quantity,
+    find_values,
+)
 from fourbar.solving import solve
 
 LABEL_WIDTH, _CELL = 15, 15
@@ -62,10 +67,15 @@ class PositionSheet:
         ]
 
     def _read(self, name: str) -> Array | None:
-        """Return a quantity of the motion, zero where it changes its sign."""
+        """Return a quantity of the motion, zero where it changes its sign.
+
+        Angles stay: that of a whole turn has the sign of its rounding on either side.
+        """
         values = find_values(self.solution, name)
         if values is None:
             return None
+        if find_unit_of_quantity(name) == "rad":
+            return np.asarray(values[0])
         before, after = (find_values(beside, name)[0] for beside in self.beside)
         return np.where(before * after < 0.0, 0.0, values[0])
 

@@ -15,9 +15,11 @@ import fourbar
 from fourbar import Bar, Free, Gravity, Motion, Scene, solve
 from fourbar.effects import Place
 from fourbar.files import loads
+from fourbar.scene import command_at
 from fourbar.show.located import locate
 from fourbar.show.position import PositionSheet
 from fourbar.show.units import COMMON, units
+from fourbar.studies.course import follow
 from fourbar.studies.passing import find_positions
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
@@ -233,3 +235,17 @@ def test_the_reason_is_said_where_a_motion_begins(motion, why):
     rows, _ = write_forces(motion, at=("time", 0.0))
     assert rows[-1] == f"on the change point pin forces have no value: {why}"
     assert numbers(rows[1]) == []
+
+
+def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
+    """At the limit of bar 4 its speed is zero; a whole turn later the angle is 2 pi."""
+    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(None, 10.0))
+    at_limit = locate(scene, "theta_4", "max")
+    rows = PositionSheet(scene, solve(scene, at=at_limit), units("N m")).write_bars()
+    assert abs(solve(scene, at=at_limit).omega_4[0]) > 0.0
+    assert rows[3].split()[3] == "0" and rows[2].split()[3] != "0"
+    turned = Scene(PARALLELOGRAM, Motion(fourbar.Sweep(0.0, 2.0 * np.pi, 4), 1.0))
+    one = solve(turned, at=command_at(turned, np.array([2.0 * np.pi])))
+    follow(turned, one)
+    rows = PositionSheet(turned, one, units("N m")).write_bars()
+    assert rows[3].split()[2] == "6.2832"
