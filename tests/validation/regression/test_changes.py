@@ -17,7 +17,7 @@ from tests.support import runs
 from tests.support.runs import FORMS, HERE, compare_rows, kinds
 
 WHY = "Cannot find module 'x'"
-ROW = runs.changed(allowed=1e-9, reason=WHY)
+ROW = runs.changed(allowed=1e-9, reason="")
 
 
 def changed(**fields):
@@ -55,7 +55,7 @@ KINDS = [
     ([FAILING], [], Kind.GONE),
     ([ALARM], [], Kind.GONE_FAILURE),
     ([], [OTHER], Kind.NEW),
-    ([], [replace(OTHER, verdict=FAILS)], Kind.NEW_FAILURE),
+    ([], [replace(OTHER, verdict=FAILS, reason=WHY)], Kind.NEW_FAILURE),
     ([ROW], [changed(setting="h/2", error=1.0)], Kind.NOT_COMPARED),
     ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
 ]
