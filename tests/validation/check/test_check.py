@@ -832,6 +832,7 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(read):
     table = read("theta_2 [deg],theta_3\n\n45,1\n")
     judgement = judge_table(THESIS, table)
     assert judgement.not_assembled == [3] and judgement.status == FAILED
+    assert judgement.findings == []
 
 
 @pytest.mark.parametrize("degrees", [False, True])

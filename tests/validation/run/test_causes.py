@@ -323,6 +323,18 @@ def reverse_F43(numbers, at):
     numbers["F43"] = -numbers["F43"]
 
 
+def test_numbers_where_an_engine_finds_no_loop_closed_are_not_looked_at():
+    class Partly(Altered):
+        def answer(self, scene, at):
+            answer = super().answer(scene, at)
+            answer.assembled[:5] = False
+            answer.quantities["F43"][:5] = 7.0
+            return answer
+
+    (cause,) = find_causes(partial(Partly, reverse_F43))
+    assert cause == "sign reversed, or F_ij given for F_ji: F43"
+
+
 def turn_F32_alone(numbers, at):
     turned = dict(numbers)
     turn_into_bars(turned, at)
