@@ -828,11 +828,16 @@ def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path, check):
     assert "directory" in check(THESIS, None)[2]
 
 
+ANGLES = ("theta_2", "theta_3")
+
+
 def test_positions_that_do_not_assemble_are_named_by_their_line(read):
-    table = read("theta_2 [deg],theta_3\n\n45,1\n")
+    """A right number beside them makes no success of the table."""
+    right_row = ",".join(repr(float(right(THESIS)[key][0])) for key in ANGLES)
+    table = read(f"theta_2,theta_3\n{right_row}\n{math.radians(45.0)!r},1\n")
     judgement = judge_table(THESIS, table)
     assert judgement.not_assembled == [3] and judgement.status == FAILED
-    assert judgement.findings == []
+    assert [finding.line for finding in judgement.findings] == [2]
 
 
 @pytest.mark.parametrize("degrees", [False, True])
@@ -948,7 +953,9 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     agreed = f"{count} of {count} numbers agree within rtol 0.001, atol 0"
     assert code == HOLDS and f"{agreed}; {count - rows} to round-off" in printed
     assert report["agree_to_round_off"] == count - rows and failing == []
+    assert report["agree"] == count
     assert judge("--atol", "1e-9")[0] == FAILED
+    assert judge("--atol", "1.0")[0] == HOLDS
     assert judge("--rtol", "-1")[0] == BAD_INPUT
 
 
