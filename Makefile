@@ -17,10 +17,10 @@ validate: setup
 	@echo "validate: what six digits of torque and pin forces cost MuJoCo, some seconds"
 	$(BIN)/python -m validation advise models/crank_rocker.toml --error 1e-6
 
-# the contributor's loop: some two minutes on two idle cores. Three processes, as a test
+# the contributor's loop: two to three minutes on two idle cores. Three processes, as a test
 # waits now and then for what it started
 test: check
-	@echo "test: the quick tests, some two minutes"
+	@echo "test: the quick tests, two to three minutes"
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow"
 
 # every test that is not of a night
