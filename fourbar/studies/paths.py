@@ -21,12 +21,8 @@ NEAREST = 1e-4
 """Part of the path by which the places of a course may miss an extreme. It falls as
 the square of the steps.
 """
-DIRECTIONS = np.linspace(0.0, 0.5 * TURN, 360, endpoint=False)
-"""Directions, rad, in which the width of a path is measured before the least is found
-between two of them. Around it the width has one least value.
-"""
-THIRDS = 90
-"""Rounds that leave two thirds of the directions: round-off of the first is left."""
+MOST_LINES = 300
+"""Directions of nearest lines that are told apart. A circle has more of them."""
 MOST_PLACES = 50_000
 """Places from which on the steps are not divided: they are short all around."""
 
@@ -97,18 +93,10 @@ def _list_extremes(points: Array, missed: float) -> NDArray[np.intp]:
 
     `missed`: part of the path by which the points may miss an extreme.
     """
-    direction, near = _find_direction(points, missed)
+    direction, lines = _find_direction(points, missed)
     ends = _list_ends(points @ direction)
     sides = [np.nanargmin(points, axis=0), np.nanargmax(points, axis=0)]
-    room = missed * np.ptp(points[ends] @ direction)
-    # what is no corner between these places may be one between closer ones
-    touching = np.zeros(len(points), dtype=bool)
-    for angle in near:
-        heights = points @ np.array([-np.sin(angle), np.cos(angle)])
-        with np.errstate(invalid="ignore"):
-            touching |= heights <= np.nanmin(heights) + room
-            touching |= heights >= np.nanmax(heights) - room
-    return np.unique([*np.flatnonzero(touching), *ends, *np.ravel(sides)])
+    return np.unique([*lines, *ends, *np.ravel(sides)])
 
 
 def _list_ends(heights: Array) -> list[int]:
@@ -116,28 +104,64 @@ def _list_ends(heights: Array) -> list[int]:
     return [int(np.nanargmin(heights)), int(np.nanargmax(heights))]
 
 
-def _find_direction(points: Array, missed: float = 0.0) -> tuple[Array, list[float]]:
+def _find_direction(points: Array, missed: float = 0.0) -> tuple[Array, list[int]]:
     """Return a unit vector along the two nearest parallel lines that hold the points.
 
-    The second result has the angles of these lines, and of others, rad, that are hardly
-    farther apart: by `missed` as a part of the path.
+    One of the lines goes through two neighbouring corners of their convex hull, the
+    other through the corner that is farthest from it. The second result has the rows of
+    the points on these lines, and on others that are hardly farther apart.
     """
-    points = points[np.isfinite(points).all(axis=1)]
+    hull = np.array(_list_hull(points))
+    if len(hull) < 3:
+        across = points[hull[-1]] - points[hull[0]]
+        length = np.hypot(*across)
+        along = across / length if length > 0.0 else np.array([1.0, 0.0])
+        return along, hull.tolist()
+    corners = points[hull]
+    sides = np.roll(corners, -1, axis=0) - corners
+    along = sides / np.hypot(*sides.T)[:, None]
+    normals = np.stack([-along[:, 1], along[:, 0]])
+    bases = np.sum(corners.T * normals, axis=0)
+    # the farthest corner is where the sides have turned by half a turn
+    angles = np.unwrap(np.arctan2(sides[:, 1], sides[:, 0]))
+    farthest = np.searchsorted(np.append(angles, angles + TURN), angles + 0.5 * TURN)
+    opposite = corners[farthest % len(hull)]
+    widths = np.sum(opposite.T * normals, axis=0) - bases
+    direction = along[np.argmin(widths)]
+    room = missed * np.hypot(*np.ptp(corners, axis=0))
+    near = np.flatnonzero(widths <= widths.min() + room)
+    if len(near) > MOST_LINES:
+        return direction, hull.tolist()
+    # what is no corner between these places may be one between closer ones
+    heights = points @ normals[:, near] - bases[near]
+    with np.errstate(invalid="ignore"):
+        touching = (heights <= room) | (heights >= widths[near] - room)
+    return direction, np.flatnonzero(touching.any(axis=1)).tolist()
 
-    def measure_width(angle: float) -> float:
-        return float(np.ptp(points @ np.array([-np.sin(angle), np.cos(angle)])))
 
-    widths = np.array([measure_width(angle) for angle in DIRECTIONS])
-    best = int(np.argmin(widths))
-    angle = float(DIRECTIONS[best])
-    step = float(DIRECTIONS[1])
-    for _ in range(THIRDS):
-        beside = [angle - step, angle, angle + step]
-        angle = min(beside, key=measure_width)
-        step *= 2.0 / 3.0
-    room = missed * widths.max()
-    near = DIRECTIONS[widths <= widths[best] + room].tolist()
-    return np.array([np.cos(angle), np.sin(angle)]), [angle, *near]
+def _list_hull(points: Array) -> list[int]:
+    """List the rows of the corners of the convex hull, counter-clockwise.
+
+    Andrew's monotone chain: the points from left to right turn to the left below, and
+    back from right to left above.
+    """
+    x, y = points.T.tolist()
+    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    order = finite[np.lexsort(points[finite].T[::-1])].tolist()
+    halves = []
+    for rows in (order, order[::-1]):
+        chain: list[int] = []
+        for row in rows:
+            while len(chain) > 1:
+                first, second = chain[-2:]
+                across = (x[second] - x[first]) * (y[row] - y[first])
+                if across - (y[second] - y[first]) * (x[row] - x[first]) > 0.0:
+                    break
+                chain.pop()
+            chain.append(row)
+        halves.append(chain[:-1])
+    corners = halves[0] + halves[1]
+    return corners or order[:1]
 
 
 def _measure_points(places: Array, points: Array) -> Path:

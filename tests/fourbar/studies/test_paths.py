@@ -21,6 +21,8 @@ STIRLING = ("22.114772314 4.188803 12.010892 18.925111", complex(12.08631, 7.475
 CUTTER = ("657.64732 100 700 1000", 1000.0 * np.exp(-1j * radians(36.87)))
 TRAINER = ("50 8 33 34", 12.0 * np.exp(1j * radians(167.0)))
 """The same of a web cutter with its blade, and of an elliptical trainer's pedal."""
+TWO_WAYS = ("78 12 126 147", 64.0 - 123.0j)
+"""An arc that is narrow in two directions, by nearly as much."""
 DRIVE = """\
 [lengths]
 ground = "{d} mm"
@@ -29,7 +31,7 @@ coupler = "{b} mm"
 output = "{c} mm"
 ground_angle = "{angle} deg"
 [motion]
-theta_2 = {{ from = "0 deg", to = "360 deg", steps = {steps} }}
+theta_2 = {{ from = "{first} deg", to = "{last} deg", steps = {steps} }}
 [points]
 P = {{ bar = 3, from_pin = {{ x = "{place.real} mm", y = "{place.imag} mm" }} }}
 """
@@ -41,10 +43,10 @@ AT_REST = 1e-5
 """s: at its ends a 3-4-5 law stands still to round-off for as long."""
 
 
-def find_hull(lengths, place, angle, steps):
+def find_hull(lengths, place, angle, ends, steps):
     """Return the convex hull of a coupler's path, mm, by the cosine rule in A B O4."""
     d, a, b, c = lengths
-    A = a * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, steps + 1))
+    A = a * np.exp(1j * np.linspace(*np.radians(ends), steps + 1))
     to_O4 = d * np.exp(1j * radians(angle)) - A
     side = np.abs(to_O4)
     at_A = np.arccos((b * b + side * side - c * c) / (2.0 * b * side))
@@ -62,32 +64,37 @@ def scan(path, directions):
 
 
 @pytest.mark.parametrize(
-    "curve, angle, steps",
+    "curve, angle, ends, steps",
     slow_but(
-        [(STIRLING, 32.31614688136, 36)],
+        [(STIRLING, 32.31614688136, (0, 360), 36)],
         [
-            (STIRLING, 32.31614688136, 36),
-            (STIRLING, 52.31614688136, 360),
-            (CUTTER, 0.0, 36),
-            (TRAINER, 0.0, 36),
+            (STIRLING, 32.31614688136, (0, 360), 36),
+            (STIRLING, 52.31614688136, (0, 360), 360),
+            (CUTTER, 0.0, (0, 360), 36),
+            (TRAINER, 0.0, (0, 360), 36),
+            (TWO_WAYS, 0.0, (126, 415), 36),
         ],
     ),
 )
-def test_straightness_is_the_distance_of_the_nearest_two_lines(curve, angle, steps):
+def test_straightness_is_the_distance_of_the_nearest_two_lines(
+    curve, angle, ends, steps
+):
     """Whatever the ground's angle, and however coarse the steps are.
 
     Of an oval the width turns slowly, and every side of it decides.
     """
     named, place = curve
     d, a, b, c = lengths = [float(length) for length in named.split()]
-    text = DRIVE.format(d=d, a=a, b=b, c=c, angle=angle, steps=steps, place=place)
+    shown = {"d": d, "a": a, "b": b, "c": c, "angle": angle, "place": place}
+    text = DRIVE.format(first=ends[0], last=ends[1], steps=steps, **shown)
     (path,) = measure_paths(solve(loads(text))).values()
     if curve is STIRLING:
         assert 1e3 * path.stroke == approx(10.0, abs=1e-6)
         assert 1e3 * path.straightness == approx(0.1, abs=1e-7)
-    coarse = find_hull(lengths, place, angle, 2000)
-    _, _, direction = scan(coarse, np.linspace(0.0, np.pi, 721))
-    in_full = find_hull(lengths, place, angle, 200_000)
+    coarse = find_hull(lengths, place, angle, ends, 2000)
+    # one of the two lines goes along a side of the hull
+    _, _, direction = scan(coarse, np.angle(np.roll(coarse, -1) - coarse))
+    in_full = find_hull(lengths, place, angle, ends, 200_000)
     for step in 0.02 * 0.1 ** np.arange(9):
         beside = direction + np.linspace(-step, step, 21)
         width, length, direction = scan(in_full, beside)
