@@ -128,7 +128,6 @@ EXACT = [engine for engine in ENGINES if not engine.through_time]
 SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
 ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
-INVERSE = {*ON_TREES, "free-body"}
 NO_COUNTERPART = {
     "mujoco-simulated": {
         key for key, kind in list_kinds().items() if not kind.has_mjcf()

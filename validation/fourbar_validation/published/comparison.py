@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from fourbar.errors import FAILED, HOLDS, DependencyError, say_install
+from fourbar.errors import FAILED, HOLDS, needing
 from fourbar.writing import write_text
 from fourbar_validation.places import HARNESS_PROGRAM
 from fourbar_validation.published.figures import (
@@ -200,13 +200,9 @@ def published(show_all: bool, out: Path | None) -> int:
     """
     from rich.console import Console
 
-    try:
-        # a missing library of the last source is noticed before the first is printed
+    # a missing library of the last source is noticed before the first is printed
+    with needing("a free motion among the sources needs SciPy", "validation"):
         import_module("scipy.integrate")
-    except ModuleNotFoundError:
-        raise DependencyError(
-            f"a free motion among the sources needs SciPy: {say_install('validation')}"
-        ) from None
     rows = list_ladder_rows()
     title = "The published torque, error by error"
     table = make_words_table(ERRATA_HEADINGS, rows, 2, title=title, show_lines=True)
