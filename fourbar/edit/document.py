@@ -109,7 +109,10 @@ def _collect_words(kind: Any) -> dict[str, list[str]]:
 
 
 def _offer_bars(offers: dict[str, Any]) -> None:
-    """Add the numbers of the moving bars: pairs as parts, the others as fields."""
+    """Add the numbers of the moving bars to what the workbench offers, in place.
+
+    Pairs are parts, optional numbers are fields.
+    """
     fields: dict[str, Any] = offers["fields"].setdefault("bars", {})
     for bar_number in MOVING_BARS:
         bar = BAR_NAMES[bar_number]

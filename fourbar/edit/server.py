@@ -103,9 +103,10 @@ class Workbench:
             line.send(data)
 
     def take(self, line: "_PageLine", asked: dict[str, Any]) -> None:
-        """Put a request in the queue.
+        """Put a request in the queue; `check` and `stop` are done at once.
 
-        A later request of the same gesture replaces one that waits.
+        A later request of the same gesture replaces one that waits. Where too many wait
+        the page is told so.
         """
         if self.ended.is_set():  # a page may go on sending while the server ends
             return

@@ -225,9 +225,13 @@ class Case(NamedTuple):
         *,
         moving: bool = True,
     ) -> State:
-        """Close the loop at the half angles of a command.
+        """Return the state at each position of a command: positions and motion.
 
-        `moving`: False: positions only. Without a command, `compute_state` closes it.
+        Parameters
+        ----------
+        half : half angles of the command's angles, from `half_angle` or, in longer
+            numbers, from `decide_half_angles`.
+        moving : False: positions only.
         """
         path = self.path
         q = at.angle

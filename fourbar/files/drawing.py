@@ -307,7 +307,10 @@ def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]
 
 
 def _find_side_of_cylinder(drawing: DrawnPins, line: LinearDrive) -> str:
-    """Find the side of a cylinder's end on its bar."""
+    """Return "left" or "right": the side on which a cylinder's end on its bar lies.
+
+    The line is that from the bar's ground pin to the cylinder's end on the ground.
+    """
     on_ground, on_bar = _draw_ends(drawing, line)
     bar = line.end.bar
     if bar == 1:

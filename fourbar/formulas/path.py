@@ -107,8 +107,7 @@ class LoopPath(NamedTuple):
     def sign(self, q: Number, branch: Number) -> Number:
         """Compute the sign of the bar's own sine at an angle in an assembly.
 
-        Twice applied it returns its argument: of that sign at the angle it is the
-        assembly.
+        Given the sign at that angle, it returns the assembly.
         """
         if not self.has_change_point:
             return branch

@@ -320,7 +320,7 @@ def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
 
 
 def _collect_columns(solution: Solution) -> dict[str, Any]:
-    """Collect the values quantity by quantity."""
+    """Collect arrays by name, in SI units, and signs and statuses for the page."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
         columns["status"] = solution.status

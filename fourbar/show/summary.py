@@ -1,7 +1,7 @@
 """Summary of a solved scene: ranges, peaks and their places, drive and ends of motion.
 
-`summarize` collects the facts
-from the curves over the motion; `fourbar.show.block` prints them.
+`summarize` collects the facts from the curves over the motion; `fourbar.show.block`
+prints them.
 """
 
 import math

@@ -44,8 +44,7 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     ----------
     wanted : names among `STATED_POSITIONS` and values, rad, m or s. Each gives the
         positions of the scene's assembly that have it, of a motion over time those
-        that it passes,
-        of a released one the first.
+        that it passes, of a released one the first.
 
     Raises
     ------
@@ -278,7 +277,7 @@ def _require_values(values: Array | None, name: str) -> Array:
 
 
 def _say_position(name: str, value: float) -> str:
-    """Say a place as the command line has it."""
+    """Return a position as a message names it, "at theta_4 = 30 deg"."""
     return f"at {name} = {_write_position(name, value)}"
 
 

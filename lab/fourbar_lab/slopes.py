@@ -98,7 +98,10 @@ def _compute_exact_slopes(scene: Scene) -> tuple[BallValues, Slopes]:
 
 
 def differentiate(scene: Scene) -> dict[str, Any]:
-    """Differentiate by every number by `sensitivity`; a row for each number."""
+    """Return the derivatives at the first position, by quantity, (p,) or (p, 2).
+
+    The p numbers are those of `list_numbers_by_key`, in its order.
+    """
     derivatives = sensitivity(scene)
     rows = [list(derivatives.keys).index(key) for key in list_numbers_by_key(scene)]
     return {name: of[rows, 0] for name, of in derivatives.by.items()}

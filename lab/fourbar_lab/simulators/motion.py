@@ -158,7 +158,7 @@ class Simulator:
         return time.process_time
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course."""
+        """Step through a course, and return a reading at each of its stops."""
         raise NotImplementedError
 
     def states(self, scene: Scene) -> Readings:

@@ -46,7 +46,7 @@ class PinocchioSlider:
         self.data = self.model.createData()
 
     def set(self, q: Array, v: Array) -> None:
-        """Set joint positions and speeds."""
+        """Set positions and speeds of crank, rod and slider, (3,), rad and m."""
         self.q = q.copy()
         self.v = v.copy()
         pin.forwardKinematics(self.model, self.data, self.q, self.v, np.zeros(3))

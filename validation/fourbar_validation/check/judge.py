@@ -209,7 +209,7 @@ class Judge:
         self._exact[key] = exact
 
     def size(self, key: str) -> Array:
-        """Compute what the error of a key is divided by at each position, (n,)."""
+        """Return the size that the error of a key is divided by, (n,), in its unit."""
         return self.scale(key).size
 
     @cached_property

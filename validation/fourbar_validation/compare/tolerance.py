@@ -182,7 +182,10 @@ def find_conditions(
 ) -> Array:
     """Return the conditions of several quantities at each position, (q, n).
 
-    Positions have s and what follows s^2, times lever and drive.
+    Angles, places and pure numbers have s times the lever, all that follows from them
+    s^2 times the lever; forces, torques and power have the drive condition as a further
+    factor, and those of a cylinder its stroke over the longest bar. What is commanded,
+    or follows from a commanded input alone, has the condition of the command.
     """
     bar = formulas.at.bar
     units = [UNITS[quantity] for quantity in quantities]

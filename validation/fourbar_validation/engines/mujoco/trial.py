@@ -209,12 +209,14 @@ class TrialSetup:
         timestep: float,
         edit: Edit | None = None,
     ) -> tuple[ClosedLoop, ClosedLoop | None]:
-        """Build the loop that is stepped.
+        """Build the loop that is stepped, and the loop that the drive is read from.
 
-        The one from which a drive elsewhere is read is built too. Both are closed
-        alike: at a state that a soft closure has reached, another closure asks for
-        other forces. Pads stiffen the closure of a crank with a flywheel alone, so with
-        pads the second loop has a light one; otherwise it is the linkage by itself.
+        The second is None for a drive on bar 2. Both are closed alike: at a state that
+        a soft closure has reached, another closure asks for other forces. Pads stiffen
+        the closure of a crank with a flywheel alone, so with pads the second loop has a
+        light one; otherwise it is the linkage by itself.
+
+        `edit`: change of both texts of MJCF.
         """
 
         def build(built: Settings) -> ClosedLoop:
