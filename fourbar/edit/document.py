@@ -15,7 +15,6 @@ from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
 from fourbar.effects import Load, PointDrive, list_kinds
 from fourbar.errors import InputError
-from fourbar.files.scene_text import BRANCH_OF_NAME
 from fourbar.linkage import (
     BAR_NAMES,
     MOVING_BARS,
@@ -26,7 +25,14 @@ from fourbar.linkage import (
     OneOf,
     list_declared,
 )
-from fourbar.scene.motion import COMMAND_NAMES, SIDES, SPLINES, STROKE_COMMAND, Motion
+from fourbar.scene.motion import (
+    BRANCH_OF_NAME,
+    COMMAND_NAMES,
+    SIDES,
+    SPLINES,
+    STROKE_COMMAND,
+    Motion,
+)
 from fourbar.scene.numbers import Point
 
 KeyPath = Sequence[str | int]

@@ -24,12 +24,18 @@ from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.fields import Reader
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
-from fourbar.files.scene_text import BRANCH_OF_NAME, write_drawn_scene, write_new_scene
+from fourbar.files.scene_text import write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE
 from fourbar.quantities.units import UnitError, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DRAWN_WORD
-from fourbar.scene.motion import COMMAND_NAMES, SIDES, STROKE_COMMAND, require_steps
+from fourbar.scene.motion import (
+    BRANCH_OF_NAME,
+    COMMAND_NAMES,
+    SIDES,
+    STROKE_COMMAND,
+    require_steps,
+)
 from fourbar.scene.pictures import TracedPicture
 from fourbar.show.summary import summarize
 from fourbar.show.units import find_length, units, units_of_scene

@@ -34,7 +34,7 @@ from fourbar.files.drawing import (
     state_motion,
 )
 from fourbar.files.fields import BARE_KEY, Reader
-from fourbar.files.scene_text import BRANCH_OF_NAME, MOVING_BAR_NUMBERS, SIGMA
+from fourbar.files.scene_text import MOVING_BAR_NUMBERS, SIGMA
 from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, POSITIVE, Bar, FourBar
 from fourbar.quantities import Array
@@ -42,6 +42,7 @@ from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
 from fourbar.scene.motion import (
     BAR_OF_ANGLE,
+    BRANCH_OF_NAME,
     DEFAULT_STEPS,
     LAW_KINDS,
     SIDES,

@@ -42,7 +42,6 @@ from fourbar.scene.pictures import TracedPicture
 from fourbar.studies.keys import OF_A_UNIFORM_BAR, find_misfit, list_entries
 from fourbar.writing import write_text
 
-BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
 SIGMA = "sigma"
 """Word of a tolerance that is a standard deviation."""
 MOVING_BAR_NUMBERS = {BAR_NAMES[number]: number for number in MOVING_BARS}

@@ -40,6 +40,7 @@ from fourbar.quantities import Array
 OPEN = 1
 CROSSED = -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
+BRANCH_OF_NAME = {name: branch for branch, name in BRANCH_NAMES.items()}
 LARGEST_SPEED = math.sqrt(sys.float_info.max)
 """Largest speed, rad/s. The square of a greater one is beyond the range of a double,
 and so is every acceleration.
@@ -48,9 +49,12 @@ COMMAND_NAMES = {
     bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS
 }
 """Names of the commanded angle, speed and acceleration by bar."""
+_NAMES_OF_BARS = tuple(name for names in COMMAND_NAMES.values() for name in names)
 BAR_OF_ANGLE = {names[0]: bar for bar, names in COMMAND_NAMES.items()}
 STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
+_FIELDS_OF_NUMBERS = ("angle", "speed", "acceleration")
+"""Fields of a motion that hold the numbers of its command."""
 SIDES = {"left": 1.0, "right": -1.0}
 """Signs of the side on which the moving end of a cylinder lies. The line runs from the
 bar's pivot to the end on the ground, and is seen towards the latter.
@@ -123,24 +127,21 @@ class Free(Described):
     stated_at: ClassVar[str] = "motion.free"
 
 
-def _find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
-    """Return the bar of which numbers (angle, speed, acceleration) are stated, or None.
+def _find_bar(key: str, numbers: Mapping[str, Any]) -> int | None:
+    """Return the bar of which numbers are stated by name, or None.
 
     Raises InputError for two bars.
     """
-    stated = {
-        name: number
-        for bar, of_bar in numbers.items()
-        for name, number in zip(COMMAND_NAMES[bar], of_bar, strict=True)
-        if number is not None
-        and not (name.startswith("alpha") and type(number) is float and not number)
-    }
-    bars = [int(name[-1]) for name in stated]
-    for bar, (name, number) in zip(bars, stated.items(), strict=True):
-        if bar != bars[0]:
-            allowed = f"{next(iter(stated))} commands bar {bars[0]}; one bar is"
-            raise InputError(f"{key}.{name}", number, f"{allowed} commanded")
-    return bars[0] if bars else None
+    first = ""
+    for name, number in numbers.items():
+        rests = name.startswith("alpha") and type(number) is float and not number
+        if number is None or rests:
+            continue
+        first = first or name
+        if name[-1] != first[-1]:
+            allowed = f"{first} commands bar {first[-1]}; one bar is commanded"
+            raise InputError(f"{key}.{name}", number, allowed)
+    return int(first[-1]) if first else None
 
 
 class _OverTime:
@@ -151,10 +152,7 @@ class _OverTime:
     @property
     def bar(self: Any) -> int:
         """Number of the bar whose angle the law gives: 2, 3 or 4."""
-        stated = {
-            bar: tuple(getattr(self, name, None) for name in names)
-            for bar, names in COMMAND_NAMES.items()
-        }
+        stated = {name: getattr(self, name, None) for name in _NAMES_OF_BARS}
         return _find_bar("motion.law", stated) or 2
 
     def times(self: Any) -> Array:
@@ -280,26 +278,27 @@ class Law(Described, _OverTime):
         return theta + mean * (time - t[0]), omega + mean, alpha
 
 
-def _compute_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
-    """Compute a law from 0 to 1 and its two derivatives at u in [0, 1].
+def _rise(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
+    """Compute a law that rises from 0 to 1 over a duration, and its rates by time.
 
-    Speed and acceleration are 0 at both ends. cycloidal: u - sin(2 pi u)/(2 pi);   345:
-    10 u^3 - 15 u^4 + 6 u^5.
+    With u = time/duration, cycloidal: u - sin(2 pi u)/(2 pi);   345: 10 u^3 - 15 u^4 +
+    6 u^5. Speed and acceleration are 0 at both ends, before and after.
     """
+    u = np.clip(time / duration, 0.0, 1.0)
     v = 1.0 - u
     if kind == "cycloidal":
         near = np.minimum(u, v)
         rises = u <= v
         sine = np.sin(TURN * near)
-        cosine = np.cos(TURN * near)
-        place = near - sine / TURN
-        return (
-            np.where(rises, place, 1.0 - place),
-            1.0 - cosine,
-            TURN * np.where(rises, sine, -sine),
-        )
-    place = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
-    return place, 30.0 * (u * v) ** 2, 60.0 * u * v * (v - u)
+        risen = near - sine / TURN
+        angle = np.where(rises, risen, 1.0 - risen)
+        speed = 1.0 - np.cos(TURN * near)
+        acceleration = TURN * np.where(rises, sine, -sine)
+    else:
+        angle = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+        speed = 30.0 * (u * v) ** 2
+        acceleration = 60.0 * u * v * (v - u)
+    return angle, speed / duration, acceleration / (duration * duration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,10 +360,10 @@ class Rise(Described, _OverTime):
         time = require_numbers("time", time)
         angle, duration = self.rise
         first = getattr(self, f"theta_{self.bar}")
-        place, speed, acceleration = _part(self.kind, time, duration)
+        place, speed, acceleration = _rise(self.kind, time, duration)
         if self.fall is not None:
             late = time - (duration + self.dwell)
-            fallen, fall_speed, fall_acceleration = _part(self.kind, late, self.fall)
+            fallen, fall_speed, fall_acceleration = _rise(self.kind, late, self.fall)
             place = place - fallen
             speed = speed - fall_speed
             acceleration = acceleration - fall_acceleration
@@ -424,35 +423,6 @@ def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> tuple[Any
     return pieces, pieces.derivative(1), pieces.derivative(2)
 
 
-def _part(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]:
-    """Compute a law from 0 to 1 over a duration, and its rates by time.
-
-    The value is constant before and after the duration.
-    """
-    u = np.clip(time / duration, 0.0, 1.0)
-    place, speed, acceleration = _compute_law(kind, u)
-    return place, speed / duration, acceleration / (duration * duration)
-
-
-def _make_number_property(name: str, place: int) -> Any:
-    """Make the property that reads a number of the command by its name.
-
-    The number is None (an acceleration: 0) if the command has another name.
-    """
-    field = ("angle", "speed", "acceleration")[place]
-    otherwise = 0.0 if place == 2 else None
-
-    def read(motion: "Motion") -> Any:
-        if name == motion.names[place]:
-            return getattr(motion, field)
-        return otherwise
-
-    return property(
-        read,
-        doc=f"The {field} if {name} is commanded, otherwise {otherwise}.",
-    )
-
-
 @dataclass(frozen=True, slots=True, init=False, eq=False)
 class Motion:
     """The command to one moving bar, the input unless numbers of bar 3 or 4 are stated.
@@ -507,18 +477,6 @@ class Motion:
         for names in commands
         for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
     }
-    theta_2: ClassVar[Any] = _make_number_property("theta_2", 0)
-    theta_3: ClassVar[Any] = _make_number_property("theta_3", 0)
-    theta_4: ClassVar[Any] = _make_number_property("theta_4", 0)
-    stroke: ClassVar[Any] = _make_number_property("stroke", 0)
-    omega_2: ClassVar[Any] = _make_number_property("omega_2", 1)
-    omega_3: ClassVar[Any] = _make_number_property("omega_3", 1)
-    omega_4: ClassVar[Any] = _make_number_property("omega_4", 1)
-    stroke_speed: ClassVar[Any] = _make_number_property("stroke_speed", 1)
-    alpha_2: ClassVar[Any] = _make_number_property("alpha_2", 2)
-    alpha_3: ClassVar[Any] = _make_number_property("alpha_3", 2)
-    alpha_4: ClassVar[Any] = _make_number_property("alpha_4", 2)
-    stroke_acceleration: ClassVar[Any] = _make_number_property("stroke_acceleration", 2)
 
     def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,
@@ -540,57 +498,55 @@ class Motion:
         side: str | None = None,
     ) -> None:
         expect("motion.law", law, Law, Rise, Sine, type(None))
-        angles = {
-            2: (theta_2, omega_2, alpha_2),
-            3: (theta_3, omega_3, alpha_3),
-            4: (theta_4, omega_4, alpha_4),
-        }
-        stated = _find_bar("motion", angles)
+        of_bars = (
+            *(theta_2, omega_2, alpha_2),
+            *(theta_3, omega_3, alpha_3),
+            *(theta_4, omega_4, alpha_4),
+        )
+        numbers = dict(zip(_NAMES_OF_BARS, of_bars, strict=True))
+        stated = _find_bar("motion", numbers)
         bar = (stated or 2) if law is None else law.bar
         names = COMMAND_NAMES[bar]
-        numbers = angles[bar]
         if stroke is not None or side is not None or stroke_speed is not None:
             if stroke is None:
                 allowed = "is missing: side and stroke_speed are of a stroke"
                 raise InputError("motion.stroke", None, allowed)
             if stated is not None or law is not None or free is not None:
-                raise InputError(
-                    "motion.stroke",
-                    stroke,
-                    "is commanded alone: no angle, law or release besides",
-                )
+                allowed = "is commanded alone: no angle, law or release besides"
+                raise InputError("motion.stroke", stroke, allowed)
             names = STROKE_COMMAND
-            numbers = (_require_strokes(stroke), stroke_speed, stroke_acceleration)
+            of_stroke = _require_strokes(stroke), stroke_speed, stroke_acceleration
+            numbers = dict(zip(names, of_stroke, strict=True))
             if side not in SIDES:
-                raise InputError(
-                    "motion.side",
-                    side,
-                    'must be "left" or "right", as a stroke has two angles',
-                )
+                allowed = 'must be "left" or "right", as a stroke has two angles'
+                raise InputError("motion.side", side, allowed)
         if law is not None and (stated is not None or free is not None):
-            raise InputError(
-                "motion.law",
-                "a law",
-                f"stands alone: it gives {', '.join(names[:2])} and {names[2]}",
-            )
+            allowed = f"stands alone: it gives {', '.join(names[:2])} and {names[2]}"
+            raise InputError("motion.law", "a law", allowed)
         if isinstance(branch, str):
-            branch = {name: number for number, name in BRANCH_NAMES.items()}.get(
-                branch,
-                branch,
-            )
-        checked = _require_command(names, *numbers)
+            branch = BRANCH_OF_NAME.get(branch, branch)
+        checked = _require_command(names, *(numbers[name] for name in names))
         expect("motion.branch", branch, int, np.integer, str)
         expect("motion.free", free, Free, type(None))
         if branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", branch, A_BRANCH)
-        fields = zip(
-            self.__slots__,
-            (names[0], bar, *checked, branch, free, law, side),
-            strict=True,
-        )
-        for name, value in fields:
+        values = (names[0], bar, *checked, branch, free, law, side)
+        for name, value in zip(self.__slots__, values, strict=True):
             # the class is frozen; this is its constructor
             object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a number of the command by its name, like theta_2 or stroke_speed.
+
+        The number is None (an acceleration: 0) if the command has another name.
+        """
+        if name not in Motion.numbers:
+            raise AttributeError(f"a motion has no {name!r}")
+        if name in self.names:
+            return getattr(self, _FIELDS_OF_NUMBERS[self.names.index(name)])
+        return (
+            0.0 if name.startswith("alpha") or name.endswith("acceleration") else None
+        )
 
     def replace(self, **changes: Any) -> "Motion":
         """Return a copy with other values of fields.
@@ -598,21 +554,17 @@ class Motion:
         Fields are angle, speed, acceleration, branch, free, law and side. The first
         three are those of what this motion commands, a bar or a stroke.
         """
-        keywords = dict(
-            zip(("angle", "speed", "acceleration"), self.names, strict=True)
-        )
+        keywords = dict(zip(_FIELDS_OF_NUMBERS, self.names, strict=True))
         keywords |= {name: name for name in ("branch", "free", "law", "side")}
         if foreign := changes.keys() - keywords:
+            allowed = f"it has {', '.join(keywords)}"
             raise TypeError(
-                f"a motion has no field {min(foreign)!r} to replace; it has"
-                f" {', '.join(keywords)}"
+                f"a motion has no field {min(foreign)!r} to replace; {allowed}"
             )
-        return Motion(
-            **{
-                key: changes.get(name, getattr(self, name))
-                for name, key in keywords.items()
-            }
-        )
+        values = {}
+        for name, keyword in keywords.items():
+            values[keyword] = changes.get(name, getattr(self, name))
+        return Motion(**values)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):

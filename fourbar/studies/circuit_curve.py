@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.effect import Actions, list_bodies
+from fourbar.effects.effect import Actions
 from fourbar.errors import NotAssembledError
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import Number, polar, sine
@@ -39,7 +39,7 @@ from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solving import solve
 from fourbar.studies.passing import say_nowhere
-from fourbar.studies.sloped import Sloped
+from fourbar.studies.sloped import Sloped, take_slopes
 
 POSITIONS_OF_A_BRANCH = 3600
 """Positions of a whole branch that are looked at for friction and for zeros."""
@@ -59,19 +59,6 @@ class RestPosition(NamedTuple):
     theta_4: float
     branch: int
     """+1 or -1; 0 at a limit of theta_2, where the two meet."""
-
-
-def _compute_generalized_force(
-    scene: Scene,
-    terms: tuple[Any, ...],
-    state: State,
-) -> Any:
-    """Compute Q of loads and effects by the parameter of the state's coefficients."""
-    return (
-        Actions(state, list_bodies(scene.linkage, terms))
-        .add(terms)
-        .generalized_forces()[0]
-    )
 
 
 class _Sizes(Actions):
@@ -121,17 +108,18 @@ def of_input(scene: Scene) -> Command:
 
 
 class CircuitCurve:
-    """The circuit of a scene: its branches as closed rows of psi and mu.
+    """The circuit of a scene as a closed row of psi and mu.
 
     psi = theta_2 - theta_1, mu = theta_4 - theta_3.
 
-    A row is sampled by an angle tau: psi itself where the input turns fully, otherwise
+    The row is sampled by an angle tau: psi itself where the input turns fully,
+    otherwise
         psi = middle - half width cos tau,
     on the open branch up to half a turn and back on the crossed one, so that it is
-    smooth through the limits. A linkage with change points has one row, its assembly: a
-    parallelogram never becomes an antiparallelogram. With a single change point the row
-    goes through two turns, after which the assembly repeats: a turn of theta_2 leads to
-    the mirror image.
+    smooth through the limits. A linkage with change points has the row of its assembly:
+    a parallelogram never becomes an antiparallelogram. With a single change point the
+    row goes through two turns, after which the assembly repeats: a turn of theta_2
+    leads to the mirror image.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -148,41 +136,37 @@ class CircuitCurve:
             raise NotAssembledError(say_nowhere(scene))
         self.circuit = circuits(linkage)[number[number >= 0][0]]
         self.full = turns_fully(linkage)
-        self.assembly = self.full and len(change_points(linkage)) > 0
-        """True if the row is that of one assembly."""
+        singular = change_points(linkage)
+        self.branch = int(at.branch[0]) if singular else self.circuit.branches[0]
+        """Branch of a row without limits."""
         turns = int(count_turns(linkage.lengths, 2)) if self.full else 1
         self.period = turns * TURN
-        """Angle of a whole row, rad."""
+        """Angle of the whole row, rad."""
         self.positions = turns * POSITIONS_OF_A_BRANCH
-        """Number of positions of a row."""
-        self.branches = self.circuit.branches
-        if self.assembly:
-            self.branches = (int(at.branch[0]),)
+        """Number of positions of the row."""
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
         self.at = at
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
         self.sweep = (
             (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
         )
-        self.singular = [
+        points = [
             (point - self.theta_1 + turn, 0.0 if point == self.theta_1 else math.pi)
             for turn in np.arange(0.0, self.period, TURN).tolist()
-            for point in change_points(linkage)
+            for point in singular
         ]
-        self.singular = [
-            place
-            for place in self.singular
-            if self.inside(np.array([place[0]]), np.zeros(1))[0]
-        ]
+        self.singular = np.reshape(points, (-1, 2))
+        """Change points within the sweep as psi and mu, (k, 2)."""
+        self.singular = self.singular[self.inside(self.singular[:, 0])]
 
-    def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
-        """Mark where psi, within a radius, lies in the sweep, if one is stated."""
+    def inside(self, psi: Array) -> NDArray[np.bool_]:
+        """Mark where psi lies in the sweep, if one is stated."""
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
             return np.ones(psi.shape, dtype=bool)
         middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
         half = 0.5 * (self.sweep[1] - self.sweep[0])
         apart = np.abs(_measure_apart(psi, middle, self.period))
-        return np.asarray(apart <= half + radius + AT_END_OF_SWEEP)
+        return np.asarray(apart <= half + AT_END_OF_SWEEP)
 
     def reached(self, points: Array) -> NDArray[np.bool_]:
         """Mark the points that the sweep passes, all of them without a sweep.
@@ -212,7 +196,7 @@ class CircuitCurve:
         """
         places = self.at.theta_2 - self.theta_1
         signs = find_signs(self.scene.linkage, self.at.angle, self.at.branch)
-        between = np.array([self.low, self.high, *(psi for psi, _ in self.singular)])
+        between = np.array([self.low, self.high, *self.singular[:, 0]])
         changes = np.flatnonzero(np.diff(signs)) + 1
         bounds = [0, *changes.tolist(), len(signs)]
         runs = list[tuple[float, float, int]]()
@@ -227,15 +211,12 @@ class CircuitCurve:
             runs.append((min(psi), max(psi), int(signs[first])))
         return runs
 
-    def point(self, tau: Array, branch: int) -> Array:
-        """Return psi and mu, (n, 2), at places of a row.
-
-        `branch`: if the input turns fully.
-        """
+    def points(self, tau: Array) -> Array:
+        """Return psi and mu, (n, 2), at places of the row."""
         tau = np.asarray(np.remainder(tau, self.period), dtype=float)
         if self.full:
             psi = self.low + tau
-            sign = branch * self.root_sign(psi)
+            sign = self.sign(psi)
         else:
             psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(
                 tau
@@ -243,38 +224,26 @@ class CircuitCurve:
             sign = np.where(tau <= math.pi, 1.0, -1.0)
         return np.stack([psi, sign * transmission(self.ratios, psi)], axis=1)
 
-    def tau(self, points: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return the place and the row (index into `rows`) of points."""
+    def tau(self, points: Array) -> Array:
+        """Return the places of points in the row, (n,), rad."""
         psi = self.low + np.remainder(points[:, 0] - self.low, self.period)
-        sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
-        if self.assembly:
-            return psi - self.low, np.zeros(len(points), dtype=np.intp)
         if self.full:
-            return psi - self.low, np.array(
-                [self.rows.index(branch) for branch in sign],
-                dtype=np.intp,
-            )
+            return np.asarray(psi - self.low)
         part = np.clip(
             (0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)),
             -1.0,
             1.0,
         )
-        tau = np.where(sign > 0, np.arccos(part), TURN - np.arccos(part))
-        return tau, np.zeros(len(points), dtype=np.intp)
+        opens = np.sin(points[:, 1]) >= 0.0
+        return np.asarray(np.where(opens, np.arccos(part), TURN - np.arccos(part)))
 
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """The branch of each row; one row holds both where the input has limits."""
-        return self.branches if self.full else (1,)
-
-    def root_sign(self, psi: Array) -> Array:
-        """Return the sign of sin mu at places of a row in the open branch, (n,)."""
-        if not self.assembly:
-            return np.ones(psi.shape)
-        return np.asarray(half_angle(self.ratios, psi).root_sign)
+    def sign(self, psi: Array) -> Array:
+        """Return the sign of sin mu in a row without limits, (n,)."""
+        root_sign = half_angle(self.ratios, psi).root_sign
+        return np.full(psi.shape, self.branch * root_sign)
 
     def samples(self) -> Array:
-        """Sample all rows at even places within the sweep and at its ends, (n, 2).
+        """Sample the row at even places within the sweep and at its ends, (n, 2).
 
         Limits and change points are left out.
         """
@@ -282,9 +251,8 @@ class CircuitCurve:
             np.linspace(0.0, self.period, self.positions, endpoint=False)
             + 0.5 * self.period / self.positions
         )
-        points = np.concatenate([self.point(tau, branch) for branch in self.rows])
-        points = points[self.inside(points[:, 0], np.zeros(1))]
-        return np.concatenate([points, self.ends()])
+        points = self.points(tau)
+        return np.concatenate([points[self.inside(points[:, 0])], self.ends()])
 
     def ends(self) -> Array:
         """Return the ends of the sweep on each branch, (n, 2).
@@ -299,33 +267,29 @@ class CircuitCurve:
         on_circuit &= np.abs(np.sin(mu)) > AT_END_OF_SWEEP
         psi = psi[on_circuit]
         mu = mu[on_circuit]
-        return np.concatenate(
-            [
-                np.stack([psi, branch * self.root_sign(psi) * mu], axis=1)
-                for branch in self.branches
-            ]
-        )
+        signs = [self.sign(psi)] if self.full else [1.0, -1.0]
+        return np.concatenate([np.stack([psi, sign * mu], axis=1) for sign in signs])
 
     def order(self, points: Array) -> NDArray[np.intp]:
-        """Return the indices of the points in the sweep, in order along the rows.
+        """Return the indices of the points in the sweep, in order along the row.
 
         A row that goes round begins where theta_2 is counted from.
         """
-        tau, row = self.tau(points)
-        along = self.count(points[:, 0]) if self.full else tau
-        order = np.lexsort((along, row))
-        return order[self.inside(points[order, 0], np.zeros(1))]
+        along = self.count(points[:, 0]) if self.full else self.tau(points)
+        order = np.argsort(along, kind="stable")
+        return order[self.inside(points[order, 0])]
 
     def state(self, points: Array) -> State:
         """Compute positions with their derivatives along the curve."""
         return on_curve(self.lengths, self.theta_1, points[:, 0], points[:, 1])
 
+    def _force_of(self, state: State) -> Any:
+        actions = Actions(state, self.case.bodies).add(self.case.terms)
+        return actions.generalized_forces()[0]
+
     def force(self, points: Array) -> Array:
         """Compute Q of all but dry friction, by the curve's parameter."""
-        return np.broadcast_to(
-            _compute_generalized_force(self.scene, self.case.terms, self.state(points)),
-            len(points),
-        )
+        return np.broadcast_to(self._force_of(self.state(points)), len(points))
 
     def slope(self, points: Array) -> Array:
         """Compute dQ/ds along the curve."""
@@ -333,12 +297,8 @@ class CircuitCurve:
         psi, mu = (
             Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True)
         )
-        Q = _compute_generalized_force(
-            self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu)
-        )
-        if isinstance(Q, Sloped):
-            return np.broadcast_to(Q.slopes[0], len(points))
-        return np.zeros(len(points))
+        Q = self._force_of(on_curve(self.lengths, self.theta_1, psi, mu))
+        return np.broadcast_to(np.ravel(take_slopes(Q)), len(points))
 
     def size(self, points: Array) -> Array:
         """Return the sum of the absolute terms of Q."""
@@ -350,13 +310,6 @@ class CircuitCurve:
         return np.asarray(
             np.abs(self.force(points)) <= ROUND_OFF_OF_Q * self.size(points)
         )
-
-    def in_rows(self, tau: Array, branch: Array) -> Array:
-        """Return points of several rows as psi and mu, (n, 2)."""
-        points = np.empty((len(tau), 2))
-        for row in self.rows:
-            points[branch == row] = self.point(tau[branch == row], row)
-        return points
 
     def count(self, psi: Array) -> Array:
         """Return psi as it is counted within the sweep.
@@ -392,17 +345,6 @@ def _measure_apart(psi: Array, middle: float, period: float) -> Array:
     """Return how far psi lies from a middle, within half a period."""
     away = psi - middle
     return np.asarray(away - period * np.rint(away / period))
-
-
-def closure(lengths: Loop, psi: Number, mu: Number) -> Number:
-    """Compute the residual of the loop closure, m^2: zero where the loop closes.
-
-    The residual is a d cos psi - b c cos mu - (a^2 + d^2 - b^2 - c^2)/2.
-    """
-    d, a, b, c = lengths[:4]
-    return (
-        a * d * np.cos(psi) - b * c * np.cos(mu) - 0.5 * (a * a + d * d - b * b - c * c)
-    )
 
 
 def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:

@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,10 +74,9 @@ _AT_CHANGE_POINT = 1e-4
 
 
 class _CircuitRange(NamedTuple):
-    """A part of a row of the circuit."""
+    """A part of the row of the circuit."""
 
     ends: tuple[RestPosition, RestPosition]
-    row: int
     low: float
     """Start and extent of the range, rad of the row's own angle."""
     width: float
@@ -180,7 +179,7 @@ def equilibrium(scene: Scene) -> Equilibria:
                 (part.ends for part in held if _is_inside(curve, point, part)), None
             )
             equilibria.append(_describe_equilibrium(curve, point, size, around))
-        singular = tuple(curve.place(np.array(point)) for point in curve.singular)
+        singular = tuple(map(curve.place, curve.singular))
         positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
         sense = _moves(
@@ -300,8 +299,9 @@ class _Zeros(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Points of the rows, and the pairs of neighbours between which Q has a value."""
+    """Points of the row, and the pairs of neighbours between which Q has a value."""
 
+    curve: CircuitCurve
     points: Array
     Q: Array
     """Generalised force at each point."""
@@ -316,31 +316,51 @@ class _Grid(NamedTuple):
     """Place in the row of the first point of each pair, rad."""
     gap: Array
     """Distance to the second, rad."""
-    branch: Array
-    """Branch of the row."""
 
+    @classmethod
+    def of(cls, curve: CircuitCurve, points: Array) -> Self:
+        """Pair neighbouring points along the row, but not across a gap of the sweep."""
+        tau = curve.tau(points)
+        first = np.argsort(tau, kind="stable")
+        second = np.roll(first, -1)
+        gap = np.remainder(tau[second] - tau[first], curve.period)
+        near = gap < 2.5 * curve.period / curve.positions
+        first = first[near]
+        second = second[near]
+        size = np.array(curve.size(points))
+        around = size.copy()
+        around[first] = np.maximum(around[first], size[second])
+        around[second] = np.maximum(around[second], size[first])
+        Q = curve.force(points)
+        idle = np.abs(Q) <= ROUND_OFF_OF_Q * around
+        return cls(curve, points, Q, around, idle, first, second, tau[first], gap[near])
 
-def _make_grid(curve: CircuitCurve, points: Array) -> _Grid:
-    """Pair neighbouring points along the rows, but not across a gap of the sweep."""
-    tau, row = curve.tau(points)
-    first = np.lexsort((tau, row))
-    second = np.empty_like(first)
-    for number in range(len(curve.rows)):
-        in_row = row[first] == number
-        second[in_row] = np.roll(first[in_row], -1)
-    gap = np.remainder(tau[second] - tau[first], curve.period)
-    near = gap < 2.5 * curve.period / curve.positions
-    first = first[near]
-    second = second[near]
-    gap = gap[near]
-    size = np.array(curve.size(points))
-    around = size.copy()
-    around[first] = np.maximum(around[first], size[second])
-    around[second] = np.maximum(around[second], size[first])
-    Q = curve.force(points)
-    idle = np.abs(Q) <= ROUND_OFF_OF_Q * around
-    branch = np.array(curve.rows, dtype=float)[row[first]]
-    return _Grid(points, Q, around, idle, first, second, tau[first], gap, branch)
+    def locate(
+        self,
+        values: Array,
+        compute: Callable[[Array], Array],
+        among: NDArray[np.bool_],
+    ) -> tuple[Array, NDArray[np.intp]]:
+        """Locate where a function changes its sign between neighbours.
+
+        Return the points, (k, 2), and the index of the first neighbour of each, (k,).
+
+        Parameters
+        ----------
+        values : of the function at the points of the grid.
+        among : marks the pairs that may have such a place; one where Q is nothing has
+            none.
+        """
+        chosen = among & (values[self.first] * values[self.second] < 0.0)
+        chosen &= ~self.idle[self.first] & ~self.idle[self.second]
+        first = self.first[chosen]
+        tau = self.tau[chosen]
+
+        def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
+            return np.asarray(compute(self.curve.points(tau)) * values[first] > 0.0)
+
+        _, after = bisect(has_sign_of_start, tau, tau + self.gap[chosen])
+        return self.curve.points(after), first
 
 
 def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
@@ -349,7 +369,7 @@ def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     A sample without Q may itself be a zero; with another one beside it, it is in a
     range where Q is nothing.
     """
-    grid = _make_grid(curve, points)
+    grid = _Grid.of(curve, points)
     idle_beside = np.zeros(len(points), dtype=bool)
     idle_beside[grid.first] = grid.idle[grid.second]
     idle_beside[grid.second] |= grid.idle[grid.first]
@@ -360,9 +380,9 @@ def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     )
     ending = alone & (paired == 1)  # the sweep: nothing beyond shows a sign
     at_end = _Zeros(points[ending], grid.size[ending])
-    touching, passed = _find_least_sizes(curve, _make_grid(curve, points[~alone]))
+    touching, passed = _find_least_sizes(_Grid.of(curve, points[~alone]))
     refined = np.concatenate([points[~alone], passed])
-    crossing = _find_sign_changes(curve, _make_grid(curve, refined))
+    crossing = _find_sign_changes(_Grid.of(curve, refined))
     zeros = np.concatenate([at_end.points, touching.points, crossing.points])
     size = np.concatenate([at_end.size, touching.size, crossing.size])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
@@ -373,50 +393,27 @@ def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
     return _Zeros(zeros, size)
 
 
-def _find_least_sizes(curve: CircuitCurve, grid: _Grid) -> tuple[_Zeros, Array]:
+def _find_least_sizes(grid: _Grid) -> tuple[_Zeros, Array]:
     """Find where dQ/ds changes its sign between two points at which Q has one sign.
 
     Returns the places where Q touches zero, and those where it has the other sign.
     """
-    first = grid.first
-    second = grid.second
-    slope = curve.slope(grid.points)
-    one_sign = grid.Q[first] * grid.Q[second] > 0.0
-    turning = one_sign & (slope[first] * slope[second] < 0.0)
-    turning &= ~grid.idle[first] & ~grid.idle[second]
-    tau = grid.tau[turning]
-    branch = grid.branch[turning]
-    start = slope[first][turning]
-
-    def slopes_as_at_start(tau: Array) -> NDArray[np.bool_]:
-        return curve.slope(curve.in_rows(tau, branch)) * start > 0.0
-
-    _, after = bisect(slopes_as_at_start, tau, tau + grid.gap[turning])
-    least = curve.in_rows(after, branch)
+    curve = grid.curve
+    one_sign = grid.Q[grid.first] * grid.Q[grid.second] > 0.0
+    least, first = grid.locate(curve.slope(grid.points), curve.slope, one_sign)
     Q = curve.force(least)
-    size = grid.size[first][turning]
+    size = grid.size[first]
     touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
-    passed = Q * grid.Q[first][turning] < 0.0
+    passed = Q * grid.Q[first] < 0.0
     return _Zeros(least[touches], size[touches]), least[passed & ~touches]
 
 
-def _find_sign_changes(curve: CircuitCurve, grid: _Grid) -> _Zeros:
+def _find_sign_changes(grid: _Grid) -> _Zeros:
     """Find the zeros between points at which Q has two signs; a jump is none."""
-    first = grid.first
-    second = grid.second
-    between = grid.Q[first] * grid.Q[second] < 0.0
-    between &= ~grid.idle[first] & ~grid.idle[second]
-    tau = grid.tau[between]
-    branch = grid.branch[between]
-    start = grid.Q[first][between]
-
-    def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
-        return curve.force(curve.in_rows(tau, branch)) * start > 0.0
-
-    _, after = bisect(has_sign_of_start, tau, tau + grid.gap[between])
-    zeros = curve.in_rows(after, branch)
-    size = grid.size[first][between]
-    continuous = np.abs(curve.force(zeros)) <= _A_JUMP * size
+    everywhere = np.ones(len(grid.first), dtype=bool)
+    zeros, first = grid.locate(grid.Q, grid.curve.force, everywhere)
+    size = grid.size[first]
+    continuous = np.abs(grid.curve.force(zeros)) <= _A_JUMP * size
     return _Zeros(zeros[continuous], size[continuous])
 
 
@@ -465,80 +462,62 @@ def _list_ranges(
     holds: Callable[[Array], NDArray[np.bool_]],
     points_held: Array,
 ) -> list[_CircuitRange]:
-    """List the ranges within the sweep in which a condition holds, row by row.
+    """List the ranges within the sweep in which a condition holds, along the row.
 
     `points_held`: points at which the condition is known to hold.
     """
+
+    def there(tau: Array) -> NDArray[np.bool_]:
+        points = curve.points(tau)
+        return curve.inside(points[:, 0]) & holds(points)
+
+    grid = (np.arange(curve.positions) + 0.5) * (curve.period / curve.positions)
+    tau = np.concatenate([grid, curve.tau(points_held)])
+    inside = there(tau)
+    inside[curve.positions :] = True
+    order = np.argsort(tau)
+    tau = tau[order]
+    inside = inside[order]
+    if inside.all():
+        first = last = curve.place(curve.points(np.zeros(1))[0])
+        if curve.full:
+            last = first._replace(theta_2=first.theta_2 + curve.period)
+        return [_CircuitRange((first, last), 0.0, curve.period, curve.positions)]
+    starts, stops = (np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1))
+    if len(starts) and stops[0] < starts[0]:
+        stops = np.roll(stops, -1)
+    following = tau[(stops + 1) % len(tau)]
+    before = np.remainder(tau[starts] - tau[starts - 1], curve.period)
+    after = np.remainder(following - tau[stops], curve.period)
+    begin = _find_edge(there, tau[starts], -before) % curve.period
+    end = _find_edge(there, tau[stops], after) % curve.period
     ranges = []
-    own_tau, own_row = curve.tau(points_held)
-    for row, branch in enumerate(curve.rows):
-
-        def there(tau: Array, branch: int = branch) -> NDArray[np.bool_]:
-            points = curve.point(tau, branch)
-            return curve.inside(points[:, 0], np.zeros(1)) & holds(points)
-
-        tau = np.concatenate(
-            [
-                (np.arange(curve.positions) + 0.5) * (curve.period / curve.positions),
-                own_tau[own_row == row],
-            ]
-        )
-        order = np.argsort(tau)
-        tau, inside = (
-            tau[order],
-            (there(tau) | (np.arange(len(tau)) >= curve.positions))[order],
-        )
-        if inside.all():
-            first = curve.place(curve.point(np.zeros(1), branch)[0])
-            last = first
-            if curve.full:
-                last = first._replace(theta_2=first.theta_2 + curve.period)
-            ranges.append(
-                _CircuitRange((first, last), row, 0.0, curve.period, curve.positions)
-            )
-            continue
-        starts, stops = (
-            np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1)
-        )
-        if len(starts) and stops[0] < starts[0]:
-            stops = np.roll(stops, -1)
-        following = tau[(stops + 1) % len(tau)]
-        before = np.remainder(tau[starts] - tau[starts - 1], curve.period)
-        after = np.remainder(following - tau[stops], curve.period)
-        begin = _find_edge(there, tau[starts], -before) % curve.period
-        end = _find_edge(there, tau[stops], after) % curve.period
-        for low, high, count in zip(
-            begin,
-            end,
-            (stops - starts) % len(tau) + 1,
-            strict=True,
-        ):
-            one, stop = (
-                curve.place(point)
-                for point in curve.point(np.array([low, high]), branch)
-            )
-            if curve.full and stop.theta_2 < one.theta_2:
-                stop = stop._replace(theta_2=stop.theta_2 + curve.period)
-            if not curve.full and one.branch == stop.branch == -1:
-                ends = (stop, one)
-            else:
-                ends = (one, stop)
-            width = float(np.remainder(high - low, curve.period))
-            ranges.append(_CircuitRange(ends, row, low, width, int(count)))
+    for low, high, count in zip(
+        begin.tolist(),
+        end.tolist(),
+        ((stops - starts) % len(tau) + 1).tolist(),
+        strict=True,
+    ):
+        one, stop = map(curve.place, curve.points(np.array([low, high])))
+        if curve.full and stop.theta_2 < one.theta_2:
+            stop = stop._replace(theta_2=stop.theta_2 + curve.period)
+        ends = (one, stop)
+        if not curve.full and one.branch == stop.branch == -1:
+            ends = (stop, one)
+        width = float(np.remainder(high - low, curve.period))
+        ranges.append(_CircuitRange(ends, low, width, count))
     return ranges
 
 
 def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
-    tau, row = curve.tau(point[None])
-    beyond = np.remainder(tau[0] - part.low, curve.period)
-    return bool(row[0] == part.row and beyond <= part.width)
+    beyond = np.remainder(curve.tau(point[None])[0] - part.low, curve.period)
+    return bool(beyond <= part.width)
 
 
 def _is_reached(curve: CircuitCurve, part: _CircuitRange) -> bool:
     """Return True if the scene's sweep passes an end or the middle of a range."""
     tau = part.low + np.array([0.0, 0.5, 1.0]) * part.width
-    points = curve.point(tau, curve.rows[part.row])
-    return bool(curve.reached(points).any())
+    return bool(curve.reached(curve.points(tau)).any())
 
 
 def _find_edge(
