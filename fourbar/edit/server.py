@@ -8,7 +8,6 @@ import hmac
 import json
 import os
 import signal
-import socket
 import sys
 import threading
 from collections import deque
@@ -18,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.ioloop import IOLoop
-from tornado.iostream import IOStream
+from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
@@ -38,12 +36,8 @@ MOST_WAITING = 100
 """Requests of all pages that wait; of a drag only the latest does."""
 MOST_UNREAD = 4_000_000
 """Bytes that wait for a page which does not read, besides one frame."""
-MOST_CONNECTIONS = 64
-"""Connections besides those of pages; where there are more the oldest one is closed."""
 IDLE = 10.0
 """Time within which a request must be complete, s."""
-_PAUSE = 0.5
-"""Time without new connections where the process can open no more files, s."""
 GONE = 90.0
 """Time from the last page's leaving to the server's end, s. A page in the background
 looks for the server once a minute.
@@ -54,8 +48,6 @@ SPREAD_DELAY = 1.0
 """Time without a change after which the spreads of tolerances are sampled, s. Sampling
 takes seconds.
 """
-SAVING_DELAY = 0.3
-"""s, after which a change is written to the state file."""
 
 
 class Workbench:
@@ -72,29 +64,21 @@ class Workbench:
         self.one = ThreadPoolExecutor(1)
         self.aside = ThreadPoolExecutor(1)  # what takes seconds
         self.working: asyncio.Task[None] | None = None
-        self.timers: dict[str, asyncio.TimerHandle] = {}
+        self.following: asyncio.Task[None] | None = None
+        self.leaving: asyncio.TimerHandle | None = None
         self.check = HarnessRun(session.exports.folder / "check", self.tell)
-
-    def set_timer(self, name: str, seconds: float, what: Any) -> None:
-        """Do something after a while, once: a timer of the same name begins anew."""
-        self.cancel_timer(name)
-        self.timers[name] = self.loop.call_later(seconds, what)
-
-    def cancel_timer(self, name: str) -> None:
-        """Cancel a timer, if it runs."""
-        if name in self.timers:
-            self.timers.pop(name).cancel()
 
     def join(self, line: "_PageLine") -> None:
         """Add a page, and cancel the end of a server without pages."""
         self.pages.add(line)
-        self.cancel_timer("gone")
+        if self.leaving is not None:
+            self.leaving.cancel()
 
     def leave(self, line: "_PageLine") -> None:
         """Remove a page; some time after the last one the server ends."""
         self.pages.discard(line)
         if not self.pages:
-            self.set_timer("gone", GONE, self.ended.set)
+            self.leaving = self.loop.call_later(GONE, self.ended.set)
 
     def tell(self, about: dict[str, Any], *, to: "_PageLine | None" = None) -> None:
         """Send an answer to one page or to all."""
@@ -129,8 +113,8 @@ class Workbench:
             )
             return
         self.waiting.append((line, asked))
-        self.cancel_timer("settle")
-        self.cancel_timer("sample")
+        if self.following is not None:
+            self.following.cancel()
         if self.working is None or self.working.done():
             self.working = asyncio.create_task(self._run_work())
 
@@ -147,14 +131,7 @@ class Workbench:
                 about,
                 to=line if alone or "refused" in about or "ask" in about else None,
             )
-        self.set_timer(
-            "settle",
-            ERROR_BAR_DELAY,
-            lambda: asyncio.create_task(self._settle()),
-        )
-        self.set_timer(
-            "state file", SAVING_DELAY, lambda: self.one.submit(self._write_state_file)
-        )
+        self.following = asyncio.create_task(self._follow_up())
 
     def _compare(self) -> dict[str, Any]:
         try:
@@ -171,49 +148,34 @@ class Workbench:
                 {"note": f"the state file cannot be written: {error}"},
             )
 
-    async def _settle(self) -> None:
-        """Send error bars and summary, unless something has changed again.
+    async def _follow_up(self) -> None:
+        """Send error bars and summary of a state that rests, then what tolerances do.
 
-        Changes are answered meanwhile.
+        The next request cancels this; changes are answered meanwhile.
         """
+        await asyncio.sleep(ERROR_BAR_DELAY)
+        self.one.submit(self._write_state_file)
         session = self.session
         state = session.now
         units = session.units
         pressure = session.pressure
-        chosen = (session.unit_names, session.pressure_text)
 
-        def is_present() -> bool:
-            return state is session.now and chosen == (
-                session.unit_names,
-                session.pressure_text,
-            )
-
-        def evaluate() -> dict[str, Any] | None:
-            if not is_present():
-                return None
+        def evaluate() -> dict[str, Any]:
             data = state.evaluate(units, settled=True, pressure=pressure)
             return data | {"kept_peaks": session.locate_kept_peaks()}
 
-        def describe(data: dict[str, Any]) -> dict[str, Any] | None:
-            if is_present():
-                return session.describe(data, settled=True)
-            return None
+        def describe(data: dict[str, Any]) -> dict[str, Any]:
+            return session.describe(data, settled=True)
 
         try:
             data = await self.loop.run_in_executor(self.aside, evaluate)
-            if self.ended.is_set():
-                return
-            about = data and await self.loop.run_in_executor(self.one, describe, data)
+            about = await self.loop.run_in_executor(self.one, describe, data)
         except FourBarError as error:
             self.tell({"note": str(error)})
             return
-        if about and not self.waiting:
-            self.tell(about)
-            self.set_timer(
-                "sample",
-                SPREAD_DELAY,
-                lambda: asyncio.create_task(self._sample(state, about["data"])),
-            )
+        self.tell(about)
+        await asyncio.sleep(SPREAD_DELAY)
+        await self._sample(state, data)
 
     async def _sample(self, state: SceneState, data: dict[str, Any]) -> None:
         """Send what the tolerances do, unless something has changed meanwhile."""
@@ -248,16 +210,23 @@ class Workbench:
         `redirect`: page that leads browsers and other servers here.
         """
         try:
-            listening = socket.create_server((_LOOPBACK, port))
+            sockets = bind_sockets(port, _LOOPBACK)
         except (OSError, OverflowError) as error:
             raise InputError(
                 "--port",
                 port,
                 f"the port cannot be opened: {error}",
             ) from None
-        listening.setblocking(False)
-        own_port = listening.getsockname()[1]
-        self.entrance = _Entrance(_make_application(self, own_port), listening)
+        own_port = sockets[0].getsockname()[1]
+        server = HTTPServer(
+            _make_application(self, own_port),
+            max_body_size=LARGEST_REQUEST,
+            max_header_size=16_384,
+            max_buffer_size=2 * LARGEST_REQUEST,
+            idle_connection_timeout=IDLE,
+            body_timeout=IDLE,
+        )
+        server.add_sockets(sockets)
         for name in (signal.SIGINT, signal.SIGTERM):
             with suppress(NotImplementedError):  # Windows: KeyboardInterrupt
                 self.loop.add_signal_handler(name, self.ended.set)
@@ -270,13 +239,13 @@ class Workbench:
         if browse and redirect is not None:
             threading.Thread(target=redirect.open, daemon=True).start()
         await self.ended.wait()
-        self.entrance.close()
+        server.stop()
         gone = not self.pages
         self.waiting.clear()
         if self.working is not None:
             await asyncio.wait({self.working})
-        for timer in self.timers.values():
-            timer.cancel()
+        if self.following is not None:
+            self.following.cancel()
         for line in list(self.pages):
             line.close(1001, "the server ends")
             line.drop()
@@ -286,61 +255,6 @@ class Workbench:
         await self.loop.run_in_executor(self.one, lambda: self.session.end(gone=gone))
         self.one.shutdown()
         self.aside.shutdown(wait=False, cancel_futures=True)
-
-
-class _Entrance:
-    """The listening socket, which closes connections that say nothing for a while.
-
-    If there are many, the oldest is closed.
-    """
-
-    def __init__(self, application: Application, listening: socket.socket) -> None:
-        self.server = HTTPServer(
-            application,
-            max_body_size=LARGEST_REQUEST,
-            max_header_size=16_384,
-            idle_connection_timeout=IDLE,
-            body_timeout=IDLE,
-        )
-        self.listening = listening
-        self.streams = list[IOStream]()
-        self._open()
-
-    def _open(self) -> None:
-        if self.listening.fileno() >= 0:
-            IOLoop.current().add_handler(self.listening, self._accept, IOLoop.READ)
-
-    def _accept(self, *_: Any) -> None:
-        try:
-            connection, peer = self.listening.accept()
-        except (BlockingIOError, ConnectionAbortedError):
-            return
-        except OSError:
-            # no more files (EMFILE, ENFILE): the socket would offer it again and again
-            IOLoop.current().remove_handler(self.listening)
-            IOLoop.current().call_later(_PAUSE, self._open)
-            self._close_oldest(MOST_CONNECTIONS // 4)
-            return
-        if len(self.streams) >= MOST_CONNECTIONS:
-            self.streams = [stream for stream in self.streams if not stream.closed()]
-            self._close_oldest(len(self.streams) - MOST_CONNECTIONS + 1)
-        stream = IOStream(connection, max_buffer_size=2 * LARGEST_REQUEST)
-        self.streams.append(stream)
-        self.server.handle_stream(stream, peer)
-
-    def _close_oldest(self, number: int) -> None:
-        for stream in self.streams[: max(number, 0)]:
-            stream.close()
-        self.streams = self.streams[max(number, 0) :]
-
-    def spare(self, stream: Any) -> None:
-        """Leave a connection open however many others come: that of a page."""
-        self.streams = [one for one in self.streams if one is not stream]
-
-    def close(self) -> None:
-        """Take no more connections."""
-        IOLoop.current().remove_handler(self.listening)
-        self.listening.close()
 
 
 class _Guarded(RequestHandler):
@@ -367,31 +281,16 @@ class _Guarded(RequestHandler):
 
     def set_default_headers(self) -> None:
         """Keep the page and its address to this browser."""
-        for name, value in {
-            **{
-                "Cache-Control": "no-store",
-                "Referrer-Policy": "no-referrer",
-                "X-Content-Type-Options": "nosniff",
-            },
-            **{
-                "X-Frame-Options": "DENY",
-                "Cross-Origin-Resource-Policy": "same-origin",
-                "Server": "fourbar",
-            },
-        }.items():
+        headers = {
+            "Cache-Control": "no-store",
+            "Referrer-Policy": "no-referrer",
+            "X-Content-Type-Options": "nosniff",
+            "X-Frame-Options": "DENY",
+            "Cross-Origin-Resource-Policy": "same-origin",
+            "Server": "fourbar",
+        }
+        for name, value in headers.items():
             self.set_header(name, value)
-
-    def write_error(self, status_code: int, **details: Any) -> None:
-        """Write the status alone."""
-        self.finish(f"{status_code}\n")
-
-    def log_exception(self, kind: Any, error: Any, traceback: Any) -> None:
-        """Say in one line what went wrong in the server.
-
-        The sender of a wrong request is told instead.
-        """
-        if not isinstance(error, HTTPError):
-            print(f"error: {kind.__name__}: {error}", file=sys.stderr)
 
 
 class Page(_Guarded):
@@ -454,16 +353,11 @@ class _PageLine(WebSocketHandler, _Guarded):
         if len(self.bench.pages) >= _MOST_PAGES:
             raise HTTPError(503)
 
-    def check_origin(self, origin: str) -> bool:
-        """Return True: `prepare` has looked at it."""
-        return True
-
     def open(self, *args: str, **kwargs: str) -> None:
-        """Add the page to the workbench, and keep its connection open."""
+        """Add the page to the workbench."""
         self.set_nodelay(True)
         self.unread = 0
         self.stream = getattr(self.ws_connection, "stream", None)
-        self.bench.entrance.spare(self.stream)
         self.bench.join(self)
 
     def send(self, data: bytes) -> None:
@@ -527,18 +421,7 @@ def _make_application(bench: Workbench, port: int) -> Application:
         log_function=lambda handler: None,
         websocket_max_message_size=LARGEST_REQUEST,
         websocket_ping_interval=20.0,
-        default_handler_class=Nothing,
     )
-
-
-class Nothing(RequestHandler):
-    """Reply to any other address."""
-
-    def prepare(self) -> None:
-        """Refuse the request with the status 404 alone."""
-        self.set_header("Server", "fourbar")
-        self.set_status(404)
-        self.finish("404\n")
 
 
 def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> None:

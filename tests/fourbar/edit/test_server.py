@@ -15,7 +15,6 @@ import sys
 import threading
 import time
 import warnings
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -482,72 +481,6 @@ def test_the_picture_is_served_as_an_image_alone(bench, path):
         assert "default-src 'none'" in policy and policy.endswith("sandbox")
 
     bench(ask)
-
-
-def half_open(address, number):
-    """Connections that begin a request and say no more."""
-    made = []
-    for _ in range(number):
-        made.append(
-            socket.create_connection(("127.0.0.1", int(port_of(address))), timeout=5.0)
-        )
-        made[-1].sendall(b"GET / HTTP/1.1\r\n")
-    return made
-
-
-def processor_time(process):
-    """User and system time of a process so far, s."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-@pytest.mark.slow
-@pytest.mark.linux
-@pytest.mark.parametrize("files, connections", [(256, 377), (40, 120)])
-def test_half_open_connections_neither_stop_the_server_nor_stay(
-    path, files, connections
-):
-    """Within its limit of files it goes on, and beyond it when they have gone."""
-    import resource
-
-    # imported before the limit holds: the server alone is tried
-    program = f"""
-import resource, sys, fourbar.edit.server as server, fourbar.show.animate, fourbar.mjcf
-from pathlib import Path
-resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))
-server.IDLE = 3.0
-server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
-"""
-    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most), most))
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with ExitStack() as stack:
-        command = [sys.executable, "-c", program, str(path)]
-        process = stack.enter_context(subprocess.Popen(command, **streams))
-        stack.callback(process.kill)
-        address = process.stdout.readline().strip()
-        before = processor_time(process)
-        idle = half_open(address, connections)
-        for connection in idle:
-            stack.callback(connection.close)
-        time.sleep(2.0)
-        assert processor_time(process) - before < 1.0  # it was all of it
-
-        async def save():
-            line = await page(address)
-            await told(line, set_input("105 mm"))
-            assert (await told(line, {"do": "save"})).get("saved")
-            line.close()
-
-        if files == 256:
-            asyncio.run(save())
-        for connection in idle:
-            connection.settimeout(20.0)
-            assert connection.recv(100) == b""  # closed by the server
-        asyncio.run(save())
-        process.send_signal(2)
-        error = process.communicate(timeout=20)[1]
-    assert error == "" and '"105 mm"' in path.read_text()
 
 
 def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server():
