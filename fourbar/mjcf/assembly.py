@@ -334,11 +334,10 @@ def write_usd(
             "O4": foot[4],
         }[pin]
         relative = turn[follower] - turn[one]
-        on_first = (*_split_point(on_one), 0.0)
-        turn_on_first = LEVEL.turn_on(relative)
-        if one == 1:  # the world, whose axes are not the plane's
-            on_first = plane.place(*_split_point(on_one))
-            turn_on_first = plane.turn_on(relative)
+        # the world's axes are not the plane's
+        frame = plane if one == 1 else LEVEL
+        on_first = frame.place(*_split_point(on_one))
+        turn_on_first = frame.turn_on(relative)
         joints.append(f"""    def PhysicsRevoluteJoint "{pin}"
     {{
         uniform token physics:axis = "Z"

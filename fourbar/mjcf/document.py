@@ -4,8 +4,6 @@ import math
 import tomllib
 from dataclasses import dataclass, replace
 from importlib.resources import files
-from itertools import cycle
-from operator import add
 from typing import Any, Literal, NamedTuple, get_args
 from xml.etree import ElementTree as ET
 
@@ -87,7 +85,6 @@ def write_mjcf(
     start: "Start | None" = None,
     drive: Drive = "flywheel",
     plane: Plane = LEVEL,
-    origin: tuple[float, float] = (0.0, 0.0),
 ) -> str:
     """Write the MJCF text of a scene: it runs on its own in MuJoCo.
 
@@ -105,7 +102,6 @@ def write_mjcf(
         controller, "none" likewise without an actuator: then nothing is added to the
         linkage's inertia.
     plane : where the linkage stands in the world.
-    origin : place of O2 in the linkage's plane, m.
 
     Raises
     ------
@@ -114,64 +110,43 @@ def write_mjcf(
     LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
-    require_input(scene, "the drive of an MJCF")
-    if scene.motion.law is not None:
-        raise LimitError(
-            "a motion law has no counterpart in MJCF: its drive keeps omega_2 or"
-            " alpha_2"
-        )
-    require_carriable(scene.linkage)
+    _require_counterpart(scene, drive)
     scene = scene.in_pairs_from_pins()
-    cylinder = _find_cylinder(scene, drive)
-    if scene.motion.free is not None:
-        drive, cylinder = "none", None
+    is_released = scene.motion.free is not None
+    if is_released:
+        drive = "none"
     if drive != "flywheel":
         settings = _leave_out_flywheel(scene, settings)
-    start = (start or find_start(scene)) if keyframe else None
-    if start is not None:
-        timestep = start.run.timestep(settings)
-    elif settings.timestep is not None:
-        timestep = settings.timestep * settings.timestep_scale
-    else:
-        raise InputError(
-            "timestep",
-            None,
-            "is missing: state it, or request a keyframe",
-        )
     if settings.pad == "fitted":
         settings = replace(settings, pad=fit_pad(scene))
-    model = Model(scene.linkage, settings, timestep)
-    model.cylinder = cylinder
+    start = (start or find_start(scene)) if keyframe else None
+    model = Model(scene.linkage, settings, _choose_timestep(settings, start))
+    if isinstance(scene.drive, LinearDrive) and not is_released:
+        model.cylinder = scene.drive
     for term in (*scene.effects, *scene.loads):
         term.add_to_mjcf(model)
-    armature = size_flywheel(scene, settings)
+    # MuJoCo alone reads motors without a control
+    passive = drive == "motor" and reader == "mujoco"
     root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
-    for line in _write_comments(scene, drive, reader, exerts=model.exerts):
+    for line in _write_comments(scene, drive, reader, passive=passive and model.exerts):
         root.append(ET.Comment(f" {line} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root)
     add_appearance(root, scene.linkage)
-    actuator = (
-        make_motor(scene.drive_bar, _size_control(scene))
-        if drive == "motor"
-        else make_constant_motor(armature * scene.motion.alpha_2)
-    )
     if start is not None:
         start = start._replace(qpos=unwind(scene, start.qpos))
         model.rest = start.qpos
-        if scene.motion.alpha_2 == 0.0 and drive == "flywheel":
-            actuator = make_servo(armature / (SETTLING * timestep), start.qvel[0])
+    armature = size_flywheel(scene, settings)
     model.add_bodies(root, armature)
     model.add_load_sites(root)
     model.add_closure(root)
     model.add_tendons(root)
-    model.add_actuators(
-        root,
-        actuator,
-        cylinder=cylinder is not None and drive == "flywheel",
-        passive=_is_passive(drive, reader),
-    )
-    _shift_world(root, origin)
+    if drive == "motor":
+        actuator = make_motor(scene.drive_bar, _size_control(scene))
+    else:
+        speed = None if start is None else start.qvel[0]
+        actuator = _keep_speed(scene, armature, model.timestep, speed)
+    model.add_actuators(root, actuator, driven=drive == "flywheel", passive=passive)
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
         ET.SubElement(
@@ -181,47 +156,55 @@ def write_mjcf(
             qpos=write_exactly(*start.qpos),
             qvel=write_exactly(*start.qvel),
         )
-    _move_into_plane(root, plane)
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _move_into_plane(root: ET.Element, plane: Plane) -> None:
-    """Move the model into its plane, and say in a comment that it is tilted."""
     if plane.is_moved:
         plane.move_mjcf(root)
     if plane.is_tilted:
         root.insert(0, ET.Comment(f" {NOTES['mjcf']['tilted']} "))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _shift_world(root: ET.Element, origin: tuple[float, float]) -> None:
-    """Move the whole world from O2 = (0, 0) to where the drawing has O2."""
-    if not any(origin):
-        return
-    world = root.find("worldbody")
-    assert world is not None
-    for element in world:
-        for name in {"pos", "fromto"} & element.attrib.keys() or {"pos"}:
-            # one point or two
-            numbers = [float(text) for text in element.get(name, "0 0 0").split()]
-            shifts = cycle((*origin, 0.0))
-            element.set(name, write_exactly(*map(add, numbers, shifts)))
+def _keep_speed(
+    scene: Scene,
+    armature: float,
+    timestep: float,
+    speed: float | None,
+) -> dict[str, str]:
+    """Return attributes of the drive beside a flywheel; none has an empty dict.
+
+    `speed`: of the input in the keyframe, rad/s; None: there is no keyframe.
+    """
+    if armature and speed is not None and scene.motion.alpha_2 == 0.0:
+        return make_servo(armature / (SETTLING * timestep), speed)
+    return make_constant_motor(armature * scene.motion.alpha_2)
 
 
-def _find_cylinder(scene: Scene, drive: Drive) -> LinearDrive | None:
-    """Return the cylinder that drives; LimitError for a motor of another force."""
-    if isinstance(scene.drive, LinearDrive):
-        return scene.drive
-    if scene.drive is not None and drive == "motor":
+def _require_counterpart(scene: Scene, drive: Drive) -> None:
+    """Raise an error where linkage, motion or drive have no counterpart in MJCF."""
+    require_input(scene, "the drive of an MJCF")
+    if scene.motion.law is not None:
+        raise LimitError(
+            "a motion law has no counterpart in MJCF: its drive keeps omega_2 or"
+            " alpha_2"
+        )
+    require_carriable(scene.linkage)
+    if drive == "motor" and scene.drive is not None and not scene.drive.has_stroke:
         raise LimitError(
             "a force at a point has no motor in MJCF: choose flywheel or none"
         )
-    return None
 
 
-def _is_passive(drive: Drive, reader: str) -> bool:
-    """Return whether loads have no controls: MuJoCo alone reads motors without one."""
-    return drive == "motor" and reader == "mujoco"
+def _choose_timestep(settings: Settings, start: "Start | None") -> float:
+    """Return the timestep of a file, s, which its settings or its start state."""
+    if start is not None:
+        return start.run.timestep(settings)
+    if settings.timestep is None:
+        raise InputError(
+            "timestep",
+            None,
+            "is missing: state it, or request a keyframe",
+        )
+    return settings.timestep * settings.timestep_scale
 
 
 def _size_control(scene: Scene) -> float:
@@ -245,7 +228,7 @@ def _write_comments(
     drive: Drive,
     reader: str,
     *,
-    exerts: bool,
+    passive: bool,
 ) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
     notes = NOTES["mjcf"]
@@ -266,7 +249,7 @@ def _write_comments(
         lines += notes["without_flywheel"]
     if drive == "motor":
         lines.append(notes["control"])
-    if _is_passive(drive, reader) and exerts:
+    if passive:
         lines.append(notes["passive"])
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
@@ -624,8 +607,7 @@ def write_mjcf_for(
         settings,
         simulator,
         drive=drive,
-        plane=plane,
-        origin=scene.origin,
+        plane=plane.moved(*scene.origin),
     )
 
 

@@ -1,9 +1,10 @@
 """The settings, bodies, joints and sites of an MJCF model, and how they look."""
 
+import cmath
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -73,46 +74,30 @@ def write_six_digits(*numbers: float) -> str:
     return " ".join(f"{number:.6g}" for number in numbers)
 
 
-class _CameraView(NamedTuple):
-    """View of the camera: the box in which pins A and B move."""
+def _find_view(linkage: FourBar) -> tuple[float, float, float]:
+    """Return where a camera that looks down on the plane sees every position, m.
 
-    x: float
-    y: float
-    half_height: float
-    """Half height of the picture, m."""
-
-    @property
-    def distance(self) -> float:
-        """Distance of the camera from the plane, m."""
-        return self.half_height / math.tan(math.radians(0.5 * _FOVY))
-
-
-def compute_frame(linkage: FourBar) -> _CameraView:
-    """Compute the box around the circle of A about O2 and of B about O4.
-
-    No position leaves it.
+    No position leaves the box around the circle of A about O2 and of B about O4.
     """
-    d, a, _, c = linkage.lengths
-    x = d * math.cos(linkage.ground_angle)
-    y = d * math.sin(linkage.ground_angle)
-    left = min(-a, x - c)
-    right = max(a, x + c)
-    low = min(-a, y - c)
-    high = max(a, y + c)
-    half_height = 0.5 * (high - low)
-    half_width = 0.5 * (right - left)
-    half = PICTURE_MARGIN * max(half_height, half_width / _ASPECT)
-    return _CameraView(0.5 * (left + right), 0.5 * (low + high), half)
+    _, a, _, c = linkage.lengths
+    O4 = cmath.rect(linkage.ground, linkage.ground_angle)
+    left = min(-a, O4.real - c)
+    right = max(a, O4.real + c)
+    low = min(-a, O4.imag - c)
+    high = max(a, O4.imag + c)
+    half_height = 0.5 * PICTURE_MARGIN * max(high - low, (right - left) / _ASPECT)
+    distance = half_height / math.tan(math.radians(0.5 * _FOVY))
+    return 0.5 * (left + right), 0.5 * (low + high), distance
 
 
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     """Add the extent and free camera of the viewer, light and background."""
-    seen = compute_frame(linkage)
+    x, y, distance = _find_view(linkage)
     ET.SubElement(
         root,
         "statistic",
-        extent=write_six_digits(seen.distance / 1.5),
-        center=write_six_digits(seen.x, seen.y, 0),
+        extent=write_six_digits(distance / 1.5),
+        center=write_six_digits(x, y, 0),
     )
     visual = ET.SubElement(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks
@@ -151,8 +136,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 
 def _add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
-    seen = compute_frame(linkage)
-    place = write_six_digits(seen.x, seen.y, seen.distance)
+    place = write_six_digits(*_find_view(linkage))
     shining = {
         "diffuse": ".2 .2 .2",  # with the headlight 1
         "specular": ".1 .1 .1",
@@ -164,9 +148,9 @@ def _add_camera(world: ET.Element, linkage: FourBar) -> None:
 
 
 CYLINDER = "cylinder"
+"""Name of the tendon of a linear drive, and of the actuator on it."""
 _NEVER_REACHED = "1e10"
 """Length, m, up to which the tendon of a spring that only pushes has no force."""
-"""Name of the tendon of a linear drive, and of the actuator on it."""
 LEAST_MASS = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
 RGBA_OF_BARS = {
@@ -208,14 +192,6 @@ here does not depend on the angle. To MuJoCo, and so to Gymnasium, it is no cont
 MuJoCo 3 refuses a motor constant of 0. The back-EMF goes as its square, and that of
 1e-200 is 0 in double precision.
 """
-
-
-def _make_passive(force: float) -> dict[str, str]:
-    """Return the attributes of a `dcmotor` that exerts a constant force.
-
-    The force is in N, or a factor on the gear of the motor.
-    """
-    return {**_PASSIVE, "cogging": write_exactly(force, 0.0, math.pi / 2.0)}
 
 
 def make_constant_motor(force: float) -> dict[str, str]:
@@ -276,11 +252,9 @@ def require_carriable(linkage: FourBar) -> None:
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
     if heaviest:
         enough = max(_A_MILLIONTH * heaviest, 2.0 * LEAST_MASS)
-    else:
-        enough = MASS_OF_MASSLESS_BARS
-    if heaviest:
         part = "a millionth of the heaviest bar's"
     else:
+        enough = MASS_OF_MASSLESS_BARS
         part = "which all bars can have where loads alone act"
     for number in MOVING_BARS:
         bar = linkage.bar(number)
@@ -339,11 +313,9 @@ class Model:
         }
 
     @property
-    def O4(self) -> tuple[float, float]:
-        """The fixed pin O4, m."""
-        d = self.linkage.ground
-        theta_1 = self.linkage.ground_angle
-        return (d * math.cos(theta_1), d * math.sin(theta_1))
+    def along_ground(self) -> complex:
+        """Unit vector from O2 to O4: the ground's body keeps the world's axes."""
+        return cmath.rect(1.0, self.linkage.ground_angle)
 
     @property
     def radius(self) -> float:
@@ -391,17 +363,18 @@ class Model:
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
+        O4 = self.linkage.ground * self.along_ground
         self._add_site(ground, "O2", 0.0)
-        self._add_site(ground, "O4", *self.O4)
-        crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
-        self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
-        self._add_bar(ground, 4, self.O4)
+        self._add_site(ground, "O4", O4)
+        crank = self._add_bar(ground, 2, 0.0, armature=flywheel)
+        self._add_bar(crank, 3, self.linkage.input.length)
+        self._add_bar(ground, 4, O4)
 
     def _add_bar(
         self,
         parent: ET.Element,
         number: int,
-        at: tuple[float, float],
+        at: complex,
         **drive: float,
     ) -> ET.Element:
         """Add a bar that turns about its first pin.
@@ -414,7 +387,7 @@ class Model:
             parent,
             "body",
             name=BAR_NAMES[number],
-            pos=write_exactly(*at, 0.0),
+            pos=write_exactly(at.real, at.imag, 0.0),
         )
         if self.rest is not None:
             angle = self.rest[number - 2]
@@ -460,12 +433,12 @@ class Model:
         self._add_site(end, f"B{number}", bar.length)
         return body
 
-    def _add_site(self, body: ET.Element, name: str, x: float, y: float = 0.0) -> None:
+    def _add_site(self, body: ET.Element, name: str, at: complex) -> None:
         ET.SubElement(
             body,
             "site",
             name=name,
-            pos=write_exactly(x, y, 0.0),
+            pos=write_exactly(at.real, at.imag, 0.0),
             size=write_six_digits(self.radius),
         )
 
@@ -477,15 +450,14 @@ class Model:
         z: float,
     ) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
-        theta = self.linkage.ground_angle if number == 1 else 0.0
-        cos = math.cos(theta)
-        sin = math.sin(theta)
+        along = self.along_ground if number == 1 else 1.0
+        middle = 0.5 * length * along
         shape = {
             "name": BAR_NAMES[number],
             "type": "capsule",
             "size": write_six_digits(self.radius, length / 2.0),
-            "pos": write_six_digits(cos * length / 2.0, sin * length / 2.0, z),
-            "zaxis": write_six_digits(cos, sin, 0.0),
+            "pos": write_six_digits(middle.real, middle.imag, z),
+            "zaxis": write_six_digits(along.real, along.imag, 0.0),
             "rgba": RGBA_OF_BARS[number],
         }
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
@@ -541,14 +513,10 @@ class Model:
         tendon = ET.SubElement(tendons, "spatial", name=name)
         for which, point in (("start", line.start), ("end", line.end)):
             ET.SubElement(tendon, "site", site=f"{name}_{which}")
-            x, y = point.in_bar.real, point.in_bar.imag
-            if point.bar == 1:  # the ground's body keeps world axes
-                cos, sin = (
-                    math.cos(self.linkage.ground_angle),
-                    math.sin(self.linkage.ground_angle),
-                )
-                x, y = cos * x - sin * y, sin * x + cos * y
-            self._add_site(_find_bar_element(root, point.bar), f"{name}_{which}", x, y)
+            at = point.vector()
+            if point.bar == 1:
+                at = at * self.along_ground
+            self._add_site(_find_bar_element(root, point.bar), f"{name}_{which}", at)
         return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
@@ -556,75 +524,82 @@ class Model:
         for index, load in enumerate(self.loads, 1):
             z = load.foot(self.linkage.bar(load.bar).to_centre)
             body = _find_bar_element(root, load.bar)
-            self._add_site(body, f"load_{index}", z.real, z.imag)
+            self._add_site(body, f"load_{index}", z)
 
     def add_actuators(
         self,
         root: ET.Element,
         drive: dict[str, str],
         *,
-        cylinder: bool,
+        driven: bool,
         passive: bool,
     ) -> None:
         """Add actuators: the drive, if it has attributes; loads; and some springs.
 
         Actuators of loads and springs ignore their controls.
 
-        `passive`: these have no controls.
+        `driven`: a flywheel drives, and the cylinder's force is 0 without a control.
+        `passive`: loads and springs have no controls.
         """
         springs = {
             f"spring_{i}": s
             for i, s in enumerate(self.springs, 1)
             if not _is_slack_somewhere(s)
         }
-        if not drive and not cylinder and not self.loads and not springs:
+        has_cylinder = driven and self.cylinder is not None
+        if not drive and not has_cylinder and not self.loads and not springs:
             return
         actuators = ET.SubElement(root, "actuator")
         if drive:
             name = CYLINDER if drive.get("tendon") == CYLINDER else "drive"
             ET.SubElement(actuators, "general", drive, name=name)
-        if cylinder:
+        if has_cylinder:
             ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
         for name, spring in springs.items():
             placed = {"name": name, "tendon": name}
+            stiffness = spring.stiffness
             if passive:
                 tendon = root.find(f"tendon/spatial[@name='{name}']")
                 assert tendon is not None
-                tendon.set("stiffness", write_exactly(spring.stiffness))
+                tendon.set("stiffness", write_exactly(stiffness))
                 tendon.set("springlength", "0")
-                preload = _make_passive(-spring.slack)
-                ET.SubElement(actuators, "dcmotor", {**preload, **placed})
-                continue
-            tension = write_exactly(-spring.slack, 0.0 - spring.stiffness, 0.0)
-            ET.SubElement(
-                actuators,
-                "general",
-                {**_UNCONTROLLED, **placed},
-                biasprm=tension,
-            )
+                stiffness = 0.0
+            _add_force(actuators, placed, -spring.slack, stiffness, passive=passive)
         for index, load in enumerate(self.loads, 1):
-            fx = fy = 0.0
+            force = 0j if load.force is None else cmath.rect(*load.force)
             couple = load.moment
-            if load.force is not None:
-                fx = load.force[0] * math.cos(load.force[1])
-                fy = load.force[0] * math.sin(load.force[1])
-                if load.arm is not None:
-                    # force and arm both keep their direction, and so their moment
-                    arm, angle = load.arm
-                    couple += arm * (math.cos(angle) * fy - math.sin(angle) * fx)
+            if load.arm is not None:
+                # force and arm both keep their direction, and so their moment
+                arm, angle = load.arm
+                couple += arm * (cmath.rect(1.0, -angle) * force).imag
             placed = {"name": f"load_{index}", "site": f"load_{index}"}
             if load.frame == "world":
                 placed["refsite"] = "O2"
-            placed["gear"] = write_exactly(fx, fy, 0.0, 0.0, 0.0, couple)
-            if passive:
-                ET.SubElement(actuators, "dcmotor", {**_make_passive(1.0), **placed})
-                continue
-            ET.SubElement(
-                actuators,
-                "general",
-                {**_UNCONTROLLED, **placed},
-                biasprm="1 0 0",
-            )
+            placed["gear"] = write_exactly(force.real, force.imag, 0, 0, 0, couple)
+            _add_force(actuators, placed, 1.0, passive=passive)
+
+
+def _add_force(
+    actuators: ET.Element,
+    placed: dict[str, str],
+    force: float,
+    stiffness: float = 0.0,
+    *,
+    passive: bool,
+) -> None:
+    """Add an actuator that exerts a force less stiffness times its tendon's length.
+
+    The force is in N, or a factor on the gear; its control does nothing.
+
+    `passive`: it has no control, and no stiffness.
+    """
+    if passive:
+        cogging = write_exactly(force, 0.0, math.pi / 2.0)
+        ET.SubElement(actuators, "dcmotor", {**_PASSIVE, "cogging": cogging, **placed})
+    else:
+        tension = write_exactly(force, 0.0 - stiffness, 0.0)
+        attributes = {**_UNCONTROLLED, **placed}
+        ET.SubElement(actuators, "general", attributes, biasprm=tension)
 
 
 def _is_slack_somewhere(spring: "Spring") -> bool:

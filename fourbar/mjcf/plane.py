@@ -68,25 +68,8 @@ class Plane:
     def rotation(self) -> Array:
         """Return the axes of the frame as columns in world axes, (3, 3)."""
         w, x, y, z = self.quaternion
-        return np.array(
-            [
-                [
-                    1.0 - 2.0 * (y * y + z * z),
-                    2.0 * (x * y - w * z),
-                    2.0 * (x * z + w * y),
-                ],
-                [
-                    2.0 * (x * y + w * z),
-                    1.0 - 2.0 * (x * x + z * z),
-                    2.0 * (y * z - w * x),
-                ],
-                [
-                    2.0 * (x * z - w * y),
-                    2.0 * (y * z + w * x),
-                    1.0 - 2.0 * (x * x + y * y),
-                ],
-            ]
-        )
+        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return np.asarray(np.eye(3) + 2.0 * (w * across + across @ across))
 
     @property
     def roll_pitch_yaw(self) -> Vector:
@@ -97,17 +80,13 @@ class Plane:
         yaw = math.atan2(yx, xx)
         return roll, pitch, yaw
 
-    def turn(self, x: float, y: float, z: float = 0.0) -> Vector:
+    def turn(self, x: float, y: float, z: float = 0.0) -> list[float]:
         """Turn a vector of the frame into world axes."""
-        in_world = self.rotation @ (x, y, z)
-        world_x, world_y, world_z = in_world.tolist()
-        return world_x, world_y, world_z
+        return (self.rotation @ (x, y, z)).tolist()  # type: ignore[no-any-return]
 
-    def place(self, x: float, y: float, z: float = 0.0) -> Vector:
+    def place(self, x: float, y: float, z: float = 0.0) -> list[float]:
         """Return a point of the frame in world axes, m."""
-        from_origin = self.turn(x, y, z)
-        world_x, world_y, world_z = map(add, self.origin, from_origin)
-        return world_x, world_y, world_z
+        return [*map(add, self.origin, self.turn(x, y, z))]
 
     def moved(self, x: float, y: float) -> "Plane":
         """Return the frame with its origin at a point of this one, m.
@@ -115,7 +94,8 @@ class Plane:
         A drawing has O2 there.
         """
         if x or y:
-            return Plane(self.axis, self.place(x, y))
+            x, y, z = self.place(x, y)
+            return Plane(self.axis, (x, y, z))
         return self
 
     def turn_on(self, angle: float) -> tuple[float, float, float, float]:
@@ -131,36 +111,27 @@ class Plane:
         )
 
     def move_mjcf(self, root: ET.Element) -> None:
-        """Move an MJCF that was written for the plane x-y.
+        """Move an MJCF that was written for the plane x-y, O2 in the origin.
 
-        Ground, gravity, light and camera move.
+        Gravity turns; ground, light, camera and the view move, and turn if the plane is
+        tilted.
         """
-        option = root.find("option")
-        statistic = root.find("statistic")
-        assert option is not None
-        assert statistic is not None
+        moved = ("statistic", "worldbody/body", "worldbody/light", "worldbody/camera")
+        for path in moved:
+            for element in root.iterfind(path):
+                name = "center" if path == "statistic" else "pos"
+                point = _read_vector(element.get(name, "0 0 0"))
+                element.set(name, write_exactly(*self.place(*point)))
+        if not self.is_tilted:
+            return
+        for path, name in (("option", "gravity"), ("worldbody/light", "dir")):
+            for element in root.iterfind(path):
+                vector = _read_vector(element.get(name, "0 0 0"))
+                element.set(name, write_exactly(*self.turn(*vector)))
         quaternion = write_exactly(*self.quaternion)
-        self._turn_attribute(option, "gravity")
-        self._move_attribute(statistic, "center")
-        for body in root.iterfind("worldbody/body"):
-            self._move_attribute(body, "pos")
-            body.set("quat", quaternion)
-        for light in root.iterfind("worldbody/light"):
-            self._move_attribute(light, "pos")
-            self._turn_attribute(light, "dir")
-        for camera in root.iterfind("worldbody/camera"):
-            self._move_attribute(camera, "pos")
-            camera.set("quat", quaternion)
-
-    def _turn_attribute(self, element: ET.Element, name: str) -> None:
-        """Turn a vector of the frame that an attribute states into world axes."""
-        vector = _read_vector(element.get(name, "0 0 0"))
-        element.set(name, write_exactly(*self.turn(*vector)))
-
-    def _move_attribute(self, element: ET.Element, name: str) -> None:
-        """Move a point of the frame that an attribute states into the world."""
-        point = _read_vector(element.get(name, "0 0 0"))
-        element.set(name, write_exactly(*self.place(*point)))
+        for path in ("worldbody/body", "worldbody/camera"):
+            for element in root.iterfind(path):
+                element.set("quat", quaternion)
 
 
 def _require_three(name: str, value: object) -> tuple[float, ...]:

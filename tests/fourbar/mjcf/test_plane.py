@@ -74,7 +74,8 @@ def test_mujoco_moves_and_loads_a_tilted_linkage_alike(axis):
         forces = (data.cfrc_int[bodies, 3:] @ turn)[:, :2]
         tip = turn.T @ (data.site("B3").xpos - place.origin)
         closing = (turn.T @ data.efc_force[:3])[:2]
-        answers.append((data.qpos.copy(), forces, tip, closing))
+        seen = [model.stat.center, data.cam("plane").xpos] @ turn - place.origin @ turn
+        answers.append((data.qpos.copy(), forces, tip, closing, seen))
     for level, tilted in zip(*answers, strict=True):
         size = np.abs(level).max()
         assert np.allclose(tilted, level, rtol=0.0, atol=1e-7 * size)
