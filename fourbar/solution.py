@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
@@ -163,11 +163,6 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
-        counts = zip(
-            STATUS_NAMES,
-            np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)),
-            strict=True,
-        )
         shown = list_parts(
             {name: find_values(self, name) for name in _list_quantities(self)},
             scalars=("theta_2", "torque", "drive_force"),
@@ -176,16 +171,14 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         if self.drive is not None:
             on = "along a line" if self.drive.has_stroke else "at a point"
         of = f" {self.title!r}" if self.title else ""
-        lines = [
-            f"Solution{of}: {describe_extent(self.theta_2)}, drive {on}",
-            "status: "
-            + ", ".join(f"{count} {name}" for name, count in counts if count),
-            *(
-                f"{name}: {write_between(values)}"
-                f" {find_unit_of_quantity(name.strip('|'))}"
-                for name, values in shown.items()
-            ),
-        ]
+        lines = [f"Solution{of}: {describe_extent(self.theta_2)}, drive {on}"]
+        counts = np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES))
+        by_status = zip(STATUS_NAMES, counts, strict=True)
+        stated = [f"{count} {name}" for name, count in by_status if count]
+        lines.append("status: " + ", ".join(stated))
+        for name, values in shown.items():
+            unit = find_unit_of_quantity(name.strip("|"))
+            lines.append(f"{name}: {write_between(values)} {unit}")
         return "\n".join([*lines, list_names("evaluated", self.evaluated())])
 
     def _repr_html_(self) -> Any:
@@ -322,6 +315,9 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     are given.
     """
     names = _list_quantities(solution)
+    passed: dict[str, Any] = {}
+    if solution.change_points is not None:
+        passed["change_points"] = solution.change_points
     return write_object(
         ANALYZE_SCHEMA,
         title=solution.title,
@@ -332,11 +328,7 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
         status=solution.status,
         branch=solution.branch,
         **{name: find_values(solution, name, units) for name in names},
-        **(
-            {}
-            if solution.change_points is None
-            else {"change_points": solution.change_points}
-        ),
+        **passed,
         drive_bar=solution.drive_bar,
         assembled=solution.assembled,
         **more,
@@ -355,36 +347,27 @@ def write_csv(
 
     `chosen`: the columns by heading, in these units; left out: all quantities.
     """
-    size = solution.theta_2.size
-    first = _list_leading(solution) if chosen is None else {}
+    scalars: Mapping[str, Array | None] = chosen or {}
+    columns: dict[str, Iterable[Any]] = {}
     if chosen is None:
-        scalars: Mapping[str, Array | None] = {
+        scalars = {
             column.heading: column.values for column in _list_scalars(solution, units)
         }
-    else:
-        scalars = chosen
-    columns = {
-        heading: [math.nan] * size if values is None else values.tolist()
-        for heading, values in scalars.items()
-    }
-    text = io.StringIO()
-    writer = csv.writer(
-        text,
-        lineterminator="\n",
-        delimiter=";" if decimal == "," else ",",
-    )
-    writer.writerow([*first, *columns])
-    for index, row in enumerate(zip(*columns.values(), strict=True)):
-        start = [values[index] for values in first.values()]
-        writer.writerow(
-            [
-                *start,
-                *(
-                    repr(cell).replace(".", decimal) if math.isfinite(cell) else ""
-                    for cell in row
-                ),
-            ]
+        columns |= _list_leading(solution)
+
+    def write_cell(number: float) -> str:
+        return repr(number).replace(".", decimal) if math.isfinite(number) else ""
+
+    nothing = [math.nan] * solution.theta_2.size
+    for heading, values in scalars.items():
+        columns[heading] = map(
+            write_cell, nothing if values is None else values.tolist()
         )
+    text = io.StringIO()
+    delimiter = ";" if decimal == "," else ","
+    writer = csv.writer(text, lineterminator="\n", delimiter=delimiter)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
     return text.getvalue()
 
 
@@ -433,7 +416,8 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
         unit, _ = find_unit_in(find_unit_of_quantity(name), units)
         named = f" [{unit}]" if units and unit != "1" else ""
         for part, column in _split_columns(name, values).items():
-            columns.append(_ScalarColumn(f"{part}{named}", unit, column))
+            flat = None if column is None else column.ravel()  # members in turn
+            columns.append(_ScalarColumn(f"{part}{named}", unit, flat))
     time = compute_times(solution.scene, solution.at)
     if time is not None:
         columns.append(_ScalarColumn("time [s]" if units else "time", "s", time))
@@ -441,18 +425,13 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
 
 
 def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
-    """Split a quantity into columns of one number a position, members in turn."""
+    """Split a quantity into columns of one number a position."""
     if is_scalar(name):
-        return {name: None if values is None else values.ravel()}
-    x = y = size = None
-    if values is not None:
-        x = values[..., 0].ravel()
-        y = values[..., 1].ravel()
+        return {name: values}
+    x, y = (None, None) if values is None else (values[..., 0], values[..., 1])
     parts = {f"{name}_x": x, f"{name}_y": y}
     if has_size(name):
-        if x is not None and y is not None:
-            size = np.hypot(x, y)
-        parts[f"|{name}|"] = size
+        parts[f"|{name}|"] = None if x is None or y is None else np.hypot(x, y)
     return parts
 
 
@@ -481,10 +460,8 @@ def compute_times(scene: Scene | None, at: Command) -> Array | None:
     `scene`: None for a study, whose positions have no time.
     """
     places = at.places
-    if scene is None or at.time is not None or len(places) < 2:
-        return None
     _, speed, acceleration = at.stated
-    if speed is None:
+    if scene is None or at.time is not None or len(places) < 2 or speed is None:
         return None
     if np.ptp(speed) != 0.0 or np.any(acceleration) or not np.all(speed):
         return None
@@ -495,19 +472,12 @@ def compute_times(scene: Scene | None, at: Command) -> Array | None:
 
 def require_units(units: object) -> Conversion:
     """Return units as `fourbar.units` makes them; InputError for others."""
-    plain = isinstance(units, Mapping) and all(
-        isinstance(to, tuple) and len(to) == 2 for to in units.values()
-    )
-    if (
-        not isinstance(units, Mapping)
-        or not plain
-        or not all(isinstance(name, str) for name, _ in units.values())
+    if not isinstance(units, Mapping) or not all(
+        isinstance(to, tuple) and len(to) == 2 and isinstance(to[0], str)
+        for to in units.values()
     ):
-        raise InputError(
-            "units",
-            units,
-            'must be as fourbar.units makes them, like fourbar.units("mm N.mm")',
-        )
+        allowed = 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")'
+        raise InputError("units", units, allowed)
     for _, factor in units.values():
         require("units", factor, "1", POSITIVE)
     return units
@@ -526,11 +496,9 @@ def _list_quantities(solution: "Solution") -> list[str]:
     left_out: tuple[str, ...] = LINE_QUANTITIES
     if solution.drive is not None:
         left_out = () if solution.drive.has_stroke else (STROKE,)
-    names = [
-        name
-        for name in UNITS
-        if name not in left_out and (name != "time" or solution.time is not None)
-    ]
+    if solution.time is None:
+        left_out = (*left_out, "time")
+    names = [name for name in UNITS if name not in left_out]
     points = dict.fromkeys(
         (*solution.points, *solution.velocity, *solution.acceleration)
     )

@@ -33,7 +33,6 @@ from fourbar.quantities import (
     STAGE_OF,
     STAGES,
     STROKE,
-    UNITS,
     Array,
 )
 from fourbar.scene import (
@@ -102,7 +101,12 @@ def solve(
     """
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
     if not isinstance(scene, Scene):
-        return _require_study(scene, at).solve(stage, out=out, side=side)
+        if not hasattr(scene, "solve"):
+            raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
+        if at is not None:
+            allowed = "a study states its own positions: vary the commanded angle"
+            raise InputError("at", "a command", allowed)
+        return scene.solve(stage, out=out, side=side)
     of_release: dict[str, Any] = {}
     if at is not None:
         _require_command_at(at)
@@ -121,10 +125,12 @@ def solve(
         if isinstance(at.origin, ReleaseOrigin):
             results = _solve_released(scene, at.origin, request)
         else:
-            case = _make_case(scene, at, request, side)
-            results = _solve_alone(case, at, request) or _solve_blocks(
-                case, at, request
-            )
+            case = Case.of(scene, at.bar, side)
+            if request.asks_forces and scene.counts_turns:
+                stated = command(scene)
+                case = case.begin_with(stated if stated.bar == at.bar else at)
+            alone = _solve_alone(case, at, request)
+            results = alone or _solve_blocks(case, at, request)
     return make_solution(scene, at, results, solved=scene, **of_release)
 
 
@@ -252,20 +258,6 @@ def _may_sign_differ(case: Case) -> bool:
     return case.path.bar != 2 or case.path.has_change_point
 
 
-def _make_case(
-    scene: Scene,
-    at: Command,
-    request: SolveRequest,
-    side: int,
-) -> Case:
-    """Make the case of one linkage, with effects that count turns from its start."""
-    case = Case.of(scene, at.bar, side)
-    if not request.asks_forces or not scene.counts_turns:
-        return case
-    stated = command(scene)
-    return case.begin_with(stated if stated.bar == at.bar else at)
-
-
 def _solve_alone(case: Case, at: Command, request: SolveRequest) -> Results | None:
     """Solve a single position in plain numbers.
 
@@ -333,28 +325,14 @@ def split(size: int, most: int) -> Iterator[slice]:
     return (slice(start, min(start + most, size)) for start in range(0, size, most))
 
 
-def _require_study(study: object, at: Command | None) -> ManyScenes:
-    """Return the study; InputError for another type, or if a command is given too."""
-    if not hasattr(study, "solve"):
-        raise InputError("scene", study, "must be a Scene, or a Study of `vary`")
-    if at is not None:
-        raise InputError(
-            "at",
-            "a command",
-            "a study states its own positions: vary the commanded angle",
-        )
-    return study
-
-
 def _require_command_at(at: Command) -> None:
     """Raise an InputError unless a command is well formed."""
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
     theta, omega, alpha = COMMAND_NAMES[at.bar]
     angle, branch, speed, acceleration, _, time, origin = at
-    expect(f"at.{theta}", angle, np.ndarray)
-    n = angle.size
     expect("at.origin", origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
+    n = np.size(angle)
     arrays: dict[str, Any] = {theta: angle, "branch": branch}
     if time is not None:
         arrays["time"] = time
@@ -432,43 +410,39 @@ def make_solution(
     of_release : fields of a free motion: `change_points`, `with_extremes` and
         `command_at`.
     """
-    codes = results.codes
-    quantities_by_name = results.arrays
-    _unwrap_angles(quantities_by_name, at.bar)
+    quantities: dict[str, Any] = dict(results.arrays)
+    commanded = COMMAND_NAMES[at.bar][0]
+    for name in ("theta_2", *ANGLES):
+        if name in quantities and name != commanded:  # which stays as it is stated
+            unwrap(quantities[name])
+    theta_2 = at.angle
     if at.moves_stroke:
         # as commanded, wherever it has a value
         for name, value in zip(at.names[:2], at.stated, strict=False):
-            if name in quantities_by_name:
-                stroke = quantities_by_name[name]
-                stroke[...] = value + 0.0 * stroke
-    of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
-    for point in scene.points:
-        for start, arrays in of_points.items():
-            array = quantities_by_name.get(start + point.name)
-            if array is not None:
-                arrays[point.name] = array
-    quantities: Mapping[str, Any] = quantities_by_name
-    if scene.points:
-        quantities = {
-            name: array for name, array in quantities_by_name.items() if name in UNITS
-        }
-    theta_2 = at.angle
-    if at.moves_stroke:
-        theta_2 = _turn_first(theta_2, at, quantities_by_name)
-    if at.bar != 2:
-        theta_2 = quantities["theta_2"]
-        quantities = {
-            name: array for name, array in quantities.items() if name != "theta_2"
+            if name in quantities:
+                quantities[name][...] = value + 0.0 * quantities[name]
+        theta_2 = _turn_first(theta_2)
+        if commanded in quantities:
+            quantities[commanded][...] = theta_2 + 0.0 * quantities[commanded]
+    of_points = dict[str, dict[str, Array]]()
+    for start in POINT_STAGES:
+        names = {start + point.name: point.name for point in scene.points}
+        of_points[start] = {
+            names[name]: quantities.pop(name) for name in names if name in quantities
         }
     branch = at.branch
     if results.sign_may_differ:
-        branch = _read_signs(scene, at, quantities.get("sin_mu"))
+        sine = quantities.get("sin_mu")
+        if sine is None:
+            branch = find_signs(scene.linkage, at.angle, at.branch, at.bar)
+        else:
+            branch = np.where(np.abs(sine) > 0.0, np.sign(sine), at.branch)
     return Solution.of(
         title=scene.title,
         drive_bar=scene.drive_bar,
-        status_code=codes,
+        status_code=results.codes,
         branch=np.array(branch, dtype=np.int8),
-        theta_2=theta_2,
+        theta_2=quantities.pop("theta_2", theta_2),
         time=at.time,
         **quantities,
         points=of_points[""],
@@ -484,42 +458,12 @@ def make_solution(
     )
 
 
-def _read_signs(scene: Scene, at: Command, sine: Array | None) -> Any:
-    """Return the sign of sin(theta_4 - theta_3) at each position.
-
-    The branch replaces the sign where the sine is zero or NaN. `sine`: None if it was
-    not evaluated.
-    """
-    if sine is None:
-        angle, branch, *_ = at
-        return find_signs(scene.linkage, angle, branch, at.bar)
-    return np.where(np.abs(sine) > 0.0, np.sign(sine), at.branch)
-
-
-def _unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
-    """Make every computed angle continuous along its sweep.
-
-    The commanded angle stays as it is stated.
-    """
-    commanded = COMMAND_NAMES[bar][0]
-    for name in ("theta_2", *ANGLES):
-        if name in arrays and name != commanded:
-            unwrap(arrays[name])
-
-
-def _turn_first(angle: Array, at: Command, arrays: dict[str, Array]) -> Array:
-    """Turn the angle that follows from a stroke to (-pi, pi] at the first position.
-
-    `arrays`: those of a solution, in which that of bar 3 or 4 is turned.
-    """
+def _turn_first(angle: Array) -> Array:
+    """Turn an angle that follows from a stroke to (-pi, pi] at the first position."""
     finite = angle[np.isfinite(angle)]
     if not finite.size:
         return angle
-    turned = angle - TURN * np.ceil((finite.flat[0] - np.pi) / TURN)
-    name = COMMAND_NAMES[at.bar][0]
-    if name in arrays:
-        arrays[name][...] = turned + 0.0 * arrays[name]
-    return np.asarray(turned)
+    return np.asarray(angle - TURN * np.ceil((finite.flat[0] - np.pi) / TURN))
 
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:

@@ -115,20 +115,12 @@ def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
         return loads(read_scene_text(path), str(path))
     if not hasattr(path, "read"):
         expect("path", path, str, Path)
-    return _read_stream(path)
-
-
-def _read_stream(stream: IO[str] | IO[bytes]) -> Scene:
-    """Read the scene of an open file, text or bytes."""
-    name = getattr(stream, "name", None)
+    name = getattr(path, "name", None)
     shown = name if isinstance(name, str) else "stream"
-    content = stream.read(LARGEST_SCENE_FILE + 1)
+    content = path.read(LARGEST_SCENE_FILE + 1)
     if len(content) > LARGEST_SCENE_FILE:
-        raise InputError(
-            "scene file",
-            shown,
-            f"must not exceed {LARGEST_SCENE_FILE} bytes",
-        )
+        allowed = f"must not exceed {LARGEST_SCENE_FILE} bytes"
+        raise InputError("scene file", shown, allowed)
     if isinstance(content, bytes):
         try:
             content = content.decode("utf-8-sig")
@@ -159,12 +151,8 @@ def parse_tables(text: str, name: str = "scene") -> dict[str, Any]:
     shown = _write_name(name)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS_OF_A_LINE:
-            raise InputError(
-                "TOML",
-                line[:40],
-                f"line {number} holds more than {MOST_DOTS_OF_A_LINE} dots",
-                shown,
-            )
+            allowed = f"line {number} holds more than {MOST_DOTS_OF_A_LINE} dots"
+            raise InputError("TOML", line[:40], allowed, shown)
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -199,12 +187,8 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     place = PLACE.search(reason)
     lines = text.split("\n")
     if place is None:
-        return InputError(
-            "TOML",
-            text[:LONGEST_SHOWN_LINE],
-            f"cannot be read: {' '.join(reason.split())[:120]}",
-            shown,
-        )
+        allowed = f"cannot be read: {' '.join(reason.split())[:120]}"
+        return InputError("TOML", text[:LONGEST_SHOWN_LINE], allowed, shown)
     line = int(place[1] or len(lines))
     column = int(place[2] or len(lines[-1]) + 1)
     start = max(0, column - 1 - LONGEST_SHOWN_LINE // 2)
@@ -212,16 +196,10 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     why = " ".join(reason[: place.start()].split())[:120]
     for bare in _UNQUOTED.finditer(lines[line - 1]):
         if bare.start(1) < column <= bare.end(1) + 1:
-            why = (
-                "a number with a unit stands in quotes, like"
-                f' "{bare[1].strip()[:LONGEST_SHOWN_LINE]}"'
-            )
-    return InputError(
-        f"line {line}, column {column}",
-        value,
-        f"cannot be read as TOML: {why}",
-        shown,
-    )
+            number = bare[1].strip()[:LONGEST_SHOWN_LINE]
+            why = f'a number with a unit stands in quotes, like "{number}"'
+    key = f"line {line}, column {column}"
+    return InputError(key, value, f"cannot be read as TOML: {why}", shown)
 
 
 def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
@@ -237,14 +215,17 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     drive_bar, drive = _read_drive(read, top.get("drive", {}), bars)
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > _MOST_LOADS:
-        raise read.refuse(
-            "loads",
-            entries,
-            f"must be written as [[loads]], at most {_MOST_LOADS}",
-        )
+        allowed = f"must be written as [[loads]], at most {_MOST_LOADS}"
+        raise read.refuse("loads", entries, allowed)
     effects = read.table("effects", top.get("effects", {}), list_kinds())
     motion = top.get("motion", {})
     linkage = _read_linkage(read, top)
+    pictures = []
+    for name, bar in top.get("bars", {}).items():
+        if "picture" in bar:  # its file is read when it is shown
+            text = read.text(f"bars.{name}.picture", bar["picture"])
+            pictures.append(Picture(MOVING_BAR_NUMBERS[name], text, folder))
+    pictures.sort(key=lambda picture: picture.bar)
     if drawing is not None:
         line = None
         if isinstance(drive, LinearDrive):
@@ -261,7 +242,7 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         tuple(_read_effect(read, key, value, bars) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
-        _read_pictures(read, top.get("bars", {}), folder),
+        tuple(pictures),
         points,
         drive=drive,
         drawing=drawing,
@@ -269,12 +250,13 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     )
     if drawing is not None:
         scene = choose_assembly(scene, drawing)
-    scene = replace(scene, coordinates=tuple(read.coordinates.items()))
+    met = None
     if read.stated_lengths is not None:
-        pair = read.stated_lengths, linkage.lengths
-        scene = replace(scene, met_lengths=pair)
+        met = read.stated_lengths, linkage.lengths
     return replace(
         scene,
+        coordinates=tuple(read.coordinates.items()),
+        met_lengths=met,
         tolerances=_read_tolerances(read, scene, top.get("tolerances", {})),
     )
 
@@ -307,36 +289,13 @@ def _read_drive(
 
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     if not isinstance(value, dict) or len(value) > MOST_POINTS_OF_A_SCENE:
-        raise read.refuse(
-            "points",
-            value,
-            f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}",
-        )
+        allowed = f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}"
+        raise read.refuse("points", value, allowed)
     points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
         points.append(read_described(read, key, point, Point, {}, name=name))
     return tuple(points)
-
-
-def _read_pictures(
-    read: Reader,
-    bars: dict[str, Any],
-    folder: str,
-) -> tuple[Picture, ...]:
-    """Read the names of the bars' pictures.
-
-    The files themselves are read when they are shown.
-    """
-    return tuple(
-        Picture(
-            number,
-            read.text(f"bars.{name}.picture", bars[name]["picture"]),
-            folder,
-        )
-        for name, number in MOVING_BAR_NUMBERS.items()
-        if "picture" in bars.get(name, {})
-    )
 
 
 def _read_traced(read: Reader, value: object, folder: str) -> TracedPicture | None:
@@ -368,71 +327,42 @@ def _read_traced(read: Reader, value: object, folder: str) -> TracedPicture | No
 
 
 def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
-    lengths = read.table(
-        "lengths",
-        top.get("lengths", {}),
-        (*BAR_NAMES.values(), "ground_angle"),
-    )
-    length = read.numbers(
-        "lengths",
-        lengths,
-        dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"]),
-    )
-    met = _meet_stated_equalities(length, lengths)
-    if met != length:
-        read.stated_lengths = tuple(length[name] for name in BAR_NAMES.values())
-    length = met
-    tables = read.table("bars", top.get("bars", {}), MOVING_BAR_NUMBERS)
-    bars = {
-        name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name])
-        for name in MOVING_BAR_NUMBERS
-    }
-    ground = read.numbers("lengths", lengths, FourBar.numbers)
-    return FourBar(
-        length["ground"],
-        bars["input"],
-        bars["coupler"],
-        bars["output"],
-        ground["ground_angle"],
-    )
-
-
-def _meet_stated_equalities(
-    length: dict[str, float],
-    stated: dict[str, Any],
-) -> dict[str, float]:
-    """Return the lengths with the equalities that their last decimals miss."""
     names = tuple(BAR_NAMES.values())
-    d, a, b, c = (length[name] for name in names)
-    if not math.isfinite(d + a + b + c):  # refused where they are put together
-        return length
-    roundings = [half_unit_of_text(stated[name], "m") for name in names]
-    met = meet_change_points((d, a, b, c), tuple(roundings))  # type: ignore[arg-type]
-    return dict(zip(names, met, strict=True))
+    stated = read.table("lengths", top.get("lengths", {}), (*names, "ground_angle"))
+    by_name = read.numbers(
+        "lengths", stated, dict.fromkeys(names, Bar.numbers["length"])
+    )
+    lengths: Any = tuple(by_name.values())
+    met = lengths
+    if math.isfinite(sum(lengths)):  # more is refused where they are put together
+        roundings: Any = [half_unit_of_text(stated[name], "m") for name in names]
+        met = meet_change_points(lengths, tuple(roundings))
+    if met != lengths:
+        read.stated_lengths = lengths
+    tables = read.table("bars", top.get("bars", {}), MOVING_BAR_NUMBERS)
+    ground, *moving = met
+    two, three, four = (
+        _read_bar(read, f"bars.{name}", tables.get(name, {}), length)
+        for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
+    )
+    angle = read.numbers("lengths", stated, FourBar.numbers)["ground_angle"]
+    return FourBar(ground, two, three, four, angle)
 
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
-    stated = {
-        name: declared for name, declared in Bar.numbers.items() if name != "length"
-    }
-    entry = read.table(key, value, (*stated, "picture"))
-    numbers = read.numbers(key, entry, stated)
-    if numbers["inertia"] is None and not math.isfinite(
-        numbers["mass"] * length * length
-    ):
-        raise read.refuse(
-            f"{key}.mass",
-            entry.get("mass"),
-            "must leave the inertia m L^2/12 a finite number",
-        )
+    declared = dict(Bar.numbers)
+    del declared["length"]
+    entry = read.table(key, value, (*declared, "picture"))
+    numbers = read.numbers(key, entry, declared)
+    inertia = numbers["mass"] * length * length
+    if numbers["inertia"] is None and not math.isfinite(inertia):
+        allowed = "must leave the inertia m L^2/12 a finite number"
+        raise read.refuse(f"{key}.mass", entry.get("mass"), allowed)
     try:
         return Bar(length, **numbers)
     except InputError as error:  # which knows of one bar alone
-        raise read.refuse(
-            f"{key}.{error.key}",
-            entry.get(error.key),
-            error.allowed,
-        ) from None
+        value = entry.get(error.key)
+        raise read.refuse(f"{key}.{error.key}", value, error.allowed) from None
 
 
 def _read_motion(read: Reader, value: object) -> Motion:
@@ -458,16 +388,6 @@ def _read_motion(read: Reader, value: object) -> Motion:
     if "law" in entry:
         arguments["law"] = _read_law(read, entry["law"])
     return Motion(**arguments)
-
-
-def _read_steps(read: Reader, key: str, entry: Mapping[str, Any]) -> int:
-    """Read the number of steps of a motion, which has a default."""
-    return read.whole(
-        f"{key}.steps",
-        entry.get("steps", DEFAULT_STEPS),
-        1,
-        MOST_INTERVALS,
-    )
 
 
 def _read_law(read: Reader, value: object) -> Law | Rise | Sine:
@@ -504,19 +424,16 @@ def _read_commanded(
     from_limit = " or { limit, offset }" if unit == "rad" else ""
     if not isinstance(value, dict):
         like = "135 deg" if unit == "rad" else "1.5 m"
-        raise read.refuse(
-            key,
-            value,
-            f'must be like "{like}", a list of such, {{ from, to, steps }}{from_limit}',
-        )
+        forms = f"a list of such, {{ from, to, steps }}{from_limit}"
+        raise read.refuse(key, value, f'must be like "{like}", {forms}')
     if from_limit and value.keys() & {"limit", "offset"}:
-        from_limit_position: FromLimit = read_described(read, key, value, FromLimit, {})
-        return from_limit_position
+        return read_described(read, key, value, FromLimit, {})  # type: ignore[no-any-return]
     sweep = read.table(key, value, ("from", "to", "steps"))
     start, stop = (
         read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to")
     )
-    return Sweep(start, stop, _read_steps(read, key, sweep))
+    steps = sweep.get("steps", DEFAULT_STEPS)
+    return Sweep(start, stop, read.whole(f"{key}.steps", steps, 1, MOST_INTERVALS))
 
 
 def _read_load(read: Reader, key: str, value: Any, bars: Mapping[str, int]) -> Load:
@@ -560,26 +477,19 @@ def _read_tolerances(
     for key, stated in flat.items():
         name = f'tolerances."{key}"'
         if key in COMMAND_KEYS:
-            raise read.refuse(
-                name,
-                stated,
+            allowed = (
                 "a commanded value has no tolerance; its speed and acceleration may"
-                " have one",
+                " have one"
             )
+            raise read.refuse(name, stated, allowed)
         if key not in entries:
-            raise read.refuse(
-                name,
-                stated,
-                refuse_key(key, stated, list(entries)).allowed,
-            )
+            allowed = refuse_key(key, stated, list(entries)).allowed
+            raise read.refuse(name, stated, allowed)
         entry = entries[key]
         sigma = isinstance(stated, list)
         if sigma and (len(stated) != 2 or stated[1] != SIGMA):
-            raise read.refuse(
-                name,
-                stated,
-                f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]',
-            )
+            form = f'"0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]'
+            raise read.refuse(name, stated, f"must be like {form}")
         width = stated[0] if sigma else stated
         size = read.quantity(name, width, entry.unit, POSITIVE)
         if size <= 0.0:
@@ -598,16 +508,12 @@ def _read_tolerances(
 def _flatten(read: Reader, value: object, before: str = "") -> dict[str, Any]:
     """Flatten a table to full keys, whether these are quoted or dotted."""
     if not isinstance(value, dict):
-        raise read.refuse(
-            "tolerances",
-            value,
-            'must be a table of keys like "lengths.input" = "0.05 mm"',
-        )
+        allowed = 'must be a table of keys like "lengths.input" = "0.05 mm"'
+        raise read.refuse("tolerances", value, allowed)
     flat: dict[str, Any] = {}
     for key, entry in value.items():
-        flat |= (
-            _flatten(read, entry, f"{before}{key}.")
-            if isinstance(entry, dict)
-            else {f"{before}{key}": entry}
-        )
+        if isinstance(entry, dict):
+            flat |= _flatten(read, entry, f"{before}{key}.")
+        else:
+            flat[f"{before}{key}"] = entry
     return flat

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Effect, list_kinds
+from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
 from fourbar.files.described import write_described
 from fourbar.files.drawing import choose_assembly, meet_lengths, read_point
@@ -34,8 +34,6 @@ from fourbar.scene.motion import (
     FromLimit,
     Law,
     Motion,
-    Rise,
-    Sine,
     Sweep,
 )
 from fourbar.scene.pictures import TracedPicture
@@ -70,11 +68,8 @@ def dump(scene: Scene) -> str:
     that exceeds it.
     """
     expect("scene", scene, Scene)
-    top = {}
-    if scene.title:
-        top["title"] = scene.title
-    if scene.source:
-        top["source"] = scene.source
+    words = {"title": scene.title, "source": scene.source}
+    top = {name: text for name, text in words.items() if text}
     described = list_scene_tables(scene)
     motion = _write_motion(scene.motion)
     bars = described["bars"]
@@ -85,25 +80,26 @@ def dump(scene: Scene) -> str:
     read_back = scene
     if "lengths" in dict(pins_or_lengths):
         read_back = replace(scene, drawing=None)
-    tables_of_bars = [
-        (f"bars.{name}", bars[name]) for name in MOVING_BAR_NUMBERS if name in bars
-    ]
-    loads = [("[loads]", load) for load in described["loads"]]
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
         *pins_or_lengths,
-        *tables_of_bars,
+        *((f"bars.{name}", bars[name]) for name in MOVING_BAR_NUMBERS if name in bars),
         ("motion", motion),
         ("drive", described["drive"]),
         ("points", described["points"]),
-        *loads,
+        *(("[loads]", load) for load in described["loads"]),
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(read_back)),
         ("picture", _write_traced(scene.picture)),
     ]
-    return "\n".join(
-        _write_toml_table(name, entries) for name, entries in tables if entries
-    )
+    texts = []
+    for name, entries in tables:
+        if entries:
+            lines = [f"[{name}]\n"] if name else []
+            for key, value in entries.items():
+                lines.append(f"{key} = {_write_toml_value(key, value)}\n")
+            texts.append("".join(lines))
+    return "\n".join(texts)
 
 
 def _write_traced(picture: TracedPicture | None) -> dict[str, Any]:
@@ -133,10 +129,9 @@ def _write_lengths(
         return [("lengths", lengths)]
     pins = {pin: [write_quantity(x, "m") for x in drawing.place(pin)] for pin in PINS}
     drawn = (*meet_lengths(drawing, pins), drawing.angle(1))
-    linkage = scene.linkage
-    if drawn != (*linkage.lengths, linkage.ground_angle):
-        return [("lengths", lengths)]
-    if choose_assembly(scene, drawing).motion.branch != scene.motion.branch:
+    stated = (*scene.linkage.lengths, scene.linkage.ground_angle)
+    motion_drawn = choose_assembly(scene, drawing).motion if drawn == stated else None
+    if motion_drawn is None or motion_drawn.branch != scene.motion.branch:
         return [("lengths", lengths)]
     del motion["branch"]
     return [("pins", pins)]
@@ -171,7 +166,15 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
 
     Raises InputError where a file cannot hold the effects.
     """
-    _require_writable(scene.effects)
+    keys = [effect.key for effect in scene.effects]
+    for effect in scene.effects:
+        if list_kinds().get(effect.key) is not type(effect):
+            allowed = "a scene file cannot state this effect"
+            kind = type(effect).__name__
+            raise InputError(f"effects.{effect.key}", kind, allowed)
+    if len(set(keys)) < len(keys):
+        allowed = "a scene file holds one effect of each kind"
+        raise InputError("effects", keys, allowed)
     linkage = scene.linkage
     lengths = zip(BAR_NAMES.values(), linkage.lengths, strict=True)
     drive = {"bar": scene.drive_bar}
@@ -205,52 +208,31 @@ def _write_bar(bar: Bar) -> dict[str, Any]:
     return numbers | last
 
 
-def _require_writable(effects: tuple[Effect, ...]) -> None:
-    """Raise InputError where a file has no form of an effect, or not of them all."""
-    keys = [effect.key for effect in effects]
-    for effect in effects:
-        if list_kinds().get(effect.key) is not type(effect):
-            raise InputError(
-                f"effects.{effect.key}",
-                type(effect).__name__,
-                "a scene file cannot state this effect",
-            )
-    if len(set(keys)) < len(keys):
-        allowed = "a scene file holds one effect of each kind"
-        raise InputError("effects", keys, allowed)
-
-
 def _write_motion(motion: Motion) -> dict[str, Any]:
     law = motion.law
     free = motion.free
     stated = motion.angle
     theta, omega, alpha = motion.names
-    unit = "rad" if motion.stroke is None else "m"
-    angles: Any = None
+    unit, of_speed, of_growth = (motion.numbers[name].unit for name in motion.names)
+    entry: dict[str, Any] = {theta: None, omega: None}
     if isinstance(stated, Sweep):
-        ends = {
-            "from": write_quantity(stated.start, unit),
-            "to": write_quantity(stated.stop, unit),
-        }
-        angles = {**ends, "steps": stated.steps}
+        ends = {"from": stated.start, "to": stated.stop}
+        written = {key: write_quantity(end, unit) for key, end in ends.items()}
+        entry[theta] = {**written, "steps": stated.steps}
     elif isinstance(stated, FromLimit):
-        angles = write_described(stated)
+        entry[theta] = write_described(stated)
     elif stated is not None:
-        angles = _write_quantities(stated, unit)
-    speed = motion.speed
-    entry = {
-        theta: angles,
-        omega: None if speed is None else _write_quantities(speed, f"{unit}/s"),
-        alpha: (
-            _write_quantities(motion.acceleration, f"{unit}/s^2")
-            if law is None
-            else None
-        ),
-        "law": None if law is None else _write_law(law),
-        "branch": BRANCH_NAMES[motion.branch],
-        "side": motion.side,
-        "free": None if free is None else write_described(free),
-    }
+        entry[theta] = _write_quantities(stated, unit)
+    if motion.speed is not None:
+        entry[omega] = _write_quantities(motion.speed, of_speed)
+    if law is None:
+        entry[alpha] = _write_quantities(motion.acceleration, of_growth)
+    else:
+        kind = {} if isinstance(law, Law) else {"kind": law.kind}
+        entry["law"] = {**kind, **write_described(law)}
+    entry["branch"] = BRANCH_NAMES[motion.branch]
+    entry["side"] = motion.side
+    entry["free"] = None if free is None else write_described(free)
     return {key: value for key, value in entry.items() if value is not None}
 
 
@@ -261,35 +243,15 @@ def _write_quantities(numbers: float | Array, unit: str) -> Any:
     return write_quantity(float(numbers), unit)
 
 
-def _write_law(law: Law | Rise | Sine) -> dict[str, Any]:
-    kind = {} if isinstance(law, Law) else {"kind": law.kind}
-    return {**kind, **write_described(law)}
-
-
-def _write_toml_table(name: str, entries: dict[str, Any]) -> str:
-    heading = f"[{name}]\n" if name else ""
-    return heading + "".join(
-        f"{key} = {_write_toml_value(key, value)}\n" for key, value in entries.items()
-    )
-
-
 def _write_toml_value(key: str, value: object) -> str:
     """Write a TOML value; strings escape as in JSON, and DEL too."""
     if isinstance(value, dict):
-        return (
-            "{ "
-            + ", ".join(
-                f"{name} = {_write_toml_value(key, entry)}"
-                for name, entry in value.items()
-            )
-            + " }"
-        )
+        pairs = (f"{name} = {_write_toml_value(key, x)}" for name, x in value.items())
+        return f"{{ {', '.join(pairs)} }}"
     if isinstance(value, list):
         # one line each where there are many: no line has more than MOST_DOTS_OF_A_LINE
         between = ", " if len(value) <= 3 else ",\n  "
-        return (
-            "[" + between.join(_write_toml_value(key, entry) for entry in value) + "]"
-        )
+        return f"[{between.join(_write_toml_value(key, entry) for entry in value)}]"
     if not isinstance(value, str):
         return repr(value)
     try:
@@ -310,11 +272,8 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
     rows = dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in entries:
-            raise InputError(
-                "tolerances",
-                tolerance.key,
-                "no number of the scene has this key",
-            )
+            allowed = "no number of the scene has this key"
+            raise InputError("tolerances", tolerance.key, allowed)
         entry = entries[tolerance.key]
         width = write_quantity(tolerance.width, entry.unit)
         if (misfit := find_misfit(scene, entry, tolerance)) is not None:

@@ -53,9 +53,6 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive, LinearDrive, Load, Place
 
 
-_A_DRIVE = "a drive is a couple on a bar or a force: state drive_bar or drive"
-
-
 def load_show(module: str) -> Any:
     """Import a module of `fourbar.show`.
 
@@ -118,11 +115,16 @@ class Scene:
     )
 
     def __post_init__(self) -> None:
-        one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
-        expect("drawing", self.drawing, DrawnPins, type(None))
-        expect("picture", self.picture, TracedPicture, type(None))
-        for name, kind in one.items():
-            expect(name, getattr(self, name), kind)
+        kinds: dict[str, tuple[type, ...]] = {
+            "linkage": (FourBar,),
+            "motion": (Motion,),
+            "title": (str,),
+            "source": (str,),
+            "drawing": (DrawnPins, type(None)),
+            "picture": (TracedPicture, type(None)),
+        }
+        for name, types in kinds.items():
+            expect(name, getattr(self, name), *types)
         many = {
             "loads": Effect,
             "effects": Effect,
@@ -130,23 +132,27 @@ class Scene:
             "points": Point,
             "tolerances": Tolerance,
         }
-        for name, each_kind in many.items():
+        for name, kind in many.items():
             entries = getattr(self, name)
             expect(name, entries, tuple, list)
             object.__setattr__(self, name, tuple(entries))
             for entry in entries:
-                expect(name, entry, each_kind)
+                expect(name, entry, kind)
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
         if self.drive is None:
-            if self.drive_bar is None:
-                bar = 2
-            else:
-                bar = require_bar("drive.bar", self.drive_bar)
-            object.__setattr__(self, "drive_bar", bar)
+            stated = 2 if self.drive_bar is None else self.drive_bar
+            object.__setattr__(self, "drive_bar", require_bar("drive.bar", stated))
         else:
-            self._require_force_drive(self.drive)
+            from fourbar.effects.force_drive import ForceDrive
+
+            expect("drive", self.drive, ForceDrive)
+            if self.drive_bar is not None:
+                allowed = (
+                    "a drive is a couple on a bar or a force: state drive_bar or drive"
+                )
+                raise InputError("drive.bar", self.drive_bar, allowed)
         self._require_points()
         drive = self.settled_drive()
         if drive is not None:
@@ -155,12 +161,9 @@ class Scene:
             object.__setattr__(self, "motion", copy(self.motion))
             bar = _find_triangle(self.linkage, drive).bar
             object.__setattr__(self.motion, "bar", bar)
-        if len({picture.bar for picture in self.pictures}) < len(self.pictures):
-            raise InputError(
-                "pictures",
-                [picture.bar for picture in self.pictures],
-                "a bar has one picture",
-            )
+        bars = [picture.bar for picture in self.pictures]
+        if len(set(bars)) < len(bars):
+            raise InputError("pictures", bars, "a bar has one picture")
 
     def plot(
         self,
@@ -190,29 +193,13 @@ class Scene:
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """
-        options = {} if units is None else {"units": units}
-        return load_show("plot").draw_figure(
-            self,
-            figure,
-            position=position,
-            dimensions=dimensions,
-            **options,
-        )
+        options = {"position": position, "dimensions": dimensions}
+        if units is not None:
+            options["units"] = units
+        return load_show("plot").draw_figure(self, figure, **options)
 
     def _repr_html_(self) -> Any:
         return load_show("notebook").show_scene(self)
-
-    def _require_force_drive(self, drive: object) -> None:
-        """Raise InputError if the drive exerts no force, or a bar is driven too."""
-        from fourbar.effects.force_drive import ForceDrive
-
-        expect("drive", drive, ForceDrive)
-        if self.drive_bar is not None:
-            raise InputError(
-                "drive.bar",
-                self.drive_bar,
-                _A_DRIVE,
-            )
 
     def with_places(self, change: "Callable[[Place], Place]") -> "Scene":
         """Return the scene with each place changed.
@@ -510,11 +497,10 @@ class _Triangle(NamedTuple):
         """Return the strokes at two values of beta between 0 and pi, m."""
         fold = abs(self.length - self.reach)
         twice_mean = 2.0 * math.sqrt(self.length * self.reach)
-        strokes = (
+        least, most = (
             math.hypot(fold, twice_mean * math.sin(0.5 * beta))
             for beta in (first, last)
         )
-        least, most = strokes
         return least, most
 
     def turn_bar(
@@ -522,22 +508,17 @@ class _Triangle(NamedTuple):
         stroke: Any,
         speed: Any,
         acceleration: Any,
-        side: str | None,
+        side: Any,
     ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the condition.
 
         The condition is the lever over the longer of l and r. NaN where the cylinder
         cannot have the stroke. All may be arrays, and numbers with slopes.
         """
-        assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
         sign = SIDES[side]
-        near = exact_difference(stroke, reach, length, zero) * exact_difference(
-            stroke,
-            length,
-            reach,
-            zero,
-        )
+        beyond_length = exact_difference(stroke, reach, length, zero)
+        near = beyond_length * exact_difference(stroke, length, reach, zero)
         far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
         with np.errstate(all="ignore"):
             near = np.sqrt(near)
@@ -604,6 +585,11 @@ def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
     )
 
 
+def _triangle_of(scene: Scene) -> _Triangle:
+    """Return the triangle of a scene's cylinder."""
+    return _find_triangle(scene.linkage, scene.settled_drive())
+
+
 def _reverse(point: "Place") -> Any:
     """Return half a turn for a point at a distance that is negative."""
     forwards = 0.0 * point.distance  # zero of the same kind of number
@@ -618,7 +604,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     """
     steps = DEFAULT_STEPS
     if scene.motion.stroke is not None:
-        triangle = _find_triangle(scene.linkage, scene.settled_drive())
+        triangle = _triangle_of(scene)
         first, last = triangle.find_strokes(
             ANGLE_FROM_LIMITS, np.pi - ANGLE_FROM_LIMITS
         )
@@ -646,12 +632,8 @@ def compute_bar_motion(
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, 1.0
-    return _find_triangle(scene.linkage, scene.settled_drive()).turn_bar(
-        place,
-        speed,
-        acceleration,
-        scene.motion.side,
-    )
+    side = scene.motion.side
+    return _triangle_of(scene).turn_bar(place, speed, acceleration, side)
 
 
 def command_stroke(
@@ -664,31 +646,23 @@ def command_stroke(
 
     The branch is that of the motion.
     """
-    angle, omega, alpha, condition = compute_bar_motion(
-        scene,
-        stroke,
-        speed,
-        acceleration,
-    )
+    stated = stroke, speed, acceleration
+    angle, omega, alpha, condition = compute_bar_motion(scene, *stated)
     lost = None
     if speed is not None:  # what angle, speed and acceleration leave out as doubles
         with np.errstate(all="ignore"):
             longer = _find_triangle(
                 *change_numbers((scene.linkage, scene.settled_drive()), lengthen)
             )
-            *turned, _ = longer.turn_bar(
-                lengthen(stroke),
-                lengthen(speed),
-                lengthen(acceleration),
-                scene.motion.side,
-            )
+            s, v, a = map(lengthen, stated)
+            *turned, _ = longer.turn_bar(s, v, a, scene.motion.side)
             gaps = [
                 shorten(after - before)
                 for before, after in zip((angle, omega, alpha), turned, strict=True)
             ]
         lost = np.stack(np.broadcast_arrays(*gaps), axis=-1)
     branch = np.full(np.shape(angle), scene.motion.branch, dtype=np.int8)
-    origin = StrokeOrigin(stroke, speed, acceleration, condition, lost)
+    origin = StrokeOrigin(*stated, condition, lost)
     return Command(angle, branch, omega, alpha, scene.motion.bar, origin=origin)
 
 
@@ -697,7 +671,7 @@ def find_stroke_ranges(scene: Scene) -> list[tuple[float, float]]:
 
     In each the loop of the bars closes, and the triangle of the cylinder on its side.
     """
-    triangle = _find_triangle(scene.linkage, scene.settled_drive())
+    triangle = _triangle_of(scene)
     assert scene.motion.side is not None
     sign = SIDES[scene.motion.side]
     ranges: list[tuple[float, float]] = []
@@ -725,17 +699,14 @@ def command_at(scene: Scene, places: Array) -> Command:
     """Return the command of the scene's motion at other angles, strokes or times."""
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        triangle = _find_triangle(scene.linkage, scene.settled_drive())
+        triangle = _triangle_of(scene)
         least = abs(triangle.length - triangle.reach)
         most = triangle.length + triangle.reach
         inside = (places >= least) & (places <= most)
         if not inside.all():
-            raise InputError(
-                "motion.stroke",
-                float(places[np.argmin(inside)]),
-                f"this cylinder can have {write_stroke_ranges(scene)}",
-                unit="m",
-            )
+            refused = float(places[np.argmin(inside)])
+            allowed = f"this cylinder can have {write_stroke_ranges(scene)}"
+            raise InputError("motion.stroke", refused, allowed, unit="m")
         return command_stroke(scene, places, motion.speed, motion.acceleration)
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:
@@ -783,16 +754,12 @@ def command(scene: Scene) -> Command:
     elif isinstance(stated, Sweep):
         places = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):
-        key = f"motion.theta_{bar}.limit"
         limits = find_limit_angles(linkage, bar)
-        if not limits:
-            raise InputError(
-                key,
-                stated.limit,
-                f"the {BAR_NAMES[bar]} of this linkage has no limit positions",
-            )
         if stated.limit > len(limits):
-            raise InputError(key, stated.limit, f"must be from 1 to {len(limits)}")
+            allowed = f"must be from 1 to {len(limits)}"
+            if not limits:
+                allowed = f"the {BAR_NAMES[bar]} of this linkage has no limit positions"
+            raise InputError(f"motion.theta_{bar}.limit", stated.limit, allowed)
         from fourbar.formulas.many_digits import limit_remainder
 
         limit = limits[stated.limit - 1]
