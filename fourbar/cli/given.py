@@ -250,7 +250,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     if name == "t":  # as it is printed
         name = "time"
     if value == "drawn":
-        return find_positions(scene, [(name, _read_drawn(scene, name, text))])
+        return find_positions(scene, name, _read_drawn(scene, name, text))
     if name not in STATED_POSITIONS or value in EXTREMES:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
@@ -265,7 +265,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     if unit == "rad" and name != scene.motion.commanded:
         rounding = half_unit_of_text(value, unit)
         stated = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
-    return find_positions(scene, [(name, stated)])
+    return find_positions(scene, name, stated)
 
 
 _ANGLE_OF_SCENE = re.compile(r"(.+):\s*(theta_[234])\s*(?:([+-])\s*(.+))?")
@@ -324,13 +324,13 @@ def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, floa
 
 def _read_drawn(scene: Scene, name: str, text: str) -> float:
     """Return the angle or stroke of the scene's drawing."""
-    from fourbar.files.drawing import find_drawn
+    from fourbar.files.drawing import list_drawn
 
     drawing = scene.drawing
     if drawing is None:
         drawn = None
     else:
-        drawn = find_drawn(drawing, scene.settled_drive(), name)
+        drawn = list_drawn(drawing, scene.settled_drive()).get(name)
     if drawn is None:
         raise InputError("--at", text, "needs a scene that states [pins]")
     return drawn

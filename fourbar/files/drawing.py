@@ -5,14 +5,15 @@ The motion may use the word "drawn".
 
 import cmath
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.effects import ForceDrive, LinearDrive
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader
+from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.mobility import count_equalities, meet_change_points
 from fourbar.linkage import (
     BAR_NAMES,
@@ -96,70 +97,45 @@ def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
     return read.quantity(f"{key}[0]", x, "m"), read.quantity(f"{key}[1]", y, "m")
 
 
-def state_lengths(
-    read: Reader,
-    top: dict[str, Any],
-    drawing: DrawnPins,
-) -> dict[str, Any]:
-    """State a drawing by lengths, and each place of it in its bar's frame."""
-    met = meet_lengths(drawing, top["pins"])
-    drawn = tuple(drawing.length(bar) for bar in ENDS)
-    if met != drawn:
-        read.stated_lengths = drawn
-    lengths = {name: f"{met[bar - 1]!r} m" for name, bar in BAR_NUMBERS.items()}
-    lengths["ground_angle"] = f"{drawing.angle(1)!r} rad"
-    stated = {}
-    for key, value in top.items():
-        if key != "pins":
-            stated[key] = _state_places(read, key, value, drawing)
-    stated["lengths"] = lengths
-    return stated
-
-
-@dataclass(frozen=True, slots=True)
-class _DrawnGround:
+class DrawnGround(NamedTuple):
     """The ground of a scene of lengths, O2 at the origin; no other bar is drawn."""
 
-    angle: float
+    direction: float = 0.0
+    """Direction from O2 to O4, rad."""
+    length: float | None = None
+    """m; None: the scene states it as that of any bar."""
+
+    def angle(self, bar: int) -> float:
+        """Return the direction of the ground, rad."""
+        return self.direction
 
     def into_bar(self, bar: int, place: PlanePoint) -> complex:
         """Return a place in the frame of the ground, m."""
-        return complex(*place) * cmath.rect(1.0, -self.angle)
+        return complex(*place) * cmath.rect(1.0, -self.direction)
 
 
-def state_ground(read: Reader, top: dict[str, Any]) -> dict[str, Any]:
-    """State the ground of a scene of lengths by its length and angle.
+def read_ground(read: Reader, lengths: Any) -> DrawnGround:
+    """Read the direction of the ground of a scene of lengths.
 
-    The file may have x and y of O4 from O2 in their place. Drawn places of the ground
-    are stated in its frame.
+    The file may have x and y of O4 from O2 in the place of length and angle.
     """
-    lengths = top.get("lengths")
     if not isinstance(lengths, dict):
-        return top
-    key = "lengths.ground_angle"
+        return DrawnGround()
+    key = "lengths.ground"
     angle = lengths.get("ground_angle")
-    if isinstance(lengths.get("ground"), dict):
-        if angle is not None:
-            allowed = "must be left out: x and y of the ground state its angle"
-            raise read.refuse(key, angle, allowed)
-        entry = read.table("lengths.ground", lengths["ground"], ("x", "y"))
-        x, y = (
-            read.quantity(f"lengths.ground.{axis}", entry.get(axis), "m")
-            for axis in ("x", "y")
-        )
-        if not 0.0 < math.hypot(x, y) < math.inf:
-            allowed = "must be coordinates of O4 from O2, where it does not lie"
-            raise read.refuse("lengths.ground", lengths["ground"], allowed)
-        angle = f"{math.atan2(y, x)!r} rad"
-        # with every digit: lengths are compared within those that are stated
-        length = f"{math.hypot(x, y):.16e} m"
-        lengths = {**lengths, "ground": length, "ground_angle": angle}
-    ground = _DrawnGround(read.quantity(key, angle, "rad", default=0.0))
-    stated = {}
-    for name, value in top.items():
-        stated[name] = _state_places(read, name, value, ground)
-    stated["lengths"] = lengths
-    return stated
+    ground = lengths.get("ground")
+    if not isinstance(ground, dict):
+        return DrawnGround(read.quantity(f"{key}_angle", angle, "rad", default=0.0))
+    if angle is not None:
+        allowed = "must be left out: x and y of the ground state its angle"
+        raise read.refuse(f"{key}_angle", angle, allowed)
+    entry = read.table(key, ground, ("x", "y"))
+    x, y = (read.quantity(f"{key}.{axis}", entry.get(axis), "m") for axis in "xy")
+    length = math.hypot(x, y)
+    if not 0.0 < length < math.inf:
+        allowed = "must be coordinates of O4 from O2, where it does not lie"
+        raise read.refuse(key, ground, allowed)
+    return DrawnGround(math.atan2(y, x), length)
 
 
 def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
@@ -187,17 +163,17 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
     return met if count_equalities(met) > 1 else tuple(lengths)
 
 
-def _state_places(
+def state_places(
     read: Reader,
     key: str,
     value: Any,
-    drawing: DrawnPins | _DrawnGround,
+    drawing: DrawnPins | DrawnGround,
     bar: int | None = None,
 ) -> Any:
     """State each `{ drawn = [x, y] }` of an entry in the frame of its bar."""
     if isinstance(value, list):
         return [
-            _state_places(read, f"{key}[{index}]", entry, drawing, bar)
+            state_places(read, f"{key}[{index}]", entry, drawing, bar)
             for index, entry in enumerate(value)
         ]
     if not isinstance(value, dict):
@@ -218,7 +194,7 @@ def _state_places(
         bar_of_entry = bar
         if key == "bars":
             bar_of_entry = BAR_NUMBERS.get(name, bar)
-        stated[name] = _state_places(
+        stated[name] = state_places(
             read,
             f"{key}.{name}",
             entry,
@@ -232,7 +208,7 @@ def _state_place(
     read: Reader,
     key: str,
     value: dict[str, Any],
-    drawing: DrawnPins | _DrawnGround,
+    drawing: DrawnPins | DrawnGround,
     bar: int | None,
 ) -> dict[str, str]:
     """State a place of the drawing by its coordinates in the frame of its bar."""
@@ -241,7 +217,7 @@ def _state_place(
             f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
         )
         raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
-    if bar != 1 and isinstance(drawing, _DrawnGround):
+    if bar != 1 and isinstance(drawing, DrawnGround):
         allowed = (
             "is a place of a moving bar: it is drawn where [pins] states the linkage;"
             " here from_pin states it"
@@ -254,49 +230,13 @@ def _state_place(
     return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 
-def state_motion(
-    read: Reader,
-    motion: Any,
-    drawing: DrawnPins,
-    line: LinearDrive | None,
-) -> Any:
-    """Replace the word "drawn" of a motion by the drawn angle, stroke or side.
-
-    A side that is left out of a commanded stroke is the drawn one. InputError for the
-    stroke or side of a scene without a cylinder.
-    """
-    if not isinstance(motion, dict):
-        return motion
-    stated = dict(motion)
-    if any(name in stated for name in STROKE_COMMAND):
-        stated.setdefault("side", DRAWN_WORD)
-    if stated.get("side") == DRAWN_WORD:
-        stated["side"] = _find_side_of_cylinder(drawing, require_cylinder(line))
-    for name in (*BAR_OF_ANGLE, STROKE_COMMAND[0]):
-        place = stated.get(name)
-        drawn = find_drawn(drawing, line, name)
-        if drawn is None:
-            continue
-        unit = "rad" if name in BAR_OF_ANGLE else "m"
-        text = f"{drawn!r} {unit}"
-        if place == DRAWN_WORD:
-            stated[name] = text
-        elif isinstance(place, dict):
-            stated[name] = dict(place)
-            for end, entry in place.items():
-                if entry == DRAWN_WORD:
-                    stated[name][end] = text
-    return stated
-
-
-def find_drawn(drawing: DrawnPins, line: ForceDrive | None, name: str) -> float | None:
-    """Return the drawn angle or stroke of this name, rad or m, or None."""
-    if name in BAR_OF_ANGLE:
-        return drawing.angle(BAR_OF_ANGLE[name])
-    if name != STROKE_COMMAND[0] or not isinstance(line, LinearDrive):
-        return None
-    start, end = _draw_ends(drawing, line)
-    return abs(end - start)
+def list_drawn(drawing: DrawnPins, drive: ForceDrive | None) -> dict[str, float]:
+    """List the drawn angles and the stroke of a cylinder by their names, rad or m."""
+    drawn = {name: drawing.angle(bar) for name, bar in BAR_OF_ANGLE.items()}
+    if isinstance(drive, LinearDrive):
+        start, end = _draw_ends(drawing, drive)
+        drawn[STROKE_COMMAND[0]] = abs(end - start)
+    return drawn
 
 
 def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]:
@@ -306,20 +246,16 @@ def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]
     return start, end
 
 
-def _find_side_of_cylinder(drawing: DrawnPins, line: LinearDrive) -> str:
-    """Return "left" or "right": the side on which a cylinder's end on its bar lies.
-
-    The line is that from the bar's ground pin to the cylinder's end on the ground.
-    """
+def find_side_of_cylinder(drawing: DrawnPins, drive: ForceDrive | None) -> str:
+    """Find the side of a cylinder's end on its bar; InputError for another drive."""
+    line = require_cylinder(drive)
     on_ground, on_bar = _draw_ends(drawing, line)
     bar = line.end.bar
     if bar == 1:
         on_ground, on_bar = on_bar, on_ground
         bar = line.start.bar
     pivot = complex(*drawing.place("O2" if bar == 2 else "O4"))
-    to_ground = on_ground - pivot
-    to_bar = on_bar - pivot
-    across = (to_ground.conjugate() * to_bar).imag
+    across = cross(on_ground - pivot, on_bar - pivot)
     return "left" if across >= 0.0 else "right"
 
 

@@ -94,9 +94,10 @@ class Reader:
         self.document: Mapping[str, Any] = document or {}
         """Tables of the file, for suggestions."""
         self.coordinates: dict[str, tuple[float, float]] = {}
-        self.stated_lengths: tuple[float, ...] | None = None
         """x and y of the places (m) and forces that are stated by them, by their keys.
         """
+        self.drawn: dict[str, float] = {}
+        """Numbers that the word "drawn" stands for in a motion, by their names."""
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
         """Make the error for an entry, or a missing one (None), with the file."""
@@ -215,6 +216,10 @@ class Reader:
             missing = f'the unit is missing; did you mean "{like}"? {wanted}'
             raise self.refuse(key, value, missing)
         if value == "drawn":
+            _, _, name = key.partition("motion.")
+            drawn = self.drawn.get(name.partition(".")[0])
+            if drawn is not None:
+                return drawn
             allowed = "stands for what a drawing has, and the scene has no [pins]; "
             raise self.refuse(key, value, allowed + wanted)
         if not isinstance(value, str):

@@ -27,11 +27,14 @@ from fourbar.effects.place import settler
 from fourbar.errors import InputError, expect
 from fourbar.files.described import PLACES_OF_ENDS, list_keys, read_described
 from fourbar.files.drawing import (
+    DrawnGround,
     choose_assembly,
+    find_side_of_cylinder,
+    list_drawn,
+    meet_lengths,
     read_drawing,
-    state_ground,
-    state_lengths,
-    state_motion,
+    read_ground,
+    state_places,
 )
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS, SIGMA
@@ -40,6 +43,7 @@ from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, POSITIVE, Bar, FourBar
 from fourbar.quantities import Array
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import (
     BAR_OF_ANGLE,
     BRANCH_OF_NAME,
@@ -47,6 +51,7 @@ from fourbar.scene.motion import (
     LAW_KINDS,
     SIDES,
     SINE_LAW,
+    STROKE_COMMAND,
     Free,
     FromLimit,
     Law,
@@ -204,12 +209,11 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
 
 def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
-    top = read.table("", document, SCENE_TABLES)
+    top = dict(read.table("", document, SCENE_TABLES))
     drawing = read_drawing(read, top)
-    if drawing is None:
-        top = state_ground(read, top)
-    else:
-        top = state_lengths(read, top, drawing)
+    drawn = drawing or read_ground(read, top.get("lengths"))
+    for key in top.keys() - {"pins", "lengths"}:
+        top[key] = state_places(read, key, top[key], drawn)
     points = _read_points(read, top.get("points", {}))
     bars = {point.name: point.bar for point in points}
     drive_bar, drive = _read_drive(read, top.get("drive", {}), bars)
@@ -218,22 +222,19 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         allowed = f"must be written as [[loads]], at most {_MOST_LOADS}"
         raise read.refuse("loads", entries, allowed)
     effects = read.table("effects", top.get("effects", {}), list_kinds())
-    motion = top.get("motion", {})
-    linkage = _read_linkage(read, top)
+    lengths, met = _read_lengths(read, top, drawn)
+    linkage = _read_linkage(read, top.get("bars", {}), met, drawn.angle(1))
     pictures = []
     for name, bar in top.get("bars", {}).items():
         if "picture" in bar:  # its file is read when it is shown
             text = read.text(f"bars.{name}.picture", bar["picture"])
             pictures.append(Picture(MOVING_BAR_NUMBERS[name], text, folder))
     pictures.sort(key=lambda picture: picture.bar)
-    if drawing is not None:
-        line = None
-        if isinstance(drive, LinearDrive):
-            line = drive.with_places(settler(linkage, points))
-        motion = state_motion(read, motion, drawing, line)
+    motion = top.get("motion", {})
+    settled = drive and drive.with_places(settler(linkage, points))
     scene = Scene(
         linkage,
-        _read_motion(read, motion),
+        _read_motion(read, motion, drawing, settled),
         drive_bar,  # type: ignore[arg-type]
         tuple(
             _read_load(read, f"loads[{index}]", entry, bars)
@@ -250,13 +251,10 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     )
     if drawing is not None:
         scene = choose_assembly(scene, drawing)
-    met = None
-    if read.stated_lengths is not None:
-        met = read.stated_lengths, linkage.lengths
     return replace(
         scene,
         coordinates=tuple(read.coordinates.items()),
-        met_lengths=met,
+        met_lengths=None if met == lengths else (lengths, met),
         tolerances=_read_tolerances(read, scene, top.get("tolerances", {})),
     )
 
@@ -326,26 +324,40 @@ def _read_traced(read: Reader, value: object, folder: str) -> TracedPicture | No
     )
 
 
-def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
+def _read_lengths(
+    read: Reader, top: dict[str, Any], drawn: DrawnPins | DrawnGround
+) -> tuple[Any, Any]:
+    """Read the lengths of ground, input, coupler and output, m.
+
+    Return them as they are stated, and with the equalities of change points that their
+    last decimals miss.
+    """
+    if isinstance(drawn, DrawnPins):
+        return tuple(map(drawn.length, BAR_NAMES)), meet_lengths(drawn, top["pins"])
     names = tuple(BAR_NAMES.values())
-    stated = read.table("lengths", top.get("lengths", {}), (*names, "ground_angle"))
-    by_name = read.numbers(
-        "lengths", stated, dict.fromkeys(names, Bar.numbers["length"])
-    )
-    lengths: Any = tuple(by_name.values())
-    met = lengths
+    allowed = (*names, "ground_angle")
+    stated = dict(read.table("lengths", top.get("lengths", {}), allowed))
+    if drawn.length is not None:
+        # with every digit: lengths are compared within those that are stated
+        stated["ground"] = f"{drawn.length:.16e} m"
+    declared = dict.fromkeys(names, Bar.numbers["length"])
+    lengths: Any = tuple(read.numbers("lengths", stated, declared).values())
+    met: Any = lengths
     if math.isfinite(sum(lengths)):  # more is refused where they are put together
         roundings: Any = [half_unit_of_text(stated[name], "m") for name in names]
         met = meet_change_points(lengths, tuple(roundings))
-    if met != lengths:
-        read.stated_lengths = lengths
-    tables = read.table("bars", top.get("bars", {}), MOVING_BAR_NUMBERS)
-    ground, *moving = met
+    return lengths, met
+
+
+def _read_linkage(
+    read: Reader, value: object, lengths: tuple[float, ...], angle: float
+) -> FourBar:
+    tables = read.table("bars", value, MOVING_BAR_NUMBERS)
+    ground, *moving = lengths
     two, three, four = (
         _read_bar(read, f"bars.{name}", tables.get(name, {}), length)
         for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
     )
-    angle = read.numbers("lengths", stated, FourBar.numbers)["ground_angle"]
     return FourBar(ground, two, three, four, angle)
 
 
@@ -365,11 +377,22 @@ def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
         raise read.refuse(f"{key}.{error.key}", value, error.allowed) from None
 
 
-def _read_motion(read: Reader, value: object) -> Motion:
+def _read_motion(
+    read: Reader, value: object, drawing: DrawnPins | None, drive: ForceDrive | None
+) -> Motion:
+    """Read the motion, in which the word "drawn" stands for the numbers of a drawing.
+
+    A side that is left out of a commanded stroke is the drawn one.
+    """
     places = (*BAR_OF_ANGLE, "stroke")
     entry = read.table(
         "motion", value, (*Motion.numbers, "side", "branch", "free", "law")
     )
+    if drawing is not None:
+        read.drawn = list_drawn(drawing, drive)
+        by_stroke = not entry.keys().isdisjoint(STROKE_COMMAND)
+        if entry.get("side", DRAWN_WORD if by_stroke else None) == DRAWN_WORD:
+            entry = {**entry, "side": find_side_of_cylinder(drawing, drive)}
     arguments: dict[str, Any] = {}
     for name, by in Motion.numbers.items():
         if name in entry:

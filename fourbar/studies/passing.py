@@ -37,14 +37,16 @@ _GRID_DIGITS = 4
 """Digits of an end of a range that is read from the positions of the default sweep."""
 
 
-def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
-    """Find the positions of a scene's motion where named quantities have values.
+def find_positions(scene: Scene, name: str, value: float) -> Command:
+    """Find the positions of a scene's motion where a named quantity has a value.
+
+    The positions are those of the scene's assembly, of a motion over time those that it
+    passes, of a released one the first.
 
     Parameters
     ----------
-    wanted : names among `STATED_POSITIONS` and values, rad, m or s. Each gives the
-        positions of the scene's assembly that have it, of a motion over time those
-        that it passes, of a released one the first.
+    name : one of `STATED_POSITIONS`.
+    value : rad, m or s.
 
     Raises
     ------
@@ -52,17 +54,21 @@ def find_positions(scene: Scene, wanted: list[tuple[str, float]]) -> Command:
     NotAssembledError : no position has the value; the message says the range.
     """
     if scene.motion.free is not None or scene.motion.law is not None:
-        return join_commands([_find_times(scene, *entry) for entry in wanted])
-    places = [place for entry in wanted for place in _find_places(scene, *entry)]
-    return command_at(scene, np.array(places))
+        return _find_times(scene, name, value)
+    return command_at(scene, np.array(_find_places(scene, name, value)))
 
 
 def _find_places(scene: Scene, name: str, value: float) -> list[float]:
     """Find the commanded angles or strokes at which a named one has a value."""
     motion = scene.motion
     if name == motion.commanded:
-        _require_assembled(scene, name, value)
-        return [value]
+        at = command_at(scene, np.array([value]))  # which refuses a stroke out of range
+        if solve(scene, "position", at=at).assembled[0]:
+            return [value]
+        raise NotAssembledError(
+            f"{_say_position(name, value)}: the linkage does not assemble there;"
+            f" {say_range(scene)}"
+        )
     if name == "time":
         return [_find_place_of_sweep(scene, value)]
     places: list[float] = []
@@ -77,12 +83,10 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         # of the range that the scene's own motion is in
         places_of_range = default_places(scene, float(command(scene).angle[0]))
         whole = solve(scene, "position", at=command_at(scene, places_of_range))
-        values = _require_values(getattr(whole, name), name)
-        low, high = _find_extent(values)
+        low, high = _write_extent(getattr(whole, name), name, _GRID_DIGITS)
         raise NotAssembledError(
             f"{_say_position(name, value)}: no position of this assembly has it;"
-            f" {name} goes from {_write_position(name, low, _GRID_DIGITS)} to"
-            f" {_write_position(name, high, _GRID_DIGITS)}"
+            f" {name} goes from {low} to {high}"
         )
     return sorted(places)
 
@@ -105,20 +109,6 @@ def _find_place_of_sweep(scene: Scene, time: float) -> float:
         )
     order = np.argsort(times)
     return float(np.interp(time, times[order], sweep.places[order]))
-
-
-def _require_assembled(scene: Scene, name: str, value: float) -> None:
-    """Raise NotAssembledError where the linkage does not assemble.
-
-    The error states the range of the commanded quantity.
-    """
-    at = command_at(scene, np.array([value]))  # which refuses a stroke out of range
-    if solve(scene, "position", at=at).assembled[0]:
-        return
-    raise NotAssembledError(
-        f"{_say_position(name, value)}: the linkage does not assemble there;"
-        f" {say_range(scene)}"
-    )
 
 
 def say_nowhere(scene: Scene) -> str:
@@ -258,16 +248,19 @@ def _find_times(scene: Scene, name: str, value: float) -> Command:
         )
         times = np.concatenate([times, passed])
     if not times.size:
-        low, high = _find_extent(getattr(course.solution, name))
+        low, high = _write_extent(getattr(course.solution, name), name)
         raise NotAssembledError(
             f"{_say_position(name, value)}: the motion does not pass it; it stays"
-            f" within {_write_position(name, low)} and {_write_position(name, high)}"
+            f" within {low} and {high}"
         )
     return course.command(times)
 
 
-def _find_extent(values: Array) -> tuple[float, float]:
-    return float(np.nanmin(values)), float(np.nanmax(values))
+def _write_extent(values: Array | None, name: str, digits: int = 6) -> list[str]:
+    """Write the least and the greatest of the values of a quantity."""
+    known = _require_values(values, name)
+    ends = float(np.nanmin(known)), float(np.nanmax(known))
+    return [_write_position(name, end, digits) for end in ends]
 
 
 def _require_values(values: Array | None, name: str) -> Array:
@@ -287,17 +280,14 @@ def _write_position(name: str, value: float, digits: int = 6) -> str:
     return write_in_units("s" if name == "time" else "m", value, digits=digits)
 
 
-def join_commands(commands: list[Command]) -> Command:
-    """Join commands of one motion into one command."""
-    joined: Command = _join(commands)
-    return joined
+def join_commands(values: Sequence[Any]) -> Any:
+    """Join commands of one motion into one command.
 
-
-def _join(values: Sequence[Any]) -> Any:
-    """Join arrays, and the fields of commands and origins; of others take the first."""
+    Their arrays are joined, those of their origins too; of others the first is taken.
+    """
     first = values[0]
     if isinstance(first, tuple):
-        return type(first)(*map(_join, zip(*values, strict=True)))
+        return type(first)(*map(join_commands, zip(*values, strict=True)))
     if isinstance(first, np.ndarray) and first.ndim:
         return np.concatenate(values)
     return first

@@ -152,7 +152,7 @@ LIMITS = "on the change point: the limits from both sides"
 def write_forces(motion, gravity=ALONG, at=None, **parts):
     """Return the rows of pin forces, by position or where a quantity has a value."""
     scene = Scene(PARALLELOGRAM, motion, effects=(gravity,), **parts)
-    places = None if at is None else find_positions(scene, [at])
+    places = None if at is None else find_positions(scene, *at)
     solution = solve(scene, at=places)
     assert solution.status == ["change_point"]
     return PositionSheet(scene, solution, units("N m")).write_pin_forces(), solution

@@ -27,6 +27,7 @@ from fourbar.show.units import units
 from fourbar.studies.passing import (
     INSIDE_LIMIT,
     find_positions,
+    join_commands,
     meet_limit,
     say_nowhere,
     say_range,
@@ -70,7 +71,7 @@ def test_every_position_with_a_value_is_found_in_rising_order(scene, name):
     solution = solve(scene, "position")
     values = getattr(solution, name)
     value = float(values[3:5].mean())
-    found = find_positions(scene, [(name, value)])
+    found = find_positions(scene, name, value)
     solved = getattr(solve(scene, "position", at=found), name)
     assert solved == approx([value] * len(solved), abs=LOCATED)
     passes = np.count_nonzero(np.diff(np.sign(values - value)))
@@ -91,7 +92,7 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
     reach = b + side * a
     at_O2 = acos((d**2 + reach**2 - c**2) / (2.0 * d * reach))
     at_O4 = acos((d**2 + c**2 - reach**2) / (2.0 * d * c))
-    found = find_positions(scene, [("theta_4", theta_1 + pi - at_O4 + beside)])
+    found = find_positions(scene, "theta_4", theta_1 + pi - at_O4 + beside)
     theta_2 = theta_1 + at_O2 + (0.0 if side > 0.0 else pi)
     assert found.angle == approx([theta_2], abs=AT_LIMIT)
     told = "deg, where theta_4 is at a limit: bars 2 and 3 are in line"
@@ -101,7 +102,7 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
 def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     scene = Scene(bare(0.42, 0.6, 0.56, 0.45))
     ((_, limit),) = find_intervals(scene.linkage, 3)
-    there = solve(scene, at=find_positions(scene, [("theta_3", limit)]))
+    there = solve(scene, at=find_positions(scene, "theta_3", limit))
     between = there.theta_4 - there.theta_2
     assert np.sin(between) == approx([0.0], abs=AT_LIMIT)
     told = "theta_3 is at a limit: bars 2 and 4 are parallel"
@@ -127,26 +128,26 @@ REFUSED = [
 @pytest.mark.parametrize("scene, name, value, words", slow_but(REFUSED[1:5], REFUSED))
 def test_a_place_out_of_range_is_refused_with_the_range(scene, name, value, words):
     with raises(FourBarError, match=words):
-        find_positions(scene, [(name, value)])
+        find_positions(scene, name, value)
 
 
 @pytest.mark.parametrize("omega", [0.5, -0.5])
 def test_a_steady_sweep_has_a_place_at_each_time(omega):
     """A backward sweep begins at its other end, as its column of times has it."""
     scene = replace(crank_rocker(), motion=Motion(SWEPT, omega))
-    found = find_positions(scene, [("time", 1.3)])
+    found = find_positions(scene, "time", 1.3)
     begin = SWEPT.start if omega > 0.0 else SWEPT.stop
     assert found.angle == approx([begin + 1.3 * omega], abs=1e-12)
     with raises(NotAssembledError, match=r"the sweep goes from 0 to 2 s"):
-        find_positions(scene, [("time", 2.1)])
+        find_positions(scene, "time", 2.1)
 
 
 def test_a_law_passes_an_angle_up_and_down():
-    found = find_positions(LAW, [("theta_2", 1.5), ("time", 0.5)])
-    assert len(found.angle) == 3
+    found = [find_positions(LAW, *at) for at in (("theta_2", 1.5), ("time", 0.5))]
+    assert len(join_commands(found).angle) == 3
     assert found.angle[:2] == approx(1.5, abs=LOCATED)
     assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
-    begins = find_positions(LAW, [("theta_2", 0.3)])
+    begins = find_positions(LAW, "theta_2", 0.3)
     assert begins.time[0] == 0.0
 
 
@@ -156,7 +157,8 @@ def test_a_release_is_met_when_it_first_passes():
     free = DROPPED.motion.replace(free=Free(1.0, 20000))
     fine = fourbar.release(replace(DROPPED, motion=free))
     value = float(fine.theta_2[3001])
-    found = find_positions(DROPPED, [("time", 0.0), ("time", 0.25), ("theta_2", value)])
+    wanted = ("time", 0.0), ("time", 0.25), ("theta_2", value)
+    found = join_commands([find_positions(DROPPED, *at) for at in wanted])
     assert found.angle == approx([1.0, found.angle[1], value], abs=1e-9)
     passes = np.diff(np.sign(fine.theta_2 - value)) != 0
     first = int(np.flatnonzero(passes)[0])
@@ -177,7 +179,7 @@ def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     theta_4 = np.degrees(solve(scene).theta_4)
     opposite = radians(0.5 * (theta_4.min() + theta_4.max())) + pi
     with raises(NotAssembledError, match="no position") as caught:
-        find_positions(scene, [("theta_4", opposite)])
+        find_positions(scene, "theta_4", opposite)
     ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
     least, most = map(float, ends)
     assert least <= theta_4.min() and theta_4.max() <= most
