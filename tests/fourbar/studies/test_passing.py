@@ -143,8 +143,9 @@ def test_a_steady_sweep_has_a_place_at_each_time(omega):
 
 
 def test_a_law_passes_an_angle_up_and_down():
-    found = [find_positions(LAW, *at) for at in (("theta_2", 1.5), ("time", 0.5))]
-    assert len(join_commands(found).angle) == 3
+    wanted = ("theta_2", 1.5), ("time", 0.5)
+    found = join_commands([find_positions(LAW, *at) for at in wanted])
+    assert len(found.angle) == 3
     assert found.angle[:2] == approx(1.5, abs=LOCATED)
     assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
     begins = find_positions(LAW, "theta_2", 0.3)
