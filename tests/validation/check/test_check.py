@@ -913,11 +913,14 @@ def test_magnitudes_and_a_whole_imperial_table(wrong, read):
         "F12 [lbf]": np.hypot(*numbers["F12"].T) / pound,
         "|F43| [kN]": np.hypot(*numbers["F43"].T) / 1e3 * (1.0 + 1e-6 * wrong),
         "F14_x [kgf]": numbers["F14"][:, 0] / 9.80665,
+        "F41 [N]": np.hypot(*numbers["F14"].T),
+        "F23_y [N]": -numbers["F32"][:, 1],
         "torque": numbers["torque"] / (pound * inch),
     }
     heading, *lines = tabulate(columns, "{:.12g}".format).splitlines()
-    under = ",,,,,lbf in"  # a line of units under the names
+    under = ",,,,,,,lbf in"  # a line of units under the names
     table = read("\n".join([heading, under, *lines]))
+    assert not table.left_out
     assert list_differing(OURS, table) == ({"|F43|"} if wrong else set())
 
 

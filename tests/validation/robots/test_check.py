@@ -764,7 +764,7 @@ def test_an_absurd_timestep_is_reported_and_not_run_through(timestep):
     _, through = answers_of(examine(CRANK_ROCKER, text, {}))
     assert (
         through.refusal is not None
-        and "steps of the motion; must be 1 to 60000" in through.refusal
+        and "steps of the motion; must be 1 to 130000" in through.refusal
     )
 
 

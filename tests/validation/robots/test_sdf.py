@@ -629,7 +629,7 @@ URDF = """<robot name="r"><link name="base"/>
 <link name="one"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"
 ixz="0" iyz="0"/></inertial><visual><geometry><mesh filename="none.dae"/></geometry>
 </visual></link>
-<link name="two"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0"
+<link name="two"><inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0" ixy="0"
 ixz="0" iyz="0"/></inertial></link><gazebo/>
 <joint name="hip" type="continuous"><parent link="base"/><child link="one"/></joint>
 <joint name="knee" type="continuous"><parent link="one"/><child link="two"/>

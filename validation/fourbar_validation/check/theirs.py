@@ -67,6 +67,8 @@ _OTHER_NAMES = {
 """Names that other programs and languages use, in small letters, without spaces and
 underscores.
 """
+_REACTIONS = {"F21": "F12", "F23": "F32", "F34": "F43", "F41": "F14"}
+"""Pin forces on the other bar, and those that they are the opposite of."""
 _MAY_MEAN = (
     ("theta", "theta_2"),
     ("omega", "omega_2"),
@@ -259,6 +261,9 @@ def read_table(
     for row, (line, cells) in enumerate(rows):
         _require_cells(path, headings, line, cells)
         for index, (name, unit) in columns.items():
+            is_component = name.endswith(("_x", "_y"))
+            is_reaction = headings[index].strip()[:3] in _REACTIONS
+            sign = -1.0 if is_component and is_reaction else 1.0
             try:
                 value, half = _read_cell(cells[index])
             except InputError as error:
@@ -270,7 +275,7 @@ def read_table(
                     str(path),
                 ) from None
             numbers[name][row], halves[name][row] = (
-                value * unit.factor,
+                sign * value * unit.factor,
                 half * unit.factor,
             )
         if math.isnan(numbers[found_by][row]):
@@ -580,6 +585,7 @@ def _read_headings(
             name = match["name"] + (match["letter"] or "")
         else:
             name = heading.strip()
+        name = _REACTIONS.get(name[:3], name[:3]) + name[3:]
         name = _find_name(name, commanded, points)
         vector = name[:-2] if name[-2:] in ("_x", "_y") else name
         of_vector = vector in points or _is_vector(vector)

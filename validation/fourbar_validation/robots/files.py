@@ -181,7 +181,10 @@ class _RobotReading:
         return root
 
     def _reduce_urdf(self, root: ET.Element) -> None:
-        """Leave what MuJoCo's own reader of URDF needs: inertias and joints."""
+        """Leave what MuJoCo's own reader of URDF needs: inertias and joints.
+
+        A polynomial is judged by the motion alone, so that links without mass get one.
+        """
         left_out = {child.tag for child in root} - {"link", "joint", "material"}
         if any("xacro}" in tag for tag in left_out):
             raise self._refuse(
@@ -195,6 +198,8 @@ class _RobotReading:
             for child in list(link):
                 if child.tag != "inertial":
                     link.remove(child)
+        bounds = {"boundmass": "1e-6", "boundinertia": "1e-9", "balanceinertia": "true"}
+        ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", bounds)
         if left_out:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
         if closing:

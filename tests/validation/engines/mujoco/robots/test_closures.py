@@ -293,6 +293,12 @@ def test_a_body_that_floats_between_two_pins_is_told_its_hinge():
             "free floats freely: with top inside left, on a hinge in place of its free"
             " joint and of at_C, at_D closes the loop"
         )
+    third = pin + '<connect body1="top" anchor="0 0 0"/>'
+    served = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
+    spatial = FLOATING.format(inside="", outside=free, pin=third)
+    assert closure_of(spatial).reason == (
+        f"free floats freely on 3 pins: several loops in one ({served})"
+    )
     hinge = '<joint name="j3" axis="0 1 0" pos="-.4 0 0"/>'
     typed = TOP.format(pos=".9 0 .3", joint=hinge)
     loop = loop_of(FLOATING.format(inside=typed, outside="", pin=""))

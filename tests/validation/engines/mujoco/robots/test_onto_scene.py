@@ -121,7 +121,7 @@ def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
 def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():
     made = read_loop_scene(FILE, PoseOptions(OPEN_POSE), None, 4.0)
     (note,) = [note for note in made.notes if "what is left is 6.24 mm" in note]
-    assert "j_crank, j_rod, j_rocker stay where --pose states them" in note
+    assert "--pose holds j_crank, j_rod, j_rocker, around which" in note
     assert "ranges" not in note
 
 

@@ -57,9 +57,9 @@ stretched.
 GRAB = """
 <mujoco><compiler angle="radian"/><worldbody>
   <body pos=".01354 .073145 0"><joint name="handle" range="0 1.57"/><geom size=".01"/>
-    <body pos="-.005788 -.020186 0"><joint/><geom size=".01"/>
+    <body pos="-.005788 -.020186 0"><joint name="pin"/><geom size=".01"/>
       <site name="rod" pos=".050178 0 0"/></body></body>
-  <body pos="-.013 0 0"><joint range="-1.6 .001"/><geom size=".01"/>
+  <body pos="-.013 0 0"><joint name="jaw" range="-1.6 .001"/><geom size=".01"/>
     <site name="shell" pos="-.024601 .031487 0"/></body></worldbody>
   <equality><connect site1="rod" site2="shell"/></equality></mujoco>"""
 """A grab whose rod, without a range, is drawn along x and not to its pin."""
@@ -225,6 +225,23 @@ def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop():
     )
     free = pose_robot(compiled(BOOM.format(actuator="")), PoseOptions())
     assert "boom by" in free.notes[0]
+
+
+def test_motors_that_make_up_for_rounding_move_by_no_more():
+    """The rod alone closes the loop to 1 um, beside a dead centre of its crank."""
+    held = '<actuator><motor joint="handle"/><motor joint="jaw"/></actuator></mujoco>'
+    model = compiled(GRAB.replace("</mujoco>", held))
+    qpos = pose_robot(model, PoseOptions()).data.qpos
+    assert gap(model, qpos) < 1e-9
+    assert np.abs(np.degrees(qpos[[0, 2]])).max() < 2.5
+
+
+def test_a_stated_joint_with_ranges_beside_it_is_the_reason_too():
+    (note,) = pose_robot(compiled(GRAB), PoseOptions(joints={"pin": "-150 deg"})).notes
+    assert note.startswith(
+        "--pose holds pin, around which the other joints cannot close all loops within"
+        " the joints' ranges; what is left is 3."
+    )
 
 
 def test_zero_needs_no_unit():

@@ -418,9 +418,10 @@ class _Finder:
         return ""
 
     def _suggest_hinge(self, number: int, chain: _Chain) -> str:
-        """Say what to type for a body that floats between two pins; empty if none does.
+        """Say what to type for a body that floats between two pins.
 
-        One of the pins becomes a hinge, and the other closes the loop.
+        One of the pins becomes a hinge, and the other closes the loop. Three or more
+        pins are loops of another kind, and the text is empty without a second one.
         """
         model = self.model
         floating = {int(model.jnt_bodyid[joint]) for joint in chain.others}
@@ -429,8 +430,10 @@ class _Finder:
             ends = [int(body) for body in find_tied_bodies(model, pin)]
             if self._is_pin(pin) and len(floating.intersection(ends)) == 1:
                 pins[pin] = ends
-        if len(floating) != 1 or len(pins) != 2:
+        if len(floating) != 1 or len(pins) < 2:
             return ""
+        if len(pins) > 2:
+            return f" on {len(pins)} pins: several loops in one ({_SERVE_SPATIAL})"
         ((first, ends), (second, _)) = pins.items()
         (body,) = floating
         (holder,) = {*ends} - floating

@@ -130,8 +130,10 @@ _SINE_OF_AN_ASSEMBLY = 0.1
 """|sin(theta_4 - theta_3)| from which a loop that has yielded is in one assembly. A gap
 of a thousandth of the bars turns them by its root beside a change point.
 """
-MOST_TIMESTEPS = 60_000
-"""Steps of one run; at 0.1 ms a step of a humanoid these are six seconds."""
+MOST_TIMESTEPS = 130_000
+"""Steps of one run: two turns at 1 rad/s and a timestep of 0.1 ms. At 0.1 ms a step of
+a humanoid these are 13 seconds.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,8 +95,10 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     motors = {joint for joint, _ in list_motors(model)} - set(outside)
     passive = _Closing(model, fixed | motors, held)
     closed = passive.close(stated)
-    if passive.size(closed) > CLOSED_IN_THE_FILE:
+    if passive.size(closed) > LARGEST_RESIDUAL:
         closed = closing.close(stated)
+    elif passive.size(closed) > CLOSED_IN_THE_FILE:  # the rounding of the file is left
+        closed = closing.close(closed)
     for start in closing.list_starts(stated):  # where a range stops it short of closing
         if closing.size(closed) <= LARGEST_RESIDUAL:
             break
@@ -142,19 +144,19 @@ def _say_open(
 ) -> str:
     """Say why no pose near the stated one closes all loops.
 
-    Joints that --pose states are held, which is the reason where no joint has a range
-    and the loops close without that.
+    Joints that --pose states are held, which is the reason where the loops close
+    without that.
     """
     free = _Closing(model, held, held)
     closes = free.size(free.close(stated)) <= LARGEST_RESIDUAL
     ranges = any(model.jnt_limited[joint] for joint in free.joints)
-    if options.joints and closes and not ranges:
-        return (
-            f"{_list_some([*options.joints])} stay where --pose states them, and the"
-            f" other joints cannot close all loops around them; {left}: state fewer"
-            " joints, or more digits"
-        )
     within = " within the joints' ranges" if ranges else ""
+    if options.joints and closes:
+        return (
+            f"--pose holds {_list_some([*options.joints])}, around which the other"
+            f" joints cannot close all loops{within}; {left}: state fewer joints, or"
+            " more digits"
+        )
     return (
         f"no pose near this one closes all loops{within}; {left}: state one by --pose"
         " or --key"
