@@ -517,7 +517,7 @@ class Motion:
             names = STROKE_COMMAND
             of_stroke = _require_strokes(stroke), stroke_speed, stroke_acceleration
             numbers = dict(zip(names, of_stroke, strict=True))
-            if side not in SIDES:
+            if not isinstance(side, str) or side not in SIDES:
                 allowed = 'must be "left" or "right", as a stroke has two angles'
                 raise InputError("motion.side", side, allowed)
         if law is not None and (stated is not None or free is not None):

@@ -9,7 +9,7 @@ import math
 import pydoc
 import re
 import runpy
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.files import save
+from fourbar_lab.fault_scenes import FAULT_SCENES
 from tests.support.scenes import CYLINDER, crank_rocker
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -85,80 +86,137 @@ OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 """What functions return; nobody constructs them."""
 
 
+def list_fields(part):
+    """Return the names of the fields of a record that a user states."""
+    if isinstance(part, fourbar.Motion):  # its constructor takes other names
+        return ["angle", "free", "law"]
+    if is_dataclass(part):
+        return [one.name for one in fields(part) if one.name not in MADE_ALONG]
+    return getattr(part, "_fields", ())
+
+
+MADE_ALONG = ("coordinates", "met_lengths", "turns")
+"""Fields that the package fills itself."""
+
+
+def list_arguments(part, path=()):
+    """Yield each argument that a scene is made of: its path, its name and value."""
+    for name in list_fields(part):
+        value = getattr(part, name)
+        yield (*path, name), f"{type(part).__name__}.{name}", value
+        yield from list_arguments(value, (*path, name))
+    if type(part) is tuple:
+        for place, inner in enumerate(part):
+            yield from list_arguments(inner, (*path, place))
+
+
+def put(whole, path, value):
+    """Return nested records and tuples with another value at a path."""
+    if not path:
+        return value
+    first, *rest = path
+    if isinstance(first, int):
+        return (*whole[:first], put(whole[first], rest, value), *whole[first + 1 :])
+    part = put(getattr(whole, first), rest, value)
+    if isinstance(whole, fourbar.Motion):
+        return whole.replace(**{first: part})
+    change = replace if is_dataclass(whole) else type(whole)._replace
+    return change(whole, **{first: part})
+
+
+PAIR, END = (0.1, 0.2), fourbar.Place(4, (0.1, 0.2))
+P = fourbar.Point("P", 2, PAIR)
+AT_P, SPAN = {"point": "P"}, {"from_centre": PAIR}
+PULL = fourbar.Spring(fourbar.Place(2, **SPAN), END, 1.0, 0.2, 0.1, 0.1)
+PINS = (0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05)
+MOTIONS = [
+    {"theta_2": 1.0, "omega_2": 10.0, "alpha_2": 0.1, "branch": 1},
+    {"theta_3": 0.4, "omega_3": 1.0, "alpha_3": 1.0},
+    {"theta_4": 1.9, "omega_4": 1.0, "alpha_4": 1.0},
+    {"stroke": 0.25, "stroke_speed": 0.1, "stroke_acceleration": 0.1, "side": "left"},
+]
+LAWS = [
+    fourbar.Sine(1.0, 0.5, 2.0, 3.0, 0.1, 8),
+    *(
+        fourbar.Rise("345", PAIR, steps=8, **{f"theta_{bar}": angle})
+        for bar, angle in ((3, 0.4), (4, 1.9))
+    ),
+    *(
+        fourbar.Law((0.0, 1.0, 2.0, 3.0), steps=2, **{name: angles})
+        for name, angles in (
+            ("theta_3", (0.4, 0.5, 0.6, 0.5)),
+            ("theta_4", (1.9, 2.0, 2.1, 2.0)),
+        )
+    ),
+]
+STEEL = fourbar.Bar(0.1, density=7850.0, section=(0.02, 0.01))
+MADE = [
+    *FAULT_SCENES.values(),
+    crank_rocker(drawing=fourbar.DrawnPins(*PINS)),
+    *(crank_rocker(motion=fourbar.Motion(law=law)) for law in LAWS),
+    crank_rocker(drive=fourbar.PointDrive(END, 0.3)),
+    crank_rocker(points=(P, fourbar.Point("Q", 3, **SPAN))),
+    crank_rocker(points=(P,), loads=(fourbar.Load(2, (1.0, 0.0), **AT_P),)),
+    crank_rocker(loads=(fourbar.Load(2, (1.0, 0.0), moment=0.1, **SPAN),)),
+    crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 0.1, False),)),
+    crank_rocker(effects=(fourbar.Springs((PULL,)),)),
+    crank_rocker(
+        points=(P,),
+        effects=(fourbar.Springs((replace(PULL, start=fourbar.Place(2, **AT_P)),)),),
+    ),
+    *(
+        crank_rocker(linkage=replace(crank_rocker().linkage, input=bar))
+        for bar in (STEEL, fourbar.Bar(0.1, mass_per_length=4.2))
+    ),
+]
+"""Scenes in which each field of each record is stated somewhere."""
+
+
+def uses():
+    """Each argument of a class: a scene that is solved with it, and a good value."""
+
+    def move(stated, name):
+        drive = CYLINDER if "stroke" in stated else None
+        return lambda x: fourbar.solve(
+            crank_rocker(motion=fourbar.Motion(**{**stated, name: x}), drive=drive)
+        )
+
+    found = {}
+    for scene in MADE:
+        for path, name, value in list_arguments(scene):
+            if value is not None and name not in found:
+                found[name] = partial(put, scene, path), (value,)
+    uses = {
+        name: (lambda x, make=make: fourbar.solve(make(x)), good)
+        for name, (make, good) in found.items()
+    }
+    return uses | {
+        f"Motion.{name}": (move(stated, name), (good,))
+        for stated in MOTIONS
+        for name, good in stated.items()
+    }
+
+
 def calls():
-    """Every public function and class, used: what is called, and good arguments."""
+    """Every public function, used: what is called, and good arguments."""
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    turning = fourbar.Motion(1.0, 10.0)
-    scene = fourbar.Scene(link, turning)
-    still = fourbar.Scene(link, fourbar.Motion(1.0, 5.0, free=fourbar.Free(0.1, 2)))
+    scene = fourbar.Scene(link, fourbar.Motion(1.0, 10.0))
+    still = replace(scene, motion=fourbar.Motion(1.0, 5.0, free=fourbar.Free(0.1, 2)))
     solution = fourbar.solve(scene)
     study = fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
     sensitivity = fourbar.sensitivity(scene)
-    command = fourbar.command(scene)
-    ends = (fourbar.Place(2, (0.1, 0.2)), fourbar.Place(4, (0.1, 0.2)))
-    spring = fourbar.Spring(*ends, 1.0)
-    rows = (("O2", 0.1), ("B", 0.2))
-    drawn = ((0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05))
-    times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
-    curve = (link, 0.1, 0.1, 0, 1, 8)
     torques = np.empty(1)
-    empty = ("", "", (), (), ())
-
-    def solve(linkage=link, motion=turning, **parts):
-        return fourbar.solve(fourbar.Scene(linkage, motion, **parts))
-
-    def state(kind, use):
-        """Return a call that uses what a constructor makes of its arguments."""
-        return lambda *arguments: use(kind(*arguments))
-
-    def bar(moving):
-        return solve(fourbar.FourBar(0.3, moving, link.coupler, link.output))
-
-    def move(motion):
-        return solve(motion=motion)
-
-    def follow(law):
-        return move(fourbar.Motion(law=law))
-
-    def act(effect):
-        return solve(effects=(effect,))
-
-    def pull(pulling):
-        return act(fourbar.Springs((pulling,)))
-
-    def drive(cylinder):
-        return solve(drive=cylinder)
-
-    uses = {
-        "Bar": (bar, (0.1, 0.2, 0.1, (0.1, 0.1))),
-        "DrawnPins": (lambda pins: solve(drawing=pins), drawn),
-        "from_pins": (fourbar.solve, drawn),
-        "Scene": (
-            fourbar.solve,
-            (link, turning, 2, (fourbar.Load(2),), (fourbar.Gravity(),), *empty),
-        ),
-        "Motion": (move, (1.0, 10.0, 0.0, 1, None, None)),
-        "Sweep": (state(fourbar.Motion, move), (0.0, 1.0, 2)),
-        "Free": (lambda free: move(fourbar.Motion(1.0, free=free)), (0.01, 2)),
-        "Law": (follow, (times, angles, 2, "free")),
-        "Rise": (follow, ("345", (0.1, 0.2), 0.3, 0.1, 0.2, 0.1, 8)),
-        "Sine": (follow, (1.0, 0.5, 2.0, 3.0, 0.1, 8)),
-        "Point": (lambda point: solve(points=(point,)), ("P", 3, (0.1, 0.2))),
-        "Load": (lambda load: solve(loads=(load,)), (2, (1.0, 0.0))),
-        "Spring": (pull, (*ends, 1.0, 0.1, 0.1)),
-        "Place": (lambda end: pull(fourbar.Spring(end, ends[1], 1.0)), (2, (0.1, 0.2))),
-        "LinearDrive": (drive, ends),
-        "PointDrive": (drive, (ends[1], 0.3, "world")),
-        "Springs": (act, ((spring,),)),
-        "Gravity": (act, (9.81, 1.0)),
-        "Flywheel": (act, (0.1, 2)),
-        "Viscous": (act, (rows,)),
-        "Friction": (act, (rows,)),
-        "PinFriction": (act, ((("O2", 0.1, 0.01),),)),
-        "Torsion": (act, ((("O2", 0.1, 0.0, 0.1),),)),
+    times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
+    at_O2 = {
+        fourbar.Viscous: 0.1,
+        fourbar.Friction: 0.1,
+        fourbar.PinFriction: (0.1, 0.01),
+        fourbar.Torsion: (0.1, 0.0, 0.1),
     }
-    at_O2 = {"Viscous": 0.1, "Friction": 0.1, "PinFriction": (0.1, 0.01)}
-    at_O2["Torsion"] = (0.1, 0.0, 0.1)
+
+    def act(kind, number):
+        return fourbar.solve(replace(scene, effects=(kind.at(O2=number),)))
+
     plain = {
         ("change_points", "circuits", "classify", "time_ratio"): (link,),
         ("transmission_extremes",): (link,),
@@ -174,10 +232,8 @@ def calls():
         ("save",): (scene, "a.toml"),
         ("vary",): (scene, {"lengths.input": [0.1]}),
         ("release",): (still,),
-        ("FourBar",): (0.3, link.input, link.coupler, link.output, 0.1),
+        ("from_pins",): PINS,
         ("FromLimit",): (1, 0.1),
-        ("Tolerance",): ("lengths.input", 0.1, False),
-        ("Table",): ((0.0, 2.0), (1.0, 1.0)),
         ("Picture",): (3, "a.png", "."),
     }
     return {
@@ -187,19 +243,12 @@ def calls():
             for name in names
         },
         **{
-            name: (state(getattr(fourbar, name), use), good)
-            for name, (use, good) in uses.items()
-        },
-        **{
-            f"{name}.at": (
-                lambda x, name=name: act(getattr(fourbar, name).at(O2=x)),
-                (good,),
-            )
-            for name, good in at_O2.items()
+            f"{kind.__name__}.at": (partial(act, kind), (good,))
+            for kind, good in at_O2.items()
         },
         "coupler_curve": (
             lambda *x: fourbar.coupler_curve(*x[:4], branch=x[4], steps=x[5]),
-            curve,
+            (link, 0.1, 0.1, 0, 1, 8),
         ),
         "uniform": (
             lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]),
@@ -220,7 +269,7 @@ def calls():
         **{
             name: (lambda *x: fourbar.solve(x[0], x[1], at=x[2], side=x[3]), good)
             for name, good in {
-                "solve": (scene, "force", command, 0),
+                "solve": (scene, "force", fourbar.command(scene), 0),
                 "solve, a study": (study, "force", None, 0),
             }.items()
         },
@@ -244,87 +293,6 @@ def calls():
     }
 
 
-def calls_by_name():
-    """Arguments that are given by their names, each for itself.
-
-    What is called, and a good value.
-    """
-    link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    end = fourbar.Place(4, (0.1, 0.2))
-    turning = fourbar.Motion(1.0, 10.0)
-    pair, points = (0.1, 0.2), (fourbar.Point("P", 2, (0.1, 0.2)),)
-
-    def solve(motion=turning, linkage=link, points=points, **parts):
-        return fourbar.solve(fourbar.Scene(linkage, motion, points=points, **parts))
-
-    def load(**stated):
-        return solve(loads=(fourbar.Load(2, (1.0, 0.0), **stated),))
-
-    def bar(**stated):
-        moving = fourbar.Bar(0.1, **stated), link.coupler, link.output
-        return solve(linkage=fourbar.FourBar(0.3, *moving))
-
-    def pull(**stated):
-        spring = fourbar.Spring(fourbar.Place(2, **stated), end, 1.0)
-        return solve(effects=(fourbar.Springs((spring,)),))
-
-    def name(**stated):
-        return solve(points=(fourbar.Point("Q", 3, **stated),))
-
-    def turn(**stated):
-        return solve(fourbar.Motion(**stated))
-
-    def rise(**stated):
-        return turn(law=fourbar.Rise("345", pair, steps=8, **stated))
-
-    def follow(**stated):
-        return turn(law=fourbar.Law((0.0, 1.0, 2.0, 3.0), steps=2, **stated))
-
-    def stroke(**stated):
-        motion = {"stroke": 0.25, "side": "left"} | stated
-        return solve(fourbar.Motion(**motion), drive=CYLINDER)
-
-    third, fourth = {"theta_3": 0.4}, {"theta_4": 1.9}
-    load_by = {"from_pin": pair, "from_centre": pair, "arm": pair, "point": "P"}
-    load_by |= {"moment": 0.1, "frame": "bar"}
-    load_by["table"] = fourbar.Table((0.0, 2.0), (1.0, 1.0))
-    laws = {"theta_3": (0.4, 0.5, 0.6, 0.5), "theta_4": (1.9, 2.0, 2.1, 2.0)}
-    drawn = fourbar.DrawnPins(
-        (0.0, 0.0),
-        (0.0, 0.1),
-        (0.175, 0.05),
-        (0.25, 0.05),
-    )
-    driven = {"drive": fourbar.LinearDrive(fourbar.Place(2, pair), end)}
-    stated = [
-        ("Load", load, load_by),
-        ("Bar", partial(bar, diameter=0.02), {"density": 7850.0}),
-        ("Bar", partial(bar, density=7850.0), {"section": (0.02, 0.01)}),
-        ("Bar", partial(bar, density=7850.0), {"diameter": 0.02}),
-        ("Bar", bar, {"mass_per_length": 4.2}),
-        ("Point", name, {"from_centre": pair}),
-        ("Place", pull, {"point": "P", "from_centre": pair}),
-        ("Rise", rise, third | fourth),
-        ("Law", follow, laws),
-        ("Motion", turn, third | fourth),
-        ("Motion", partial(turn, **third), {"omega_3": 1.0}),
-        ("Motion", partial(turn, **third, omega_3=1.0), {"alpha_3": 1.0}),
-        ("Motion", partial(turn, **fourth), {"omega_4": 1.0}),
-        ("Motion", partial(turn, **fourth, omega_4=1.0), {"alpha_4": 1.0}),
-        ("Motion", stroke, {"stroke": 0.2, "stroke_speed": 0.1}),
-        ("Motion", partial(stroke, stroke_speed=0.1), {"stroke_acceleration": 0.1}),
-        ("Scene", solve, {**driven, "drawing": drawn}),
-    ]
-    return {
-        f"{kind},{argument}": (
-            lambda x, call=call, argument=argument: call(**{argument: x}),
-            (good,),
-        )
-        for kind, call, ones in stated
-        for argument, good in ones.items()
-    }
-
-
 def spoilt(value, wrong):
     """The wrong value, and tuples in which it stands for one part, at any depth."""
     yield wrong
@@ -340,7 +308,7 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    table = calls() | calls_by_name()
+    table = calls() | uses()
     public = set(dir(fourbar)) - OF_OTHERS
     errors = {name for name in public if name.endswith("Error")}
     assert {re.split(r"[.,]", name)[0] for name in table} - OF_OTHERS == public - errors

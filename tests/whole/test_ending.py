@@ -107,66 +107,44 @@ def leaving_nothing(mark):
 @pytest.mark.linux
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 10 * KILLS)
+@pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.parametrize("what", [READING, GUEST])
-def test_ctrl_c_while_workers_start_is_one_line(what, tmp_path):
-    """A terminal sends it to all processes of the command."""
-    for moment in START_SECONDS * (np.arange(KILLS) + 0.5) / KILLS:
+def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
+    """A terminal sends SIGINT to all processes of the command, while workers start."""
+    by_terminal = ended_by == signal.SIGINT
+    moments = [START_SECONDS]
+    if by_terminal:
+        moments = START_SECONDS * (np.arange(KILLS) + 0.5) / KILLS
+    for moment in moments:
         mark = f"{tmp_path}/{what}/{moment}"
         process = start(what, tmp_path, mark)
         with leaving_nothing(mark):
-            wait_for_process(STARTING, mark)
+            started = STARTING if by_terminal or what == READING else b"busy.py"
+            wait_for_process(started, mark)
             time.sleep(moment)
-            os.killpg(process.pid, signal.SIGINT)
+            (os.killpg if by_terminal else os.kill)(process.pid, ended_by)
             _, errors = process.communicate(timeout=PATIENCE)
-        assert errors.decode().strip() == "error: interrupted", moment
-        assert process.returncode == INTERRUPTED
-
-
-@pytest.mark.slow
-@pytest.mark.linux
-@pytest.mark.parametrize("ended_by", [signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("what", [READING, GUEST])
-def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
-    mark = f"{tmp_path}/{what}"
-    process = start(what, tmp_path, mark)
-    with leaving_nothing(mark):
-        wait_for_process(STARTING if what == READING else b"busy.py", mark)
-        time.sleep(START_SECONDS)
-        process.send_signal(ended_by)
-        _, errors = process.communicate(timeout=PATIENCE)
-    if ended_by == signal.SIGTERM:
-        assert process.returncode == INTERRUPTED
-        # click ends the line of the terminal's ^C first
-        assert errors.decode().strip() == "error: interrupted"
+        if ended_by != signal.SIGKILL:
+            # click ends the line of the terminal's ^C first
+            assert errors.decode().strip() == "error: interrupted", moment
+            assert process.returncode == INTERRUPTED
 
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_processor_time_is_bounded_by_the_process_itself():
-    spinning = (
-        "from fourbar_validation.engines.processes import bound_processor_time\n"
-        "bound_processor_time(0.1)\n"
-        "while True: pass"
-    )
+@pytest.mark.parametrize(
+    ("program", "status"),
+    [
+        ("bound_processor_time(0.1)\nwhile True: pass", -signal.SIGXCPU),
+        # the library starts a program, which outlives the worker or complains
+        ("open_no_windows()\nimport mujoco\nsys.exit('glfw' in sys.modules)", 0),
+    ],
+    ids=["processor time", "library of windows"],
+)
+def test_a_process_bounds_itself(program, status):
+    name = program.partition("(")[0]
+    line = f"import sys; from fourbar_validation.engines.processes import {name}\n"
     ended = subprocess.run(
-        [sys.executable, "-c", spinning],
-        timeout=60,
-        check=False,
+        [sys.executable, "-c", line + program], timeout=60, check=False
     )
-    assert ended.returncode == -signal.SIGXCPU
-
-
-@pytest.mark.slow
-def test_a_worker_loads_no_library_of_windows():
-    """The library starts a program, which outlives the worker or complains."""
-    looking = (
-        "from fourbar_validation.engines.processes import open_no_windows\n"
-        "open_no_windows()\n"
-        "import mujoco, sys\n"
-        "sys.exit('glfw' in sys.modules)"
-    )
-    subprocess.run(
-        [sys.executable, "-c", looking],
-        timeout=60,
-        check=True,
-    )
+    assert ended.returncode == status

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import fourbar_validation.run.plan
-from fourbar.errors import BROKEN, HOLDS, FourBarError, InputError
+from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, FourBarError, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
@@ -44,6 +44,7 @@ from fourbar_validation.scenes.suites import (
 )
 from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
+from tests.support.texts import LENGTHS
 from tests.support.unlucky import (
     Few,
     Moody,
@@ -63,9 +64,7 @@ KILLS_OF_BLAME = 4
 """Kills of one scene that an engine is blamed for: twice with the others, twice alone.
 """
 COUNT, IN_A_TASK = (220, 20) if FULL else (30, 3)
-"""Scenes of a run, none of them drawn, so that the work is the judging alone; and as
-many tasks in a small run.
-"""
+"""Scenes of a run, none of them drawn, and those of a task."""
 SMALL = (
     "import fourbar_validation.run.plan as plan; plan.SCENES_OF_A_QUICK_TASK ="
     f" {IN_A_TASK}; "
@@ -87,9 +86,7 @@ def judge_all(suite, out, engines=EXACT, workers=2):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(
-    300
-)  # its hangs alone take half a minute, and every new worker imports the harness again
+@pytest.mark.timeout(300)  # every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatch):
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(fourbar_validation.run.plan, size, 2)
@@ -111,44 +108,58 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatc
         assert any(row.scene == scene and row.engine == "free-body" for row in rows)
 
 
+@pytest.fixture
+def give_lives(tmp_path, monkeypatch):
+    """Gives so many lives, each of which costs a worker its own."""
+
+    def give(count):
+        (tmp_path / "lives").mkdir()
+        for life in range(count):
+            (tmp_path / "lives" / str(life)).touch()
+        monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+        return tmp_path / "lives"
+
+    return give
+
+
 @pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.parametrize(("kills", "blamed"), [(1, False), (KILLS_OF_BLAME, True)])
 def test_a_worker_killed_once_is_not_held_against_the_engine(
-    tmp_path, monkeypatch, kills, blamed
+    tmp_path, give_lives, kills, blamed
 ):
     """One that kills its worker each time is: in the scene, and by itself."""
-    (tmp_path / "lives").mkdir()
-    for life in range(kills):
-        (tmp_path / "lives" / str(life)).touch()
-    monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+    lives = give_lives(kills)
     unlucky = Engine("unlucky", Unlucky, EQUIVALENCE)
-    judge_all(
-        Few(("a",)),
-        tmp_path / "run",
-        (*EXACT, unlucky),
-        workers=1,
-    )
+    judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1)
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = [row.engine for row in rows if row.verdict == FAILS]
     assert failing == ["unlucky"] * blamed
     assert {"formulas", "free-body", "unlucky"} <= {row.engine for row in rows}
-    assert not list((tmp_path / "lives").iterdir())
+    assert not list(lives.iterdir())
 
 
 @pytest.mark.slow
 def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, give_lives
 ):
-    (tmp_path / "lives").mkdir()
-    (tmp_path / "lives" / "0").touch()
-    monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
+    give_lives(1)
     with monkeypatch.context() as dying:
         dying.setattr(workers, "prepare_worker", dies_at_first)
         with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
             judge_all(Few(), tmp_path / "run", workers=1)
     assert not (tmp_path / "run" / "results.csv").exists()
     assert judge_all(Few(), tmp_path / "run", workers=1).counts[FAILS] == 0
+
+
+def apply_one(function, item, seconds=None):
+    """Return what a worker makes of one item."""
+    tasks = [(0, [item])]
+    return list(
+        workers.apply_over_processes(
+            function, tasks, 1, seconds=seconds, instead=workers.fail
+        )
+    )
 
 
 @pytest.mark.slow
@@ -159,15 +170,8 @@ def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_within_seconds()
     The others must not wait for it as long as Pebble does, two minutes.
     """
     begin = time.monotonic()
-    results = workers.apply_over_processes(
-        die_with_the_pipe,
-        [(0, [None])],
-        1,
-        seconds=None,
-        instead=workers.fail,
-    )
     with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
-        list(results)
+        apply_one(die_with_the_pipe, None)
     assert time.monotonic() - begin < 60.0
 
 
@@ -182,14 +186,8 @@ def test_a_clock_that_jumps_forward_ends_nothing(tmp_path, monkeypatch):
 
     clock = SimpleNamespace(time=now, sleep=time.sleep)
     monkeypatch.setattr("pebble.pool.process.time", clock)
-    results = workers.apply_over_processes(
-        start_and_sleep,
-        [(0, [starts])],
-        1,
-        seconds=workers.SCENE_SECONDS,
-        instead=workers.fail,
-    )
-    assert list(results) == [(0, ["done"])]
+    results = apply_one(start_and_sleep, starts, workers.SCENE_SECONDS)
+    assert results == [(0, ["done"])]
     assert len(starts.read_text().splitlines()) > 1
 
 
@@ -241,211 +239,148 @@ def test_a_record_is_read_from_its_part_as_it_was(tmp_path):
     assert repr(Record.restore(kept)) == repr(record)
 
 
-LIMIT = (
+LIMITED = (
     "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (60_000,"
-    " resource.RLIM_INFINITY)); "
+    " resource.RLIM_INFINITY)); " + ("" if FULL else SMALL) + HARNESS
 )
-LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
 """The harness on a disk that takes no file of more than 60 kB: the parts fit, the
 results do not.
 """
+VICTIMS = ("worker", "guest", "run") if Path("/proc/self").exists() else ("run",)
+"""Processes that are killed in turn, as far as the system tells which they are."""
 
 
-def words_of(out, count, workers, more=()):
-    words = f"run --random {count} --workers {workers} --engines free-body"
-    return [*words.split(), "--no-pictures", "--out", str(out), *more]
+def words_of(out, guest):
+    words = f"run --random {COUNT} --workers {2 if FULL else 1} --engines free-body"
+    return [*words.split(), "--no-pictures", f"--guest={guest}", "--out", str(out)]
 
 
-def start(
-    out, count, *program, workers=2 if FULL else 1, stderr=subprocess.DEVNULL, more=()
-):
-    return subprocess.Popen(
-        [
-            *(sys.executable, *(program or PROGRAM)),
-            *words_of(out, count, workers, more),
-        ],
-        cwd=Path(__file__).parents[2],
-        stdout=subprocess.DEVNULL,
-        stderr=stderr,
-        start_new_session=True,
-    )
+@pytest.fixture
+def undisturbed(tmp_path):
+    """A guest, and the folder of a run with it that nothing disturbed."""
+    guest, out = write_program(tmp_path, "plain"), tmp_path / "undisturbed"
+    with pytest.MonkeyPatch.context() as here:
+        judge_here(here)
+        assert status(words_of(out, guest)) == HOLDS
+    end_guests()
+    return guest, out
 
 
-def assert_unfinished(out):
-    """What ended the run left it without results and with parts to go on from."""
-    assert not (out / "results.csv").exists()
-    assert list(out.glob("parts/0*"))
+def list_children(process):
+    """The processes that judge: no zombie, nor Python's tracker of resources."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
+    return [pid for pid in map(int, children.split()) if runs(pid, b"spawn_main")]
 
 
-def wait_for_parts(out, process, at_least):
-    deadline = time.monotonic() + 60.0
-    while (
-        len(list(out.glob("parts/0*"))) < at_least
-        and process.poll() is None
-        and time.monotonic() < deadline
-    ):
-        time.sleep(0.01)
+def runs(pid, word):
+    """Return whether a process has a word in its line; one of them names its guest."""
+    command = Path(f"/proc/{pid}/cmdline").read_bytes()
+    return word in command and b"--guest" not in command
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    """The folder of a run that nothing disturbed, judged in this process."""
-    out = tmp_path_factory.mktemp("undisturbed")
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        judge_here(monkeypatch)
-        judge_all(Random(COUNT, 0, TYPES), out)
-    return out
+class Disturbed:
+    """A run with a guest in one folder, started again and again."""
+
+    def __init__(self, out, guest, mark):
+        self.out, self.guest, self.mark = out, guest, mark
+        self.rng = np.random.default_rng(SEED)
+
+    @property
+    def parts(self):
+        return sorted(self.out.glob("parts/0*"))
+
+    def start(self, *program, more=1, stderr=subprocess.DEVNULL):
+        """Start the run, and wait until it has finished some tasks more."""
+        wanted = len(self.parts) + more
+        process = subprocess.Popen(
+            [sys.executable, *(program or PROGRAM), *words_of(self.out, self.guest)],
+            cwd=Path(__file__).parents[2],
+            stdout=subprocess.DEVNULL,
+            stderr=stderr,
+            start_new_session=True,
+        )
+        deadline = time.monotonic() + 60.0
+        while len(self.parts) < wanted and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        return process
+
+    def kill(self, victim, process):
+        """Kill one of those who take part at a random moment."""
+        time.sleep(float(self.rng.uniform(0.0, 0.3)))
+        while process.poll() is None:
+            with suppress(OSError):  # it has just gone
+                pid = self.rng.choice(self.list_victims(victim, process) or [0])
+                if pid:
+                    os.kill(int(pid), signal.SIGKILL)
+                    return
+
+    def list_victims(self, victim, process):
+        if victim == "run":
+            return [process.pid]
+        if victim == "guest":
+            return [pid for pid in list_processes(self.mark) if runs(pid, b"plain.py")]
+        return list_children(process)
+
+    def require_unfinished(self):
+        """Hold that nothing passes for results; leave work for the next start."""
+        assert not (self.out / "results.csv").exists()
+        assert self.parts
+        for part in self.parts[1:]:
+            part.unlink()
 
 
 @pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.usefixtures("interruptible")
-@pytest.mark.timeout(120 + 20 * KILLS)
-def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(
-    tmp_path, undisturbed
-):
-    """A run with one worker is interrupted, killed at random moments and met with a
-    full disk, one after the other in one folder.
-    """
-    process = start(tmp_path, COUNT)
-    wait_for_parts(tmp_path, process, at_least=1)
-    os.kill(process.pid, signal.SIGINT)
-    assert process.wait(timeout=60) == 130
-    assert not list(tmp_path.glob("**/*.part"))
-    assert_unfinished(tmp_path)
-
-    rng = np.random.default_rng(SEED)
-    tasks = len(range(0, COUNT, IN_A_TASK))
-    for _ in range(KILLS):
-        process = start(tmp_path, COUNT)
-        wait_for_parts(tmp_path, process, at_least=int(rng.integers(1, tasks)))
-        time.sleep(float(rng.uniform(0.0, 0.3)))
-        assert process.poll() is None, "it ended before it was killed"
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        assert_unfinished(tmp_path)
-
-    process = start(tmp_path, COUNT, "-c", LIMITED, stderr=subprocess.PIPE)
-    _, printed = process.communicate(timeout=100)
-    assert process.returncode == 3
-    assert b"Traceback" not in printed
-    last = printed.decode().strip().splitlines()[-1]
-    assert last.startswith("error: ") and str(tmp_path / "results.") in last
-    assert not (tmp_path / "results.csv").exists()
-
-    assert start(tmp_path, COUNT).wait(timeout=100) == 0
-    for name in ("results.csv", "results.parquet"):
-        assert (tmp_path / name).read_bytes() == (undisturbed / name).read_bytes()
-    assert {path.name for path in tmp_path.iterdir()} == {
-        path.name for path in undisturbed.iterdir()
-    }
-
-
-def workers_of(process):
-    """The processes that judge.
-
-    No zombie of one that was killed, nor Python's tracker of resources.
-    """
-    try:
-        children = (
-            Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        )
-        return [
-            int(pid)
-            for pid in children
-            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
-        ]
-    except OSError:  # one of them has just gone
-        return []
-
-
-@pytest.mark.slow
-@pytest.mark.linux
-@pytest.mark.timeout(400 + 20 * KILLS)
-def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path, undisturbed):
-    rng = np.random.default_rng(SEED + 1)
-    kills = runs = 0
-    # a run is over after some ten of them, or before the first: another one takes the
-    # rest
-    while kills < KILLS:
-        out, runs = tmp_path / str(runs), runs + 1
-        process = start(out, COUNT, workers=2)
-        while kills < KILLS and process.poll() is None:
-            wait_for_parts(out, process, at_least=1)
-            time.sleep(
-                float(rng.uniform(0.0, 0.5))
-            )  # a worker needs a moment to start again
-            workers = workers_of(process)
-            if workers:
-                with suppress(ProcessLookupError):
-                    os.kill(workers[int(rng.integers(len(workers)))], signal.SIGKILL)
-                    kills += 1
-        ended = process.wait(timeout=200)
-        if ended == BROKEN:  # it was killed while none was at work
-            ended = start(out, COUNT, workers=2).wait(timeout=100)
-        assert ended == HOLDS
-        assert (out / "results.csv").read_bytes() == (
-            undisturbed / "results.csv"
-        ).read_bytes()
-
-
-def guests_of(mark, program):
-    """The programs of guests among the processes with a mark.
-
-    The run names them too.
-    """
-    guests = []
-    for pid in list_processes(mark):
-        with suppress(OSError):  # it has just gone
-            command = Path(f"/proc/{pid}/cmdline").read_bytes()
-            if program.encode() in command and b"--guest" not in command:
-                guests.append(pid)
-    return guests
-
-
-@pytest.mark.slow
-@pytest.mark.linux
 @pytest.mark.timeout(200 + 120 * KILLS)
-def test_a_guest_its_worker_and_its_run_killed_in_turn_change_no_byte(
-    tmp_path, monkeypatch
+def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
+    tmp_path, undisturbed, monkeypatch
 ):
-    """Each is killed in the middle, with questions left to ask."""
-    guest = [f"--guest={write_program(tmp_path, 'plain')}"]
-    undisturbed = tmp_path / "undisturbed"
-    with monkeypatch.context() as here:
-        judge_here(here)
-        assert status(words_of(undisturbed, COUNT, 1, guest)) == HOLDS
-    end_guests()
-    mark = f"MARK_OF_TEST={tmp_path}"
+    """A run is interrupted, its guest, a worker and itself are killed at random moments
+    with questions left to ask, and it meets a full disk, all in one folder.
+    """
+    guest, expected = undisturbed
+    out, mark = tmp_path / "out", f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
-    for kill in range(KILLS):
-        out = tmp_path / str(kill)
-        process = start(out, COUNT, more=guest)
-        for victim in ("guest", "worker", "run"):
-            parts = len(list(out.glob("parts/0*")))
-            wait_for_parts(out, process, at_least=parts + 1)
-            victims = []
-            while not victims and process.poll() is None:
-                time.sleep(0.01)
-                victims = {
-                    "guest": guests_of(mark, "plain.py"),
-                    "worker": workers_of(process),
-                    "run": [process.pid],
-                }[victim]
-            if process.poll() == BROKEN:  # its worker was killed when it had no task
-                break
-            os.kill(victims[0], signal.SIGKILL)
-        process.wait()
-        assert_unfinished(out)
-        assert start(out, COUNT, more=guest).wait(timeout=100) == 0
-        expected, killed = (
-            (folder / "results.csv").read_bytes() for folder in (undisturbed, out)
-        )
-        assert killed == expected
+    run = Disturbed(out, guest, mark)
+
+    process = run.start()
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait(timeout=60) == INTERRUPTED
+    assert not list(out.glob("**/*.part"))
+    run.require_unfinished()
+
+    for _ in range(KILLS):
+        process = run.start()
+        for victim in VICTIMS:
+            if process.poll() is not None:  # its worker was killed when it had no task
+                assert process.returncode == BROKEN
+                process = run.start()
+            run.kill(victim, process)
+        process.wait(timeout=100)
+        run.require_unfinished()
+
+    process = run.start("-c", LIMITED, more=COUNT, stderr=subprocess.PIPE)
+    printed = process.communicate(timeout=100)[1].decode()
+    assert process.returncode == BROKEN and "Traceback" not in printed
+    last = printed.strip().splitlines()[-1]
+    assert last.startswith("error: ") and str(out / "results.") in last
+    run.require_unfinished()
+
+    process = run.start()
+    run.kill(VICTIMS[0], process)
+    if process.wait(timeout=100) != HOLDS:
+        assert run.start(more=COUNT).wait(timeout=100) == HOLDS
+    for name in ("results.csv", "results.parquet"):
+        assert (out / name).read_bytes() == (expected / name).read_bytes()
+    assert {path.name for path in out.iterdir()} == {
+        path.name for path in expected.iterdir()
+    }
     latest = time.monotonic() + 30.0
-    while list_processes(mark) and time.monotonic() < latest:
+    while VICTIMS[1:] and list_processes(mark):
+        assert time.monotonic() < latest
         time.sleep(0.1)
-    assert not list_processes(mark)
 
 
 @pytest.mark.skipif(
@@ -475,22 +410,11 @@ def test_a_read_only_folder_is_reported(tmp_path):
 def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
     motion, key, tmp_path
 ):
-    lengths = (
-        '[lengths]\nground = "4 m"\ninput = "1 m"\ncoupler = "3 m"\noutput = "3 m"\n'
-    )
-    masses = (
-        '[bars.input]\nmass = "1 kg"\n[bars.coupler]\nmass = "1 kg"\n'
-        '[bars.output]\nmass = "1 kg"\n'
-    )
     path = tmp_path / "long.toml"
-    path.write_text(
-        f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS_OF_A_SCENE - 1)}\n"
-    )
+    path.write_text(f"{LENGTHS}[motion]\n{motion % (MOST_POSITIONS_OF_A_SCENE - 1)}\n")
     a_second = AS_LONG_AS if key == "motion.free" else 0
     assert read_scene_files([path]).positions == MOST_POSITIONS_OF_A_SCENE + a_second
-    path.write_text(
-        f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS_OF_A_SCENE}\n"
-    )
+    path.write_text(f"{LENGTHS}[motion]\n{motion % MOST_POSITIONS_OF_A_SCENE}\n")
     with pytest.raises(
         InputError,
         match=(
