@@ -7,10 +7,12 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fourbar.effects import (
+    Effect,
     Flywheel,
     Friction,
     Gravity,
@@ -61,116 +63,96 @@ POINTS_OF_BARS = (
     Point("Q", 4, (0.05, -0.3)),
     Point("R", 2, (0.03, 0.2)),
 )
-CRANK_ROCKER = Scene(
-    CRANK_ROCKER_LINKAGE,
-    MOTION_OF_A_TURN,
-    2,
-    LOADS,
-    (WEIGHT,),
-    points=POINTS_OF_BARS,
-)
+
+
+def _change(**changes: Any) -> Scene:
+    """Return the loaded crank-rocker with other parts."""
+    parts: dict[str, Any] = {
+        "linkage": CRANK_ROCKER_LINKAGE,
+        "motion": MOTION_OF_A_TURN,
+        "loads": LOADS,
+        "effects": (WEIGHT,),
+        "points": POINTS_OF_BARS,
+    }
+    return Scene(**parts | changes)
+
+
+def _move(
+    motion: Motion,
+    *effects: Effect,
+    linkage: FourBar = CRANK_ROCKER_LINKAGE,
+    **parts: Any,
+) -> Scene:
+    """Return a linkage without loads that moves under some effects."""
+    return Scene(linkage, motion, effects=effects, **parts)
+
+
+CRANK_ROCKER = _change()
+_CROSSED_TURN = MOTION_OF_A_TURN.replace(branch=CROSSED)
+_STROKE: dict[str, Any] = {"stroke_speed": 0.2, "stroke_acceleration": 0.1}
+_INPUT_CYLINDER = LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4)))
+_COUPLER_CYLINDER = LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7)))
+_COUPLER_SPRING = Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0)
+_RELEASED = Motion(1.0, 3.0, free=Free(0.5, 50))
+
+
+def _near(angle: float, *offsets: float, speed: float = 1.0) -> Motion:
+    """Return a motion at some positions beside an angle."""
+    return Motion(angle + np.array(offsets), speed)
+
+
+_LIMIT = limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2
+_REVERSAL = limit_positions(CRANK_ROCKER_LINKAGE, 4)[0].theta_2
+_EIGHT_STEPS = Motion(Sweep(0.1, 3.0, 8), 10.0)
+_RISE = Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24)
 _WRITTEN_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
-    "coupler driven": replace(
-        CRANK_ROCKER,
-        motion=MOTION_OF_A_TURN.replace(branch=CROSSED),
-        drive_bar=3,
+    "coupler driven": _change(motion=_CROSSED_TURN, drive_bar=3),
+    "output driven": _change(
+        motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4
     ),
-    "output driven": replace(
-        CRANK_ROCKER,
-        motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0),
-        drive_bar=4,
-    ),
-    "cylinder": replace(
-        CRANK_ROCKER,
-        motion=MOTION_OF_A_TURN.replace(branch=CROSSED),
-        drive_bar=None,  # type: ignore[arg-type]
+    "cylinder": _change(
+        motion=_CROSSED_TURN,
         drive=LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7))),
     ),
-    "stroke": replace(
-        CRANK_ROCKER,
-        motion=Motion(
-            stroke=Sweep(0.25, 0.35, 12),
-            stroke_speed=0.2,
-            stroke_acceleration=0.1,
-            side="left",
-        ),
-        drive_bar=None,  # type: ignore[arg-type]
-        drive=LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4))),
+    "stroke": _change(
+        motion=Motion(stroke=Sweep(0.25, 0.35, 12), side="left", **_STROKE),
+        drive=_INPUT_CYLINDER,
     ),
-    "stroke of the output": replace(
-        CRANK_ROCKER,
-        motion=Motion(
-            stroke=Sweep(0.33, 0.36, 12),
-            stroke_speed=0.2,
-            stroke_acceleration=0.1,
-            side="right",
-        ),
-        drive_bar=None,  # type: ignore[arg-type]
+    "stroke of the output": _change(
+        motion=Motion(stroke=Sweep(0.33, 0.36, 12), side="right", **_STROKE),
         drive=LinearDrive(Place(1, (0.5, -0.5)), Place(4, (0.09, 0.7))),
     ),
-    "output commanded": replace(
-        CRANK_ROCKER,
-        motion=Motion(theta_4=Sweep(1.8, 2.5, 12), omega_4=3.0),
-        drive_bar=4,
+    "output commanded": _change(
+        motion=Motion(theta_4=Sweep(1.8, 2.5, 12), omega_4=3.0), drive_bar=4
     ),
-    "push": replace(
-        CRANK_ROCKER,
-        drive_bar=None,  # type: ignore[arg-type]
-        drive=PointDrive(Place(4, (0.17, -0.6)), 1.1, "bar"),
+    "push": _change(drive=PointDrive(Place(4, (0.17, -0.6)), 1.1, "bar")),
+    "push on the coupler": _change(
+        drive=PointDrive(Place(3, from_centre=(0.07, 0.9)), 2.1)
     ),
-    "push on the coupler": replace(
-        CRANK_ROCKER,
-        drive_bar=None,  # type: ignore[arg-type]
-        drive=PointDrive(Place(3, from_centre=(0.07, 0.9)), 2.1),
+    "cylinder on the ground": _change(drive=_COUPLER_CYLINDER),
+    "slender bars": _move(MOTION_OF_A_TURN, linkage=SLENDER_LINKAGE),
+    "limited": _move(
+        Motion(Sweep(0.3, 1.4, 22), 3.0), WEIGHT, linkage=ROCKER_CRANK_LINKAGE
     ),
-    "cylinder on the ground": replace(
-        CRANK_ROCKER,
-        drive_bar=None,  # type: ignore[arg-type]
-        drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
+    "near a limit": _move(
+        _near(_LIMIT, 1e-2, 1e-3), WEIGHT, linkage=ROCKER_CRANK_LINKAGE
     ),
-    "slender bars": Scene(SLENDER_LINKAGE, MOTION_OF_A_TURN),
-    "limited": Scene(
-        ROCKER_CRANK_LINKAGE,
-        Motion(Sweep(0.3, 1.4, 22), 3.0),
-        effects=(WEIGHT,),
+    "nearest to a limit": _move(
+        _near(_LIMIT, 1e-3, 1e-13), WEIGHT, linkage=ROCKER_CRANK_LINKAGE
     ),
-    "near a limit": Scene(
-        ROCKER_CRANK_LINKAGE,
-        Motion(
-            limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2 + np.array([1e-2, 1e-3]),
-            1.0,
-        ),
-        effects=(WEIGHT,),
-    ),
-    "nearest to a limit": Scene(
-        ROCKER_CRANK_LINKAGE,
-        Motion(
-            limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2 + np.array([1e-3, 1e-13]),
-            1.0,
-        ),
-        effects=(WEIGHT,),
-    ),
-    "positions": Scene(CRANK_ROCKER_LINKAGE, Motion(Sweep(0.0, 6.0, 12))),
-    "damped": replace(
-        CRANK_ROCKER,
+    "positions": _move(Motion(Sweep(0.0, 6.0, 12))),
+    "damped": _change(
         effects=(
             Viscous.at(O2=0.01, A=0.02, B=0.03, O4=0.015),
             Friction.at(O2=0.02, A=0.05, B=0.04, O4=0.03),
         ),
     ),
-    "sprung": replace(
-        CRANK_ROCKER,
+    "sprung": _change(
         effects=(
             Springs(
                 (
-                    Spring(
-                        Place(1, (0.2, 0.6)),
-                        Place(3, (0.15, -0.4)),
-                        80.0,
-                        0.1,
-                        2.0,
-                    ),
+                    _COUPLER_SPRING,
                     Spring(Place(2, (0.05, 0.3)), Place(4, (0.1, 0.5)), 50.0, 0.12),
                 )
             ),
@@ -178,8 +160,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
             Flywheel(0.003, 4),
         ),
     ),
-    "sprung at the pins": replace(
-        CRANK_ROCKER,
+    "sprung at the pins": _change(
         effects=(
             Springs(
                 tuple(
@@ -189,33 +170,22 @@ _WRITTEN_SCENES: dict[str, Scene] = {
             ),
         ),
     ),
-    "flywheel": replace(
-        CRANK_ROCKER,
-        effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1))),
+    "flywheel": _change(effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))),
+    "wound": _move(Motion(Sweep(0.0, 9.0, 30), 5.0), Torsion.at(O2=(0.5, 1.0, 0.1))),
+    "sliding pins": _change(
+        effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)))
     ),
-    "wound": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(Sweep(0.0, 9.0, 30), 5.0),
-        effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
+    "one sliding pin": _change(
+        effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))), drive_bar=4
     ),
-    "sliding pins": replace(
-        CRANK_ROCKER,
-        effects=(WEIGHT, PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03))),
-    ),
-    "one sliding pin": replace(
-        CRANK_ROCKER,
-        effects=(WEIGHT, PinFriction.at(B=(0.3, 0.03))),
-        drive_bar=4,
-    ),
-    "at rest": Scene(
-        CRANK_ROCKER_LINKAGE,
+    "at rest": _move(
         Motion(Sweep(0.1, 6.0, 12), 0.0),
-        2,
-        LOADS,
-        (WEIGHT, Friction.at(A=0.05, B=0.02), PinFriction.at(O4=(0.2, 0.02))),
+        WEIGHT,
+        Friction.at(A=0.05, B=0.02),
+        PinFriction.at(O4=(0.2, 0.02)),
+        loads=LOADS,
     ),
-    "table": replace(
-        CRANK_ROCKER,
+    "table": _change(
         loads=(
             Load(
                 4,
@@ -228,8 +198,7 @@ _WRITTEN_SCENES: dict[str, Scene] = {
             ),
         ),
     ),
-    "law": Scene(
-        CRANK_ROCKER_LINKAGE,
+    "law": _move(
         Motion(
             law=Law(
                 (0.0, 0.2, 0.5, 0.9, 1.2),
@@ -238,144 +207,93 @@ _WRITTEN_SCENES: dict[str, Scene] = {
                 "periodic",
             )
         ),
-        effects=(WEIGHT,),
+        WEIGHT,
     ),
-    "law at rest": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest")),
+    "law at rest": _move(
+        Motion(law=Law((0.0, 0.3, 0.7, 1.0), (0.3, 1.0, 2.2, 3.0), 16, "rest"))
     ),
-    "rises": Scene(
-        _ROUND_AND_FLAT,
-        Motion(law=Rise("cycloidal", (1.2, 0.4), 0.3, 0.1, 0.3, 0.1, steps=24)),
-        effects=(WEIGHT,),
+    "rises": _move(
+        Motion(law=replace(_RISE, kind="cycloidal", fall=0.3, rest=0.1)),
+        WEIGHT,
+        linkage=_ROUND_AND_FLAT,
     ),
-    "3-4-5 rise": Scene(
-        _ROUND_AND_FLAT, Motion(law=Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24))
+    "3-4-5 rise": _move(Motion(law=_RISE), linkage=_ROUND_AND_FLAT),
+    "free law": _move(
+        Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16))
     ),
-    "free law": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(law=Law((0.0, 0.3, 0.7, 1.0, 1.4), (0.3, 1.0, 2.2, 3.0, 3.3), 16)),
+    "released": _move(_RELEASED, WEIGHT),
+    "released, damped": _move(
+        _RELEASED,
+        WEIGHT,
+        Viscous.at(O4=0.01, B=0.003),
+        Friction.at(O2=0.02),
+        loads=(Load(4, moment=0.1),),
     ),
-    "released": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0, 3.0, free=Free(0.5, 50)),
-        effects=(WEIGHT,),
+    "released, pushed from G": _move(
+        _RELEASED,
+        loads=(Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), frame="bar"),),
     ),
-    "released, damped": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0, 3.0, free=Free(0.5, 50)),
-        2,
-        (Load(4, moment=0.1),),
-        (WEIGHT, Viscous.at(O4=0.01, B=0.003), Friction.at(O2=0.02)),
-    ),
-    "released, pushed from G": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0, 3.0, free=Free(0.5, 50)),
-        2,
-        (Load(3, (2.0, -0.4), from_centre=(0.06, 0.5), frame="bar"),),
-    ),
-    "double rocker released": Scene(
-        ROCKER_CRANK_LINKAGE,
+    "double rocker released": _move(
         Motion(math.radians(50.0), 0.0, free=Free(1.0, 100)),
-        effects=(Gravity(),),
+        Gravity(),
+        linkage=ROCKER_CRANK_LINKAGE,
     ),
-    "several solutions": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(np.array([2.3, 2.5]), 10.0),
-        effects=(PinFriction.at(A=(50.0, 0.01)),),
+    "several solutions": _move(
+        Motion(np.array([2.3, 2.5]), 10.0), PinFriction.at(A=(50.0, 0.01))
     ),
-    "near a reversal": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(
-            limit_positions(CRANK_ROCKER_LINKAGE, 4)[0].theta_2
-            + np.array([1.0, 1e-2, 1e-4]),
-            10.0,
-        ),
-        effects=(Friction.at(O4=0.03),),
+    "near a reversal": _move(
+        _near(_REVERSAL, 1.0, 1e-2, 1e-4, speed=10.0), Friction.at(O4=0.03)
     ),
-    "short output": Scene(
-        FourBar(1.0, Bar(1.0, 0.2), Bar(2.0, 0.5), Bar(1e-6, 0.4)),
-        Motion(math.pi + np.array([5e-4, 1e-3, 1.9e-3, 1.99e-3]), 10.0),
+    "short output": _move(
+        _near(math.pi, 5e-4, 1e-3, 1.9e-3, 1.99e-3, speed=10.0),
+        linkage=FourBar(1.0, Bar(1.0, 0.2), Bar(2.0, 0.5), Bar(1e-6, 0.4)),
     ),
-    "left open": Scene(ROCKER_CRANK_LINKAGE, Motion(omega_2=3.0)),
-    "many turns away": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(Sweep(20.0, 22.0, 10), 5.0),
-        effects=(Torsion.at(O2=(0.5, 1.0, 0.1)),),
+    "left open": _move(Motion(omega_2=3.0), linkage=ROCKER_CRANK_LINKAGE),
+    "many turns away": _move(
+        Motion(Sweep(20.0, 22.0, 10), 5.0), Torsion.at(O2=(0.5, 1.0, 0.1))
     ),
-    "ends of a spring nearly meet": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0 + np.array([1e-5, 0.1, 1.0]), 10.0),
-        effects=(
-            Springs((Spring(Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0)), 80.0, 0.05),)),
-        ),
+    "ends of a spring nearly meet": _move(
+        _near(1.0, 1e-5, 0.1, 1.0, speed=10.0),
+        Springs((Spring(Place(1, (0.1, 0.8)), Place(2, (0.1, 0.0)), 80.0, 0.05),)),
     ),
-    "held by friction": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0, 0.0, free=Free(0.5, 5)),
-        effects=(WEIGHT, Friction.at(B=0.3, O2=2.0)),
+    "held by friction": _move(
+        Motion(1.0, 0.0, free=Free(0.5, 5)), WEIGHT, Friction.at(B=0.3, O2=2.0)
     ),
-    "held in the end": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0, 3.0, free=Free(1.0, 20)),
-        effects=(WEIGHT, Friction.at(A=0.3, O4=1.0)),
+    "held in the end": _move(
+        Motion(1.0, 3.0, free=Free(1.0, 20)), WEIGHT, Friction.at(A=0.3, O4=1.0)
     ),
-    "from rest against friction": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(1.0, 0.0, free=Free(0.5, 20)),
-        effects=(WEIGHT, Friction.at(A=0.01, O4=0.02)),
+    "from rest against friction": _move(
+        Motion(1.0, 0.0, free=Free(0.5, 20)), WEIGHT, Friction.at(A=0.01, O4=0.02)
     ),
-    "to full accuracy: short diagonal": Scene(
-        uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
+    "to full accuracy: short diagonal": _move(
         Motion(np.array([0.0018, 0.01]), 10.0),
-        effects=(WEIGHT,),
+        WEIGHT,
+        linkage=uniform(0.859375, 0.853515625, 0.58984375, 0.583984375),
     ),
-    "no torque": Scene(
-        uniform(0.3, 0.1, 0.3, 0.1),
+    "no torque": _move(
         Motion(np.array([0.5, 1.0]), 10.0),
-        3,
-        effects=(WEIGHT,),
+        WEIGHT,
+        linkage=uniform(0.3, 0.1, 0.3, 0.1),
+        drive_bar=3,
     ),
-    "simulated": Scene(
-        CRANK_ROCKER_LINKAGE,
+    "simulated": _move(
         Motion(Sweep(0.1, 6.0, 12), 10.0),
-        2,
-        LOADS,
-        (
-            WEIGHT,
-            Viscous.at(A=0.002, B=0.003),
-            Springs(
-                (Spring(Place(1, (0.2, 0.6)), Place(3, (0.15, -0.4)), 80.0, 0.1, 2.0),)
-            ),
-        ),
-    ),
-    "simulated, dry": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(Sweep(0.1, 3.0, 8), 10.0),
-        effects=(Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05))),
-    ),
-    "simulated cylinder": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(Sweep(0.1, 3.0, 8), 10.0),
+        WEIGHT,
+        Viscous.at(A=0.002, B=0.003),
+        Springs((_COUPLER_SPRING,)),
         loads=LOADS,
-        drive=LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7))),
     ),
-    "simulated stroke": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(
-            stroke=Sweep(0.25, 0.35, 8),
-            stroke_speed=0.2,
-            stroke_acceleration=0.1,
-            side="left",
-        ),
+    "simulated, dry": _move(
+        _EIGHT_STEPS, Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05))
+    ),
+    "simulated cylinder": _move(_EIGHT_STEPS, loads=LOADS, drive=_COUPLER_CYLINDER),
+    "simulated stroke": _move(
+        Motion(stroke=Sweep(0.25, 0.35, 8), side="left", **_STROKE),
         loads=LOADS,
-        drive=LinearDrive(Place(1, (0.3, 2.2)), Place(2, (0.12, 0.4))),
+        drive=_INPUT_CYLINDER,
     ),
-    "simulated, quickening": Scene(
-        CRANK_ROCKER_LINKAGE,
-        Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0),
-        4,
-        effects=(Flywheel(0.003, 4),),
+    "simulated, quickening": _move(
+        Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), Flywheel(0.003, 4), drive_bar=4
     ),
 }
 
