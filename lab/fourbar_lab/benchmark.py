@@ -218,10 +218,8 @@ class Benchmark:
             if problem["mechanism"] not in hello.get("mechanisms", ["four-bar"]):
                 lacking = [problem["mechanism"]]
             if lacking:
-                cell.letters, cell.reason = (
-                    REFUSED,
-                    f"refused: it does not take {', '.join(lacking)}",
-                )
+                cell.letters = REFUSED
+                cell.reason = f"refused: it does not take {', '.join(lacking)}"
             else:
                 for result in self._ask_problem(row, setting, label, problem, running):
                     row.changed = row.changed or str(result.get("shared", ""))
@@ -234,17 +232,13 @@ class Benchmark:
                 row.cells[name] = cell
         if DIFFERENTIATED in self.problems and not row.slopes:
             problem = self.problems[DIFFERENTIATED]
-            question = {
-                "ask": "slopes",
-                "scene": problem["scene"],
-                "command": problem["command"],
-            }
+            question = {key: problem[key] for key in ("scene", "command")}
             result = self._take_or_ask(
                 row,
                 label,
                 "slopes",
                 {"problem": DIFFERENTIATED},
-                question,
+                {"ask": "slopes", **question},
                 running,
             )
             row.slopes = compare_slopes(problem, result.get("slopes", []))
@@ -265,17 +259,12 @@ class Benchmark:
         }
         entry = row.entry
         name = problem["problem"]
-        for steps in (
-            entry.steps if problem["ask"] == "answer" and entry.steps else (None,)
-        ):
-            if setting:
-                asked: dict[str, Any] = {"name": setting}
-            else:
-                asked = {}
-            asked |= {} if steps is None else {"steps_per_turn": steps}
-            if steps is None:
-                stem = name
-            else:
+        several = entry.steps if problem["ask"] == "answer" else ()
+        for steps in several or (None,):
+            asked: dict[str, Any] = {"name": setting} if setting else {}
+            stem = name
+            if steps is not None:
+                asked["steps_per_turn"] = steps
                 stem = f"{name}-{steps}"
             full = question | ({"setting": asked} if asked else {})
             yield self._take_or_ask(
@@ -301,19 +290,12 @@ class Benchmark:
         The result is stored; one that broke down is asked for again.
         """
         file = self.out / "results" / re.sub(r"[^\w.-]+", "-", label) / f"{stem}.json"
-        if file.is_file():
-            result = json.loads(file.read_text(encoding="utf-8"))
-        else:
-            result = {}
-        if result.get("version") != row.text("version") or result.get(
-            "reason", ""
-        ).startswith("broke down"):
-            result = {
-                **stated,
-                "engine": label,
-                "version": row.text("version"),
-                **_ask_question(running, question),
-            }
+        version = row.text("version")
+        result = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        broke_down = result.get("reason", "").startswith("broke down")
+        if result.get("version") != version or broke_down:
+            result = stated | {"engine": label, "version": version}
+            result |= _ask_question(running, question)
             file.parent.mkdir(parents=True, exist_ok=True)
             write_text(file, json.dumps(result))
         return {**result, "file": file.relative_to(self.out)}
@@ -326,11 +308,10 @@ class Benchmark:
     ) -> None:
         """Judge one result; of several timesteps the finest that is answered stands."""
         if "answers" not in result:
-            refused = result["reason"].startswith("refused")
-            cell.reason = cell.reason if cell.runs else result["reason"]
-            cell.letters = (
-                cell.letters if cell.runs else REFUSED if refused else MISSING
-            )
+            if not cell.runs:
+                cell.reason = result["reason"]
+                refused = cell.reason.startswith("refused")
+                cell.letters = REFUSED if refused else MISSING
             return
         try:
             judged = judge_answers(problem, result)
@@ -339,11 +320,9 @@ class Benchmark:
             cell.reason = f"an answer that cannot be judged: {error}"
             return
         levels = find_levels([row for row in judged if row.level != MISSING])
-        reactions, drive = (
-            levels.get(name, MISSING) for name in ("reactions", "torque")
-        )
-        cell.letters = reactions + (
-            drive if "torque" in find_levels(judged) else levels.get("motion", MISSING)
+        second = "torque" if "torque" in find_levels(judged) else "motion"
+        cell.letters = "".join(
+            levels.get(group, MISSING) for group in ("reactions", second)
         )
         cell.reason, cell.file = "", str(result["file"])
         numbers = [(row.quantity, f"{row.error:.1e}", row.level) for row in judged]
@@ -370,65 +349,18 @@ class Benchmark:
 
         A run at a coarser timestep than the finest has no level.
         """
-        table: list[list[Any]] = []
+        table = []
         for problem in self.problems:
             for label, row in self.rows.items():
-                cell = row.cells[problem]
-                version = row.text("version")
-                if not cell.runs:
-                    line = [
-                        problem,
-                        label,
-                        version,
-                        "",
-                        "all",
-                        "",
-                        cell.letters,
-                        cell.letters,
-                        "",
-                        cell.reason,
-                    ]
-                    table.append(line)
-                for run in cell.runs:
-                    finest = run is cell.runs[-1]
-                    for quantity, error, level in run.numbers:
-                        if finest and level not in ("A", ""):
-                            reason = cell.reason
-                        else:
-                            reason = ""
-                        if level == MISSING:
-                            reason = "not read"
-                        table.append(
-                            [
-                                problem,
-                                label,
-                                version,
-                                run.setting,
-                                quantity,
-                                error,
-                                level if finest else "",
-                                cell.letters if finest else "",
-                                f"{run.seconds:.3g}",
-                                reason,
-                            ]
-                        )
+                stated = {"problem": problem, "engine": label}
+                stated["version"] = row.text("version")
+                lines = [*_list_numbers(row.cells[problem])]
                 if problem == DIFFERENTIATED:
-                    table += [
-                        [
-                            problem,
-                            label,
-                            version,
-                            how,
-                            f"d torque / d {key}",
-                            error,
-                            "",
-                            "",
-                            "",
-                            "",
-                        ]
-                        for how, errors in row.slopes
-                        for key, error in errors.items()
-                    ]
+                    lines += _list_slopes(row)
+                table += [
+                    [(stated | line).get(column, "") for column in BENCHMARK_COLUMNS]
+                    for line in lines
+                ]
         return table
 
     def write(self) -> None:
@@ -457,6 +389,35 @@ class Benchmark:
         )
 
 
+def _list_numbers(cell: _MatrixCell) -> Iterator[dict[str, str]]:
+    """Yield the entries of a cell's rows, by column."""
+    if not cell.runs:
+        letters = dict.fromkeys(("level", "letters"), cell.letters)
+        yield {"quantity": "all", "reason": cell.reason, **letters}
+    for run in cell.runs:
+        finest = run is cell.runs[-1]
+        for quantity, error, level in run.numbers:
+            reason = cell.reason if finest and level not in ("A", "") else ""
+            yield {
+                "setting": run.setting,
+                "quantity": quantity,
+                "error": error,
+                "level": level if finest else "",
+                "letters": cell.letters if finest else "",
+                "seconds": f"{run.seconds:.3g}",
+                "reason": "not read" if level == MISSING else reason,
+            }
+
+
+def _list_slopes(row: _MatrixRow) -> list[dict[str, str]]:
+    """List the entries of the rows of an engine's derivatives, by column."""
+    return [
+        {"setting": how, "quantity": f"d torque / d {key}", "error": error}
+        for how, errors in row.slopes
+        for key, error in errors.items()
+    ]
+
+
 PANELS = {
     "Pinocchio": ("Pinocchio",),
     "MuJoCo": ("MuJoCo",),
@@ -475,21 +436,18 @@ _MARKERS = "os^DvP"
 
 def read_work(table: Iterable[Mapping[str, Any]]) -> dict[str, list[TimedWork]]:
     """Read processor time and worst error of torque and pin forces of every run."""
-    errors: dict[str, dict[float, list[float]]] = {}
+    errors: dict[str, dict[float, float]] = {}
     for row in table:
-        timed = row["setting"].endswith("/rev") and float(row["seconds"] or 0.0) > 0.0
+        seconds = float(row["seconds"] or 0.0)
+        timed = row["setting"].endswith("/rev") and seconds > 0.0
         wanted = row["quantity"] in ("torque", *PIN_FORCES)
         if row["problem"] == DIFFERENTIATED and timed and wanted:
-            name = name_row(row["engine"], row["version"])
-            runs = errors.setdefault(name, {})
-            of_run = runs.setdefault(float(row["seconds"]), [])
-            of_run.append(float(row["error"]))
-    work: dict[str, list[TimedWork]] = {}
-    for name, runs in errors.items():
-        work[name] = []
-        for seconds, of_run in runs.items():
-            work[name].append(TimedWork(seconds, float(np.nanmax(of_run))))
-    return work
+            runs = errors.setdefault(name_row(row["engine"], row["version"]), {})
+            error = float(row["error"])
+            runs[seconds] = float(np.fmax(runs.get(seconds, math.nan), error))
+    return {
+        name: [TimedWork(*run) for run in runs.items()] for name, runs in errors.items()
+    }
 
 
 def find_panel(name: str) -> str:
@@ -626,23 +584,16 @@ def _find_order(runs: list[BenchmarkRun]) -> float | None:
 
     None: fewer than two runs with a positive error and different timesteps.
     """
-    if len(runs) < 2:
-        return None
-    errors = []
-    steps = []
+    points = []
     for run in runs[-2:]:
-        errors += [
-            float(error) for quantity, error, _ in run.numbers if quantity == "torque"
-        ]
-        steps += [float(number) for number in re.findall(r"(\d+)/rev$", run.setting)]
-    if (
-        len(errors) < 2
-        or len(steps) < 2
-        or not all(0.0 < error < math.inf for error in errors)
-        or steps[0] == steps[1]
-    ):
+        errors = {quantity: float(error) for quantity, error, _ in run.numbers}
+        steps = re.search(r"(\d+)/rev$", run.setting)
+        if steps is not None and 0.0 < errors.get("torque", 0.0) < math.inf:
+            points.append((float(steps[1]), errors["torque"]))
+    if len({steps for steps, _ in points}) < 2:
         return None
-    return math.log(errors[0] / errors[1]) / math.log(steps[1] / steps[0])
+    (coarse, before), (fine, after) = points
+    return math.log(before / after) / math.log(fine / coarse)
 
 
 @click.command()
