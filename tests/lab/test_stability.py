@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, Motion, Scene, uniform
 from fourbar.show.block import write_block
 from fourbar_lab.families import ANYWHERE, FAMILY_DRAWERS
 from fourbar_lab.slopes import judge_slopes
@@ -149,7 +150,7 @@ def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch):
     )
     apart = replace(
         scene,
-        linkage=fourbar.uniform(0.3, 0.2, 0.1, 0.1),
+        linkage=uniform(0.3, 0.2, 0.1, 0.1),
         motion=scene.motion.replace(angle=3.0),
     )
     assert (judged(held).no_torque, judged(apart).not_assembled) == (1, 1) and judged(
@@ -253,14 +254,14 @@ def test_a_tally_adds_up():
 
 
 def test_the_command_line_says_how_few_digits_are_left():
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
     dead = float(
         np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35))
     )  # bars 2, 3 in line
     for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
-        scene = fourbar.Scene(
+        scene = Scene(
             linkage,
-            fourbar.Motion(angle, 10.0),
+            Motion(angle, 10.0),
             drive_bar=4,
         )
         lines = write_block(scene, fourbar.solve(scene, "error"))
@@ -270,10 +271,8 @@ def test_the_command_line_says_how_few_digits_are_left():
             )
             is warned
         )
-    nothing = fourbar.FourBar(
-        0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22)
-    )
-    scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
+    nothing = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+    scene = Scene(nothing, Motion(1.0, 5.0))
     assert not any(
         "digits left" in line
         for line in write_block(scene, fourbar.solve(scene, "error"))
@@ -281,13 +280,13 @@ def test_the_command_line_says_how_few_digits_are_left():
 
 
 def test_error_bars_grow_towards_a_dead_centre():
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
     # bars 2 and 3 in line: e^2 = c^2 with O2, B, O4; the input angle by the cosine rule
     reach = 0.35
     theta = float(np.arccos((0.3**2 + reach**2 - 0.22**2) / (2 * 0.3 * reach)))
     bars = [
         fourbar.solve(
-            fourbar.Scene(linkage, fourbar.Motion(theta + offset, 10.0), drive_bar=4),
+            Scene(linkage, Motion(theta + offset, 10.0), drive_bar=4),
             "error",
         ).torque_error
         for offset in (1e-1, 1e-4, 1e-7)

@@ -76,17 +76,11 @@ _LEAST_KNOWN_CONDITION = K * EPS / PRINTED.factor
 """Condition below which the rounding of the free bodies, K eps over it, is more than a
 row allows.
 """
-FIRST_PANELS = 12
-"""Panels of the motion before any is halved."""
-MOST_HALVINGS = 14
-"""Rounds of halving, after which a panel is 5e-6 of the motion. Beside a change point
-free bodies lose the square of the condition, and smaller panels would be noise.
+PANELS = 400
+"""Panels of a motion: beside a pole, at a condition of 1e-2, one is as wide as the pole
+is far.
 """
-MOST_OPEN = 200
-"""Panels that are halved at once. Curves that need more are rounding there."""
-SETTLED = 1e-12
-"""Part of the mean square of a curve by which halving a panel may change it."""
-_NODES, _WEIGHTS = leggauss(8)
+_NODES, _WEIGHTS = leggauss(12)
 BALANCED_SHARE = 1e-13
 """Part of the largest pin force, at the longest bar of a torque, below which a load is
 its rounding: a balanced linkage needs no torque.
@@ -389,8 +383,8 @@ class _Panels(NamedTuple):
     def mean_square(self, curves):
         """Return the mean of the square of some curves together."""
         width = self.high - self.low
-        squares = width @ _average_squares(self.values[:, :, curves]).sum(axis=1)
-        return float(squares / width.sum())
+        squares = np.square(self.values[:, :, curves]).sum(axis=2)
+        return float(width @ squares @ (0.5 * _WEIGHTS) / width.sum())
 
     def accumulate(self, curve, less=0.0):
         """Return the integral of a curve, less a number, up to each edge and zero."""
@@ -411,42 +405,15 @@ class _Panels(NamedTuple):
         return np.concatenate(totals)
 
 
-def _average_squares(values):
-    """Return the mean square of each curve on each panel."""
-    mean = np.einsum("n,pnk->pk", 0.5 * _WEIGHTS, np.square(values))
-    return mean
-
-
 def _lay_panels(sample, edges):
-    """Halve the panels between edges until every mean square settles."""
-
-    def at_nodes(low, high):
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        places = middle[:, np.newaxis] + half[:, np.newaxis] * _NODES
-        return sample(places.ravel()).reshape(*places.shape, -1)
-
-    low, high = edges[:-1], edges[1:]
-    values = at_nodes(low, high)
-    allowed = SETTLED * (edges[-1] - edges[0]) * _average_squares(values).mean(axis=0)
-    settled = []
-    for halving in range(MOST_HALVINGS):
-        middle = 0.5 * (low + high)
-        first, last = (
-            np.stack(ends, axis=1).ravel() for ends in ((low, middle), (middle, high))
-        )
-        halves = at_nodes(first, last)
-        finer = _average_squares(halves).reshape(len(low), 2, -1).mean(axis=1)
-        apart = (high - low)[:, np.newaxis] * np.abs(_average_squares(values) - finer)
-        still = (apart > allowed).any(axis=1) & (halving < MOST_HALVINGS - 1)
-        still &= np.count_nonzero(still) < MOST_OPEN
-        done = ~np.repeat(still, 2)
-        settled.append(_Panels(first[done], last[done], halves[done]))
-        low, high, values = first[~done], last[~done], halves[~done]
-        if not len(low):
-            break
-    together = [np.concatenate(parts) for parts in zip(*settled, strict=True)]
-    order = np.argsort(together[0])
-    return _Panels(*(part[order] for part in together))
+    """Lay as many panels of equal widths between each two edges."""
+    count = -(-PANELS // (len(edges) - 1))
+    pieces = [np.linspace(*ends, count + 1) for ends in pairwise(edges)]
+    low = np.concatenate([piece[:-1] for piece in pieces])
+    high = np.concatenate([piece[1:] for piece in pieces])
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    places = middle[:, np.newaxis] + half[:, np.newaxis] * _NODES
+    return _Panels(low, high, sample(places.ravel()).reshape(*places.shape, -1))
 
 
 def _judge_integrals(judged):
@@ -472,13 +439,7 @@ def _judge_integrals(judged):
         ]
         return np.concatenate(known, axis=1)
 
-    ends = judged.solution.at.places[[0, -1]]
-    first = np.linspace(
-        ends.min(),
-        ends.max(),
-        FIRST_PANELS + 1,
-    )
-    panels = _lay_panels(sample, np.union1d(first, judged.edges))
+    panels = _lay_panels(sample, judged.edges)
 
     def judge_mean(ours, name):
         rms = math.sqrt(panels.mean_square(columns[name]))
@@ -506,7 +467,8 @@ def _judge_integrals(judged):
         judged.add("integrals", 0.0 if entry["energy_swing"] is None else np.inf)
         return
     given = sums[0] - sums[1]
-    surplus = panels.accumulate(1, given * second / np.ptp(ends)) / second
+    level = given * second / np.ptp(judged.edges)
+    surplus = panels.accumulate(1, level) / second
     swing = abs(entry["energy_swing"] - np.ptp(surplus))
     judged.add("integrals", divide(swing, most))
     at = judged.solution.at

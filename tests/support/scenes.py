@@ -6,43 +6,54 @@ from dataclasses import replace
 import numpy as np
 
 import fourbar
+from fourbar import (
+    Bar,
+    FourBar,
+    Gravity,
+    LinearDrive,
+    Load,
+    Motion,
+    Place,
+    Point,
+    Scene,
+    Spring,
+    Springs,
+    Sweep,
+    uniform,
+)
 
-ON_COUPLER = fourbar.LinearDrive(
-    fourbar.Place(1, (0.25, -2.8)), fourbar.Place(3, (0.09, 0.17))
-)
+ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 """A cylinder from the ground to the coupler."""
-CYLINDER = fourbar.LinearDrive(
-    fourbar.Place(1, (0.25, math.radians(-160.0))), fourbar.Place(2, (0.09, 0.17))
-)
+CYLINDER = LinearDrive(Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17)))
 """From the ground to the input of the crank-rocker."""
 
 
 def crank_rocker(**changes):
     """A crank-rocker with gravity, an offset mass centre, a force and a couple."""
-    linkage = fourbar.FourBar(
+    linkage = FourBar(
         0.3,
-        fourbar.Bar(0.1, 0.2),
-        fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
-        fourbar.Bar(0.22, 0.4),
+        Bar(0.1, 0.2),
+        Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
+        Bar(0.22, 0.4),
         ground_angle=0.2,
     )
     parts = {
         "linkage": linkage,
-        "motion": fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
+        "motion": Motion(Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
         "loads": (
-            fourbar.Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
-            fourbar.Load(3, moment=-0.2),
+            Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
+            Load(3, moment=-0.2),
         ),
-        "effects": (fourbar.Gravity(),),
+        "effects": (Gravity(),),
         "title": "crank-rocker",
     }
-    return fourbar.Scene(**{**parts, **changes})
+    return Scene(**{**parts, **changes})
 
 
 def bare(d, a, b, c, theta_1=0.0):
     """Make a linkage of bars without mass."""
-    moving = (fourbar.Bar(length) for length in (a, b, c))
-    return fourbar.FourBar(d, *moving, ground_angle=theta_1)
+    moving = (Bar(length) for length in (a, b, c))
+    return FourBar(d, *moving, ground_angle=theta_1)
 
 
 def draw_linkage(rng, integers=False):
@@ -56,33 +67,33 @@ def draw_linkage(rng, integers=False):
 
 def balance(left, omega_2=0.01):
     """Make a crank whose counterweight leaves a part of its weight's moment."""
-    linkage = fourbar.FourBar(
+    linkage = FourBar(
         0.3,
-        fourbar.Bar(0.1, 0.5, 0.001, (0.1 * (1.0 - left), math.pi)),
-        fourbar.Bar(0.25, 0.5, 0.004, (0.0, 0.0)),
-        fourbar.Bar(0.22, 0.4, 0.002, (0.0, 0.0)),
+        Bar(0.1, 0.5, 0.001, (0.1 * (1.0 - left), math.pi)),
+        Bar(0.25, 0.5, 0.004, (0.0, 0.0)),
+        Bar(0.22, 0.4, 0.002, (0.0, 0.0)),
     )
-    motion = fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 36), omega_2)
-    return fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    motion = Motion(Sweep(0.1, 0.1 + math.tau, 36), omega_2)
+    return Scene(linkage, motion, effects=(Gravity(),))
 
 
-def balanced_lamp(omega_2: float | None = None) -> fourbar.Scene:
+def balanced_lamp(omega_2: float | None = None) -> Scene:
     """Make a parallelogram lamp that a spring of no free length balances.
 
     Its stiffness is k = m g l/(r h).
     """
-    arms = fourbar.Bar(0.3), fourbar.Bar(0.06, 2.0), fourbar.Bar(0.3)
-    linkage = fourbar.FourBar(0.06, *arms, 0.5 * math.pi)
-    ends = fourbar.Place(1, (0.1, 0.0)), fourbar.Place(2, (0.08, 0.0))
-    spring = fourbar.Spring(*ends, 2.0 * 9.81 * 0.3 / (0.08 * 0.1))
-    swept = fourbar.Sweep(math.radians(-40.0), math.radians(60.0), 10)
-    effects = (fourbar.Gravity(), fourbar.Springs((spring,)))
-    return fourbar.Scene(linkage, fourbar.Motion(swept, omega_2), effects=effects)
+    arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
+    linkage = FourBar(0.06, *arms, 0.5 * math.pi)
+    ends = Place(1, (0.1, 0.0)), Place(2, (0.08, 0.0))
+    spring = Spring(*ends, 2.0 * 9.81 * 0.3 / (0.08 * 0.1))
+    swept = Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    effects = (Gravity(), Springs((spring,)))
+    return Scene(linkage, Motion(swept, omega_2), effects=effects)
 
 
 TURN = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + math.tau, 24), 10.0),
-    points=(fourbar.Point("P", 3, (0.1, 0.7)), fourbar.Point("J", 4, (0.05, 0.2))),
+    motion=Motion(Sweep(0.1, 0.1 + math.tau, 24), 10.0),
+    points=(Point("P", 3, (0.1, 0.7)), Point("J", 4, (0.05, 0.2))),
 )
 """A turn of the crank-rocker with points on coupler and output."""
 
@@ -95,15 +106,15 @@ def low_parallelogram(steps=8, **changes):
     antiparallelogram.
     """
     ground_angle = 0.2
-    linkage = replace(fourbar.uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)
+    linkage = replace(uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)
     start, stop = np.radians([200.0, 340.0]) + ground_angle
     parts = {
         "linkage": linkage,
-        "motion": fourbar.Motion(fourbar.Sweep(start, stop, steps), 6.0),
-        "effects": (fourbar.Gravity(),),
+        "motion": Motion(Sweep(start, stop, steps), 6.0),
+        "effects": (Gravity(),),
         "title": "parallelogram below its ground",
     }
-    return fourbar.Scene(**{**parts, **changes})
+    return Scene(**{**parts, **changes})
 
 
 def thesis(theta_2=None):
@@ -115,19 +126,19 @@ def thesis(theta_2=None):
     def inertia(mass, length):
         return mass * (length**2 + 0.0254**2) / 12.0
 
-    linkage = fourbar.FourBar(
+    linkage = FourBar(
         0.20,
-        fourbar.Bar(0.48, 57.0, 11.119275, (0.765, 0.0)),
-        fourbar.Bar(0.55, 0.544, inertia(0.544, 0.55)),
-        fourbar.Bar(0.20, 0.2, inertia(0.2, 0.20)),
+        Bar(0.48, 57.0, 11.119275, (0.765, 0.0)),
+        Bar(0.55, 0.544, inertia(0.544, 0.55)),
+        Bar(0.20, 0.2, inertia(0.2, 0.20)),
         ground_angle=math.radians(45.0),
     )
-    loads = [fourbar.Load(2, (10.0, 0.0), arm=(0.05, math.radians(265.0)))]
-    loads += [fourbar.Load(bar, moment=-0.15) for bar in (2, 3, 4)]
+    loads = [Load(2, (10.0, 0.0), arm=(0.05, math.radians(265.0)))]
+    loads += [Load(bar, moment=-0.15) for bar in (2, 3, 4)]
     angles = np.radians([135.0]) if theta_2 is None else theta_2
-    return fourbar.Scene(
+    return Scene(
         linkage,
-        fourbar.Motion(angles, 0.2244),
+        Motion(angles, 0.2244),
         4,
         tuple(loads),
         title="thesis",
@@ -162,7 +173,7 @@ def mirrored(scene):
         loads.append(replace(load, force=force, moment=-load.moment, **place))
     effects = []
     for effect in scene.effects:
-        turned = isinstance(effect, fourbar.Gravity)
+        turned = isinstance(effect, Gravity)
         effects.append(replace(effect, angle=-effect.angle) if turned else effect)
     return replace(
         scene,

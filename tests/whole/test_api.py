@@ -18,6 +18,31 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import (
+    Bar,
+    DrawnPins,
+    FourBar,
+    FourBarError,
+    Free,
+    Friction,
+    InputError,
+    Law,
+    Load,
+    Motion,
+    PinFriction,
+    Place,
+    Point,
+    PointDrive,
+    Rise,
+    Scene,
+    Sine,
+    Spring,
+    Springs,
+    Tolerance,
+    Torsion,
+    Viscous,
+    uniform,
+)
 from fourbar.cli import status
 from fourbar.files import save
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -55,12 +80,12 @@ def test_dir_shows_what_there_is_and_nothing_else():
 @pytest.mark.parametrize("number", [0.25, np.float64(0.25)])
 def test_a_number_where_a_bar_belongs_gets_a_sentence(number):
     words = r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar"
-    with pytest.raises(fourbar.InputError, match=words):
-        fourbar.FourBar(
+    with pytest.raises(InputError, match=words):
+        FourBar(
             0.3,
-            fourbar.Bar(0.1),
+            Bar(0.1),
             number,
-            fourbar.Bar(0.22),
+            Bar(0.22),
         )
 
 
@@ -88,7 +113,7 @@ OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 
 def list_fields(part):
     """Return the names of the fields of a record that a user states."""
-    if isinstance(part, fourbar.Motion):  # its constructor takes other names
+    if isinstance(part, Motion):  # its constructor takes other names
         return ["angle", "free", "law"]
     if is_dataclass(part):
         return [one.name for one in fields(part) if one.name not in MADE_ALONG]
@@ -118,16 +143,16 @@ def put(whole, path, value):
     if isinstance(first, int):
         return (*whole[:first], put(whole[first], rest, value), *whole[first + 1 :])
     part = put(getattr(whole, first), rest, value)
-    if isinstance(whole, fourbar.Motion):
+    if isinstance(whole, Motion):
         return whole.replace(**{first: part})
     change = replace if is_dataclass(whole) else type(whole)._replace
     return change(whole, **{first: part})
 
 
-PAIR, END = (0.1, 0.2), fourbar.Place(4, (0.1, 0.2))
-P = fourbar.Point("P", 2, PAIR)
+PAIR, END = (0.1, 0.2), Place(4, (0.1, 0.2))
+P = Point("P", 2, PAIR)
 AT_P, SPAN = {"point": "P"}, {"from_centre": PAIR}
-PULL = fourbar.Spring(fourbar.Place(2, **SPAN), END, 1.0, 0.2, 0.1, 0.1)
+PULL = Spring(Place(2, **SPAN), END, 1.0, 0.2, 0.1, 0.1)
 PINS = (0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05)
 MOTIONS = [
     {"theta_2": 1.0, "omega_2": 10.0, "alpha_2": 0.1, "branch": 1},
@@ -136,37 +161,37 @@ MOTIONS = [
     {"stroke": 0.25, "stroke_speed": 0.1, "stroke_acceleration": 0.1, "side": "left"},
 ]
 LAWS = [
-    fourbar.Sine(1.0, 0.5, 2.0, 3.0, 0.1, 8),
+    Sine(1.0, 0.5, 2.0, 3.0, 0.1, 8),
     *(
-        fourbar.Rise("345", PAIR, steps=8, **{f"theta_{bar}": angle})
+        Rise("345", PAIR, steps=8, **{f"theta_{bar}": angle})
         for bar, angle in ((3, 0.4), (4, 1.9))
     ),
     *(
-        fourbar.Law((0.0, 1.0, 2.0, 3.0), steps=2, **{name: angles})
+        Law((0.0, 1.0, 2.0, 3.0), steps=2, **{name: angles})
         for name, angles in (
             ("theta_3", (0.4, 0.5, 0.6, 0.5)),
             ("theta_4", (1.9, 2.0, 2.1, 2.0)),
         )
     ),
 ]
-STEEL = fourbar.Bar(0.1, density=7850.0, section=(0.02, 0.01))
+STEEL = Bar(0.1, density=7850.0, section=(0.02, 0.01))
 MADE = [
     *FAULT_SCENES.values(),
-    crank_rocker(drawing=fourbar.DrawnPins(*PINS)),
-    *(crank_rocker(motion=fourbar.Motion(law=law)) for law in LAWS),
-    crank_rocker(drive=fourbar.PointDrive(END, 0.3)),
-    crank_rocker(points=(P, fourbar.Point("Q", 3, **SPAN))),
-    crank_rocker(points=(P,), loads=(fourbar.Load(2, (1.0, 0.0), **AT_P),)),
-    crank_rocker(loads=(fourbar.Load(2, (1.0, 0.0), moment=0.1, **SPAN),)),
-    crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 0.1, False),)),
-    crank_rocker(effects=(fourbar.Springs((PULL,)),)),
+    crank_rocker(drawing=DrawnPins(*PINS)),
+    *(crank_rocker(motion=Motion(law=law)) for law in LAWS),
+    crank_rocker(drive=PointDrive(END, 0.3)),
+    crank_rocker(points=(P, Point("Q", 3, **SPAN))),
+    crank_rocker(points=(P,), loads=(Load(2, (1.0, 0.0), **AT_P),)),
+    crank_rocker(loads=(Load(2, (1.0, 0.0), moment=0.1, **SPAN),)),
+    crank_rocker(tolerances=(Tolerance("lengths.input", 0.1, False),)),
+    crank_rocker(effects=(Springs((PULL,)),)),
     crank_rocker(
         points=(P,),
-        effects=(fourbar.Springs((replace(PULL, start=fourbar.Place(2, **AT_P)),)),),
+        effects=(Springs((replace(PULL, start=Place(2, **AT_P)),)),),
     ),
     *(
         crank_rocker(linkage=replace(crank_rocker().linkage, input=bar))
-        for bar in (STEEL, fourbar.Bar(0.1, mass_per_length=4.2))
+        for bar in (STEEL, Bar(0.1, mass_per_length=4.2))
     ),
 ]
 """Scenes in which each field of each record is stated somewhere."""
@@ -178,7 +203,7 @@ def uses():
     def move(stated, name):
         drive = CYLINDER if "stroke" in stated else None
         return lambda x: fourbar.solve(
-            crank_rocker(motion=fourbar.Motion(**{**stated, name: x}), drive=drive)
+            crank_rocker(motion=Motion(**{**stated, name: x}), drive=drive)
         )
 
     found = {}
@@ -199,19 +224,19 @@ def uses():
 
 def calls():
     """Every public function, used: what is called, and good arguments."""
-    link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-    scene = fourbar.Scene(link, fourbar.Motion(1.0, 10.0))
-    still = replace(scene, motion=fourbar.Motion(1.0, 5.0, free=fourbar.Free(0.1, 2)))
+    link = uniform(0.3, 0.1, 0.25, 0.22)
+    scene = Scene(link, Motion(1.0, 10.0))
+    still = replace(scene, motion=Motion(1.0, 5.0, free=Free(0.1, 2)))
     solution = fourbar.solve(scene)
     study = fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
     sensitivity = fourbar.sensitivity(scene)
     torques = np.empty(1)
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
     at_O2 = {
-        fourbar.Viscous: 0.1,
-        fourbar.Friction: 0.1,
-        fourbar.PinFriction: (0.1, 0.01),
-        fourbar.Torsion: (0.1, 0.0, 0.1),
+        Viscous: 0.1,
+        Friction: 0.1,
+        PinFriction: (0.1, 0.01),
+        Torsion: (0.1, 0.0, 0.1),
     }
 
     def act(kind, number):
@@ -251,7 +276,7 @@ def calls():
             (link, 0.1, 0.1, 0, 1, 8),
         ),
         "uniform": (
-            lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]),
+            lambda *x: uniform(*x[:4], per_metre=x[4]),
             (0.3, 0.1, 0.25, 0.22, 1.0),
         ),
         "vary, a value": (
@@ -264,7 +289,7 @@ def calls():
                 samples=x[1],
                 seed=x[2],
             ),
-            ((fourbar.Tolerance("lengths.input", 1e-4),), 2, 0),
+            ((Tolerance("lengths.input", 1e-4),), 2, 0),
         ),
         **{
             name: (lambda *x: fourbar.solve(x[0], x[1], at=x[2], side=x[3]), good)
@@ -282,7 +307,7 @@ def calls():
             (torques,),
         ),
         "FourBar.bar": (link.bar, (3,)),
-        "Law.at": (fourbar.Law(times, angles).at, (np.array([0.5]),)),
+        "Law.at": (Law(times, angles).at, (np.array([0.5]),)),
         "Solution.to_csv": (
             lambda *x: solution.to_csv(x[0], degrees=x[1], units=x[2]),
             ("a.csv", True, {}),
@@ -321,7 +346,7 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
                     call(*arguments)
                     if wrong is ALWAYS_WRONG[-1]:
                         holes.append(f"{name} takes {wrong!r}")
-                except fourbar.FourBarError as error:
+                except FourBarError as error:
                     if "\n" in str(error):
                         holes.append(f"{name} given {wrong!r}: {error}")
                 except Exception as error:
@@ -341,7 +366,7 @@ def test_a_figure_is_refused_arguments_of_another_type(tmp_path):
     )
     wrong = (*ALWAYS_WRONG, tmp_path / "no" / "a.svg")
     for call, argument in itertools.product(calls, wrong):
-        with pytest.raises(fourbar.InputError) as caught:
+        with pytest.raises(InputError) as caught:
             call(argument)
         assert "\n" not in str(caught.value)
 
@@ -380,7 +405,7 @@ def test_the_public_formulas_agree_with_a_solution():
 def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert status(["classify", "0.3", "0.1", "0.25", "0.22", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
     assert document["name"] == "crank-rocker" and document["turning"] == [2]
     assert document["swing"]["output"] == fourbar.swing(linkage)
     assert document["time_ratio"] == fourbar.time_ratio(linkage)
@@ -403,7 +428,7 @@ def test_a_scene_draws_itself(tmp_path):
     assert drawing._repr_svg_().rstrip().endswith("</svg>")
     drawing.save(tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
-    with pytest.raises(fourbar.InputError, match="must be one of"):
+    with pytest.raises(InputError, match="must be one of"):
         crank_rocker().plot("pie")
 
 
@@ -411,21 +436,21 @@ def test_help_says_the_parameters():
     shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)
     for name in ("figure", "position", "units", "dimensions"):
         assert f"{name} :" in shown
-    shown = pydoc.render_doc(fourbar.Scene, renderer=pydoc.plaintext)
-    for field in fields(fourbar.Scene):
+    shown = pydoc.render_doc(Scene, renderer=pydoc.plaintext)
+    for field in fields(Scene):
         listed = re.search(rf"^ \|  .*\b{field.name}\b.* : ", shown, re.MULTILINE)
         assert listed, field.name
 
 
 def test_scenes_compare_by_value(tmp_path):
     def turn(*angles, **stated):
-        return crank_rocker(motion=fourbar.Motion(np.array(angles), 10.0, **stated))
+        return crank_rocker(motion=Motion(np.array(angles), 10.0, **stated))
 
     scene, same = turn(0.1, 0.2), turn(0.1, 0.2)
     assert scene == same and hash(scene) == hash(same) and scene != "scene"
     for changed in (
         turn(0.1, 0.3),
-        crank_rocker(motion=fourbar.Motion(0.1, 10.0)),
+        crank_rocker(motion=Motion(0.1, 10.0)),
         turn(0.1, 0.2, branch=-1),
         replace(scene, loads=scene.loads[:1]),
         replace(scene, drive_bar=4),
@@ -441,9 +466,9 @@ def test_loads_without_a_speed_are_pointed_to_the_static_torque(
     tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    save(crank_rocker(motion=fourbar.Motion(1.0)), "still.toml")
-    bars = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
-    save(fourbar.Scene(fourbar.FourBar(0.3, *bars), fourbar.Motion(1.0)), "bare.toml")
+    save(crank_rocker(motion=Motion(1.0)), "still.toml")
+    bars = (Bar(length) for length in (0.1, 0.25, 0.22))
+    save(Scene(FourBar(0.3, *bars), Motion(1.0)), "bare.toml")
     hint = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
     assert status(["analyze", "still.toml"]) == 0
     assert hint in capsys.readouterr().out
@@ -455,9 +480,9 @@ def test_loads_without_a_speed_are_pointed_to_the_static_torque(
 
 @pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])
 def test_a_command_on_no_branch_is_refused(wrong):
-    scene = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
+    scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
     command = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
         at = command._replace(angle=command.theta_2[: len(row)], branch=row)
-        with pytest.raises(fourbar.InputError, match=r"at\.branch = .*must be \+1"):
+        with pytest.raises(InputError, match=r"at\.branch = .*must be \+1"):
             fourbar.solve(scene, at=at)

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Free, Motion, Sweep
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
@@ -64,7 +65,7 @@ COMMENT_LIMIT = 65_536
 """Characters of a comment on GitHub."""
 
 
-SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
+SCENE = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 36), 5.0))
 SOLUTION = fourbar.solve(SCENE, "force")
 
 
@@ -203,10 +204,10 @@ def test_the_times_of_engines_are_those_of_the_run():
 @pytest.mark.parametrize(
     ("motion", "pictures"),
     [
-        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24)), 3),
-        (fourbar.Motion(1.0, 5.0), 1),  # the linkage alone
-        (fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)), 3),
-        (fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 5.0), 3),
+        (Motion(Sweep(0.0, 6.0, 24)), 3),
+        (Motion(1.0, 5.0), 1),  # the linkage alone
+        (Motion(1.0, 0.0, free=Free(0.2, 20)), 3),
+        (Motion(Sweep(0.0, 6.0, 24), 5.0), 3),
     ],
     ids=["positions", "one position", "released", "sweep"],
 )

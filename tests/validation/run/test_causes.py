@@ -14,6 +14,19 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    Motion,
+    Place,
+    Spring,
+    Springs,
+    Sweep,
+    Torsion,
+    Viscous,
+)
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.check.mistakes import Explanation
@@ -31,7 +44,7 @@ from tests.support.guests import PLAIN
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 30), 10.0, 5.0),
+    motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0),
     loads=(),
 )
 CAPABILITIES = Path(__file__).parents[3] / "models" / "capabilities"
@@ -425,7 +438,7 @@ LINE_DRIVEN = ("stroke_output", "cylinder_2_3", "push_output")
 def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     """The weight of the coupler is what the balances with and without it differ by."""
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
-    scene = replace(scene, effects=(fourbar.Gravity(),))
+    scene = replace(scene, effects=(Gravity(),))
     linkage = scene.linkage
     massless = replace(
         linkage.coupler,
@@ -461,23 +474,23 @@ def scale(without, factor):
     return partial(Altered, change)
 
 
-GROUND, COUPLER = fourbar.Place(1, (0.3, 0.2)), fourbar.Place(3, (0.1, 0.4))
-SPRING = fourbar.Spring(
+GROUND, COUPLER = Place(1, (0.3, 0.2)), Place(3, (0.1, 0.4))
+SPRING = Spring(
     GROUND,
     COUPLER,
     90.0,
     0.1,
     4.0,
 )
-SLACK = fourbar.Spring(
+SLACK = Spring(
     GROUND,
-    fourbar.Place(4, (0.1, 0.0)),
+    Place(4, (0.1, 0.0)),
     50.0,
     0.1,
 )
-TORSION = fourbar.Torsion((("O4", 2.0, 1.0, 0.0),))
+TORSION = Torsion((("O4", 2.0, 1.0, 0.0),))
 BOTH, ONE, SLIPPED, GRASPED = (
-    fourbar.Springs(springs)
+    Springs(springs)
     for springs in (
         (SPRING, SLACK),
         (SPRING,),
@@ -492,12 +505,12 @@ ACTING = {
     "the free length of spring 1": (ONE, GRASPED),
     "the rest angle of torsion spring 1": (
         TORSION,
-        fourbar.Torsion((("O4", 2.0, 0.0, 0.0),)),
+        Torsion((("O4", 2.0, 0.0, 0.0),)),
     ),
-    "the viscous damping": (fourbar.Viscous((("O4", 0.2),)),),
+    "the viscous damping": (Viscous((("O4", 0.2),)),),
     "the torsion springs": (TORSION,),
-    "the flywheel": (fourbar.Flywheel(0.3),),
-    "the dry friction": (fourbar.Friction((("O4", 0.5),)),),
+    "the flywheel": (Flywheel(0.3),),
+    "the dry friction": (Friction((("O4", 0.5),)),),
 }
 """What acts, and what is left where a part of it is missing."""
 DONE = {"missing": 0.0, "doubled": 2.0, "reversed": -1.0}
@@ -506,7 +519,7 @@ DONE = {"missing": 0.0, "doubled": 2.0, "reversed": -1.0}
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "word"), list(zip(ACTING, cycle(DONE))))
 def test_what_acts_may_be_left_out_doubled_or_reversed(name, word):
-    bare = replace(SCENE, effects=(fourbar.Gravity(),))
+    bare = replace(SCENE, effects=(Gravity(),))
     acting, *left = ACTING[name]
     scene, without = (
         replace(bare, effects=(*bare.effects, *effects)) for effects in ([acting], left)
@@ -529,11 +542,11 @@ def weigh(name, of_mass, of_inertia):
 
 
 def with_load(*from_pin):
-    load = fourbar.Load(3, (3.0, 0.7), from_pin=from_pin)
+    load = Load(3, (3.0, 0.7), from_pin=from_pin)
     return replace(SCENE, loads=(load,))
 
 
-DAMPED = replace(SCENE, effects=(fourbar.Gravity(), fourbar.Viscous((("O4", 0.2),))))
+DAMPED = replace(SCENE, effects=(Gravity(), Viscous((("O4", 0.2),))))
 OTHER_SCENES = {
     "coupler: mass of the input": (
         SCENE,
@@ -636,7 +649,7 @@ def test_what_explains_the_first_rows_alone_hides_no_mistake(monkeypatch):
         return tried(judge, *others)
 
     monkeypatch.setattr(search, "explain", mislead)
-    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 5.0)
+    motion = Motion(Sweep(0.1, 6.0, 60), 10.0, 5.0)
     scene = replace(SCENE, motion=motion)
     guest = make_guest(replacements=REPLACED["gravity is missing"])
     assert find_causes(guest, scene) == ["gravity is missing"]
@@ -662,7 +675,7 @@ def test_single_precision_is_named_and_a_smooth_error_of_its_size_is_not():
 
 def loaded(**stated):
     """Return the scene with a force on bar 4, placed as stated."""
-    return replace(SCENE, loads=(fourbar.Load(4, (3.0, 0.7), **stated),))
+    return replace(SCENE, loads=(Load(4, (3.0, 0.7), **stated),))
 
 
 PLACE = (0.05, 1.0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, FourBar, Friction, Motion, Sweep, uniform
 from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene, command, with_signs
@@ -125,11 +126,11 @@ class OffAtTheReversal(Echo):
 
 def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
     """At the dead centre of bar 4, with dry friction at O4."""
-    linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    linkage = uniform(0.3, 0.1, 0.25, 0.22)
     d, a, b, c = linkage.lengths
     psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
-    motion = fourbar.Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
-    scene = Scene(linkage, motion, effects=(fourbar.Friction.at(O4=0.5),))
+    motion = Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
+    scene = Scene(linkage, motion, effects=(Friction.at(O4=0.5),))
     rows = rows_of(OffAtTheReversal, scene)
     for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]
@@ -141,7 +142,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
             assert row.theta_2 == psi, quantity
 
 
-ROCKER = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
+ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 LIMIT = limit_positions(ROCKER)[0].theta_2
 
 
@@ -151,9 +152,7 @@ def test_where_no_digit_is_left_nothing_is_judged():
     near, *_ = (
         scene
         for side in (1.0, -1.0)
-        for scene in [
-            Scene(ROCKER, fourbar.Motion(np.array([LIMIT + side * 1e-13]), 1.0))
-        ]
+        for scene in [Scene(ROCKER, Motion(np.array([LIMIT + side * 1e-13]), 1.0))]
         if fourbar.solve(scene).assembled.all()
     )
     torque = rows_of(Echo, near)["torque"]
@@ -168,7 +167,7 @@ class Elsewhere(Echo):
 
 def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails():
     thetas = LIMIT + np.array([0.2, 0.3, 0.4, 0.5, 0.6, 1e-12])
-    rows = rows_of(Elsewhere, Scene(ROCKER, fourbar.Motion(thetas, 1.0)))
+    rows = rows_of(Elsewhere, Scene(ROCKER, Motion(thetas, 1.0)))
     assert rows["assembled"].verdict == FAILS
 
 
@@ -188,7 +187,7 @@ def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it(
 
 
 def test_positions_alone_need_no_forces():
-    scene = replace(crank_rocker(), motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 10)))
+    scene = replace(crank_rocker(), motion=Motion(Sweep(0.0, 6.0, 10)))
     rows = judge("scene", scene, []).rows
     assert {row.quantity for row in rows} == {"closure"}
 
@@ -215,18 +214,16 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     assert make_prediction(engine, scene, commanded, answer) is None
 
 
-PARALLELOGRAM = fourbar.uniform(1.0, 0.5, 1.0, 0.5)
+PARALLELOGRAM = uniform(1.0, 0.5, 1.0, 0.5)
 FIVE = np.linspace(0.3, 2.0, 5)
-HEAVY = fourbar.FourBar(
-    3.0, fourbar.Bar(1.0, 1.0), fourbar.Bar(2.5, 1e308, 1.0), fourbar.Bar(2.2, 1.0)
-)
+HEAVY = FourBar(3.0, Bar(1.0, 1.0), Bar(2.5, 1e308, 1.0), Bar(2.2, 1.0))
 WITHHELD = {
     "no torque on bar 3 of a parallelogram": (
-        Scene(PARALLELOGRAM, fourbar.Motion(FIVE, 1.0), 3),
+        Scene(PARALLELOGRAM, Motion(FIVE, 1.0), 3),
         "the formulas state no value: 5 no_torque",
     ),
     "beyond the range of doubles": (
-        Scene(HEAVY, fourbar.Motion(FIVE, 10.0)),
+        Scene(HEAVY, Motion(FIVE, 10.0)),
         "the formulas state no value: 5 overflow",
     ),
 }
@@ -250,7 +247,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared(what, adapter):
 
 def test_positions_without_a_value_are_counted_next_to_those_that_were_compared():
     """An antiparallelogram driven by its coupler, through its change point."""
-    motion = fourbar.Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0, branch=-1)
+    motion = Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0, branch=-1)
     rows = rows_of(AnswersAnyway, Scene(PARALLELOGRAM, motion, 3))
     assert rows["torque"].verdict == AGREES
     for quantity in ("torque", "omega_3"):

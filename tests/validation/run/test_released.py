@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-import fourbar
+from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion, uniform
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
@@ -25,11 +25,9 @@ def falling(coupler=0.15):
 
     With a coupler of 0.12 m that is a change point.
     """
-    linkage = fourbar.FourBar(
-        0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4)
-    )
-    released = fourbar.Motion(1.0, 0.0, free=fourbar.Free(1.0, 100))
-    return Scene(linkage, released, effects=(fourbar.Gravity(),))
+    linkage = FourBar(0.3, Bar(0.2, 0.2), Bar(coupler, 0.5), Bar(0.22, 0.4))
+    released = Motion(1.0, 0.0, free=Free(1.0, 100))
+    return Scene(linkage, released, effects=(Gravity(),))
 
 
 BEFORE_THE_LINE = 2e-6
@@ -63,13 +61,11 @@ def find_spread_by_energy(scene, solution, instant, engine):
             solution[f"omega_{number}"][instant],
         )
         kinetic += 0.5 * (bar.mass * v @ v + bar.moment_of_inertia * omega**2)
-    rest = fourbar.Free(1.0 - times[instant], len(times) - 1 - instant)
+    rest = Free(1.0 - times[instant], len(times) - 1 - instant)
     spread = 0.0
     for change in (lost, -lost):
         speed = solution.omega_2[instant] * np.sqrt(1.0 + change / kinetic)
-        motion = fourbar.Motion(
-            float(solution.theta_2[instant]), float(speed), free=rest
-        )
+        motion = Motion(float(solution.theta_2[instant]), float(speed), free=rest)
         other = solve(replace(scene, motion=motion))
         apart = np.abs(other.theta_2 - solution.theta_2[instant:])
         spread = max(spread, float(apart.max()))
@@ -103,7 +99,7 @@ def test_every_engine_is_judged_through_limits_and_change_points(coupler):
         )
         assert spread < MOST_SPREAD[coupler][engine], (engine, spread)
         assert passed.error < BEFORE_THE_LINE + spread, passed
-    before = scene.motion.replace(free=fourbar.Free(first / 100.0, first))
+    before = scene.motion.replace(free=Free(first / 100.0, first))
     rows = judge("falling", replace(scene, motion=before)).rows
     for engine in free.FORWARD:
         assert row(rows, engine, "theta_2").error < BEFORE_THE_LINE
@@ -114,12 +110,10 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     branch,
 ):
     """The couples of dry friction that hold it are those of its own assembly."""
-    friction = fourbar.Friction.at(**dict.fromkeys(("O2", "A", "B", "O4"), 5.0))
-    motion = fourbar.Motion(
-        np.radians(250.0), 0.0, branch=branch, free=fourbar.Free(0.1, 2)
-    )
-    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    scene = Scene(linkage, motion, effects=(fourbar.Gravity(), friction))
+    friction = Friction.at(**dict.fromkeys(("O2", "A", "B", "O4"), 5.0))
+    motion = Motion(np.radians(250.0), 0.0, branch=branch, free=Free(0.1, 2))
+    linkage = uniform(0.3, 0.1, 0.3, 0.1)
+    scene = Scene(linkage, motion, effects=(Gravity(), friction))
     solution = solve(scene)
     assert solution.omega_2 is not None and not solution.omega_2.any()
     rows = judge("held", scene).rows
@@ -134,7 +128,7 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
 @pytest.mark.parametrize("bar", ["coupler", "output"])
 def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
     scene = falling()
-    massless = fourbar.Bar(getattr(scene.linkage, bar).length)
+    massless = Bar(getattr(scene.linkage, bar).length)
     scene = replace(scene, linkage=replace(scene.linkage, **{bar: massless}))
     answer = PinocchioReleased().release(scene, np.zeros(1))
     assert answer.refusal.endswith("no inertia: the open tree has no mass matrix")
@@ -181,9 +175,9 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
 
     Kinetic energy and work are equal, and their difference is no scale.
     """
-    pushed = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
+    pushed = replace(falling(), effects=(), loads=(Load(4, moment=0.1),))
     for steps in (20, 200):  # 10 and 1 ms apart
-        motion = pushed.motion.replace(free=fourbar.Free(0.2, steps))
+        motion = pushed.motion.replace(free=Free(0.2, steps))
         rows = judge("pushed", replace(pushed, motion=motion)).rows
         assert not any(row.failed for row in rows)
         energy = row(rows, "mujoco-forward", "energy")

@@ -6,6 +6,23 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import (
+    Bar,
+    Flywheel,
+    Friction,
+    Gravity,
+    InputError,
+    Load,
+    Motion,
+    PinFriction,
+    PointDrive,
+    Scene,
+    Spring,
+    Springs,
+    Sweep,
+    Torsion,
+    Viscous,
+)
 from fourbar.effects import Place
 from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
@@ -21,45 +38,41 @@ from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
 EVERYTHING = (
-    fourbar.Gravity(9.81, -1.2),
-    fourbar.Viscous.at(A=0.02, O4=0.03),
-    fourbar.Springs(
-        (fourbar.Spring(Place(1, (0.1, -1.0)), Place(3, (0.2, 0.4)), 90.0, 0.1, 2.0),)
-    ),
-    fourbar.Torsion.at(A=(0.4, 0.3, 0.2), O4=(0.3, 1.0, -0.1), B=(0.2, 0.8, 0.0)),
-    fourbar.Flywheel(0.02, 4),
+    Gravity(9.81, -1.2),
+    Viscous.at(A=0.02, O4=0.03),
+    Springs((Spring(Place(1, (0.1, -1.0)), Place(3, (0.2, 0.4)), 90.0, 0.1, 2.0),)),
+    Torsion.at(A=(0.4, 0.3, 0.2), O4=(0.3, 1.0, -0.1), B=(0.2, 0.8, 0.0)),
+    Flywheel(0.02, 4),
 )
 LOADS = (
-    fourbar.Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
-    fourbar.Load(
+    Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
+    Load(
         3,
         (2.0, -1.4),
         from_pin=(0.1, 0.3),
         frame="bar",
         moment=-0.2,
     ),
-    fourbar.Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
+    Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
 )
-AT_A_POINT = fourbar.PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
+AT_A_POINT = PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
 SCENES = {
     "everything": crank_rocker(loads=LOADS, effects=EVERYTHING),
     "arm": crank_rocker(),
     "friction": crank_rocker(
         loads=LOADS,
-        effects=(fourbar.Friction.at(A=0.1), fourbar.PinFriction.at(B=(0.1, 0.01))),
+        effects=(Friction.at(A=0.1), PinFriction.at(B=(0.1, 0.01))),
     ),
     "drive on the coupler": crank_rocker(loads=LOADS, drive_bar=3),
     "drive on the output": crank_rocker(loads=LOADS, drive_bar=4),
     "cylinder": crank_rocker(loads=LOADS, drive=ON_COUPLER),
     "point": crank_rocker(loads=LOADS, drive=AT_A_POINT),
     "bar 4 commanded": crank_rocker(
-        motion=fourbar.Motion(theta_4=fourbar.Sweep(2.3, 2.8, 12), omega_4=2.0),
+        motion=Motion(theta_4=Sweep(2.3, 2.8, 12), omega_4=2.0),
         loads=LOADS,
     ),
     "bar 3 commanded": crank_rocker(
-        motion=fourbar.Motion(
-            theta_3=fourbar.Sweep(0.4, 0.7, 12), omega_3=-2.0, branch=-1
-        ),
+        motion=Motion(theta_3=Sweep(0.4, 0.7, 12), omega_3=-2.0, branch=-1),
         loads=LOADS,
     ),
 }
@@ -81,16 +94,16 @@ def list_held(scene):
 @pytest.mark.parametrize(("first", "fit"), [(0.8 + 1e-5, 2), (3.0, 3)])
 def test_a_spring_whose_ends_nearly_meet_is_not_judged_there(first, fit):
     """The rounding of its ends turns its line; at the other positions it is judged."""
-    spring = fourbar.Spring(
+    spring = Spring(
         Place(1, (0.1, 0.8)),
         Place(2, (0.1, 0.0)),
         80.0,
         0.05,
     )
     scene = crank_rocker(
-        motion=fourbar.Motion([first, 2.0, 2.5], 10.0),
+        motion=Motion([first, 2.0, 2.5], 10.0),
         loads=(),
-        effects=(fourbar.Springs((spring,)),),
+        effects=(Springs((spring,)),),
     )
     few = transformed._take_plain_positions(make_question("scene", scene, ()))
     assert few.fit.sum() == fit
@@ -124,7 +137,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
             ],
         ),
         (
-            crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]))),
+            crank_rocker(motion=Motion(np.array([0.1, 0.2]))),
             ["scenes stated otherwise: the scene states positions only"],
         ),
     ],
@@ -145,7 +158,7 @@ CHANGE_POINTS = {
 
 
 def make_linkage(d, *lengths):
-    bars = [fourbar.Bar(length, 0.8, centre=(0.3 * length, 0.2)) for length in lengths]
+    bars = [Bar(length, 0.8, centre=(0.3 * length, 0.2)) for length in lengths]
     return FourBar(d, *bars, ground_angle=0.4)
 
 
@@ -159,15 +172,13 @@ def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
     quarters = np.arange(0.2, 2.0 * np.pi, 0.5 * np.pi)
     turns = np.array((0.0, 0.0, 6.28, -12.56))
     for start, branch in product(quarters + turns, (1, -1)):
-        angles = fourbar.Sweep(start, start + 1.5, 5)
+        angles = Sweep(start, start + 1.5, 5)
         stated = {f"theta_{command}": angles, f"omega_{command}": 1.3}
-        motion = fourbar.Motion(**stated, branch=branch)
-        scene = fourbar.Scene(
-            make_linkage(*lengths), motion, effects=(fourbar.Gravity(),)
-        )
+        motion = Motion(**stated, branch=branch)
+        scene = Scene(make_linkage(*lengths), motion, effects=(Gravity(),))
         try:
             held = list_held(scene)
-        except fourbar.InputError as error:
+        except InputError as error:
             assert "stands still" in str(error)  # as bar 3 of a kite does
             continue
         if held:  # none of the positions may be well-conditioned
@@ -193,16 +204,16 @@ def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(command, gap
         sense, branch = sign
         ground = sum(lengths) - 2.0 * lengths[less]
         missed = sense * gap * np.spacing(max(ground, *lengths))
-        stated = {f"theta_{command}": fourbar.Sweep(0.9, 5.9, 7)}
+        stated = {f"theta_{command}": Sweep(0.9, 5.9, 7)}
         stated |= {f"omega_{command}": 1.3, "branch": branch}
         linkage = make_linkage(ground + missed, *lengths)
-        judged += len(list_held(fourbar.Scene(linkage, fourbar.Motion(**stated))))
+        judged += len(list_held(Scene(linkage, Motion(**stated))))
     assert judged >= 20
 
 
 def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judged():
-    motion = fourbar.Motion(fourbar.Sweep(0.9, 5.9, 7), 1.3)
-    springs = fourbar.Torsion.at(A=(0.4, 0.3, 0.2))
+    motion = Motion(Sweep(0.9, 5.9, 7), 1.3)
+    springs = Torsion.at(A=(0.4, 0.3, 0.2))
     for d, many in ((0.3 + 4 * np.spacing(0.3), 1), (0.31, 0)):
         linkage = make_linkage(
             d,
@@ -210,7 +221,7 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
             0.25,
             0.15,
         )
-        question, rows = ask(fourbar.Scene(linkage, motion, effects=(springs,)))
+        question, rows = ask(Scene(linkage, motion, effects=(springs,)))
         assert bool(rows) == (many == 0)
         assert sum("wound" in line for line in question.left_out) == many
 
@@ -242,13 +253,13 @@ def test_one_number_that_differs_fails_its_row(name, monkeypatch):
 
 def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
     """As a fault would: gravity from the ground's line in place of the world's."""
-    field = fourbar.Gravity.field.fget
+    field = Gravity.field.fget
     held = crank_rocker().linkage.ground_angle
 
     def turn(load):
         return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))
 
-    monkeypatch.setattr(fourbar.Gravity, "field", property(turn))
+    monkeypatch.setattr(Gravity, "field", property(turn))
     _, rows = ask(crank_rocker())
     assert rows["turned"].failed and rows["mirrored"].failed
 
@@ -266,4 +277,4 @@ def test_a_place_of_the_coupler_is_read_from_its_other_pin():
 def test_every_effect_of_the_package_can_be_stated_otherwise():
     """Without a conversion, scenes with the effect would silently lose the check."""
     packaged = fourbar.effects.list_kinds().values()
-    assert {*_CONVERTED} == {fourbar.Load, *packaged}
+    assert {*_CONVERTED} == {Load, *packaged}

@@ -12,6 +12,7 @@ import pytest
 
 import fourbar
 import fourbar_validation.run.question
+from fourbar import Motion, Sweep, uniform
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer
@@ -59,9 +60,7 @@ from tests.support.scenes import crank_rocker
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
 AT_CHANGE_POINTS = dict(families.approach_change_point(distances=(1e-2, 1e-8)))
 THROUGH_CHANGE_POINTS = dict(families.sweep_change_point(steps=16))
-SWEEP = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0)
-)
+SWEEP = crank_rocker(motion=Motion(Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
 
 
 def test_the_suite_is_made_from_its_parameters_alone():
@@ -78,7 +77,7 @@ def take_last(family):
     """Return the last scene of a family, at few positions."""
     *_, (_, scene) = family.scenes()
     sweep = scene.motion.theta_2
-    if isinstance(sweep, fourbar.Sweep):
+    if isinstance(sweep, Sweep):
         motion = scene.motion.replace(angle=replace(sweep, steps=12))
         scene = replace(scene, motion=motion)
     return scene
@@ -415,8 +414,8 @@ def test_a_golden_file_of_others_swept_through_its_change_point():
 
     Others stored -99 910 N m there.
     """
-    linkage = fourbar.uniform(4.0, 1.0, 3.0, 2.0)
-    scene = Scene(linkage, fourbar.Motion(np.radians([170.0, 180.0, 190.0]), 10.0))
+    linkage = uniform(4.0, 1.0, 3.0, 2.0)
+    scene = Scene(linkage, Motion(np.radians([170.0, 180.0, 190.0]), 10.0))
     s = fourbar.solve(scene)
     assert s.status == ["ok", "change_point", "ok"]
     # the motion is its own mirror image in the ground's line, so that the torque is odd
@@ -444,7 +443,7 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name
 
 
 def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches():
-    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0)
-    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), motion)
+    motion = Motion(Sweep(0.1, 6.0, 4), 1e-9, 100.0)
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
     row = compare_shipped("quickening", scene, fourbar.command(scene))
     assert row.verdict == AGREES, row
