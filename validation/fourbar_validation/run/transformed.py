@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.effects import (
-    Effect,
     Flywheel,
     Friction,
     Gravity,
@@ -24,6 +23,7 @@ from fourbar.effects import (
     PinFriction,
     Place,
     PointDrive,
+    Spring,
     Springs,
     Torsion,
     Viscous,
@@ -229,15 +229,16 @@ def _take_plain_positions(question: Question) -> _Few:
         raise NotAskedError("the scene states positions only")
     if at.moves_stroke or at.time is not None:
         raise NotAskedError("a stroke or a motion law is commanded")
-    for term in (*scene.loads, *scene.effects):
-        if type(term) not in _CONVERTED:
+    placed = state_from_pins(scene)
+    convert = _SceneConversion(scene.linkage).term
+    for term in (*placed.loads, *placed.effects):
+        if isinstance(term, Load) and term.table is not None:
+            raise NotAskedError("a load over a table has no counterpart")
+        if convert(term) is None:
             raise NotAskedError(f"the effect {term.key!r} has no counterpart")
-    if any(load.table is not None for load in scene.loads):
-        raise NotAskedError("a load over a table has no counterpart")
     in_line = scene.linkage.ground_angle + np.array([0.0, math.pi])
     if scene.counts_turns and mark_touching(scene.linkage, in_line).any():
         raise NotAskedError("rounding decides how far its torsion springs are wound")
-    placed = state_from_pins(scene)
     fit = (
         (solution.status_code == OK)
         & (solution.condition >= WELL_CONDITIONED)
@@ -320,6 +321,8 @@ def _solve_from_first(scene: Scene, command: Command) -> Solution:
 class _SceneConversion:
     """Conversion of each number of a scene."""
 
+    linkage: FourBar
+    """Linkage of the scene."""
     length: float = 1.0
     """Factor of lengths, accelerations and forces. Of couples and inertias it is its
     square.
@@ -331,9 +334,14 @@ class _SceneConversion:
     exchanged: bool = False
     """Read from the other end."""
 
-    def number(self, bar: int) -> int:
+    @property
+    def square(self) -> float:
+        """Return the factor of couples and inertias."""
+        return self.length * self.length
+
+    def number(self, bar: int | None) -> int | None:
         """Convert the number of a bar."""
-        return _OTHER_BAR[bar] if self.exchanged else bar
+        return _OTHER_BAR.get(bar or 0, bar) if self.exchanged else bar
 
     def pin(self, pin: str) -> str:
         """Convert the name of a pin."""
@@ -343,32 +351,103 @@ class _SceneConversion:
         """Convert a place or an arm of fixed direction from its bar's line."""
         return self.length * pair[0], self.sense * pair[1]
 
-    def direction(self, angle: float, frame: str = "world") -> float:
-        """Convert the direction of a force."""
-        return self.sense * angle + (self.turn if frame == "world" else 0.0)
+    def direction(self, angle: float, frame: str = "world", bar: int = 0) -> float:
+        """Convert the direction of a force, in the world or from a bar's line."""
+        if frame == "world":
+            return self.sense * angle + self.turn
+        # the coupler's line points the other way
+        return self.sense * angle + math.pi * (self.exchanged and bar == 3)
 
-    def place(self, place: Place, linkage: FourBar) -> Place:
+    def place(self, place: Place) -> Place:
         """Convert a place, which is a pair from the first pin of its bar."""
         assert place.from_pin is not None
         if not self.exchanged:
             return Place(place.bar, self.pair(place.from_pin))
         if place.bar in (2, 4):
             return Place(_OTHER_BAR[place.bar], place.from_pin)
-        length = linkage.lengths[place.bar - 1]
+        length = self.linkage.lengths[place.bar - 1]
         return Place(place.bar, _from_other_end(length, place.from_pin))
 
-    def bar(self, bar: Bar, *, reversed_: bool = False) -> Bar:
+    def bar(self, number: int) -> Bar:
         """Convert a bar; the coupler is read from its second pin."""
+        bar = self.linkage.bar(number)
         assert bar.inertia is not None and bar.centre is not None
         centre = bar.centre
-        if reversed_:
+        if self.exchanged and number == 3:
             centre = _from_other_end(bar.length, centre)
         return copy_with(
             bar,
             length=self.length * bar.length,
-            inertia=self.length * self.length * bar.inertia,
+            inertia=self.square * bar.inertia,
             centre=self.pair(centre),
         )
+
+    def torsion(self, row: tuple[str, float, float, float]) -> tuple[Any, ...]:
+        """Convert the spring at a pin.
+
+        Read from the other end two bars at A or B change their order.
+        """
+        pin, stiffness, rest, preload = row
+        sense, line = self.sense, 0.0
+        if self.exchanged:
+            sense, line = -1.0 if pin in ("A", "B") else 1.0, -math.pi
+        couple = self.square * sense * preload
+        return self.pin(pin), self.square * stiffness, sense * rest + line, couple
+
+    def load(self, load: Load) -> Load:
+        """Convert a load that is no table."""
+        force = None
+        places: dict[str, Any] = {}
+        if load.force is not None:
+            size, angle = load.force
+            direction = self.direction(angle, load.frame, load.bar)
+            force = (self.length * size, direction)
+        if load.arm is not None:
+            distance, angle = load.arm
+            places["arm"] = (self.length * distance, self.direction(angle))
+        elif load.place is not None:
+            places["from_pin"] = self.place(load.place).from_pin
+        moment = self.square * self.sense * load.moment
+        bar = self.number(load.bar) or load.bar
+        return Load(bar, force, **places, moment=moment, frame=load.frame)
+
+    def term(self, term: Any) -> Any:
+        """Convert a load, an effect or the drive; None if it has no counterpart."""
+        match term:
+            case Load(table=None):
+                return self.load(term)
+            case Gravity():
+                size = self.length * term.magnitude
+                return Gravity(size, self.direction(term.angle))
+            case Viscous() | Friction():  # their couples have no sense of their own
+                rows = {self.pin(pin): self.square * x for pin, x in term.rows}
+                return type(term).at(**rows)
+            case PinFriction():
+                pins = (
+                    (self.pin(pin), mu, self.length * r) for pin, mu, r in term.pins
+                )
+                return PinFriction(tuple(pins))
+            case Springs():
+                return Springs(tuple(map(self.term, term.springs)))
+            case Spring():
+                return replace(
+                    term,
+                    start=self.place(term.start),
+                    end=self.place(term.end),
+                    length=self.length * term.length,
+                    preload=self.length * term.preload,
+                    stroke=None if term.stroke is None else self.length * term.stroke,
+                )
+            case Torsion():
+                return Torsion(tuple(map(self.torsion, term.springs)))
+            case Flywheel():
+                return Flywheel(self.square * term.inertia, self.number(term.bar) or 2)
+            case LinearDrive():
+                return LinearDrive(self.place(term.start), self.place(term.end))
+            case PointDrive(place, direction, frame):
+                turned = self.direction(direction, frame, place.bar)
+                return PointDrive(self.place(place), turned, frame)
+        return None
 
 
 def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, float]:
@@ -376,173 +455,26 @@ def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, fl
     return cmath.polar(length - cmath.rect(*pair))
 
 
-def _convert_load(
-    load: Load,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Load:
-    force = None
-    places: dict[str, Any] = {}
-    if load.force is not None:
-        # a direction from the bar's line turns with the coupler's line
-        of_coupler = load.bar == 3 and load.frame == "bar"
-        turned = math.pi if to.exchanged and of_coupler else 0.0
-        size, angle = load.force
-        direction = to.direction(angle, load.frame) + turned
-        force = (to.length * size, direction)
-    if load.arm is not None:
-        distance, angle = load.arm
-        places["arm"] = (to.length * distance, to.direction(angle))
-    elif load.place is not None:
-        places["from_pin"] = to.place(load.place, linkage).from_pin
-    moment = to.length * to.length * to.sense * load.moment
-    return Load(to.number(load.bar), force, **places, moment=moment, frame=load.frame)
-
-
-def _convert_gravity(
-    effect: Gravity,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Gravity:
-    return Gravity(to.length * effect.magnitude, to.direction(effect.angle))
-
-
-def _convert_couples(
-    effect: Any,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Any:
-    """Convert damping and dry friction, whose couples have no sense of their own."""
-    square = to.length * to.length
-    converted = {to.pin(pin): square * number for pin, number in effect.rows}
-    return type(effect).at(**converted)
-
-
-def _convert_pin_friction(
-    effect: PinFriction,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> PinFriction:
-    return PinFriction(
-        tuple(
-            (to.pin(pin), coefficient, to.length * radius)
-            for pin, coefficient, radius in effect.pins
-        )
-    )
-
-
-def _convert_springs(
-    effect: Springs,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Springs:
-    return Springs(
-        tuple(
-            replace(
-                spring,
-                start=to.place(spring.start, linkage),
-                end=to.place(spring.end, linkage),
-                length=to.length * spring.length,
-                preload=to.length * spring.preload,
-                stroke=None if spring.stroke is None else to.length * spring.stroke,
-            )
-            for spring in effect.springs
-        )
-    )
-
-
-def _convert_torsion(
-    effect: Torsion,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Torsion:
-    """Convert springs at pins.
-
-    Read from the other end two bars at A or B change their order.
-    """
-    rows = []
-    square = to.length * to.length
-    for pin, stiffness, rest, preload in effect.springs:
-        sense = to.sense
-        line = 0.0
-        if to.exchanged:
-            sense = -1.0 if pin in ("A", "B") else 1.0
-            line = -math.pi
-        rows.append(
-            (
-                to.pin(pin),
-                square * stiffness,
-                sense * rest + line,
-                square * sense * preload,
-            )
-        )
-    return Torsion(tuple(rows))
-
-
-def _convert_flywheel(
-    effect: Flywheel,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Flywheel:
-    inertia = to.length * to.length * effect.inertia
-    return Flywheel(inertia, to.number(effect.bar))
-
-
-_CONVERTED: dict[type[Effect], Callable[[Any, _SceneConversion, FourBar], Any]] = {
-    Load: _convert_load,
-    Gravity: _convert_gravity,
-    Viscous: _convert_couples,
-    Friction: _convert_couples,
-    PinFriction: _convert_pin_friction,
-    Springs: _convert_springs,
-    Torsion: _convert_torsion,
-    Flywheel: _convert_flywheel,
-}
-"""Loads and effects that can be stated otherwise."""
 _NOT_IN_PARTS = (Friction, PinFriction)
 """Effects that are not the sum of what each adds."""
 
 
-def _convert_drive(
-    drive: Any,
-    to: _SceneConversion,
-    linkage: FourBar,
-) -> Any:
-    if isinstance(drive, LinearDrive):
-        ends = (to.place(end, linkage) for end in (drive.start, drive.end))
-        return LinearDrive(*ends)
-    if not isinstance(drive, PointDrive):
-        return None
-    direction = to.direction(drive.direction, drive.frame)
-    if to.exchanged and drive.place.bar == 3 and drive.frame == "bar":
-        direction += math.pi
-    return PointDrive(to.place(drive.place, linkage), direction, drive.frame)
-
-
-def _convert(scene: Scene, to: _SceneConversion) -> Scene:
+def _convert(scene: Scene, **how: Any) -> Scene:
     """State a scene otherwise."""
     link = scene.linkage
-    bars = [
-        to.bar(link.bar(bar), reversed_=to.exchanged and bar == 3)
-        for bar in MOVING_BARS
-    ]
+    to = _SceneConversion(link, **how)
+    bars = [to.bar(number) for number in MOVING_BARS]
     theta_1 = to.sense * link.ground_angle + to.turn
-    drive_bar = scene.drive_bar
     if to.exchanged:
         bars = bars[::-1]
         theta_1 = theta_1 + math.pi
-        drive_bar = _OTHER_BAR.get(drive_bar, drive_bar)
-    loads, effects = (
-        tuple(_CONVERTED[type(term)](term, to, link) for term in terms)
-        for terms in (scene.loads, scene.effects)
-    )
     return copy_with(
         scene,
         linkage=_put_bars(link, bars, to.length * link.ground, theta_1),
-        drive_bar=drive_bar,
-        loads=loads,
-        effects=effects,
-        drive=_convert_drive(scene.drive, to, link),
+        drive_bar=to.number(scene.drive_bar),
+        loads=tuple(map(to.term, scene.loads)),
+        effects=tuple(map(to.term, scene.effects)),
+        drive=to.term(scene.drive),
     )
 
 
@@ -568,7 +500,7 @@ def _measure_mirrored(few: _Few) -> Array:
     """Mirror at the x-axis: the sine changes its sign."""
     command = few.command
     other = few.solve_alike(
-        _convert(few.scene, _SceneConversion(sense=-1.0)),
+        _convert(few.scene, sense=-1.0),
         -1,
         angle=-command.angle,
         speed=-np.asarray(command.speed),
@@ -589,7 +521,7 @@ def _measure_mirrored(few: _Few) -> Array:
 def _measure_turned(few: _Few) -> Array:
     """Turn about O2."""
     other = few.solve(
-        _convert(few.scene, _SceneConversion(turn=TURNED)),
+        _convert(few.scene, turn=TURNED),
         angle=few.command.angle + TURNED,
     )
 
@@ -610,7 +542,7 @@ def _measure_scaled(few: _Few) -> Array:
 
     Return what differs at all.
     """
-    other = few.solve(_convert(few.scene, _SceneConversion(length=SCALE)))
+    other = few.solve(_convert(few.scene, length=SCALE))
     power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
     differences = []
     for name, ours in zip(few.quantities, few.numbers, strict=True):
@@ -629,7 +561,7 @@ def _measure_exchanged(few: _Few) -> Array:
     bar = _OTHER_BAR[command.bar]
     reversed_ = bar == 3
     other = few.solve_alike(
-        _convert(few.scene, _SceneConversion(exchanged=True)),
+        _convert(few.scene, exchanged=True),
         -1 if reversed_ else 1,
         angle=command.angle + math.pi if reversed_ else command.angle,
         bar=bar,
