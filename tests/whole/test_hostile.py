@@ -27,7 +27,7 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
-from fourbar_validation.regression.record import MOST_ROWS_COMPARED
+from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, write_about
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
 from fourbar_validation.run.plan import Plan, RunOptions
@@ -149,8 +149,7 @@ def test_differences_hold_hostile_names_as_text(tmp_path, capsys):
                 writer.writerow([*who, *cells, name, 1.0, 1.0])
         versions = dict.fromkeys(HOSTILE.values(), folder)
         machine = " ".join(HOSTILE.values()) + folder
-        about = {"versions": versions, "machine": machine, "settings": {}}
-        (tmp_path / folder / "record.json").write_text(json.dumps(about))
+        write_about(About(versions, machine, {}), tmp_path / folder)
     forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
     code = status(["compare", str(tmp_path / "old"), str(tmp_path / "new"), *forms])
     printed = capsys.readouterr()

@@ -26,7 +26,6 @@ from fourbar_validation.regression.rules import (
     Weakening,
     list_grown_rows,
     list_weakened,
-    list_weakened_rows,
 )
 from fourbar_validation.regression.scenes import (
     SceneChange,
@@ -131,7 +130,7 @@ class Differences:
     weakened: list[Weakening]
     """Rules that are weaker than they were; reported first, and a regression."""
     notes: list[str] = field(default_factory=list)
-    """Engines and scenes of another name, and what an older record cannot say."""
+    """Engines and scenes of another name, and what neither record says."""
     baseline: str = ""
     """The old run in words: where it lies, of which date and commit."""
     picture: str = ""
@@ -352,16 +351,20 @@ def compare_runs(
         rows = rows[0][rows[0][column].isin(now)], rows[1][rows[1][column].isin(now)]
     table = _join_runs(*map(_keep_worst, rows))
     table = _classify_rows(table, changed, before, after)
-    surroundings, older = _list_surroundings(before, after)
-    known = list_weakened(before.rules, after.rules)
-    weakened = [*known, *list_weakened_rows(table, known)]
+    weakened = list_weakened(before.rules, after.rules)
+    surroundings = _list_surroundings(before, after)
     differences = Differences(table, surroundings, changed, weakened, notes)
-    if older:
-        notes.append(
+    suites = [
+        about.settings.get("suite", "not recorded")[:12] for about in (old[0], after)
+    ]
+    if suites[0] != suites[1] and not (before.scenes or after.scenes):
+        notes += [
             f"{differences.compared} of {differences.rows} rows are compared: the"
-            " others are of one run alone"
-        )
-        notes += older
+            " others are of one run alone",
+            f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and neither run"
+            " says what they ask: a scene that changed cannot be named, rows are"
+            " compared by name alone",
+        ]
     return differences
 
 
@@ -494,67 +497,39 @@ def _classify_missing(
     engines = {FORMULAS, *of_new.engine, *after.engines}
     mended = (table.verdict_old == FAILS) & table.quantity.isin(WHOLE_ENGINE)
     suite = after.settings.get("scenes of", "")
-    if suite and suite == before.settings.get("scenes of"):
-        without_scene = Kind.SCENE_GONE
-    else:
-        without_scene = Kind.NOT_RUN
-    if after.settings.get("chosen") == "":
-        without_engine = Kind.ENGINE_GONE
-    else:
-        without_engine = Kind.NOT_RUN
+    same_suite = suite != "" and suite == before.settings.get("scenes of")
+    all_engines = after.settings.get("chosen") == ""
     return np.select(
         [~table.scene.isin(scenes), ~table.engine.isin(engines), mended],
-        [without_scene, without_engine, Kind.GONE_FAILURE],
+        [
+            Kind.SCENE_GONE if same_suite else Kind.NOT_RUN,
+            Kind.ENGINE_GONE if all_engines else Kind.NOT_RUN,
+            Kind.GONE_FAILURE,
+        ],
         Kind.GONE,
     )
 
 
-_NOT_SURROUNDINGS = ("suite", "scenes of", "chosen", "guests")
+_NOT_SURROUNDINGS = {"suite", "scenes of", "chosen", "guests"}
 """Settings that say what was asked for, and not with what."""
 
 
 def _list_surroundings(
     old: About,
     new: About,
-) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """List what the runs were made with if it differs.
-
-    What a record cannot say is listed too.
-    """
+) -> list[tuple[str, str, str]]:
+    """List what the runs were made with if it differs: what, old and new."""
     if old.commit and new.commit:
         pairs = [("commit", old.commit, new.commit)]
     else:
         pairs = []
-    pairs += _take_both(old.versions, new.versions)
-    pairs.append(("machine", old.machine, new.machine))
-    pairs += [
-        pair
-        for pair in _take_both(old.settings, new.settings)
-        if pair[0] not in _NOT_SURROUNDINGS
-    ]
-    suites = [about.settings.get("suite", "not recorded")[:12] for about in (old, new)]
-    notes = []
-    if suites[0] != suites[1] and not (old.scenes and new.scenes):
-        if not (old.scenes or new.scenes):
-            silent = "neither run says"
-        else:
-            silent = "the older record does not say"
-        notes.append(
-            f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent}"
-            " what they ask: a scene that changed cannot be named, rows are compared by"
-            " name alone"
-        )
-    return [
-        (what, before, after) for what, before, after in pairs if before != after
-    ], notes
-
-
-def _take_both(
-    old: Mapping[str, str],
-    new: Mapping[str, str],
-) -> list[tuple[str, str, str]]:
-    unstated = "not recorded"
-    return [
-        (what, old.get(what, unstated), new.get(what, unstated))
-        for what in sorted(old.keys() | new.keys())
-    ]
+    for before, after in (
+        (old.versions, new.versions),
+        ({"machine": old.machine}, {"machine": new.machine}),
+        (old.settings, new.settings),
+    ):
+        pairs += [
+            (what, before.get(what, "not recorded"), after.get(what, "not recorded"))
+            for what in sorted((before.keys() | after.keys()) - _NOT_SURROUNDINGS)
+        ]
+    return [pair for pair in pairs if pair[1] != pair[2]]

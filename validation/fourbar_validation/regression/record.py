@@ -56,15 +56,13 @@ class About:
     settings: dict[str, str]
     """Engines, suite, and the factors of the tolerances."""
     scenes: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Entries of each scene, by its name. Empty in older records and in suites too long
-    for it.
-    """
+    """Entries of each scene, by its name. Empty in suites too long for it."""
     date: str = ""
-    """UTC, ISO 8601; empty in older records."""
+    """UTC, ISO 8601."""
     commit: str = ""
     """Commit of the checkout that the run was made in; empty if there is none."""
     rules: Rules = field(default_factory=dict)
-    """Tolerances, predictions and limits of the engines; empty in older records."""
+    """Tolerances, predictions and limits of the engines."""
 
     @property
     def engines(self) -> list[str]:
@@ -214,9 +212,7 @@ class Recorded:
     about: About
     table: Path
     verified: bool = False
-    """True if the tables are those that the record was written with. Older records do
-    not say.
-    """
+    """True if a record says that the tables are those that it was written with."""
     key: str = "RESULTS"
     """Name in an error message: the argument or option that named the record."""
 
@@ -344,54 +340,24 @@ def _open_described(
 
     Raises InputError if either is damaged.
     """
-    about, tables = _read_record(record, key)
-    if tables is None:
-        return Recorded(about, table, key=key)
+    try:
+        kept = json.loads(record.read_text(encoding="utf-8"))
+        if kept.pop("sha256", None) != _hash_own(kept):
+            why = "is damaged: it is not what `run` wrote"
+            raise InputError(key, str(record), why)
+        tables: Mapping[str, Mapping[str, Any]] = kept.pop("tables")
+        about = About(**_escape_texts(kept))
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
+        raise InputError(key, str(record), "is not a record written by `run`") from None
     _require_undamaged(tables, table.parent, table.name, key)
     return Recorded(about, table, True, key)
 
 
-def _read_record(
-    record: Path,
-    key: str,
-) -> tuple[About, Mapping[str, Mapping[str, Any]] | None]:
-    """Read a record and what it says of its tables; None if it is an older one."""
-    try:
-        kept = json.loads(record.read_text(encoding="utf-8"))
-        stated = kept.pop("sha256", None)
-        about = _make_record(kept)
-        tables: Mapping[str, Mapping[str, Any]] | None = kept.get("tables")
-    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
-        raise InputError(key, str(record), "is not a record written by `run`") from None
-    if stated is None and tables is None:
-        return about, None
-    if stated != _hash_own(kept):
-        raise InputError(key, str(record), "is damaged: it is not what `run` wrote")
-    return about, tables
-
-
-def _make_record(kept: dict[str, Any]) -> About:
-    """Make the record of what a file says of a run; its words are somebody's text."""
-    versions, settings = (
-        _escape_entries(kept[name]) for name in ("versions", "settings")
-    )
-    scenes = {
-        escape_controls(name): _escape_entries(entries)
-        for name, entries in kept.get("scenes", {}).items()
-    }
-    date, commit = (escape_controls(kept.get(name, "")) for name in ("date", "commit"))
-    rules = {
-        escape_controls(name): _escape_entries(entries)
-        for name, entries in kept.get("rules", {}).items()
-    }
-    machine = escape_controls(kept["machine"])
-    return About(versions, machine, settings, scenes, date, commit, rules)
-
-
-def _escape_entries(entries: dict[str, str]) -> dict[str, str]:
-    return {
-        escape_controls(key): escape_controls(value) for key, value in entries.items()
-    }
+def _escape_texts(value: Any) -> Any:
+    """Escape somebody's text, or all texts of nested entries."""
+    if isinstance(value, dict):
+        return {escape_controls(key): _escape_texts(x) for key, x in value.items()}
+    return escape_controls(value)
 
 
 def find_baseline(name_or_path: str) -> Path:

@@ -9,16 +9,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fourbar_validation.compare.rows import AGREES, COMPARED_VERDICTS
+from fourbar_validation.compare.rows import COMPARED_VERDICTS
 from fourbar_validation.compare.tolerance import (
-    EQUIVALENCE,
-    FULL_ACCURACY,
     IDENTITY,
-    SIMULATED,
     ErrorBound,
     K,
 )
-from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 
@@ -43,11 +39,6 @@ NOTABLE = 10.0
 """Growth of a row's allowance that is printed. The worst position moves with the
 kernels of a processor, and K eps/condition with it: 139 of 2093 allowances grew so.
 """
-CLASSES = {
-    STATED_BY_THE_ENGINE,
-    *(bound.cause for bound in (IDENTITY, EQUIVALENCE, SIMULATED, FULL_ACCURACY)),
-}
-"""Names of the classes of tolerance, with which the reason of a row begins."""
 
 
 def list_rules(engines: Iterable[Engine]) -> Rules:
@@ -148,33 +139,6 @@ def _read_float(text: str) -> float:
         return float(text)
     except ValueError:
         return float("inf")
-
-
-def list_weakened_rows(
-    table: "DataFrame",
-    known: Iterable[Weakening],
-) -> list[Weakening]:
-    """List the classes of tolerance that are wider in rows that agree, once each.
-
-    No record of the rules is needed: a table of both runs says it by itself.
-    """
-    rows = table[
-        (table.verdict_old == AGREES)
-        & (table.verdict_new == AGREES)
-        & (table.why == "")
-        & (table.allowed_new > table.allowed_old)
-    ]
-    before, after = (
-        rows[column].str.split(":", n=1).str[0]
-        for column in ("reason_old", "reason_new")
-    )
-    other = before.isin(CLASSES) & after.isin(CLASSES) & (before != after)
-    told = {(one.name, one.what) for one in known}
-    return [
-        Weakening(engine, CLASS_CHANGED, before[line], after[line])
-        for line, engine in rows.engine[other].drop_duplicates().items()
-        if (engine, CLASS_CHANGED) not in told
-    ]
 
 
 def list_grown_rows(table: "DataFrame") -> list[str]:
