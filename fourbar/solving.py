@@ -332,7 +332,8 @@ def _require_command_at(at: Command) -> None:
     theta, omega, alpha = COMMAND_NAMES[at.bar]
     angle, branch, speed, acceleration, _, time, origin = at
     expect("at.origin", origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
-    n = np.size(angle)
+    expect(f"at.{theta}", angle, np.ndarray)
+    n = angle.size
     arrays: dict[str, Any] = {theta: angle, "branch": branch}
     if time is not None:
         arrays["time"] = time
