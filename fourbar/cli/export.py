@@ -30,6 +30,20 @@ if TYPE_CHECKING:
 def _plane_options(command: Callable[..., str]) -> Callable[..., str]:
     """Add --axis and --origin, given to the command as `plane`."""
 
+    @click.option(
+        "--axis",
+        default="0 0 1",
+        show_default=True,
+        metavar='"X Y Z"',
+        help="Direction of the pins' axes in the world.",
+    )
+    @click.option(
+        "--origin",
+        default="0 0 0",
+        show_default=True,
+        metavar='"X Y Z"',
+        help="Place of pin O2 (of a drawing's origin) in the world, m or with units.",
+    )
     @wraps(command)
     def placed(scene: Scene, axis: str, origin: str, **others: Any) -> str:
         from fourbar.mjcf.plane import Plane
@@ -38,21 +52,6 @@ def _plane_options(command: Callable[..., str]) -> Callable[..., str]:
         plane = Plane(direction, given.read_three("--origin", origin))
         return command(scene, plane=plane, **others)
 
-    for name, default, text in (
-        (
-            "--origin",
-            "0 0 0",
-            "Place of pin O2 (of a drawing's origin) in the world, m or with units.",
-        ),
-        ("--axis", "0 0 1", "Direction of the pins' axes in the world."),
-    ):
-        placed = click.option(
-            name,
-            default=default,
-            show_default=True,
-            metavar='"X Y Z"',
-            help=text,
-        )(placed)
     return placed
 
 
@@ -66,6 +65,18 @@ def _export_command(command: Callable[..., str]) -> Callable[..., None]:
     One of the first two is given.
     """
 
+    @click.argument("scene", type=given.FILE_PATH, required=False)
+    @click.option(
+        "--lengths",
+        nargs=4,
+        metavar="D A B C",
+        help="Lengths of ground, input, coupler, output, m.",
+    )
+    @click.option(
+        "--omega",
+        metavar="W",
+        help="Speed of the input with --lengths, rad/s.",
+    )
     @wraps(command)
     def written(
         scene: Path | None,
@@ -77,21 +88,6 @@ def _export_command(command: Callable[..., str]) -> Callable[..., None]:
         with _open_or_make_scene(scene, lengths, omega, out) as described:
             given.print_to(command(described, **options), out)
 
-    for add in (
-        click.option(
-            "--omega",
-            metavar="W",
-            help="Speed of the input with --lengths, rad/s.",
-        ),
-        click.option(
-            "--lengths",
-            nargs=4,
-            metavar="D A B C",
-            help="Lengths of ground, input, coupler, output, m.",
-        ),
-        click.argument("scene", type=given.FILE_PATH, required=False),
-    ):
-        written = add(written)
     return written
 
 

@@ -46,14 +46,6 @@ def _read_units(
 
 
 scene_argument = click.argument("scene", type=FILE_PATH)
-out_option = click.option(
-    "-o",
-    "--out",
-    type=FILE_PATH,
-    required=True,
-    metavar="FILE",
-    help="Write to FILE.",
-)
 TABLE_ENDINGS = (".txt", ".json")
 at_option = click.option(
     "--at",
@@ -81,9 +73,9 @@ def units_option(default: str = "those of the file") -> Callable[..., Any]:
 
 
 def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
-    """Make the option -o of a command that writes text.
+    """Make the option -o of a command that writes a file.
 
-    An ending that belongs to another form is refused.
+    An ending that belongs to another form is refused; without endings any is taken.
     """
 
     def require_ending(
@@ -91,7 +83,7 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
         parameter: click.Parameter,
         out: Path | None,
     ) -> Path | None:
-        if out is not None and out.suffix and out.suffix.lower() not in endings:
+        if endings and out and out.suffix and out.suffix.lower() not in endings:
             raise InputError(
                 "path",
                 str(out),
@@ -109,6 +101,9 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
         metavar="FILE",
         help=help_text,
     )
+
+
+out_option = text_option(required=True)
 
 
 def json_option(command: Callable[..., None]) -> Callable[..., None]:

@@ -196,54 +196,45 @@ class SceneDocument:
                 f"must have {_LONGEST_TEXT} characters at most",
             )
         old = self.at(path)
-        if not text.strip() and old is not None and not isinstance(path[-1], int):
+        is_empty = not text.strip()
+        if is_empty and old is None:
+            return
+        if is_empty and not isinstance(path[-1], int):
             self.remove(path)
-        elif text.strip() or old is not None:
-            if old is not None:
-                example = old
-            else:
-                example = _find_table(list_offers()["fields"], path)
-            self.put(
-                path,
-                (
-                    text
-                    if isinstance(example, str) or example is None
-                    else _read_plain_number(text)
-                ),
-            )
+            return
+        example = _find_table(list_offers()["fields"], path) if old is None else old
+        is_text = isinstance(example, str) or example is None
+        self.put(path, text if is_text else _read_plain_number(text))
 
     def put(self, path: KeyPath, value: Any) -> None:
         """State an entry and the tables that contain it; an index of -1 appends."""
         *into, last = path
         holder = self._find_holder(into)
-        if isinstance(last, int) and last < 0:
-            holder.append(
-                _make_toml_table(value, tomlkit.nl())
-                if isinstance(holder, AoT)
-                else _write_inline(value)
-            )
-        elif (
-            isinstance(holder, (Table, InlineTable))
-            or holder is self.tree
-            or isinstance(last, int)
-        ):
-            old = self.at(path)
-            # a table of its own is written anew, with its heading
-            if isinstance(old, Table):
-                del holder[last]
-                old = None
-            is_at_top = len(path) == 1
-            if is_at_top and isinstance(value, dict):
-                new = _make_toml_table(value)
-            else:
-                new = _write_inline(value)
-            holder[last] = new if old is None else _make_item_like(old, value)
-        else:
+        is_table = holder is self.tree or isinstance(holder, (Table, InlineTable))
+        if not is_table and not isinstance(last, int):
             raise InputError(
                 name_entry(path),
                 value,
                 "has no table that it could stand in",
             )
+        if last == -1:
+            is_of_tables = isinstance(holder, AoT)
+            blank = tomlkit.nl()
+            new = (
+                _make_toml_table(value, blank) if is_of_tables else _write_inline(value)
+            )
+            holder.append(new)
+            return
+        old = self.at(path)
+        # a table of its own is written anew, with its heading
+        if isinstance(old, Table):
+            del holder[last]
+            old = None
+        if len(path) == 1 and isinstance(value, dict):
+            new = _make_toml_table(value)
+        else:
+            new = _write_inline(value)
+        holder[last] = new if old is None else _make_item_like(old, value)
 
     def remove(self, path: KeyPath) -> None:
         """Take an entry away, and a table that it leaves empty."""
@@ -300,10 +291,8 @@ def _make_item_like(old: Any, value: Any) -> Any:
     """Return the value as an item, with the comment and blanks of the old item."""
     made = tomlkit.item(_write_inline(value))
     if isinstance(old, Item):
-        made.trivia.comment_ws, made.trivia.comment = (
-            old.trivia.comment_ws,
-            old.trivia.comment,
-        )
+        made.trivia.comment_ws = old.trivia.comment_ws
+        made.trivia.comment = old.trivia.comment
         made.trivia.trail = old.trivia.trail
     return made
 

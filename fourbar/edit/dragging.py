@@ -204,7 +204,7 @@ def drag(
             path_of_angle = (*handle.force, 1)
             old_angle = document.at(path_of_angle)
             new_size = write_rounded(force, abs(force) / 50.0, unit)
-            new_angle = _write_dragged_angle(old_angle, angle, 0.02)
+            new_angle = _write_like(old_angle, angle, 0.02, "rad")
             document.put(path_of_size, new_size)
             document.put(path_of_angle, new_angle)
             return
@@ -237,21 +237,13 @@ def _drag_pin(
     }[str(dragged.what)]
     for bar, pin in lengths.items():
         key = ("lengths", bar)
-        document.put(
-            key,
-            _write_length(document.at(key), abs(dragged.to - pins[pin]), dragged.grain),
-        )
+        length = abs(dragged.to - pins[pin])
+        document.put(key, _write_like(document.at(key), length, dragged.grain))
     if dragged.what == "O4":
         angle = cmath.phase(dragged.to)
+        grain = dragged.grain / max(abs(dragged.to), dragged.grain)
         key = ("lengths", "ground_angle")
-        document.put(
-            key,
-            _write_dragged_angle(
-                document.at(key),
-                angle,
-                dragged.grain / max(abs(dragged.to), dragged.grain),
-            ),
-        )
+        document.put(key, _write_like(document.at(key), angle, grain, "rad"))
 
 
 def _drag_drawn_pin(
@@ -279,7 +271,7 @@ def _drag_drawn_pin(
     for axis, coordinate in enumerate(place):
         key = ("pins", str(dragged.what), axis)
         old = document.at(key)
-        document.put(key, _write_length(old, coordinate, dragged.grain))
+        document.put(key, _write_like(old, coordinate, dragged.grain))
 
 
 def parse_place(stated: Any) -> complex:
@@ -308,41 +300,35 @@ def put_place(
     file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
+    x_y = document.at((*path, "x")), document.at((*path, "y"))
     if isinstance(old, dict) and DRAWN_WORD in old:
-        by = by or "xy"  # a place of its bar from now on
         before = DRAWN_WORD
-        length = document.at((*path, DRAWN_WORD, 0))
-    elif isinstance(old, dict):
-        before = "xy"
-        length = document.at((*path, "x"))
+        by = by or "xy"  # a place of its bar from now on
     else:
-        before = "polar"
-        length = document.at((*path, 0))
-    if length is None:
-        ground = ("lengths", "ground")
-        drawn = ("pins", "A", 0)
-        length = document.at((*ground, "x")) or document.at(ground)
-        length = length or document.at(drawn)
-    by = by or before
+        before = "xy" if isinstance(old, dict) else "polar"
+        by = by or before
+    lengths = (
+        *((*path, DRAWN_WORD, 0), (*path, "x"), (*path, 0)),
+        *(("lengths", "ground", "x"), ("lengths", "ground"), ("pins", "A", 0)),
+    )
+    length = next(filter(None, map(document.at, lengths)))
     parts: dict[str | int, str]
     if by == "xy":
-        like_x = document.at((*path, "x")) or length
-        like_y = document.at((*path, "y")) or length
+        pairs = zip("xy", x_y, (place.real, place.imag), strict=True)
         parts = {
-            "x": _write_length(like_x, place.real, grain),
-            "y": _write_length(like_y, place.imag, grain),
+            axis: _write_like(old_part or length, part, grain)
+            for axis, old_part, part in pairs
         }
         stated: Any = parts
     else:
         distance = abs(place)
-        angle = cmath.phase(place)
         angle_grain = grain / max(distance, grain)
-        old_angle = document.at((*path, 1)) if before == "polar" else None
+        old_angle = document.at((*path, 1))
         parts = {
-            0: _write_length(length, distance, grain),
-            1: _write_dragged_angle(old_angle, angle, angle_grain),
+            0: _write_like(length, distance, grain),
+            1: _write_like(old_angle, cmath.phase(place), angle_grain, "rad"),
         }
-        stated = list(parts.values())
+        stated = [*parts.values()]
     if old is None or by != before:
         document.put(path, stated)
         return
@@ -350,26 +336,9 @@ def put_place(
         document.put((*path, step), text)
 
 
-def _write_length(old: object, value: float, grain: float) -> str:
-    return _write_like(old, value, grain, "m", "m")
-
-
-def _write_dragged_angle(old: object, angle: float, grain: float) -> str:
-    return _write_like(old, angle, grain, "rad", "deg")
-
-
-def _write_like(
-    old: object,
-    value: float,
-    grain: float,
-    si: str,
-    otherwise: str,
-) -> str:
-    """Write a number of an SI unit in the unit of its older text.
-
-    If the older text has no unit, another unit of that kind is used.
-    """
-    unit = find_unit(old, otherwise)
+def _write_like(old: object, value: float, grain: float, si: str = "m") -> str:
+    """Write a number of an SI unit, "m" or "rad", in the unit of its older text."""
+    unit = find_unit(old, "m" if si == "m" else "deg")
     factor = to_si(f"1 {si}", unit)
     return write_rounded(value * factor, grain * factor, unit)
 

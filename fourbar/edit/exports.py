@@ -43,7 +43,6 @@ _ENDINGS = {
     "page": "html",
 }
 """Ending of the file by the name of the format."""
-CHECKOUT_FOLDER = Path(__file__).parents[2]
 HARNESS_PACKAGE = "fourbar_validation"
 LAST_LINES = 30
 """Lines of what the harness prints."""
@@ -78,8 +77,7 @@ def evaluate_scene(
         midway=True,
         solved=solution,
     )
-    data |= {"tolerances": None, "pictures": {}, "toml": None}
-    data["traced"] = None
+    data |= {"tolerances": None, "pictures": {}, "toml": None, "traced": None}
     if scene.picture is not None:
         picture = scene.picture
         data["traced"] = {
@@ -180,15 +178,10 @@ class Exports:
 
 
 def find_harness() -> list[str]:
-    """Return the command of the harness: installed, or of this checkout.
-
-    Raises DependencyError if there is none.
-    """
-    engines = all(importlib.util.find_spec(name) for name in ("mujoco", "pinocchio"))
-    if engines and importlib.util.find_spec(HARNESS_PACKAGE):
+    """Return the command of the harness; DependencyError if it is not installed."""
+    needed = ("mujoco", "pinocchio", HARNESS_PACKAGE)
+    if all(importlib.util.find_spec(name) for name in needed):
         return [sys.executable, "-m", HARNESS_PACKAGE]
-    if engines and (CHECKOUT_FOLDER / "validation" / "__main__.py").is_file():
-        return [sys.executable, "-m", "validation"]
     raise DependencyError(
         "the harness with MuJoCo and Pinocchio is not installed:"
         f" {say_install('validation')}"
@@ -244,16 +237,10 @@ class HarnessRun:
             scene = self.folder / "scene.toml"
             write_text(scene, text)
             self.process = await asyncio.create_subprocess_exec(
-                *(
-                    *command,
-                    "run",
-                    str(scene.absolute()),
-                    "--out",
-                    str(self.folder.absolute()),
-                ),
+                *command,
+                *("run", str(scene.absolute()), "--out", str(self.folder.absolute())),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                cwd=CHECKOUT_FOLDER if command[-1] == "validation" else None,
                 start_new_session=True,  # so that it ends with all that it starts
             )
             assert self.process.stdout is not None

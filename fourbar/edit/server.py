@@ -34,10 +34,10 @@ LARGEST_REQUEST = 2_000_000
 _MOST_PAGES = 16
 MOST_WAITING = 100
 """Requests of all pages that wait; of a drag only the latest does."""
-MOST_UNREAD = 4_000_000
-"""Bytes that wait for a page which does not read, besides one frame."""
 IDLE = 10.0
 """Time within which a request must be complete, s."""
+PING = 20.0
+"""Time between two pings of a page, and that within which it answers, s."""
 GONE = 90.0
 """Time from the last page's leaving to the server's end, s. A page in the background
 looks for the server once a minute.
@@ -248,7 +248,6 @@ class Workbench:
             self.following.cancel()
         for line in list(self.pages):
             line.close(1001, "the server ends")
-            line.drop()
         self.check.stop()
         if self.check.task is not None:
             await asyncio.wait({self.check.task}, timeout=5.0)
@@ -356,34 +355,15 @@ class _PageLine(WebSocketHandler, _Guarded):
     def open(self, *args: str, **kwargs: str) -> None:
         """Add the page to the workbench."""
         self.set_nodelay(True)
-        self.unread = 0
-        self.stream = getattr(self.ws_connection, "stream", None)
         self.bench.join(self)
 
     def send(self, data: bytes) -> None:
-        """Send a frame, or drop the line of a page that does not read.
-
-        A page that reads again opens another line.
-        """
-        if self.unread > MOST_UNREAD:
-            self.drop()
-            return
-
-        def forget(sent: asyncio.Future[None]) -> None:
-            self.unread -= len(data)
-            # a page may close while it is sent: that is no error
-            if not sent.cancelled():
-                sent.exception()
-
+        """Send a frame; a page that has closed meanwhile is no error."""
         with suppress(WebSocketClosedError):
             written = asyncio.ensure_future(self.write_message(data, binary=True))
-            self.unread += len(data)
-            written.add_done_callback(forget)
-
-    def drop(self) -> None:
-        """Close the connection with what it has not read."""
-        if self.stream is not None:
-            self.stream.close()
+            written.add_done_callback(
+                lambda sent: None if sent.cancelled() else sent.exception()
+            )
 
     def on_message(self, message: str | bytes) -> None:
         """Take a request, one JSON object."""
@@ -420,7 +400,9 @@ def _make_application(bench: Workbench, port: int) -> Application:
         ],
         log_function=lambda handler: None,
         websocket_max_message_size=LARGEST_REQUEST,
-        websocket_ping_interval=20.0,
+        # a page that reads nothing does not answer either, and is closed
+        websocket_ping_interval=PING,
+        websocket_ping_timeout=PING,
     )
 
 

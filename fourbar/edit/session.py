@@ -149,15 +149,7 @@ class Session:
             if self.history_index < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
             self.now = self.read(self.texts[self.history_index])
-        except (
-            ValueError,
-            LookupError,
-            TypeError,
-            AttributeError,
-            ArithmeticError,
-            RecursionError,
-            FourBarError,
-        ) as error:
+        except Exception as error:  # whatever stands in it
             allowed = (
                 f"cannot be read as a state of the workbench ({error}): remove it to"
                 " begin from the scene file"

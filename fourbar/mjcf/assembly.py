@@ -187,11 +187,10 @@ def write_sdf(
     ).splitlines():
         root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
-    ET.SubElement(world, "gravity").text = write_exactly(*plane.turn(*gravity))
+    _add_numbers(world, "gravity", *plane.turn(*gravity))
     model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")
     if plane.is_moved:
-        place = write_exactly(*plane.origin, *plane.roll_pitch_yaw)
-        ET.SubElement(model, "pose").text = place
+        _add_numbers(model, "pose", *plane.origin, *plane.roll_pitch_yaw)
     _add_link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
     _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
     for number in MOVING_BARS:
@@ -206,36 +205,29 @@ def write_sdf(
             bar.to_centre,
         )
         pin = FIRST_PIN[number]
-        _add_joint(
-            model,
-            pin,
-            "revolute",
-            BAR_NAMES[_PARENT[number]],
-            BAR_NAMES[number],
-            dynamics.get(pin, {}),
-        )
+        parent = BAR_NAMES[_PARENT[number]]
+        at_pin = dynamics.get(pin, {})
+        _add_joint(model, pin, "revolute", parent, BAR_NAMES[number], at_pin)
     length_3 = linkage.coupler.length
     length_4 = linkage.output.length
     if reader == "gazebo":
-        joint = _add_joint(
-            model,
-            "B",
-            "revolute",
-            BAR_NAMES[4],
-            BAR_NAMES[3],
-            dynamics.get("B", {}),
-        )
-        in_frame_of_child = write_exactly(length_3, 0, 0, 0, 0, 0)
-        ET.SubElement(joint, "pose").text = in_frame_of_child
+        at_pin = dynamics.get("B", {})
+        joint = _add_joint(model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], at_pin)
+        # in the frame of its child
+        _add_numbers(joint, "pose", length_3, 0, 0, 0, 0, 0)
     else:
         ball = ET.SubElement(model, "drake:ball_constraint")
         for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
             ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
         for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
-            end_of_bar = write_exactly(length, 0.0, 0.0)
-            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = end_of_bar
+            _add_numbers(ball, f"drake:ball_constraint_{key}", length, 0, 0)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_numbers(parent: ET.Element, name: str, *numbers: float) -> None:
+    """Add an element that holds numbers."""
+    ET.SubElement(parent, name).text = write_exactly(*numbers)
 
 
 def _add_link(
@@ -248,18 +240,16 @@ def _add_link(
     centre: complex,
 ) -> None:
     link = ET.SubElement(model, "link", name=name)
-    pose_of_link = write_exactly(foot.real, foot.imag, 0, 0, 0, turn)
-    ET.SubElement(link, "pose").text = pose_of_link
+    _add_numbers(link, "pose", foot.real, foot.imag, 0, 0, 0, turn)
     inertial = ET.SubElement(link, "inertial")
-    pose_of_centre = write_exactly(centre.real, centre.imag, 0, 0, 0, 0)
-    ET.SubElement(inertial, "pose").text = pose_of_centre
-    ET.SubElement(inertial, "mass").text = write_exactly(mass)
+    _add_numbers(inertial, "pose", centre.real, centre.imag, 0, 0, 0, 0)
+    _add_numbers(inertial, "mass", mass)
     tensor = ET.SubElement(inertial, "inertia")
     # izz alone acts in the plane; three equal ones are a possible body
     for axes in ("ixx", "iyy", "izz"):
-        ET.SubElement(tensor, axes).text = write_exactly(inertia)
+        _add_numbers(tensor, axes, inertia)
     for axes in ("ixy", "ixz", "iyz"):
-        ET.SubElement(tensor, axes).text = "0"
+        _add_numbers(tensor, axes, 0)
 
 
 def _add_joint(
@@ -275,11 +265,11 @@ def _add_joint(
     ET.SubElement(joint, "child").text = child
     if dynamics is not None:
         axis = ET.SubElement(joint, "axis")
-        ET.SubElement(axis, "xyz").text = "0 0 1"
+        _add_numbers(axis, "xyz", 0, 0, 1)
         if dynamics:
             values = ET.SubElement(axis, "dynamics")
             for key, value in dynamics.items():
-                ET.SubElement(values, key).text = write_exactly(value)
+                _add_numbers(values, key, value)
     return joint
 
 
@@ -307,13 +297,14 @@ def write_usd(
     bodies = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        place = plane.place(*_split_point(foot[number]))
+        centre = bar.to_centre
+        place = plane.place(foot[number].real, foot[number].imag)
         bodies.append(f"""    def Xform "{BAR_NAMES[number]}" (
         prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
     )
     {{
         float physics:mass = {bar.mass!r}
-        point3f physics:centerOfMass = {_place_in_plane(bar.to_centre)}
+        point3f physics:centerOfMass = {_write_tuple((centre.real, centre.imag, 0.0))}
         float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
         quatf physics:principalAxes = (1, 0, 0, 0)
         double3 xformOp:translate = {_write_tuple(place)}
@@ -322,21 +313,18 @@ def write_usd(
     }}
 """)
     joints = []
-    length = {number: linkage.bar(number).length for number in MOVING_BARS}
+    _, length_2, length_3, length_4 = linkage.lengths
     places = {
-        FIRST_PIN[number]: (_PARENT[number], number, 0.0) for number in MOVING_BARS
-    } | {"B": (4, 3, length[3])}
-    for pin, (one, follower, along) in places.items():
-        on_one = {
-            "O2": 0j,
-            "A": complex(length[2]),
-            "B": complex(length[4]),
-            "O4": foot[4],
-        }[pin]
+        "O2": (1, 0j, 2, 0.0),
+        "A": (2, complex(length_2), 3, 0.0),
+        "O4": (1, foot[4], 4, 0.0),
+        "B": (4, complex(length_4), 3, length_3),
+    }
+    for pin, (one, on_one, follower, along) in places.items():
         relative = turn[follower] - turn[one]
         # the world's axes are not the plane's
         frame = plane if one == 1 else LEVEL
-        on_first = frame.place(*_split_point(on_one))
+        on_first = frame.place(on_one.real, on_one.imag)
         turn_on_first = frame.turn_on(relative)
         joints.append(f"""    def PhysicsRevoluteJoint "{pin}"
     {{
@@ -345,7 +333,7 @@ def write_usd(
         rel physics:body1 = </four_bar/{BAR_NAMES[follower]}>
         point3f physics:localPos0 = {_write_tuple(on_first)}
         quatf physics:localRot0 = {_write_tuple(turn_on_first)}
-        point3f physics:localPos1 = {_place_in_plane(complex(along))}
+        point3f physics:localPos1 = {_write_tuple((along, 0.0, 0.0))}
         quatf physics:localRot1 = (1, 0, 0, 0)
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
     }}
@@ -375,14 +363,6 @@ def Xform "four_bar" (
 {{
 {"".join([*bodies, *joints])}}}
 """
-
-
-def _split_point(point: complex) -> tuple[float, float]:
-    return point.real, point.imag
-
-
-def _place_in_plane(point: complex) -> str:
-    return _write_tuple((*_split_point(point), 0.0))
 
 
 def _write_tuple(numbers: Iterable[float]) -> str:
