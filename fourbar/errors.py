@@ -200,26 +200,20 @@ def say_install(extra: str) -> str:
         return f'pip install ".[{extra}]" in the checkout'
     from importlib.metadata import requires
 
-    def needed(name: str) -> list[str]:
-        wanted = f"extra == [\"']{name}[\"']"
-        packages = [
-            line.partition(";")[0].strip()
-            for line in requires("fourbar") or ()
-            if re.search(wanted, line)
-        ]
-        inner = [
-            line.removeprefix("fourbar[").removesuffix("]").split(",")
-            for line in packages
-            if "fourbar[" in line
-        ]
-        direct = [line for line in packages if "fourbar[" not in line]
-        return direct + [
-            line for names in inner for name in names for line in needed(name)
-        ]
+    def list_packages(name: str) -> Iterator[str]:
+        for line in requires("fourbar") or ():
+            if not re.search(f"extra == [\"']{name}[\"']", line):
+                continue
+            package = line.partition(";")[0].strip()
+            inner = re.fullmatch(r"fourbar\[(.+)\]", package)
+            if inner is None:
+                yield package
+                continue
+            for other in inner[1].split(","):
+                yield from list_packages(other)
 
-    return "pip install " + " ".join(
-        f'"{each}"' for each in dict.fromkeys(needed(extra))
-    )
+    packages = dict.fromkeys(list_packages(extra))
+    return "pip install " + " ".join(f'"{package}"' for package in packages)
 
 
 HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130

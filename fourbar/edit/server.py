@@ -222,7 +222,6 @@ class Workbench:
             _make_application(self, own_port),
             max_body_size=LARGEST_REQUEST,
             max_header_size=16_384,
-            max_buffer_size=2 * LARGEST_REQUEST,
             idle_connection_timeout=IDLE,
             body_timeout=IDLE,
         )

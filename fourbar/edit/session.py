@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import math
 import os
 import re
 import secrets
@@ -520,11 +521,10 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
     if commanded == "stroke":
         unit = find_unit(find_length(session.now.plain), "m")
         factor = to_si("1 m", unit)
-        rate_unit = f"{unit}/s"
-        rate_factor = factor
+        rate_unit, rate_factor = f"{unit}/s", factor
     else:
         unit = "deg"
-        factor = to_si("1 rad", unit)
+        factor = math.degrees(1.0)
         rate_unit, rate_factor = find_unit_in("rad/s", session.now.units)
     # so that rounding leads to no position beyond
     inset = 1e-3 * (values[last] - values[first])
@@ -536,12 +536,7 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
     }
     document.put(["motion", commanded], sweep)
     if has_speed:
-        rates = getattr(before, rate_name, None)
-        if rates is None:
-            speed = 0.1 * abs(values[last] - values[first])
-        else:
-            speed = float(rates[middle])
-        rate = rate_factor * speed
+        rate = rate_factor * float(getattr(before, rate_name)[middle])
         rounded = write_rounded(rate, abs(rate) / 100.0, rate_unit)
         document.put(["motion", rate_name], rounded)
 
@@ -579,14 +574,8 @@ def _choose_nearest_assembly(
 
 def _read_bar_directions(solution: Solution, index: int) -> Any:
     """Return the directions of the three moving bars at one position."""
-    angles = np.array(
-        [
-            solution.theta_2[index],
-            solution.theta_3[index],
-            solution.theta_4[index],
-        ]
-    )
-    return np.exp(1j * angles)
+    angles = solution.theta_2, solution.theta_3, solution.theta_4
+    return np.exp(1j * np.array(angles)[:, index])
 
 
 def _find_shown(theta_2: Any, asked: dict[str, Any]) -> int | None:

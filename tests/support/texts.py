@@ -87,3 +87,63 @@ stiffness = "50 N/m"
 length = "0.05 m"
 """
 """An effect of each kind, springs between other bars than neighbours."""
+
+HELD = (
+    PLIERS.replace("[points]", 'omega_2 = "1 rad/s"\n[points]')
+    + """\
+[drive]
+point = "handle"
+direction = "90 deg"
+frame = "bar"
+[[loads]]
+point = "jaw"
+force = ["-1 lbf", "90 deg"]
+frame = "bar"
+"""
+)
+"""A hand at the handle, the grip of the jaw as the load."""
+EVERY_PLACE = """
+[lengths]
+ground = "300 mm"
+input = "100 mm"
+coupler = "250 mm"
+output = "220 mm"
+[points]
+P = { bar = 3, from_centre = ["20 mm", "10 deg"] }
+Q = { bar = 1, from_pin = { x = "5 mm", y = "-60 mm" } }
+[[loads]]
+point = "P"
+force = ["1 N", "10 deg"]
+[[loads]]
+bar = 4
+force = ["1 N", "10 deg"]
+from_centre = { x = "5 mm", y = "7 mm" }
+frame = "bar"
+[[loads]]
+bar = 2
+force = ["1 N", "10 deg"]
+arm = ["5 mm", "7 deg"]
+[[effects.springs]]
+from = { point = "Q" }
+to = { point = "P" }
+stiffness = "9 N/m"
+length = "1 mm"
+[[effects.springs]]
+from = { bar = 1 }
+to = { bar = 4, from_centre = ["3 mm", "0 deg"] }
+stiffness = "9 N/m"
+length = "1 mm"
+"""
+"""Places in every form in which a file can state them."""
+LINE_DRIVEN = (
+    LENGTHS
+    + """\
+[motion]
+theta_2 = "1 rad"
+omega_2 = "2 rad/s"
+[drive]
+from = { bar = 1, from_pin = ["21 cm", "-60 deg"] }
+to = { bar = 4, from_pin = ["9 cm", "0 deg"] }
+"""
+)
+"""A cylinder from the ground to the output."""

@@ -22,7 +22,7 @@ from fourbar.scene import command_at
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import crank_rocker
-from tests.support.texts import LENGTHS
+from tests.support.texts import LINE_DRIVEN
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
 BARS = 10.0
@@ -127,37 +127,8 @@ def test_ends_that_keep_their_distance_are_refused_in_one_line(start, end):
         Scene(uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
 
 
-TEXT = LENGTHS + '[motion]\ntheta_2 = "1 rad"\nomega_2 = "2 rad/s"\n[drive]\n'
-FROM = 'from = { bar = 1, from_pin = ["21 cm", "-60 deg"] }\n'
-TO = 'to = { bar = 4, from_pin = ["9 cm", "0 deg"] }\n'
-
-
-@pytest.mark.parametrize(
-    "drive, says",
-    [
-        (
-            "bar = 4\n" + FROM + TO,
-            r"drive\.bar = 4: a drive along a line has from and to alone",
-        ),
-        (FROM, r"drive\.to"),
-        (FROM + TO.replace("4", "1", 1), r"drive\.to\.bar = 1: must be another bar"),
-        (
-            FROM.replace("21 cm", "30 cm").replace("-60", "0") + TO,
-            r"drive\.to = .*keeps its distance",
-        ),
-        (FROM + TO.replace("9 cm", "9 kg"), r"drive\.to\.from_pin"),
-        (FROM + TO + "force = 1\n", r"drive\.force"),
-    ],
-)
-def test_a_file_with_a_wrong_drive_is_refused_in_one_line(drive, says):
-    with raises(InputError, match=says) as caught:
-        loads(TEXT + drive, "scene.toml")
-    assert "\n" not in str(caught.value)
-    assert str(caught.value).startswith("scene.toml: ")
-
-
 def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
-    scene = loads(TEXT + FROM + TO + '[tolerances]\n"drive.from.from_pin.0" = "1 mm"\n')
+    scene = loads(LINE_DRIVEN + '[tolerances]\n"drive.from.from_pin.0" = "1 mm"\n')
     again = loads(dump(scene))
     assert again.drive == scene.drive
     assert again.drive.start.bar == 1 and again.drive.end == Place(4, (0.09, 0.0))
