@@ -130,7 +130,8 @@ class PinFriction(PinRows):
         for column, pin in enumerate(arms):
             couple = sliding.x[:, column].reshape(shape)
             couples[pin] = make_like(couple, pins.F12.real)
-        couples = _refine(couples, arms, pins, per_unit)
+        slope = sliding.slope.reshape(*shape, len(arms), len(arms))
+        couples = _refine(couples, arms, pins, per_unit, slope)
         for pin, couple in couples.items():
             actions.pin_couple(pin, -senses[pin] * couple)
 
@@ -142,7 +143,7 @@ class PinFriction(PinRows):
             residuals.append(np.abs(take_doubles(residual)))
         return SolvedFriction(
             loaded,
-            sliding.from_jamming.reshape(shape),
+            find_least_stretch(sliding.slope).reshape(shape),
             np.max(residuals, axis=0),
             STATUS_OF_NUMBER[sliding.number].reshape(shape),
         )
@@ -179,42 +180,29 @@ def _refine(
     arms: dict[str, Any],
     pins: PinForces,
     per_unit: dict[str, PinForces],
+    slope: Array,
 ) -> dict[str, Any]:
-    """Take Newton's steps from couples in doubles.
-
-    The numbers are of the kind that the forces are.
+    """Take Newton's steps from couples in doubles, in numbers of the forces' kind.
 
     (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of
     numbers that carry their derivatives the same steps are the theorem of the
     implicit function.
     """
+    matrix = np.eye(len(arms)) - slope
+    regular = _find_regular(matrix)
+    inverse = np.zeros_like(matrix)
+    inverse[regular] = np.linalg.inv(matrix[regular])
     for _ in range(2):
         gaps = []
-        slopes = []
         for pin, arm in arms.items():
             name = PIN_FORCE[pin]
             force = getattr(pins, name)
             for other, couple in couples.items():
                 force = force + getattr(per_unit[other], name) * couple
             gaps.append(arm * np.abs(force) - couples[pin])
-
-            doubles = take_doubles(force)
-            direction = doubles / np.abs(doubles)
-            row = []
-            for forces in per_unit.values():
-                pull = take_doubles(getattr(forces, name))
-                along = (direction.conjugate() * pull).real
-                row.append(take_doubles(arm) * along)
-            slopes.append(np.broadcast_arrays(*row, direction.real)[:-1])
-
-        slope = np.moveaxis(np.array(slopes), (0, 1), (-2, -1))
-        matrix = np.eye(len(arms), dtype=slope.dtype) - slope
-        regular = _find_regular(matrix)
-        inverse = np.zeros_like(matrix)
-        inverse[regular] = np.linalg.inv(matrix[regular])
-        for row_index, pin in enumerate(arms):
+        for row, pin in enumerate(arms):
             for column, gap in enumerate(gaps):
-                couples[pin] = couples[pin] + inverse[..., row_index, column] * gap
+                couples[pin] = couples[pin] + inverse[..., row, column] * gap
     return couples
 
 
@@ -271,8 +259,8 @@ class _Sliding(NamedTuple):
     """(n, p), N m; the only or the least solution, NaN where there is none."""
     number: NDArray[np.uint8]
     """(n,), ONE_SOLUTION, NO_SOLUTION or MANY."""
-    from_jamming: Array
-    """(n,), in (0, 1]: the least stretch of the equations' slope, 0 where they jam."""
+    slope: Array
+    """(n, p, p), slope of k |F + C x| at the solution."""
 
 
 def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
@@ -292,11 +280,14 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
             x, number = _solve_coupled(problems, finite)
         number[~finite] = ONE_SOLUTION
         _, slope = problems.right_side(x)
-    return _Sliding(x, number, _find_least_stretch(slope))
+    return _Sliding(x, number, slope)
 
 
-def _find_least_stretch(slope: Array) -> Array:
-    """Return the least singular value of 1 - slope, at most 1, (n,)."""
+def find_least_stretch(slope: Array) -> Array:
+    """Return the distance from jamming, (n,): the least singular value of 1 - slope.
+
+    At most 1, and 0 where the equations jam.
+    """
     matrix = np.eye(slope.shape[1]) - slope
     finite = np.isfinite(matrix).all(axis=(1, 2))
     singular_values = np.linalg.svd(matrix[finite], compute_uv=False)

@@ -172,8 +172,10 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes(part):
         (whole,) = (other for other in PARTS if other["at"] == place[:2])
         document.put(place[:2], whole["value"])
     before = document.text()
+    rows = len(document.at(place[:-1]) or ()) if place[-1] == -1 else 0
     document.put(place, part["value"])
     assert document.text() != before or place[0] == "effects"
+    assert place[-1] != -1 or len(document.at(place[:-1])) == rows + 1
     loads(document.text())
 
 
@@ -244,6 +246,7 @@ REFUSED = [
 {"do": "set", "path": ["motion", "theta_2", "steps"], "value": "many"} | a whole number
 {"do": "set", "path": ["drive", "bar"], "value": "7"} | must be 2 (input), 3 (coupler)
 {"do": "set", "path": ["nothing", "here"], "value": "1"} | unknown key
+{"do": "set", "path": ["loads", 1, "force", 0], "value": ""} | there is no finite number
 """),
     (
         json.dumps(set_to("motion/theta_2/steps", str(MOST_SOLVED_ANEW))),
