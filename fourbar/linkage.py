@@ -44,8 +44,8 @@ ANY_NUMBER, AT_LEAST_ZERO, POSITIVE = (
 """Bounds of a number, as errors say them."""
 
 
-def is_within(number: float, bound: str) -> bool:
-    """Return True if a finite number satisfies a bound."""
+def is_within(number: Any, bound: str) -> Any:
+    """Return True if a finite number satisfies a bound, of arrays one by one."""
     if bound == POSITIVE:
         return number > 0.0
     if bound == AT_LEAST_ZERO:
@@ -632,13 +632,9 @@ def uniform(
     0.1524
     """
     density = require("per_metre", per_metre, "kg/m", AT_LEAST_ZERO)
-    d = require("lengths.ground", ground, "m", POSITIVE)
-    a = require("lengths.input", input, "m", POSITIVE)
-    b = require("lengths.coupler", coupler, "m", POSITIVE)
-    c = require("lengths.output", output, "m", POSITIVE)
-    return FourBar(
-        d,
-        Bar(a, mass=density * a),
-        Bar(b, mass=density * b),
-        Bar(c, mass=density * c),
+    stated = zip(BAR_NUMBERS, (ground, input, coupler, output), strict=True)
+    d, *lengths = (
+        require(f"lengths.{name}", length, "m", POSITIVE) for name, length in stated
     )
+    two, three, four = (Bar(length, mass=density * length) for length in lengths)
+    return FourBar(d, two, three, four)

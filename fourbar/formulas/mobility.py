@@ -349,19 +349,15 @@ def find_circuit(
     """
     theta_2 = np.asarray(theta_2, dtype=float)
     every = circuits(linkage)
-    if len(every) == 1:
-        number = np.zeros(theta_2.shape, dtype=np.int8)
-    elif len(every[0].branches) == 1:
-        (first_branch,) = every[0].branches
-        is_first = np.broadcast_to(branch, theta_2.shape) == first_branch
-        number = np.where(is_first, 0, 1)
-    else:  # the two ranges are mirror images in the ground's line
-        is_first = (theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN
-        number = np.where(is_first, 0, 1)
+    is_second: NDArray[np.bool_] | bool = False
+    if len(every[0].branches) == 1:
+        is_second = np.not_equal(branch, every[0].branches)
+    elif len(every) == 2:  # their ranges are mirror images in the ground's line
+        is_second = (theta_2 - linkage.ground_angle) % TURN >= 0.5 * TURN
     path = prepare_path(linkage.lengths, linkage.ground_angle)
     half = path.half_angle(theta_2)
     assembles = (half.outer >= 0.0) & (half.inner >= 0.0)
-    return np.where(assembles, number, -1).astype(np.int8)
+    return np.where(assembles, is_second, -1).astype(np.int8)
 
 
 _GRASHOF = {

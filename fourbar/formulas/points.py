@@ -20,15 +20,13 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import compute_state, prepare_path
+from fourbar.formulas.path import compute_state
 from fourbar.linkage import (
     A_BRANCH,
-    MOST_INTERVALS,
     FourBar,
     require,
     require_bar,
     require_numbers,
-    require_whole,
 )
 
 
@@ -62,7 +60,7 @@ def point_coefficients(
     expect("z", z, complex, float, int, np.number)
     require("z", z.real)
     require("z", z.imag)
-    moving = _compute_checked_state(linkage, theta_2, branch)
+    moving = compute_checked_state(linkage, theta_2, branch)
     return PointCoefficients(moving.velocity(bar, z), moving.acceleration(bar, z))
 
 
@@ -81,32 +79,6 @@ class Centre(NamedTuple):
         """(x/w, y/w), m; inf or NaN where the centre is at infinity or undetermined."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return self.x / self.w, self.y / self.w
-
-
-def instant_centres(
-    linkage: FourBar,
-    theta_2: Array,
-    branch: Number,
-) -> dict[tuple[int, int], Centre]:
-    """Locate the six instant centres I_ij, keyed by (i, j) with i < j.
-
-    I12, I23, I34, I14 are the pins; I13 = line O2 A with line B O4, I24 = line A B with
-    line O2 O4 (Aronhold-Kennedy). Where two such lines coincide the centre is
-    undetermined: x = y = w = 0.
-
-    Parameters
-    ----------
-    theta_2 : (n,), rad.
-    branch : +1 or -1, or one of them for each position.
-
-    Source: R. L. Norton, Design of Machinery, ch. 6.
-    """
-    here = _compute_checked_state(linkage, theta_2, branch)
-    position = here.position
-    O4 = linkage.ground * position.u1 + 0.0 * position.u2
-    A = here.foot(3)
-    B = here.point(4, linkage.output.length)
-    return locate_centres(O4, A, B, position.u1, position.u2, position.u3, position.u4)
 
 
 def locate_centres(
@@ -144,61 +116,6 @@ class CouplerCurve(NamedTuple):
     y: Array
 
 
-def coupler_curve(
-    linkage: FourBar,
-    r_along: float,
-    r_across: float,
-    circuit: int = 0,
-    *,
-    branch: int = 1,
-    steps: int = 360,
-) -> CouplerCurve:
-    """Trace the closed coupler curve of one circuit, through limits and change points.
-
-    Where the input turns fully theta_2 is spaced evenly, over two turns if the linkage
-    has a single change point; else the curve goes from limit to limit on one branch and
-    back on the other, spaced by the cosine, so that its points do not thin out at the
-    limits.
-
-    Parameters
-    ----------
-    r_along, r_across : the point in the coupler's frame at A, m.
-    circuit : index into `circuits`; InputError where there is none of that number.
-    branch : assembly, for a linkage with change points.
-    steps : number of intervals, a multiple of 4 (InputError otherwise): limits and
-        change points, at which directions are undetermined or lose digits, then fall
-        between positions.
-    """
-    every = circuits(linkage)
-    point = complex(require("r_along", r_along), require("r_across", r_across))
-    circuit = require_whole(
-        "circuit",
-        circuit,
-        range(len(every)),
-        f"must be from 0 to {len(every) - 1}",
-    )
-    branch = require_whole("branch", branch, (1, -1), A_BRANCH)
-    steps = require_whole(
-        "steps",
-        steps,
-        range(4, MOST_INTERVALS + 1, 4),
-        f"must be a multiple of 4 up to {MOST_INTERVALS}",
-    )
-    theta_2, assembly, turns = list_circuit(linkage, circuit, branch, steps)
-    curve = compute_state(linkage, theta_2, assembly).point(3, point)
-    x = curve.real
-    y = curve.imag
-    path = prepare_path(linkage.lengths, linkage.ground_angle)
-    signs = path.sign(theta_2, assembly).astype(np.int8)
-    theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
-    return CouplerCurve(
-        theta_2,
-        np.append(signs, signs[0]),
-        np.append(x, x[0]),
-        np.append(y, y[0]),
-    )
-
-
 def list_circuit(
     linkage: FourBar,
     circuit: int,
@@ -208,7 +125,7 @@ def list_circuit(
     """Return theta_2 and branch of a circuit's positions, (steps,), and its turns.
 
     The turns are those that theta_2 gains over the circuit, an integer. For the
-    parameters see `coupler_curve`.
+    parameters see `coupler_curve` (`studies/points.py`).
     """
     (start, stop), branches = circuits(linkage)[circuit]
     branch = branch if branch in branches else branches[0]
@@ -225,7 +142,7 @@ def list_circuit(
     return theta_2, np.repeat((branch, -branch), len(out)), 0
 
 
-def _compute_checked_state(linkage: FourBar, theta_2: object, branch: object) -> State:
+def compute_checked_state(linkage: FourBar, theta_2: object, branch: object) -> State:
     """Compute the state at positions given by a user, after checking them."""
     expect("linkage", linkage, FourBar)
     angles = require_numbers("theta_2", theta_2)

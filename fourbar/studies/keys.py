@@ -24,18 +24,17 @@ from fourbar.formulas.arithmetic import (
 )
 from fourbar.linkage import (
     ANY_NUMBER,
-    AT_LEAST_ZERO,
     BAR_NAMES,
     BAR_NUMBERS,
     ENDS,
     FIRST_PIN,
     MOVING_BARS,
     PINS,
-    POSITIVE,
     Bar,
     Entries,
     FourBar,
     copy_with,
+    is_within,
     list_declared,
     list_numbers,
 )
@@ -45,22 +44,10 @@ from fourbar.scene.numbers import PIN_COORDINATE, Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
-_SAME_FOR_ALL = (
-    *(
-        "title",
-        "source",
-        "drive",
-        "bar",
-        "branch",
-        "free",
-        "law",
-        "frame",
-        "table",
-        "picture",
-        "acts",
-    ),
-    *("from", "to", "steps", "limit", "offset"),
-)
+_SAME_FOR_ALL = {
+    *("title", "source", "drive", "bar", "branch", "free", "law", "frame", "table"),
+    *("picture", "acts", "from", "to", "steps", "limit", "offset"),
+}
 """Parts of keys that name no number. They name a word, a whole number, or what has
 another form in a study.
 """
@@ -94,10 +81,7 @@ class SceneNumber(NamedTuple):
 
     def holds(self, values: Any) -> Any:
         """Mark the numbers that a scene would accept."""
-        low = {ANY_NUMBER: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[
-            self.bound
-        ]
-        return np.isfinite(values) & low
+        return np.isfinite(values) & is_within(values, self.bound)
 
 
 def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
@@ -157,14 +141,6 @@ def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
     return dict(sorted(stated, key=lambda item: item[1].place[2] in OF_A_UNIFORM_BAR))
 
 
-def _list_pins() -> dict[str, SceneNumber]:
-    return {
-        f"pins.{pin}.{axis}": SceneNumber(("drawing", pin, axis), PIN_COORDINATE.unit)
-        for pin in PINS
-        for axis in (0, 1)
-    }
-
-
 def _list_drawn_places(
     scene: Scene,
     entries: Mapping[str, SceneNumber],
@@ -203,34 +179,30 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     last. What is commanded is not among them.
     """
     of_ground = _list_entries("lengths", ("linkage",), FourBar)
-    bars = {
-        BAR_NAMES[bar]: _list_bar(scene.linkage.bar(bar), bar) for bar in MOVING_BARS
-    }
-    lengths = {
-        f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()
-    }
-    entries = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
-    entries |= {
-        f"bars.{name}{key}": number
-        for name, numbers in bars.items()
-        for key, number in numbers.items()
-    }
+    lengths = {"lengths.ground": of_ground["lengths.ground"]}
+    bars = dict[str, SceneNumber]()
+    for bar in MOVING_BARS:
+        name = BAR_NAMES[bar]
+        numbers = _list_bar(scene.linkage.bar(bar), bar)
+        lengths[f"lengths.{name}"] = numbers.pop(".length")
+        bars |= {f"bars.{name}{key}": number for key, number in numbers.items()}
+    entries = lengths | of_ground | bars
     if scene.motion.law is None:
-        for field, name in zip(
-            ("speed", "acceleration"),
-            scene.motion.names[1:],
-            strict=True,
-        ):
-            if np.ndim(getattr(scene.motion, field)):
-                continue  # each angle has its own
-            entries[f"motion.{name}"] = SceneNumber(
-                ("motion", field), scene.motion.numbers[name].unit
-            )
+        _, omega, alpha = scene.motion.names
+        for field, name in (("speed", omega), ("acceleration", alpha)):
+            if np.ndim(getattr(scene.motion, field)) == 0:  # not one for each angle
+                unit = scene.motion.numbers[name].unit
+                entries[f"motion.{name}"] = SceneNumber(("motion", field), unit)
     for key, path, described in list_described(scene):
         entries |= _list_entries(key, path, described)
     if scene.drawing is None:
         return entries
-    return _list_pins() | entries | _list_drawn_places(scene, entries)
+    of_pins = {
+        f"pins.{pin}.{axis}": SceneNumber(("drawing", pin, axis), PIN_COORDINATE.unit)
+        for pin in PINS
+        for axis in (0, 1)
+    }
+    return of_pins | entries | _list_drawn_places(scene, entries)
 
 
 def command_key(scene: Scene) -> str:
@@ -241,27 +213,23 @@ def command_key(scene: Scene) -> str:
 def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
-    names_a_pin = key.split(".", maxsplit=1)[0] == "pins"
-    if names_a_pin and not any(name.startswith("pins.") for name in keys):
-        lengths = ", ".join(name for name in keys if name.startswith("lengths."))
-        return InputError(
-            key, value, f"the scene has no [pins]; it states lengths: {lengths}"
-        )
+    parts = key.split(".")
     inner = [name for name in keys if name.startswith(f"{key}.")]
-    if inner:
-        return InputError(
-            key, value, "is more than one number; vary " + ", ".join(inner)
-        )
-    if any(part in _SAME_FOR_ALL for part in key.split(".")):
-        return InputError(
-            key,
-            value,
+    if parts[0] == "pins" and not any(name.startswith("pins.") for name in keys):
+        lengths = ", ".join(name for name in keys if name.startswith("lengths."))
+        allowed = f"the scene has no [pins]; it states lengths: {lengths}"
+    elif inner:
+        allowed = "is more than one number; vary " + ", ".join(inner)
+    elif not _SAME_FOR_ALL.isdisjoint(parts):
+        allowed = (
             "is the same for every member of a study: only numbers vary, theta_2 as"
-            " angles",
+            " angles"
         )
-    if any(map(names_other_mechanism, key.split("."))):
-        return InputError(key, value, f"unknown key; {ELSEWHERE}")
-    return InputError(key, value, f"unknown key; {_suggest(key, keys)}")
+    elif any(map(names_other_mechanism, parts)):
+        allowed = f"unknown key; {ELSEWHERE}"
+    else:
+        allowed = f"unknown key; {_suggest(key, keys)}"
+    return InputError(key, value, allowed)
 
 
 def _suggest(key: str, keys: list[str]) -> str:
@@ -462,9 +430,8 @@ def read_place(value: Any, place: NumberPath) -> Any:
         if isinstance(name, int):
             value = value[name]
         elif isinstance(value, Bar) and getattr(value, name) is None:
-            value = {"inertia": value.moment_of_inertia, "centre": value.mass_centre}[
-                name
-            ]
+            uniform = {"inertia": value.moment_of_inertia, "centre": value.mass_centre}
+            value = uniform[name]
         else:
             value = getattr(value, name)
     return value
@@ -499,20 +466,16 @@ def replace_place(holder: Any, place: NumberPath, values: Any) -> Any:
         return values
     name, *rest = place
     if isinstance(name, int):
-        parts = [
-            replace_place(part, tuple(rest), values) if i == name else part
-            for i, part in enumerate(holder)
-        ]
+        parts = list(holder)
+        parts[name] = replace_place(parts[name], tuple(rest), values)
         return tuple(parts)
-    if isinstance(holder, tuple):  # a named tuple
-        tuple_of_names: Any = holder
-        return tuple_of_names._replace(
-            **{name: replace_place(getattr(tuple_of_names, name), tuple(rest), values)}
-        )
     old = getattr(holder, name)
     if isinstance(holder, Bar) and name == "centre" and old is None:
         old = holder.mass_centre
-    new = copy_with(holder, **{name: replace_place(old, tuple(rest), values)})
+    changed = {name: replace_place(old, tuple(rest), values)}
+    if hasattr(holder, "_replace"):  # a named tuple
+        return holder._replace(**changed)
+    new = copy_with(holder, **changed)
     if isinstance(new, Bar):
         return copy_with(new, mass=new.weigh())
     if isinstance(new, Scene) and name == "drawing":

@@ -3,11 +3,23 @@
 import numpy as np
 
 from fourbar.errors import InputError, expect
-from fourbar.formulas import points
 from fourbar.formulas.arithmetic import Number
-from fourbar.formulas.mobility import find_circuit
-from fourbar.formulas.points import Centre, CouplerCurve
-from fourbar.linkage import FourBar
+from fourbar.formulas.mobility import TURN, circuits, find_circuit
+from fourbar.formulas.path import compute_state, prepare_path
+from fourbar.formulas.points import (
+    Centre,
+    CouplerCurve,
+    compute_checked_state,
+    list_circuit,
+    locate_centres,
+)
+from fourbar.linkage import (
+    A_BRANCH,
+    MOST_INTERVALS,
+    FourBar,
+    require,
+    require_whole,
+)
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.solution import Solution
@@ -41,7 +53,11 @@ def instant_centres(
                 theta_2,
                 "a linkage needs theta_2 and branch; a scene has its own",
             )
-        return points.instant_centres(of, theta_2, branch)
+        here = compute_checked_state(of, theta_2, branch)
+        u1, u2, u3, u4 = here.position[:4]
+        O4 = of.ground * u1 + 0.0 * u2
+        B = here.point(4, of.output.length)
+        return locate_centres(O4, here.foot(3), B, u1, u2, u3, u4)
     for name, value in (("theta_2", theta_2), ("branch", branch)):
         if value is not None:
             raise InputError(name, value, "must be left out: the positions are stated")
@@ -50,7 +66,7 @@ def instant_centres(
     length, angle = solution.ground
     O4 = length * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
     along = [vector / np.abs(vector) for vector in (O4, A, B - A, B - O4)]
-    return points.locate_centres(O4, A, B, *along)
+    return locate_centres(O4, A, B, *along)
 
 
 def coupler_curve(
@@ -87,28 +103,33 @@ def coupler_curve(
         if of.scene is None:
             raise InputError("of", "a study", "has many linkages; take one scene of it")
         of = of.scene
-    if isinstance(of, FourBar):
-        return points.coupler_curve(
-            of,
-            r_along,  # type: ignore[arg-type]  # checked there
-            r_across,  # type: ignore[arg-type]
-            0 if circuit is None else circuit,
-            branch=1 if branch is None else branch,
-            steps=steps,
-        )
-    if isinstance(r_along, str):
-        r_along, r_across = _find_in_coupler(of, r_along)
-    first = solve(of, "position", at=command(of).part(slice(0, 1)))
-    if circuit is None:
-        circuit = int(find_circuit(of.linkage, first.theta_2, first.branch)[0])
-    return points.coupler_curve(
-        of.linkage,
-        r_along,
-        r_across,  # type: ignore[arg-type]  # checked there
-        circuit,
-        branch=int(first.branch[0]) if branch is None else branch,
-        steps=steps,
+    linkage = of.linkage if isinstance(of, Scene) else of
+    if isinstance(of, Scene):
+        if isinstance(r_along, str):
+            r_along, r_across = _find_in_coupler(of, r_along)
+        first = solve(of, "position", at=command(of).part(slice(0, 1)))
+        if circuit is None:
+            circuit = int(find_circuit(linkage, first.theta_2, first.branch)[0])
+        if branch is None:
+            branch = int(first.branch[0])
+    every = circuits(linkage)
+    point = complex(require("r_along", r_along), require("r_across", r_across))
+    numbers = range(len(every))
+    allowed = f"must be from 0 to {len(every) - 1}"
+    circuit = 0 if circuit is None else circuit
+    circuit = require_whole("circuit", circuit, numbers, allowed)
+    branch = require_whole("branch", 1 if branch is None else branch, (1, -1), A_BRANCH)
+    allowed = f"must be a multiple of 4 up to {MOST_INTERVALS}"
+    steps = require_whole("steps", steps, range(4, MOST_INTERVALS + 1, 4), allowed)
+    theta_2, assembly, turns = list_circuit(linkage, circuit, branch, steps)
+    curve = compute_state(linkage, theta_2, assembly).point(3, point)
+    path = prepare_path(linkage.lengths, linkage.ground_angle)
+    signs = path.sign(theta_2, assembly).astype(np.int8)
+    theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
+    signs, x, y = (
+        np.append(values, values[0]) for values in (signs, curve.real, curve.imag)
     )
+    return CouplerCurve(theta_2, signs, x, y)
 
 
 def _find_in_coupler(scene: Scene, name: str) -> tuple[float, float]:

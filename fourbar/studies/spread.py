@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect, needing
+from fourbar.formulas.mobility import TURN
+from fourbar.linkage import require_whole
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Scene, command
 from fourbar.solution import find_values, split_parts
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 8192
 _MOST_SAMPLES = 10_000_000
+_SEEDS = range(2**128)
+"""Whole numbers that seed a generator: it has 128 bits."""
 BAND_PERCENTILES = (1.0, 99.0)
 """Percentiles of the band."""
 EVALUATED_AT_ONCE = 200_000
@@ -81,9 +85,8 @@ class Spread(NamedTuple):
         """
         larger = np.fmax(self.deviation, self.first_order)
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
-        differ = ~(
-            np.abs(self.deviation - self.first_order) <= PARTED * larger
-        ) & np.isfinite(self.deviation)
+        apart = np.abs(self.deviation - self.first_order)
+        differ = np.isfinite(self.deviation) & ~(apart <= PARTED * larger)
         return np.asarray(differ & (larger > _NEGLIGIBLE * size))
 
 
@@ -151,27 +154,18 @@ class Tolerances:
 
         The deviation is the standard one.
         """
-        shown = [
-            name
-            for name in (
-                "torque",
-                "theta_3",
-                "theta_4",
-                *(f"|{name}|" for name in PIN_FORCES),
-            )
-            if name in self.spreads
-        ]
         rows = []
-        for name in shown:
+        sizes = [f"|{name}|" for name in PIN_FORCES]
+        for name in ("torque", "theta_3", "theta_4", *sizes):
+            if name not in self.spreads:
+                continue
             spread = self.spreads[name]
-            largest = (
-                np.max(x[np.isfinite(x)], initial=0.0)
+            sigma, worst = (
+                f"{np.max(x[np.isfinite(x)], initial=0.0):.3g}"
                 for x in (spread.deviation, spread.worst)
             )
-            rows.append(
-                (name, write_between(spread.nominal), *(f"{x:.3g}" for x in largest))
-            )
-        return rows  # type: ignore[return-value]
+            rows.append((name, write_between(spread.nominal), sigma, worst))
+        return rows
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
@@ -219,25 +213,16 @@ def tolerances(
     JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
-    if (
-        isinstance(samples, bool)
-        or not isinstance(samples, int)
-        or not 2 <= samples <= _MOST_SAMPLES
-    ):
-        raise InputError(
-            "samples", samples, f"must be a whole number from 2 to {_MOST_SAMPLES}"
-        )
+    may_be = range(2, _MOST_SAMPLES + 1)
+    allowed = f"must be a whole number from 2 to {_MOST_SAMPLES}"
+    samples = require_whole("samples", samples, may_be, allowed)
     is_generator = isinstance(seed, np.random.Generator)
-    is_whole = isinstance(seed, int) and not isinstance(seed, bool)
-    if not is_generator and not (is_whole and seed >= 0):  # type: ignore[operator]
+    if not is_generator:
         allowed = "must be a whole number, 0 or more, or a numpy.random.Generator"
-        raise InputError("seed", seed, allowed)
+        require_whole("seed", seed, _SEEDS, allowed)
     if not scene.tolerances:
-        raise InputError(
-            "tolerances",
-            None,
-            'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"',
-        )
+        allowed = 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"'
+        raise InputError("tolerances", None, allowed)
     if progress is not None:
         progress(0.0)
     slopes = sensitivity(scene)
@@ -267,11 +252,10 @@ def tolerances(
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
             number = find_values(solution, name)[:, -width:]
-            if name.startswith(
-                "theta_"
-            ):  # each member counts its turns from its own first position
-                turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
-                number = number - 2 * np.pi * turns
+            if name.startswith("theta_"):
+                # each member counts its turns from its own first position
+                turns = np.rint((number - values[name][name][columns]) / TURN)
+                number = number - TURN * turns
             for part, sampled in split_parts(name, number).items():
                 _fill(spreads[part], columns, sampled)
         if progress is not None:
@@ -280,7 +264,7 @@ def tolerances(
     return Tolerances(
         scene,
         samples,
-        None if isinstance(seed, np.random.Generator) else seed,
+        None if is_generator else seed,  # type: ignore[arg-type]
         slopes.solution.theta_2,
         spreads,
         without,
@@ -293,11 +277,9 @@ def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -
     """Make the study of the samples, one member each."""
     with needing("SciPy is needed for tolerances", "studies"):
         from scipy.stats import norm, qmc
-    entries, stated, numbers = (
-        list_entries(scene),
-        read_numbers(scene),
-        dict[str, Any](),
-    )
+    entries = list_entries(scene)
+    stated = read_numbers(scene)
+    numbers = dict[str, Any]()
     rng = np.random.default_rng(seed)  # a generator is returned as it is
     drawn = qmc.Sobol(len(scene.tolerances), rng=rng).random_base2(
         max(1, (samples - 1).bit_length())
@@ -348,20 +330,10 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
         np.array([getattr(tolerance, width) for tolerance in scene.tolerances])[:, None]
         for width in ("deviation", "reach")
     )
-    deviation, low, high, least, greatest = (
-        np.full(nominal.shape, np.nan) for _ in range(5)
-    )
+    shares = (slopes * deviations) ** 2
     worst = np.asarray(np.abs(slopes * reaches).sum(axis=0))
-    return Spread(
-        nominal,
-        deviation,
-        low,
-        high,
-        least,
-        greatest,
-        worst,
-        (slopes * deviations) ** 2,
-    )
+    deviation, low, high, least, greatest = np.full((5, *nominal.shape), np.nan)
+    return Spread(nominal, deviation, low, high, least, greatest, worst, shares)
 
 
 def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
@@ -371,24 +343,14 @@ def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
     """
     if np.isfinite(sampled).all():
         # standard deviation of differences: a mean of equal numbers is rounded
-        spread.deviation[columns] = (
-            sampled - np.nan_to_num(spread.nominal[columns])
-        ).std(axis=0)
-        spread.low[columns], spread.high[columns] = np.percentile(
-            sampled,
-            BAND_PERCENTILES,
-            axis=0,
-        )
-        spread.least[columns], spread.greatest[columns] = (
-            sampled.min(axis=0),
-            sampled.max(axis=0),
-        )
+        apart = sampled - np.nan_to_num(spread.nominal[columns])
+        spread.deviation[columns] = apart.std(axis=0)
+        band = np.percentile(sampled, BAND_PERCENTILES, axis=0)
+        spread.low[columns], spread.high[columns] = band
+        spread.least[columns] = sampled.min(axis=0)
+        spread.greatest[columns] = sampled.max(axis=0)
         return
-    for column, values in zip(
-        range(columns.start, columns.stop),
-        sampled.T,
-        strict=True,
-    ):
+    for column, values in enumerate(sampled.T, columns.start):
         finite = values[np.isfinite(values)]
         if finite.size > 1:
             _fill(spread, slice(column, column + 1), finite[:, None])

@@ -105,16 +105,13 @@ class Study:
 
         `begins`: the scene with effects that know where the motion begins.
         """
-        scene = replace_numbers(
-            begins,
-            {key: _repeat(values[rows], count) for key, values in self.values.items()},
-        )
+        numbers = {
+            key: _repeat(values[rows], count) for key, values in self.values.items()
+        }
+        scene = replace_numbers(begins, numbers)
         for index, turns in _find_pin_turns(scene.effects).items():
-            scene = replace_place(
-                scene,
-                ("effects", index, "turns"),
-                tuple(_repeat(turn, count) for turn in turns),
-            )
+            repeated = tuple(_repeat(turn, count) for turn in turns)
+            scene = replace_place(scene, ("effects", index, "turns"), repeated)
         return scene
 
     def begin(self, rows: slice) -> Scene:
@@ -135,12 +132,8 @@ class Study:
         begins = assembled.any(axis=1) & (np.ptp(at.branch[rows], axis=1) == 0)
         angle = np.where(begins, at.angle[rows][np.arange(count), first], np.nan)
         start = Command(angle, at.branch[rows, 0], 0.0, 0.0, at.bar)
-        counted = (
-            Case.of(self.members(rows, 1, scene), at.bar)
-            .beside(self.scene)
-            .begin_at(start)
-            .terms[len(scene.loads) :]
-        )
+        case = Case.of(self.members(rows, 1, scene), at.bar).beside(self.scene)
+        counted = case.begin_at(start).terms[len(scene.loads) :]
         for index, turns in _find_pin_turns(counted).items():
             scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
@@ -175,12 +168,12 @@ def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
 
     Only effects that depend on where the motion begins count turns.
     """
-    turns_of = {
-        index: getattr(effect, "turns", None)
-        for index, effect in enumerate(effects)
-        if effect.counts_turns
-    }
-    return {index: turns for index, turns in turns_of.items() if turns is not None}
+    turns = {}
+    for index, effect in enumerate(effects):
+        of_pins = getattr(effect, "turns", None) if effect.counts_turns else None
+        if of_pins is not None:
+            turns[index] = of_pins
+    return turns
 
 
 def _repeat(values: Array, count: int) -> Array:
@@ -224,11 +217,8 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     expect("scene", scene, Scene)
     expect("values", values, Mapping)
     if scene.motion.free is not None:
-        raise InputError(
-            "motion.free",
-            "a free motion",
-            "is integrated for one linkage; a study prescribes theta_2",
-        )
+        allowed = "is integrated for one linkage; a study prescribes theta_2"
+        raise InputError("motion.free", "a free motion", allowed)
     entries = list_entries(scene)
     theta = command_key(scene)
     arrays = {
@@ -240,20 +230,14 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         allowed = f"follows from {pin}, which varies too: vary one of them"
         raise InputError(length, _shorten_for_line(values[length]), allowed)
     angles = _read_angles(scene, arrays, theta)
-    sizes = {
-        key: array.size
-        for key, array in arrays.items()
-        if key != theta and array.size != 1
-    }
-    if angles.shape[0] != 1:
-        sizes[theta] = angles.shape[0]
-    m = next(iter(sizes.values()), 1)
+    members = {key: array.size for key, array in arrays.items() if key != theta}
+    members[theta] = angles.shape[0]
+    sizes = {key: size for key, size in members.items() if size != 1}
+    first, m = next(iter(sizes.items()), ("", 1))
     for key, size in sizes.items():
         if size != m:
-            first = next(iter(sizes))
-            raise InputError(
-                key, f"{size} members", f"must have one length: {first} has {m}"
-            )
+            allowed = f"must have one length: {first} has {m}"
+            raise InputError(key, f"{size} members", allowed)
     numbers = {
         key: np.broadcast_to(arrays[key].ravel(), (m,))
         for key in entries
@@ -317,15 +301,13 @@ def _read_members(key: str, value: Any, keys: list[str]) -> Array:
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
-        raise InputError(
-            key, _shorten_for_line(value), "must be an array of numbers, at least one"
-        )
-    most = 2 if key in COMMAND_KEYS else 1
+        allowed = "must be an array of numbers, at least one"
+        raise InputError(key, _shorten_for_line(value), allowed)
+    may_be, most = "(m,)", 1
+    if key in COMMAND_KEYS:
+        may_be, most = "(n,) or (m, n)", 2
     if array.ndim > most:
-        if most == 2:
-            allowed = "must have the shape (n,) or (m, n)"
-        else:
-            allowed = "must have the shape (m,)"
+        allowed = f"must have the shape {may_be}"
         raise InputError(key, f"shape {array.shape}", allowed)
     return array.astype(float)
 
@@ -346,11 +328,6 @@ def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
     if motion.law is None and (
         motion.angle is None or isinstance(motion.angle, FromLimit)
     ):
-        raise InputError(
-            key,
-            motion.angle,
-            "depends on the linkage; a study states it: (n,) or (m, n) angles",
-        )
-    at = command(scene)
-    angles: Array = at.stated[0]
-    return angles[None, :]
+        allowed = "depends on the linkage; a study states it: (n,) or (m, n) angles"
+        raise InputError(key, motion.angle, allowed)
+    return np.atleast_2d(command(scene).stated[0])
