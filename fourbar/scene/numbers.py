@@ -20,7 +20,6 @@ from fourbar.errors import InputError, expect
 from fourbar.linkage import (
     BAR_NAMES,
     MOVING_BARS,
-    PINS,
     POSITIVE,
     Bar,
     Declared,
@@ -118,8 +117,6 @@ TAKEN_NAMES = frozenset(
 _THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
 PIN_COORDINATE = Declared("m")
-_TABLES_OF_PLACES = ("bars", "points", "drive", "loads", "effects")
-"""Tables of a scene file in which places of bars stand."""
 LENGTH_NUMBERS = {
     **FourBar.numbers,
     **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
@@ -132,33 +129,25 @@ def find_unit_of_key(key: str) -> str | None:
     None: no scene has such a number.
     """
     table, *names = key.split(".")
-    if table == "pins":
-        is_known = len(names) == 2 and names[0] in PINS and names[1] in ("0", "1")
-        return PIN_COORDINATE.unit if is_known else None
-    if names[-2:-1] == [DRAWN_WORD]:
-        is_known = table in _TABLES_OF_PLACES and names[-1] in ("0", "1")
-        return PIN_COORDINATE.unit if is_known else None
-    numbers: dict[str, Declared]
-    if table in (tables := {"lengths": LENGTH_NUMBERS, "motion": Motion.numbers}):
-        numbers = tables[table]
-    else:
-        kinds: dict[str, Any] = {
-            "bars": Bar,
-            "points": Point,
-            "loads": effects.Load,
-            "drive": effects.PointDrive,
-        }
-        if table == "effects" and names:
-            kinds |= {table: effects.list_kinds().get(names[0])}
-        numbers = _collect_numbers(kinds.get(table))
-    *_, before, last = ("", *names) if names else ("", "")
-    stated = numbers.get(last)
-    if stated is None and last in ("0", "1"):
-        stated = numbers.get(before)
-        if stated is not None and last == "1":
-            return "rad"
-    stated = stated or numbers.get("")
-    return None if stated is None else stated.unit
+    if table == "pins" or names[-2:-1] == [DRAWN_WORD]:
+        return PIN_COORDINATE.unit
+    tables = {"lengths": LENGTH_NUMBERS, "motion": Motion.numbers}
+    kinds: dict[str, Any] = {
+        "bars": Bar,
+        "points": Point,
+        "loads": effects.Load,
+        "drive": effects.PointDrive,
+    }
+    if table == "effects" and names:
+        kinds[table] = effects.list_kinds().get(names[0])
+    numbers = tables.get(table) or _collect_numbers(kinds.get(table))
+    *_, before, last = ("", "", *names)
+    if last == "1" and last not in numbers and before in numbers:
+        return numbers[before].pair or None
+    for name in (last, before if last == "0" else last, ""):
+        if name in numbers:
+            return numbers[name].unit
+    return None
 
 
 def _collect_numbers(kind: Any) -> dict[str, Declared]:

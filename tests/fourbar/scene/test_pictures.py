@@ -77,40 +77,14 @@ def test_one_given_with_the_command_takes_its_place(tmp_path):
 @pytest.mark.parametrize(
     "name",
     (
-        *(
-            "",
-            ".",
-            "..",
-            "../secret.png",
-            "a/../../secret.png",
-            "/etc/passwd",
-            "//host/x.png",
-            "a//b.png",
-        ),
-        *(
-            r"..\\secret.png",
-            "C:/x.png",
-            "C:x.png",
-            "a\\u0000b.png",
-            "a\\nb.png",
-            "x" * 300,
-            "file:x.png",
-            "./x.png",
-        ),
+        *("", ".", "..", "../secret.png", "a/../../secret.png", "/etc/passwd"),
+        *("//host/x.png", "a//b.png", r"..\\secret.png", "C:/x.png", "C:x.png"),
+        *("a\\u0000b.png", "a\\nb.png", "x" * 300, "file:x.png", "./x.png"),
     ),
 )
-def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(
-    tmp_path, name, capsys
-):
-    (tmp_path / "secret.png").write_bytes(PNG)
-    inner = tmp_path / "inner"
-    inner.mkdir()
-    file = scene_file(inner, name)
-    assert status(["analyze", str(file)]) == 2
-    (line,) = capsys.readouterr().err.strip().split("\n")
-    assert str(file) in line
-    assert "bars.coupler.picture" in line
-    assert "PNG or JPEG" in line
+def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(name):
+    with raises(InputError, match=r"^s.toml: bars\.coupler\.picture .*PNG or JPEG"):
+        loads(f'{LENGTHS}[bars.coupler]\npicture = "{name}"\n', "s.toml")
 
 
 def test_a_picture_that_is_no_text_is_refused():
