@@ -425,12 +425,11 @@ def make_solution(
         theta_2 = _turn_first(theta_2)
         if commanded in quantities:
             quantities[commanded][...] = theta_2 + 0.0 * quantities[commanded]
-    of_points = dict[str, dict[str, Array]]()
-    for start in POINT_STAGES:
-        names = {start + point.name: point.name for point in scene.points}
-        of_points[start] = {
-            names[name]: quantities.pop(name) for name in names if name in quantities
-        }
+    of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
+    for point in scene.points:
+        for start, arrays in of_points.items():
+            if start + point.name in quantities:
+                arrays[point.name] = quantities.pop(start + point.name)
     branch = at.branch
     if results.sign_may_differ:
         sine = quantities.get("sin_mu")

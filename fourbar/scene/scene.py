@@ -698,7 +698,7 @@ def write_stroke_ranges(scene: Scene) -> str:
 def command_at(scene: Scene, places: Array) -> Command:
     """Return the command of the scene's motion at other angles, strokes or times."""
     motion, bar = scene.motion, scene.motion.bar
-    if motion.stroke is not None:
+    if motion.commanded == "stroke":
         triangle = _triangle_of(scene)
         least = abs(triangle.length - triangle.reach)
         most = triangle.length + triangle.reach
