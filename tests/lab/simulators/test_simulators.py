@@ -58,10 +58,13 @@ ENTRIES = {
 }
 
 
-def ask_position():
-    return protocol.command_from_json(
-        protocol.scene_from_json(PROBLEM["scene"]), PROBLEM["command"]
-    )
+ALL = {"theta_3", "theta_4", "torque", *PIN_FORCES}
+
+
+def ask_position(problem=PROBLEM, **changes):
+    """Read scene and command of a problem, some entries of which are changed."""
+    scene = protocol.scene_from_json(problem["scene"])
+    return protocol.command_from_json(scene, problem["command"] | changes)
 
 
 def find_errors(simulator, **setting):
@@ -88,18 +91,12 @@ def sealed(monkeypatch):
 
 @pytest.mark.usefixtures("sealed")
 def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
-    paths = [
-        path
-        for path in (ROOT / "lab/fourbar_lab/simulators").glob("*.py")
-        if path.name not in JUDGES
-    ]
-    assert len(paths) > 10
-    for path in paths:
-        assert not {
-            name
-            for name in imported(path)
-            if name.startswith(("fourbar.solving", "fourbar.formulas"))
-        }, path
+    paths = {*(ROOT / "lab/fourbar_lab/simulators").glob("*.py")}
+    handing = [path for path in paths if path.name not in JUDGES]
+    assert len(handing) > 10
+    for path in handing:
+        formulas = ("fourbar.solving", "fourbar.formulas")
+        assert not [name for name in imported(path) if name.startswith(formulas)], path
         assert "fourbar.solving" not in path.read_text(), path
     for branch in (1, -1):
         scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
@@ -108,18 +105,13 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
             motion=scene.motion.replace(branch=branch, speed=-10.0 * branch),
         )
         begin = motion.start(scene)
-        assert write_mjcf(scene, start=begin).count(
-            "<key "
-        ) == 1 and "coupler" in write_sdf(scene, "drake", begin)
+        assert write_mjcf(scene, start=begin).count("<key ") == 1
+        assert "coupler" in write_sdf(scene, "drake", begin)
         theta = (begin.qpos[0], begin.qpos[0] + begin.qpos[1], begin.qpos[2])
-        assert (
-            motion.compute_gap_at_B(scene, theta) < 1e-15
-            and np.sin(theta[2] - theta[1]) * branch > 0.0
-        )
-        assert (
-            begin.qpos[0] == (math.tau if branch > 0 else 0.0)
-            and begin.qvel[0] == -10.0 * branch
-        )
+        assert motion.compute_gap_at_B(scene, theta) < 1e-15
+        assert np.sin(theta[2] - theta[1]) * branch > 0.0
+        assert begin.qpos[0] == (math.tau if branch > 0 else 0.0)
+        assert begin.qvel[0] == -10.0 * branch
 
 
 def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated():
@@ -142,13 +134,8 @@ class Rigid(Simulator):
     A test changes it.
     """
 
-    name, version, device, made_for, changed = (
-        "rigid",
-        "1",
-        "abacus",
-        "tests",
-        "nothing",
-    )
+    name, version, device = "rigid", "1", "abacus"
+    made_for, changed = "tests", "nothing"
     settings: ClassVar[dict[str, Any]] = {"plain": 1.0, "wrong": 1.1}
     left_out = ""
     diverges_at = math.inf
@@ -162,64 +149,43 @@ class Rigid(Simulator):
             return begin.qpos[0] + speed * done * course.timestep
 
         def read(theta):
-            one = np.array([theta])
             branch = np.array([scene.motion.branch], dtype=np.int8)
-            exact = (
-                FreeBody().answer(scene, Command(one, branch, speed, 0.0)).quantities
-            )
-            angle = math.nan if done > self.diverges_at else float(exact["theta_3"][0])
-            forces = {
-                name: exact[name][0] for name in PIN_FORCES if name != self.left_out
-            }
+            command = Command(np.array([theta]), branch, speed, 0.0)
+            exact = FreeBody().answer(scene, command).quantities
+            angles = [float(exact[name][0]) for name in ("theta_3", "theta_4")]
+            if done > self.diverges_at:
+                angles[0] = math.nan
+            read = [name for name in PIN_FORCES if name != self.left_out]
+            forces = {name: exact[name][0] for name in read}
             torque = self.settings[self.setting] * float(exact["torque"][0])
-            return Instant(
-                (theta, angle, float(exact["theta_4"][0])), speed, 0.0, torque, forces
-            )
+            return Instant((theta, *angles), speed, 0.0, torque, forces)
 
         return motion.run_through(scene, course, advance, read)
 
 
 def test_a_run_is_judged_at_the_motion_that_it_made():
     errors = find_errors(Rigid, steps_per_turn=50)
-    assert max(errors.values()) < EXACT and set(errors) == {
-        "theta_3",
-        "theta_4",
-        "torque",
-        *PIN_FORCES,
-    }
+    assert max(errors.values()) < EXACT and {*errors} == ALL
     assert find_errors(Rigid, name="wrong")["torque"] == pytest.approx(0.1, abs=1e-9)
 
 
 def test_a_run_begins_before_its_first_position_where_the_linkage_closes():
     scene, command = ask_position()
-    led, course = motion.lay_out(scene, command, 100)
-    assert (
-        motion.start(led).qpos[0] == pytest.approx(-0.5 * math.pi)
-        and course.stops[-1] == 125
-    )
-    assert course.timestep == pytest.approx(
-        math.tau / 10.0 / 100
-    ) and course.rows.tolist() == list(range(25))
-    back = replace(scene, motion=scene.motion.replace(speed=-10.0))
-    led, course = motion.lay_out(
-        back,
-        command._replace(speed=-10.0),
-        100,
-    )
-    assert motion.start(led).qpos[0] == pytest.approx(
-        2.5 * math.pi
-    ) and course.rows.tolist() == list(range(24, -1, -1))
-    upright = read_problem(
-        PROBLEMS / "pinocchio_2729.json"
-    )  # 30 degrees from a change point
-    scene, command = protocol.command_from_json(
-        protocol.scene_from_json(upright["scene"]), upright["command"]
-    )
+    for sense, begin, rows in ((1, -0.5, range(25)), (-1, 2.5, range(24, -1, -1))):
+        motion_back = scene.motion.replace(speed=10.0 * sense)
+        led, course = motion.lay_out(
+            replace(scene, motion=motion_back),
+            command._replace(speed=10.0 * sense),
+            100,
+        )
+        assert motion.start(led).qpos[0] == pytest.approx(begin * math.pi)
+        assert course.stops[-1] == 125 and course.rows.tolist() == [*rows]
+        assert course.timestep == pytest.approx(math.tau / 10.0 / 100)
+    # 30 degrees from a change point
+    scene, command = ask_position(read_problem(PROBLEMS / "pinocchio_2729.json"))
     led, course = motion.lay_out(scene, command, 628)
-    assert (
-        0.1 < motion.start(led).qpos[0] < command.theta_2[0] - 0.1
-        and course.stops[0] > 1
-    )
+    assert 0.1 < motion.start(led).qpos[0] < command.theta_2[0] - 0.1
+    assert course.stops[0] > 1
 
 
 @pytest.mark.parametrize(
@@ -232,10 +198,7 @@ def test_a_run_begins_before_its_first_position_where_the_linkage_closes():
     ],
 )
 def test_a_motion_that_no_simulator_makes_is_a_refusal(changes):
-    scene, command = protocol.command_from_json(
-        protocol.scene_from_json(PROBLEM["scene"]), {**PROBLEM["command"], **changes}
-    )
-    answer = Rigid().answer(scene, command)
+    answer = Rigid().answer(*ask_position(**changes))
     assert answer.refusal is not None and answer.setting == "plain, 628/rev"
 
 
@@ -256,91 +219,62 @@ def test_a_force_that_is_not_read_is_missing_and_the_others_count(monkeypatch):
 
 @pytest.mark.slow
 def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch):
-    def tell(question):
-        replies = BytesIO()
-        serve(
-            f"{__name__}:Rigid",
-            BytesIO(json.dumps({"id": 1, **question}).encode()),
-            replies,
-        )
-        reply = json.loads(replies.getvalue())
-        return reply
-
     told = {key: PROBLEM[key] for key in ("scene", "command")}
+
+    def tell(ask, **more):
+        replies = BytesIO()
+        question = {"id": 1, "ask": ask, **told, **more}
+        serve(f"{__name__}:Rigid", BytesIO(json.dumps(question).encode()), replies)
+        return json.loads(replies.getvalue())
+
     hello = open_engine(f"{__name__}:Rigid")[1]
-    assert (hello["settings"], hello["device"], hello["made_for"]) == (
-        ["plain", "wrong"],
-        "abacus",
-        "tests",
-    )
-    for setting, made in (
-        (None, "plain, 628/rev"),
-        ({"name": "wrong"}, "wrong, 628/rev"),
-        ({"name": "wrong", "steps_per_turn": 50}, "wrong, 50/rev"),
+    assert hello["settings"] == ["plain", "wrong"]
+    assert (hello["device"], hello["made_for"]) == ("abacus", "tests")
+    for setting, key, made in (
+        (None, "setting", "plain, 628/rev"),
+        ({"name": "wrong"}, "setting", "wrong, 628/rev"),
+        ({"name": "wrong", "steps_per_turn": 50}, "setting", "wrong, 50/rev"),
+        ({"name": "no"}, "refusal", "it has no setting 'no'; it has"),
+        ({"error": 0.1}, "refusal", "it knows no law of its error"),
+        ({"steps": 3}, "error", "setting = {'steps': 3}"),
     ):
-        assert tell({"ask": "answer", **told, "setting": setting})["setting"] == made
-    refusals = [
-        tell({"ask": "answer", **told, "setting": setting})
-        for setting in ({"name": "no"}, {"error": 0.1})
-    ]
-    assert [reply["refusal"].partition(":")[0] for reply in refusals] == [
-        *("it has no setting 'no'; it has", "it knows no law of its error"),
-    ]
-    assert tell({"ask": "slopes", **told}) == {
-        "id": 1,
-        "refusal": "it has no derivatives",
-    }
-    monkeypatch.setattr(
-        Rigid,
-        "slopes",
-        lambda *_: [{"how": "by hand"}],
-        raising=False,
-    )
-    assert tell({"ask": "slopes", **told}) == {"id": 1, "slopes": [{"how": "by hand"}]}
-    assert (
-        "setting = {'steps': 3}"
-        in tell({"ask": "answer", **told, "setting": {"steps": 3}})["error"]
-    )
+        assert made in tell("answer", setting=setting)[key]
+    assert tell("slopes") == {"id": 1, "refusal": "it has no derivatives"}
+    by_hand = [{"how": "by hand"}]
+    monkeypatch.setattr(Rigid, "slopes", lambda *_: by_hand, raising=False)
+    assert tell("slopes") == {"id": 1, "slopes": by_hand}
+
+
+def load_adapter(name):
+    module, _, cls = name.partition(":")
+    assert find_spec(module) is not None
+    return getattr(pytest.importorskip(module, exc_type=ImportError), cls)
 
 
 @pytest.mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn():
-    module = pytest.importorskip(
-        "fourbar_lab.simulators.mujoco_c",
-        exc_type=ImportError,
-    )
+    simulator = load_adapter("fourbar_lab.simulators.mujoco_c:MujocoFile")
     at_states, through = (
-        find_errors(module.MujocoFile),
-        find_errors(module.MujocoFile, steps_per_turn=157),
+        find_errors(simulator, steps_per_turn=steps) for steps in (None, 157)
     )
-    assert (
-        set(at_states) == {"theta_3", "theta_4", "torque", *PIN_FORCES} == set(through)
-    )
+    assert {*at_states} == {*through} == ALL
     assert max(at_states.values()) < EXACT < max(through.values()) < THROUGH
-    assert find_errors(module.MujocoFile, name="its defaults")["torque"] > THROUGH
+    assert find_errors(simulator, name="its defaults")["torque"] > THROUGH
 
 
 @pytest.mark.usefixtures("sealed")
 def test_each_solver_of_pinocchio_carries_the_loop():
-    module = pytest.importorskip(
-        "fourbar_lab.simulators.pinocchio_simulated",
-        exc_type=ImportError,
-    )
-    for setting in module.PinocchioSolvers.settings:
+    name = "fourbar_lab.simulators.pinocchio_simulated:PinocchioSolvers"
+    simulator = load_adapter(name)
+    for setting in simulator.settings:
         accurate = setting in ("constraintDynamics", "lcaba")
-        errors = find_errors(module.PinocchioSolvers, name=setting, steps_per_turn=314)
+        errors = find_errors(simulator, name=setting, steps_per_turn=314)
         assert max(errors.values()) < IN_PINOCCHIO[accurate], setting
         if accurate:
-            assert (
-                max(find_errors(module.PinocchioSolvers, name=setting).values())
-                < IN_PINOCCHIO[True]
-            ), setting
+            at_states = find_errors(simulator, name=setting)
+            assert max(at_states.values()) < IN_PINOCCHIO[True], setting
         else:
-            answer = (
-                module.PinocchioSolvers()
-                .at_setting(name=setting)
-                .answer(*ask_position())
-            )
+            answer = simulator().at_setting(name=setting).answer(*ask_position())
             assert answer.refusal == "an impulse solver has no single states"
 
 
@@ -349,17 +283,12 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
 
     A differentiable simulator is given these changes.
     """
-    mujoco_c = pytest.importorskip(
-        "fourbar_lab.simulators.mujoco_c",
-        exc_type=ImportError,
-    )
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
     _, theta_2 = gradients.choose_quarter(scene)
 
     def answered(state):
         state.data.qpos[:], state.data.qvel[:] = state.qpos, state.qvel
-        instant = mujoco_c._evaluate_mujoco(state.model, state.data)
-        return instant
+        return mujoco_c._evaluate_mujoco(state.model, state.data)
 
     now, by = answered(gradients.compile_and_assemble(scene, theta_2, "mujoco")), {}
     for key in gradients.list_keys(scene):
@@ -374,52 +303,30 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
     zero = {**right, "by": dict.fromkeys(by, 0.0)}
     slopes = json.loads(json.dumps([right, wrong, zero, {"how": "refused"}, {}]))
     compared = benchmark.compare_slopes(PROBLEM, slopes)
-    assert set(compared[0][1]) == {
-        "torque",
-        "lengths.coupler",
-        "bars.coupler.mass",
-        "motion.theta_2",
-    }
-    assert all(float(error) < DIFFERENCES for error in compared[0][1].values())
-    assert all(float(compared[1][1][key]) == pytest.approx(0.1, abs=1e-3) for key in by)
-    assert {compared[2][1][key] for key in by} == {"zero"} and compared[3] == (
-        "refused",
-        {},
-    )
-    assert compared[4] == ("no derivatives that can be read: KeyError: 'how'", {})
+    (_, found), (_, tenth), (_, zeros), refused, unread = compared
+    assert {*found} == {"torque", *by} and "motion.theta_2" in by
+    assert all(float(error) < DIFFERENCES for error in found.values())
+    assert all(float(tenth[key]) == pytest.approx(0.1, abs=1e-3) for key in by)
+    assert {zeros[key] for key in by} == {"zero"} and refused == ("refused", {})
+    assert unread == ("no derivatives that can be read: KeyError: 'how'", {})
 
 
 @pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for():
-    module = pytest.importorskip(
-        "fourbar_lab.simulators.exudyn_simulated",
-        exc_type=ImportError,
-    )
-    (scene, command), (_, setting) = ask_position(), module.ExudynIntegrators.settings
-    assert (
-        max(
-            find_errors(
-                module.ExudynIntegrators,
-                name=setting,
-                steps_per_turn=314,
-            ).values()
-        )
-        < IN_EXUDYN
-    )
-    simulator = module.ExudynIntegrators().at_setting(name=setting, steps_per_turn=314)
+    cls = load_adapter("fourbar_lab.simulators.exudyn_simulated:ExudynIntegrators")
+    scene, command = ask_position()
+    _, setting = cls.settings
+    steps = {"name": setting, "steps_per_turn": 314}
+    assert max(find_errors(cls, **steps).values()) < IN_EXUDYN
+    simulator = cls().at_setting(**steps)
     damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
     answer = simulator.answer(damped, command)
-    ours = fourbar.solve(damped, "force", at=answer.at)
-    assert (
-        np.abs(answer.quantities["torque"] - ours.torque).max()
-        < IN_EXUDYN * np.abs(ours.torque).max()
-    )
+    ours = fourbar.solve(damped, "force", at=answer.at).torque
+    apart = np.abs(answer.quantities["torque"] - ours).max()
+    assert apart < IN_EXUDYN * np.abs(ours).max()
+    dry = replace(scene, effects=(Friction.at(B=0.01),))
     with pytest.raises(LimitError, match="alone"):
-        simulator.through(
-            *motion.lay_out(
-                replace(scene, effects=(Friction.at(B=0.01),)), command, 314
-            )
-        )
+        simulator.through(*motion.lay_out(dry, command, 314))
 
 
 @pytest.mark.slow
@@ -430,14 +337,9 @@ def test_exudyn_refuses_what_it_has_no_element_for():
 )
 def test_each_simulator_that_is_installed_carries_the_loop(name):
     entry = ENTRIES[name]
-    module, _, cls = entry.adapter.partition(":")
-    assert find_spec(module) is not None
-    simulator = getattr(pytest.importorskip(module, exc_type=ImportError), cls)
-    errors = find_errors(
-        simulator,
-        name=entry.setting or None,
-        steps_per_turn=entry.steps[1],
-    )
+    simulator = load_adapter(entry.adapter)
+    setting = entry.setting or None
+    errors = find_errors(simulator, name=setting, steps_per_turn=entry.steps[1])
     bound = simulator.tolerance[0] if "tolerance" in vars(simulator) else COARSE
     assert errors["torque"] < bound
     not_read = np.nan
