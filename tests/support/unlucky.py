@@ -11,7 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.engines import workers
 from tests.support.scenes import crank_rocker
+
+PREPARE = workers.prepare_worker
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,12 @@ def dies_at_first(*_):
     if lives:
         lives[0].unlink(missing_ok=True)
         os._exit(1)
+
+
+def wait_a_second(function):
+    """Prepare a worker that waits for the others' pipe for a second alone."""
+    workers._LOCKED = 1.0
+    PREPARE(function)
 
 
 def start_and_sleep(starts):
