@@ -6,6 +6,7 @@ docs/examples/benchmark.csv, findings from the docstrings of docs/findings/*.py.
 sentences around them are written by hand.
 """
 
+import cmath
 import csv
 import io
 import json
@@ -30,11 +31,13 @@ from fourbar.show.plot.linkage import (
 )
 from fourbar.show.plot.style import (
     BAR_COLOURS,
+    GROUND_LINE,
     INK,
     MUTED,
     RING_MARK,
     add_dark_form,
     apply_style,
+    plot_points,
 )
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
@@ -326,13 +329,7 @@ def draw_problem(name: str) -> str:
             )
             factor, _, size = choose_drawing_scale(view)
             pins = locate_pins(view, factor)
-            axes.plot(
-                *zip(pins["O2"], pins["O4"], strict=True),
-                color=MUTED,
-                lw=1.0,
-                ls=(0, (8, 3, 2, 3)),
-                zorder=1,
-            )
+            plot_points(axes, [pins["O2"], pins["O4"]], **GROUND_LINE)
             for pin in ("O2", "O4"):
                 draw_support(axes, pins[pin], size, labels)
             draw_mechanism(axes, view, view.here, 0, labels)
@@ -357,55 +354,32 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
     theta_3, stroke = (problem["answers"][key][4] for key in ("theta_3", "stroke"))
     crank, size, level = lengths["crank"], 0.1 * lengths["rod"], lengths["offset"]
     pins = {
-        "O2": (0.0, 0.0),
-        "A": (crank * math.cos(theta_2), crank * math.sin(theta_2)),
-        "B": (stroke, level),
+        "O2": 0.0j,
+        "A": cmath.rect(crank, theta_2),
+        "B": complex(stroke, level),
     }
-    assert math.isclose(
-        pins["A"][1] + lengths["rod"] * math.sin(theta_3),
-        level,
-        abs_tol=1e-12,
-    )
+    rod = cmath.rect(lengths["rod"], theta_3)
+    assert math.isclose((pins["A"] + rod).imag, level, abs_tol=1e-12)
     draw_support(axes, pins["O2"], 0.5 * size, labels)
-    guide = [(-crank, level), (1.3 * (crank + lengths["rod"]), level)]
+    end = 1.3 * (crank + lengths["rod"])
+    guide = [complex(-crank, level), complex(end, level)]
     corners = [
-        (stroke + x * size, level + 0.6 * y * size)
+        complex(stroke + x * size, level + 0.6 * y * size)
         for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
     ]
-    axes.plot(*zip(*guide, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)))
-    axes.plot(*zip(*corners, strict=True), color=BAR_COLOURS[4], lw=2.0, zorder=3)
+    plot_points(axes, guide, color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)))
+    plot_points(axes, corners, color=BAR_COLOURS[4], lw=2.0, zorder=3)
     for line in (guide, corners):
         labels.keep_off(axes, *line)
     for bar, (start, stop) in ((2, ("O2", "A")), (3, ("A", "B"))):
         ends = pins[start], pins[stop]
-        axes.plot(
-            *zip(*ends, strict=True),
-            color=BAR_COLOURS[bar],
-            lw=4.5,
-            solid_capstyle="round",
-            zorder=4,
-        )
+        look = {"color": BAR_COLOURS[bar], "lw": 4.5, "solid_capstyle": "round"}
+        plot_points(axes, ends, zorder=4, **look)
         labels.keep_off(axes, *ends, width=4.5)
     for pin, point in pins.items():
-        axes.plot(
-            *[[value] for value in point],
-            "o",
-            ms=6.0,
-            mew=1.2,
-            zorder=6,
-            **RING_MARK,
-        )
-        labels.add(
-            Label(
-                axes,
-                "$O_2$" if pin == "O2" else f"${pin}$",
-                point,
-                (0.5 * stroke, 0.0),
-                INK,
-                9.0,
-                2.5,
-            )
-        )
+        plot_points(axes, point, "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK)
+        name = "$O_2$" if pin == "O2" else f"${pin}$"
+        labels.add(Label(axes, name, point, complex(0.5 * stroke), INK, 9.0, 2.5))
     if problem["scene"].get("loads"):
         axes.annotate(
             "",

@@ -15,6 +15,7 @@ from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
+from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
@@ -248,16 +249,9 @@ def _command_between(scene: Scene, at: Command, places: Array) -> Command:
 def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
     """Write a stretch as "from theta_2 = 61.2 deg on"."""
     start, stop = stretch
-    if solution.time is not None:
-        name = "t"
-        unit = "s"
-    else:
-        name = solution.commanded
-        unit = solution.at.unit
     if start is None and stop is None:
-        if len(solution) == 1:
-            return "here"
-        return "throughout"
+        return "here" if len(solution) == 1 else "throughout"
+    name, unit = name_places(solution)
     ends = [
         "" if place is None else f"{name} = {write_short(place, unit, units)}"
         for place in stretch

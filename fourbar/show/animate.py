@@ -11,6 +11,7 @@ import html
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -79,24 +80,18 @@ def collect_page_data(
     """
     data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
     for columns in data["branches"].values():
-        columns |= {
-            name: null_nan(column)
-            for name, column in columns.items()
-            if isinstance(column, np.ndarray)
-        }
-    encoded = {
-        str(number): picture
-        for number, picture in _encode_pictures(scene, pictures).items()
-    }
+        for name, column in columns.items():
+            if isinstance(column, np.ndarray):
+                columns[name] = null_nan(column)
+    encoded = _encode_pictures(scene, pictures)
+    data["pictures"] = {str(bar): picture for bar, picture in encoded.items()}
+    data["tolerances"] = data["toml"] = None
     if scene.tolerances:
-        spreads = collect_tolerances(scene, data["over"]["values"] or data["theta_2"])
-    else:
-        spreads = None
-    try:
-        text = dump(scene)
-    except InputError:  # a file has no form of what acts
-        text = None
-    return data | {"pictures": encoded, "tolerances": spreads, "toml": text}
+        places = data["over"]["values"] or data["theta_2"]
+        data["tolerances"] = collect_tolerances(scene, places)
+    with suppress(InputError):  # a file has no form of what acts
+        data["toml"] = dump(scene)
+    return data
 
 
 def collect_live_data(
@@ -131,6 +126,7 @@ def collect_live_data(
         rows = np.flatnonzero(closes)
         shown["start"] = int(rows[len(rows) // 2 if midway else 0])
     factor, unit = choose_unit(max(linkage.lengths), "m", units)
+    bars = {str(number): linkage.bar(number) for number in MOVING_BARS}
     return {
         "type": classify(linkage).name,
         "lengths": list(linkage.lengths),
@@ -138,16 +134,11 @@ def collect_live_data(
         "unit": {"factor": factor, "name": unit},
         "units": {unit: list(entry) for unit, entry in units.items()},
         "centres": {
-            str(number): (
-                [(z := linkage.bar(number).to_centre).real, z.imag]
-                if linkage.bar(number).mass > 0.0
-                else None
-            )
-            for number in MOVING_BARS
+            number: _split(bar.to_centre) if bar.mass > 0.0 else None
+            for number, bar in bars.items()
         },
         "bars": {
-            str(number): [(bar := linkage.bar(number)).mass, bar.moment_of_inertia]
-            for number in MOVING_BARS
+            number: [bar.mass, bar.moment_of_inertia] for number, bar in bars.items()
         },
         "drive_bar": scene.drive_bar,
         "branch": motion.branch,
@@ -155,7 +146,7 @@ def collect_live_data(
             {
                 "name": point.name,
                 "bar": point.bar,
-                "at": [(z := point.place.vector()).real, z.imag],
+                "at": _split(point.place.vector()),
             }
             for point in scene.settled().points
         ],
@@ -166,18 +157,20 @@ def collect_live_data(
     }
 
 
+def _split(z: complex) -> list[float]:
+    return [z.real, z.imag]
+
+
 def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     """Write one thing that acts, as the page's script draws it."""
     entry: dict[str, Any] = symbol._asdict()
     for name in ("at", "beyond", "vector"):
-        entry[name] = [entry[name].real, entry[name].imag]
+        entry[name] = _split(entry[name])
     if symbol.end is not None:
         bar, place = symbol.end
-        entry["end"] = [bar, [place.real, place.imag]]
+        entry["end"] = [bar, _split(place)]
     table = entry.pop("table")
-    entry["factor"] = None
-    if table is not None:
-        entry["factor"] = np.asarray(table.at(theta_2)).tolist()
+    entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
     return entry
 
 
@@ -190,44 +183,46 @@ def _collect_sweep(
     """Collect both branches over theta_2, or over another commanded quantity."""
     motion = scene.motion
     swept = list_sweep(scene)
-    stated = command(scene)
-    thinned = thin_out(swept)
-    start = None
+    places = thin_out(swept).places
     name = swept.commanded
-    if len(stated.angle) == 1:
-        if stated.moves_stroke:
-            away = thinned.places - stated.places
-        else:
-            away = np.angle(np.exp(1j * (thinned.angle - stated.angle[0])))
-        start = int(np.argmin(np.abs(away)))
-    elif (drawn := find_drawn_place(scene)) is not None:
-        start = int(np.argmin(np.abs(thinned.places - drawn)))
-    theta_2 = thinned.angle
+    shown = command_at(scene, places)
     branches = {}
     for sign in signs if name == "theta_2" else (motion.branch,):
-        one = set_branch(scene, sign)
-        shown = command_at(one, thinned.places)
-        if (
-            solved is not None
-            and sign == motion.branch
-            and np.array_equal(shown.places, solved.at.places)
-        ):
-            solution = solved
+        is_solved = solved is not None and np.array_equal(places, solved.at.places)
+        if solved is None or sign != motion.branch or not is_solved:
+            one = set_branch(scene, sign)
+            solution = solve(one, stage, at=command_at(one, places))
         else:
-            solution = solve(one, stage, at=shown)
-        branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
+            solution = solved
+        branches[str(sign)] = _collect_columns(solution)
+    theta_2 = solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
     return {
         "theta_2": null_nan(theta_2),
         "time": None,
-        "over": _over(name, name, thinned.places, motion.speed),
+        "over": _over(name, name, places, motion.speed),
         "rate": None,
-        "start": start,
+        "start": _find_start(scene, shown),
         "branches": branches,
         "pace": None,
         "positions": len(swept.angle),
     }
+
+
+def _find_start(scene: Scene, shown: Command) -> int | None:
+    """Return the shown position that is nearest to the one stated or drawn, if any."""
+    stated = command(scene)
+    drawn = find_drawn_place(scene)
+    if len(stated.angle) > 1:
+        if drawn is None:
+            return None
+        away = shown.places - drawn
+    elif stated.moves_stroke:
+        away = shown.places - stated.places
+    else:
+        away = np.angle(np.exp(1j * (shown.angle - stated.angle[0])))
+    return int(np.argmin(np.abs(away)))
 
 
 def _over(
@@ -240,11 +235,10 @@ def _over(
 
     Values are included where they are not those of theta_2, a speed where it is one.
     """
-    shown = None if name == "theta_2" else values.tolist()
     return {
         "name": name,
         "commanded": commanded,
-        "values": shown,
+        "values": None if name == "theta_2" else values.tolist(),
         "speed": None if isinstance(speed, np.ndarray) else speed,
     }
 
@@ -252,30 +246,23 @@ def _over(
 def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
     motion = solve(scene)
-    assert (
-        motion.time is not None
-        and motion.omega_2 is not None
-        and motion.alpha_2 is not None
-    )
-    thinned = thin_out(motion.at)
-    assert thinned.time is not None
-    solution = solve(scene, stage, at=thinned)
+    solution = solve(scene, stage, at=thin_out(motion.at))
+    time = solution.at.places
     columns = _collect_columns(solution)
     columns["theta_2"] = solution.theta_2.tolist()
     if scene.motion.free is not None:
         for name in DRIVE_SCALARS:
             columns.pop(name, None)
         columns["energy"] = compute_energies(scene, solution).kinetic
-    duration = float(thinned.time[-1] - thinned.time[0])
-    rate = _choose_rate(duration)
+    rate = _choose_rate(float(time[-1] - time[0]))
     return {
         "theta_2": null_nan(solution.theta_2),
-        "time": thinned.time.tolist(),
-        "over": _over("time", motion.commanded, thinned.time),
+        "time": time.tolist(),
+        "over": _over("time", motion.commanded, time),
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
-        "pace": _describe_pace(motion, rate, len(thinned.time)),
+        "pace": _describe_pace(motion, rate, len(time)),
         "positions": len(motion),
     }
 
@@ -293,25 +280,23 @@ def _choose_rate(duration: float) -> float:
 
     A motion has another rate than 1 if that were too short or too long to watch.
     """
-    if duration <= 0.0:
-        return 1.0
     shortest, longest = _WATCHED
-    if duration < shortest:
-        return float(10.0 ** math.floor(math.log10(duration / shortest)))
-    if duration > longest:
-        return float(10.0 ** math.ceil(math.log10(duration / longest)))
-    return 1.0
+    power = 0
+    if 0.0 < duration < shortest:
+        power = math.floor(math.log10(duration / shortest))
+    elif duration > longest:
+        power = math.ceil(math.log10(duration / longest))
+    return float(10.0**power)
 
 
 def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
     """Say what speed 1 means, which instants are shown, and what change points mean."""
-    words = "At speed 1× it moves in real time"
+    pace = "in real time"
     if rate < 1.0:
-        words = (
-            f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
-        )
+        pace = f"{1.0 / rate:.0f} times slower than it really does"
     elif rate > 1.0:
-        words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
+        pace = f"{rate:.0f} times faster than it really does"
+    words = f"At speed 1× it moves {pace}"
     if motion.change_points:
         words += ". " + describe_change_points(motion)
     if len(motion) > shown:
@@ -345,16 +330,13 @@ def _encode_pictures(
     encoded = {}
     for name, path in pictures.items():
         if name not in MOVING_BAR_NUMBERS:
-            raise InputError(
-                "picture",
-                name,
-                "must name one of " + ", ".join(MOVING_BAR_NUMBERS),
-            )
+            named = ", ".join(MOVING_BAR_NUMBERS)
+            raise InputError("picture", name, f"must name one of {named}")
         encoded[MOVING_BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
-    by_bar = {
-        picture.bar: picture for picture in scene.pictures if picture.bar not in encoded
-    }
-    return encoded | {bar: picture.data_uri() for bar, picture in by_bar.items()}
+    for picture in scene.pictures:
+        if picture.bar not in encoded:
+            encoded[picture.bar] = picture.data_uri()
+    return encoded
 
 
 ANIMATION_FORMATS = ("html", "gif", "mp4")
@@ -406,11 +388,8 @@ def write_animation(
         write_text(target, write_page(scene, pictures or {}, units, vectors))
         return 0
     if pictures:
-        raise InputError(
-            "picture",
-            sorted(pictures),
-            "pictures are shown in an .html page only",
-        )
+        only = "pictures are shown in an .html page only"
+        raise InputError("picture", sorted(pictures), only)
     return write_film(scene, target, kind, seconds, units, moving=vectors)
 
 
@@ -435,9 +414,13 @@ def write_page(
 
     style = asset("page.css")
     script = asset(*_SCRIPTS)
+    address = ""
     if live:
-        style = style + asset("edit.css")
-        script = script + asset(*_LIVE_SCRIPTS)
+        style += asset("edit.css")
+        script += asset(*_LIVE_SCRIPTS)
+        address = live.split("/")[2]
+        scene = replace(scene, tolerances=())
+    data = collect_page_data(scene, pictures or {}, units, midway=bool(live))
     return Template(asset("page.html")).substitute(
         title=html.escape(shorten_text(scene.title, 200) or "Four-bar linkage"),
         source=html.escape(shorten_text(scene.source, 400)),
@@ -446,28 +429,19 @@ def write_page(
         style_hash=_hash_content(style),
         script=script,
         script_hash=_hash_content(script),
-        images=f" http://{live.split('/')[2]}" if live else "",
-        connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
+        images=f" http://{address}" if live else "",
+        connect=f"connect-src ws://{address}; " if live else "",
         panel=asset("edit.html") if live else "",
         strip=_STRIP if live else "",
         results=asset("bench.html") if live else "",
-        data=_embed_json(
-            collect_page_data(
-                replace(scene, tolerances=()) if live else scene,
-                pictures or {},
-                units,
-                midway=bool(live),
-            )
-            | {"vectors": vectors, "live": live}
-        ),
+        data=_embed_json(data | {"vectors": vectors, "live": live}),
     )
 
 
 def _hash_content(text: str) -> str:
     """Return the hash by which the page's security policy allows a script or style."""
-    return "sha256-" + base64.b64encode(
-        hashlib.sha256(text.encode("utf-8")).digest()
-    ).decode("ascii")
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
+    return f"sha256-{base64.b64encode(digest).decode('ascii')}"
 
 
 def _embed_json(value: object) -> str:

@@ -4,7 +4,7 @@ The duty of the drive in the JSON of `analyze` is made here too.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -35,11 +35,10 @@ from fourbar.show.acting import (
 )
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.columns import explain_static
-from fourbar.show.driving import describe_drive
+from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import acts, find_drive_rounding
-from fourbar.show.panels import Peak
 from fourbar.show.position import PositionSheet
 from fourbar.show.summary import Facts, summarize
 from fourbar.show.units import (
@@ -55,8 +54,6 @@ from fourbar.show.units import (
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.studies.passing import move_inside_limit
 
-_NO_LARGEST = "unbounded"
-"""Stands in place of a largest value that there is none of."""
 _NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
 LEAST_COLUMN = 12
@@ -74,8 +71,6 @@ OF_ONE_PREFIX = 1e-4
 FAR_BELOW_PEAK = 0.1
 """Part of its peak below which a mean has a prefix of its own: it would begin with 0.0.
 """
-_STATUS_WORDS = {"change_point": "at a change point"}
-"""Words for the statuses of positions that are not the names alone."""
 _BESIDE_CHANGE_POINT = 1e-9
 """rad; an angle nearer to a change point is rounded from it: files state angles with
 nine decimals and more.
@@ -97,20 +92,13 @@ BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 
 
 def write_block(
-    scene: Scene,
-    solution: Solution,
-    units: Conversion = COMMON,
-    *,
-    pressure: float | None = None,
-    headed: bool = True,
-    width: int | None = None,
+    scene: Scene, solution: Solution, units: Conversion = COMMON, **options: Any
 ) -> list[str]:
     """Write the summary of a solved scene line by line; of one position, everything.
 
-    The parameters are those of `write_facts`.
+    The options are those of `write_facts`.
     """
-    facts = summarize(scene, solution)
-    return write_facts(facts, units, pressure=pressure, headed=headed, width=width)
+    return write_facts(summarize(scene, solution), units, **options)
 
 
 def write_facts(
@@ -130,7 +118,7 @@ def write_facts(
     headed : begin with the linkage.
     width : that of a terminal.
     """
-    return _SceneBlock(facts, units, width).write(pressure, headed=headed)
+    return _SceneBlock(facts, units, pressure, width).write(headed=headed)
 
 
 class _SceneBlock:
@@ -140,27 +128,29 @@ class _SceneBlock:
         self,
         facts: Facts,
         units: Conversion,
+        pressure: float | None,
         width: int | None,
     ) -> None:
         self.facts = facts
+        self.scene = facts.scene
+        self.motion = facts.scene.motion
+        self.linkage = facts.scene.linkage
+        self.solution = facts.solution
+        self.drive = facts.drive
+        self.pressure = pressure
         self.width = find_block_width(width)
         self.units = units
         self.digits = POSITION_DIGITS if facts.kind == "position" else SHOWN_DIGITS
-        self.longest = max(facts.scene.linkage.lengths)
-        if facts.kind in ("law", "released"):
-            self.symbol = "t"
-            self.unit = "s"
-        else:
-            self.symbol = facts.solution.commanded
-            self.unit = facts.solution.at.unit
+        self.longest = max(self.linkage.lengths)
+        self.symbol, self.unit = name_places(self.solution)
 
-    def write(self, pressure: float | None, *, headed: bool = True) -> list[str]:
+    def write(self, *, headed: bool = True) -> list[str]:
         """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
-        head = self._write_head() if headed else []
+        head = [*self._write_head()] if headed else []
         if self.facts.kind == "position":
-            paragraphs = [*self._write_position(head, pressure)]
+            paragraphs = [*self._write_position(head)]
         else:
-            paragraphs = [[*head, *self._write_motion()], self._write_loads(pressure)]
+            paragraphs = [[*head, *self._write_motion()], [*self._write_loads()]]
         lines: list[str] = []
         for paragraph in filter(None, paragraphs):
             if lines:
@@ -169,89 +159,65 @@ class _SceneBlock:
                 lines += wrap_line(line, self.width)
         return [line.replace(_NBSP, " ") for line in lines]
 
-    def _write_loads(self, pressure: float | None) -> list[str]:
+    def _write_loads(self) -> Iterator[str]:
         """Write the drive, the loads of pins and bars, and remarks.
 
         If nothing acts, it writes the rates.
         """
-        if not acts(self.facts.scene):
-            stroke = [] if self.facts.stroke_range is None else self._write_stroke()
-            return [*stroke, *self._write_rates()]
-        return [
-            *self._write_drive(pressure),
-            *self._write_pins(),
-            *self._write_bending(),
-            *self._write_remarks(),
-        ]
+        if acts(self.scene):
+            yield from self._write_drive()
+            yield from self._write_pins()
+            yield from self._write_bending()
+            yield from self._write_remarks()
+            return
+        yield from self._write_stroke()
+        bars = self.facts.following
+        if bars:
+            heads = [f"bar {bar} ({BAR_NAMES[bar]})" for bar in bars]
+            rows = [("rates", heads)]
+            for label, unit in (("omega", "rad/s"), ("alpha", "rad/s^2")):
+                names = [f"{label}_{bar}" for bar in bars]
+                cells, places = self._write_peaks(names, unit)
+                rows += [(f"  {label}", cells), ("  at", places)]
+            yield from _align(rows, self.width)
+            yield "no mass, load or effect: nothing loads pins and drive"
 
-    def _write_rates(self) -> list[str]:
-        """Write the largest speed and acceleration of the bars that follow, if any.
-
-        Bars are columns of one table.
-        """
-        rates = self.facts.rates
-        if not rates:
-            return []
-        rows = [("rates", [f"bar {bar} ({BAR_NAMES[bar]})" for bar in rates])]
-        for label, unit, index in (("omega", "rad/s", 0), ("alpha", "rad/s^2", 1)):
-            peaks = [pair[index] for pair in rates.values()]
-            rows.append((f"  {label}", self._cells_of_peaks(peaks, unit)))
-            names = [f"{label}_{bar}" for bar in rates]
-            rows.append(("  at", self._places_of_peaks(peaks, names)))
-        return [
-            *_align(rows, self.width),
-            "no mass, load or effect: nothing loads pins and drive",
-        ]
-
-    def _write_position(
-        self,
-        head: list[str],
-        pressure: float | None,
-    ) -> Iterator[list[str]]:
+    def _write_position(self, head: list[str]) -> Iterator[list[str]]:
         """Write the paragraphs of one position: motion, forces, ratios."""
-        facts = self.facts
-        sheet = PositionSheet(facts.scene, facts.solution, self.units)
+        sheet = PositionSheet(self.scene, self.solution, self.units)
         yield [*head, self._write_place(), *self._write_statuses()]
         yield sheet.write_bars()
         yield sheet.write_points()
-        if facts.solution.F12 is not None and acts(self.facts.scene):
-            yield [*self._write_drive(pressure), *sheet.write_pin_forces()]
-            yield self._write_bending()
-        elif facts.stroke_range is not None:
-            yield self._write_stroke()
+        if self.solution.F12 is not None and acts(self.scene):
+            yield [*self._write_drive(), *sheet.write_pin_forces()]
+            yield [*self._write_bending()]
+        else:
+            yield [*self._write_stroke()]
         yield [*sheet.write_ratios(), *self._write_static_hint()]
-        yield self._write_remarks()
+        yield [*self._write_remarks()]
 
     def _write_place(self) -> str:
-        """Write what is commanded at the position.
+        """Write what is commanded at the position, and which bar is at a limit there.
 
         A motion over time has its time written too.
         """
-        one = self.facts.solution
-        name = one.commanded
-        place = float(one.at.stated[0][0])
-        text = f"at {name} = {self._value(place, one.at.unit)}"
+        one = self.solution
+        place = self._value(float(one.at.stated[0][0]), one.at.unit)
+        text = f"at {one.commanded} = {place}"
         if one.time is not None:
             text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
-        return f"{text}{self._write_limit()}"
-
-    def _write_limit(self) -> str:
-        """Write which bar is at a limit of its own at the position."""
-        one = self.facts.solution
         gaps = {2: one.theta_4 - one.theta_3, 3: one.theta_4 - one.theta_2}
         gaps[4] = one.theta_3 - one.theta_2
-        scene = self.facts.scene
         for bar, gap in gaps.items():
             theta = f"theta_{bar}"
-            _, is_limit = move_inside_limit(scene, bar, float(one[theta][0]))
+            _, is_limit = move_inside_limit(self.scene, bar, float(one[theta][0]))
             # at a change point each bar moves on
             is_alone = bar != one.at.bar and one.status_code[0] == OK
             if is_limit and is_alone and abs(math.sin(gap[0])) <= _IN_LINE:
-                bars = (
-                    f"bars {BARS_IN_LINE[bar]} are {_name_meeting(BARS_IN_LINE[bar])}"
-                )
-                return f", where {theta} is at a limit: {bars}"
-        return ""
+                meeting = _name_meeting(BARS_IN_LINE[bar])
+                bars = f"bars {BARS_IN_LINE[bar]} are {meeting}"
+                return f"{text}, where {theta} is at a limit: {bars}"
+        return text
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
         """Write a quantity of an SI unit, with a prefix that suits it.
@@ -269,9 +235,9 @@ class _SceneBlock:
 
         In a table all of one kind have one prefix, to be compared at a glance.
         """
-        if peak is None or 0.0 < abs(value) < FAR_BELOW_PEAK * abs(peak):
-            return self._value(value, unit)
-        return self._value(value, unit, abs(peak))
+        if peak is not None and 0.0 < abs(value) < FAR_BELOW_PEAK * abs(peak):
+            peak = None
+        return self._value(value, unit, peak and abs(peak))
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
@@ -279,83 +245,63 @@ class _SceneBlock:
         if abs(place) <= PLACE_ROUNDING * abs(last - first):
             place = 0.0
         text = self._value(
-            place,
-            self.unit,
-            {"m": self.longest, "s": 1.0}.get(self.unit),
+            place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
         )
-        if named:
-            return f"{self.symbol}{_NBSP}={_NBSP}{text}"
-        return text
+        return f"{self.symbol}{_NBSP}={_NBSP}{text}" if named else text
 
     def _angle(self, angle: float) -> str:
         return self._value(0.0 if abs(angle) < _NO_ANGLE else angle, "rad")
 
-    def _write_head(self) -> list[str]:
-        """Write what the linkage is."""
-        name = f"{self._name_linkage()}:"
-        lengths = self._write_lengths()
-        line = f"{name} {lengths}"
-        lines = [line] if len(line) <= self.width else [name, f"    {lengths}"]
-        return [*lines, *self._write_change_points()]
-
-    def _name_linkage(self) -> str:
-        """Name the linkage by its type, its title and its branch."""
-        scene, motion = self.facts.scene, self.facts.scene.motion
-        name = name_assembly(scene.linkage, motion.bar, motion.branch)
-        title = f' "{clean_line(scene.title)}"' if scene.title else ""
+    def _write_head(self) -> Iterator[str]:
+        """Write what the linkage is: type, title, branch, lengths, change points."""
+        motion = self.motion
+        name = name_assembly(self.linkage, motion.bar, motion.branch)
+        title = f' "{clean_line(self.scene.title)}"' if self.scene.title else ""
         of_bar = "" if motion.bar == 2 else f" of the command {motion.commanded}"
         branch = f"{BRANCH_NAMES[motion.branch]} branch{of_bar}"
-        return f"{name[0].upper()}{name[1:]}{title}, {branch}"
-
-    def _write_lengths(self) -> str:
-        """Write the lengths of the bars and their unit."""
+        name = f"{name[0].upper()}{name[1:]}{title}, {branch}:"
         factor, unit = choose_unit(self.longest, "m", self.units)
-        lengths = ", ".join(
-            f"{name} {write_digits(factor * length)}"
-            for name, length in zip(
-                BAR_NAMES.values(),
-                self.facts.scene.linkage.lengths,
-                strict=True,
-            )
-        )
-        return f"{lengths} {unit}"
+        bars = zip(BAR_NAMES.values(), self.linkage.lengths, strict=True)
+        lengths = [f"{bar} {write_digits(factor * length)}" for bar, length in bars]
+        line = f"{name} {', '.join(lengths)} {unit}"
+        if len(line) <= self.width:
+            yield line
+        else:
+            yield name
+            yield f"    {line.removeprefix(name).strip()}"
+        yield from self._write_change_points()
 
-    def _write_motion(self) -> list[str]:
+    def _write_motion(self) -> Iterator[str]:
         """Write how far the linkage moves, and how well it transmits."""
-        facts = self.facts
-        least = facts.transmission
-        return [
-            self._write_ranges(),
-            (
-                f"transmission angle: at least {self._angle(least.value)}, at"
-                f" {self._place(least.place)}"
-            ),
-            *self._write_statuses(),
-            *self._write_stretches(),
-            *self._write_static_hint(),
-        ]
+        least = self.facts.transmission
+        yield self._write_ranges()
+        yield (
+            f"transmission angle: at least {self._angle(least.value)}, at"
+            f" {self._place(least.place)}"
+        )
+        yield from self._write_statuses()
+        yield from self._write_stretches()
+        yield from self._write_static_hint()
 
-    def _write_statuses(self) -> list[str]:
+    def _write_statuses(self) -> Iterator[str]:
         """Write how many positions have which status, where one is not ok."""
-        facts = self.facts
-        counts = dict(facts.counts)
+        counts = dict(self.facts.counts)
         beside = self._find_beside_change_points()
-        if not len(beside) and all(name == "ok" for name in counts):
-            return []
+        parts = []
         if len(beside):
+            away = self._angle(float(beside.max()))
+            parts = [f"{len(beside)} within {away} of a change point"]
             counts["ok"] -= len(beside)
-        parts = [
-            f"{count} {_STATUS_WORDS.get(name, name.replace('_', ' '))}"
+        elif {*counts} == {"ok"}:
+            return
+        words = {"change_point": "at a change point"}
+        parts[:0] = [
+            f"{count} {words.get(name, name.replace('_', ' '))}"
             for name, count in counts.items()
             if count
         ]
-        if len(beside):
-            away = self._angle(float(beside.max()))
-            parts.append(f"{len(beside)} within {away} of a change point")
-        return [
-            f"{len(facts.solution)} position{'s' if len(facts.solution) > 1 else ''}:"
-            f" {', '.join(parts)}"
-        ]
+        total = len(self.solution)
+        yield f"{total} position{'s' if total > 1 else ''}: {', '.join(parts)}"
 
     def _find_beside_change_points(self) -> Array:
         """Return the distances of positions evaluated beside a change point, rad, (n,).
@@ -363,123 +309,99 @@ class _SceneBlock:
         The rounding of the angle keeps such a position from the change point that is
         meant.
         """
-        solution = self.facts.solution
-        angle = solution.at.angle[solution.status_code == OK]
-        points = change_points(self.facts.scene.linkage, solution.at.bar)
+        at = self.solution.at
+        angle = at.angle[self.solution.status_code == OK]
+        points = change_points(self.linkage, at.bar)
         if not points:
             return np.empty(0)
         away = angle[:, None] - np.array(points)
         away = np.abs(away - TURN * np.rint(away / TURN)).min(axis=1)
         return np.asarray(away[away <= _BESIDE_CHANGE_POINT])
 
-    def _write_static_hint(self) -> list[str]:
+    def _write_static_hint(self) -> Iterator[str]:
         """Say what asks for forces, if a scene with loads states positions alone."""
-        scene = self.facts.scene
-        if self.facts.solution.F12 is not None or not acts(self.facts.scene):
-            return []
-        return [
-            f"positions only, since {scene.motion.names[1]} is left out:",
-            f"    {explain_static(scene)}",
-        ]
+        if self.solution.F12 is None and acts(self.scene):
+            yield f"positions only, since {self.motion.names[1]} is left out:"
+            yield f"    {explain_static(self.scene)}"
 
-    def _write_change_points(self) -> list[str]:
+    def _write_change_points(self) -> Iterator[str]:
         """Write where change points lie and what the assembly does there.
 
         If there is none, write how nearly there would be one.
         """
-        linkage = self.facts.scene.linkage
-        motion = self.facts.scene.motion
-        points = change_points(linkage, motion.bar)
-        lines = self._write_met_equalities()
+        linkage, bar = self.linkage, self.motion.bar
+        points = change_points(linkage, bar)
+        yield from self._write_met_equalities()
         if (miss := find_miss(linkage)) is not None:
-            gap = self._value(miss[0], "m")
             has = "one change point, not two" if points else "no change point"
-            lines.append(f"misses a {miss[1]} by {gap}: it has {has}")
+            yield f"misses a {miss[1]} by {self._value(miss[0], 'm')}: it has {has}"
         if not points:
-            return lines
-        if motion.bar == 3 and classify(linkage).name == PARALLELOGRAM:
-            lines.append(
-                "no theta_3 moves the parallelogram, whose coupler does not turn"
-            )
-        angles = " and ".join(self._angle(angle) for angle in points)
-        line = (
-            f"change point{'s' if len(points) > 1 else ''} at theta_{motion.bar} ="
-            f" {angles}"
-        )
-        if len(points) == 1 and turns_fully(linkage, motion.bar):
+            return
+        if bar == 3 and classify(linkage).name == PARALLELOGRAM:
+            yield "no theta_3 moves the parallelogram, whose coupler does not turn"
+        angles = " and ".join(map(self._angle, points))
+        line = f"change point{'s' if len(points) > 1 else ''} at theta_{bar} = {angles}"
+        if len(points) == 1 and turns_fully(linkage, bar):
             line += (
                 ": the assembly repeats after two turns, open and crossed are one "
                 "motion, a turn apart"
             )
-        return [*lines, line]
+        yield line
 
-    def _write_met_equalities(self) -> list[str]:
+    def _write_met_equalities(self) -> Iterator[str]:
         """Write what lengths are read as equal, and by how much they differ."""
-        scene = self.facts.scene
-        if scene.met_lengths is None or scene.met_lengths[1] != scene.linkage.lengths:
-            return []
+        met = self.scene.met_lengths
+        if met is None or met[1] != self.linkage.lengths:
+            return
         equal = [
             f"{first} and {second}, which differ by {self._value(gap, 'm')}"
-            for first, second, gap in list_met_equalities(*scene.met_lengths)
+            for first, second, gap in list_met_equalities(*met)
         ]
-        if not equal:
-            return []
-        return [
-            "lengths read as equal within the last decimals of what is stated:"
-            f" {'; '.join(equal)}"
-        ]
+        if equal:
+            yield (
+                "lengths read as equal within the last decimals of what is stated:"
+                f" {'; '.join(equal)}"
+            )
 
     def _write_ranges(self) -> str:
         """Write how far the commanded bar goes, or the stroke, and the output.
 
         If the output is commanded, it is the input.
         """
-        facts = self.facts
-        bar = facts.solution.at.bar
-        first, last = facts.ends
-        if facts.kind == "turn":
-            begin = f"{BAR_NAMES[bar]} turns fully"
-        elif facts.kind == "list":
-            begin = (
-                f"{len(facts.solution)} positions from {self._place(first)} to"
-                f" {self._place(last, named=False)}"
-            )
-        elif facts.kind == "released":
+        kind, bar = self.facts.kind, self.solution.at.bar
+        first, last = self.facts.ends
+        name = BAR_NAMES[bar]
+        following = [4 if bar != 4 else 2]
+        start, stop = (self._place(end, named=False) for end in (first, last))
+        if kind == "turn":
+            begin = f"{name} turns fully"
+        elif kind == "list":
+            count = len(self.solution)
+            begin = f"{count} positions from {self._place(first)} to {stop}"
+        elif kind == "released":
             begin = self._write_release()
-        elif facts.kind == "law":
-            begin = (
-                f"{BAR_NAMES[bar]} {self._write_swing(bar)} by a law over"
-                f" {write_digits(last - first)} s"
-            )
+            following = [2, 4]
+        elif kind == "law":
+            over = write_digits(last - first)
+            begin = f"{name} {self._write_swing(bar)} by a law over {over} s"
         else:
-            name = "stroke" if self.unit == "m" else BAR_NAMES[bar]
-            begin = (
-                f"{name} from {self._place(first, named=False)} to"
-                f" {self._place(last, named=False)}{self._write_inset()}"
-            )
-        following = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
-        return "; ".join(
-            [
-                begin,
-                *(
-                    f"{BAR_NAMES[number]} {self._write_swing(number)}"
-                    for number in following
-                ),
-            ]
-        )
+            name = "stroke" if self.unit == "m" else name
+            begin = f"{name} from {start} to {stop}{self._write_inset()}"
+        swings = [
+            f"{BAR_NAMES[other]} {self._write_swing(other)}" for other in following
+        ]
+        return "; ".join([begin, *swings])
 
     def _write_inset(self) -> str:
         """Write how far a range that the scene leaves out stays inside the limits."""
-        motion = self.facts.scene.motion
-        linkage = self.facts.scene.linkage
-        bar = motion.bar
+        motion = self.motion
         stated = motion.angle is not None or motion.stroke is not None
-        if stated or turns_fully(linkage, bar):
+        if stated or turns_fully(self.linkage, motion.bar):
             return ""
         first, last = self.facts.ends
         inset = min(
             (first - low) % TURN
-            for low, high in find_intervals(linkage, bar)
+            for low, high in find_intervals(self.linkage, motion.bar)
             if (first - low) % TURN <= high - low
         )
         inside, low, high = map(self._angle, (inset, first - inset, last + inset))
@@ -487,76 +409,68 @@ class _SceneBlock:
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.facts.angles[bar]
-        if self.facts.kind == "turn" and high.value - low.value > 2.0 * math.pi - 1e-9:
+        width = high.value - low.value
+        if self.facts.kind == "turn" and width > 2.0 * math.pi - 1e-9:
             return "turns fully"
-        if self.facts.kind == "law" and bar == self.facts.solution.at.bar:
-            return f"from {self._angle(low.value)} to {self._angle(high.value)}"
+        start, stop = self._angle(low.value), self._angle(high.value)
+        if self.facts.kind == "law" and bar == self.solution.at.bar:
+            return f"from {start} to {stop}"
         places = [self._place(end.place, named=False) for end in (low, high)]
         if self.unit == "rad":  # the unit stands next to it
             places = [place.split(_NBSP)[0] for place in places]
-        width, start, stop = (
-            self._angle(angle)
-            for angle in (high.value - low.value, low.value, high.value)
-        )
         return (
-            f"swings {width}, from {start} ({self.symbol}{_NBSP}={_NBSP}{places[0]}) to"
-            f" {stop} ({places[1]})"
+            f"swings {self._angle(width)}, from {start}"
+            f" ({self.symbol}{_NBSP}={_NBSP}{places[0]}) to {stop} ({places[1]})"
         )
 
     def _write_release(self) -> str:
-        free = self.facts.scene.motion.free
-        solution = self.facts.solution
+        free = self.motion.free
         assert free is not None
         begin = f"released for {write_digits(free.duration)} s, without a drive"
         if self.facts.period is not None:
             begin += f", period {write_digits(self.facts.period)} s"
-        if not solution.change_points:
+        if not self.solution.change_points:
             return begin
-        times = " and ".join(f"{write_digits(t)} s" for t in solution.change_points)
+        instants = self.solution.change_points
+        times = " and ".join(f"{write_digits(t)} s" for t in instants)
         return (
             f"{begin}; at t = {times} all bars are in line, where another motion is"
             " possible"
         )
 
-    def _write_stretches(self) -> list[str]:
+    def _write_stretches(self) -> Iterator[str]:
         """Write where the assembly ends."""
         parts = []
-        for low, high in self.facts.motion.stretches:
-            if low is None:
-                start = ""
-            else:
-                start = f"from {self._place(low, named=self.unit != 'm')}"
-            if high is None:
-                stop = ""
-            else:
-                stop = f"up to {self._place(high, named=self.unit != 'm')}"
-            parts.append(f"{start} {stop}".strip())
-        return [f"assembles {', and '.join(parts)}"] if parts else []
+        for stretch in self.facts.motion.stretches:
+            ends = [
+                f"{word} {self._place(end, named=self.unit != 'm')}"
+                for word, end in zip(("from", "up to"), stretch, strict=True)
+                if end is not None
+            ]
+            parts.append(" ".join(ends))
+        if parts:
+            yield f"assembles {', and '.join(parts)}"
 
-    def _write_drive(self, pressure: float | None) -> list[str]:
+    def _write_drive(self) -> Iterator[str]:
         """Write what drives: peak and mean, power and energy, and its needs.
 
         The needs are those of a motor or a cylinder.
         """
         facts = self.facts
-        if facts.drive is None:
-            return []
-        drive = facts.drive
-        word = "force" if facts.linear else "torque"
-        lines = [self._write_drive_head(), self._row(word, self._write_peak())]
+        if self.drive is None:
+            return
+        yield self._write_drive_head()
+        yield _row("force" if facts.linear else "torque", self._write_peak())
         if facts.held:
-            lines.append(self._row("at rest", self._write_held(drive.unit)))
-        if facts.stroke_range is not None:
-            lines += self._write_stroke()
-        lines += self._write_power()
-        if pressure is not None and facts.stroke_range is not None:
-            lines += self._write_bore(pressure)
-        return lines
+            yield _row("at rest", self._write_held(self.drive.unit))
+        yield from self._write_stroke()
+        yield from self._write_power()
+        if self.pressure is not None and facts.stroke_range is not None:
+            yield from self._write_bore(self.pressure)
 
     def _write_peak(self) -> str:
         """Write the largest and the RMS value of the drive's torque or force."""
-        facts = self.facts
-        drive = facts.drive
+        facts, drive = self.facts, self.drive
         assert drive is not None
         if facts.peak is None:
             return self._write_growth(drive.keys.value)
@@ -573,10 +487,10 @@ class _SceneBlock:
     def _write_growth(self, name: str) -> str:
         """Write where a quantity grows without bound."""
         poles = self.facts.motion.panels.list_poles(name)
-        places = [self._place(pole, named=False) for pole in poles[:_MOST_POLES]]
+        places = [self._place(poles[0])]
+        places += [self._place(pole, named=False) for pole in poles[1:_MOST_POLES]]
         if len(poles) > _MOST_POLES:
             places.append(f"{len(poles) - _MOST_POLES} more places")
-        places[0] = self._place(poles[0])
         return f"grows without bound at {' and '.join(places)}"
 
     @property
@@ -586,87 +500,68 @@ class _SceneBlock:
 
     def _write_held(self, unit: str) -> str:
         """Write between which torques or forces dry friction holds, and where."""
-        facts = self.facts
+        held = self.facts.held
         parts = []
-        for held in facts.held[:_MOST_HELD]:
-            size = max(abs(held.low), abs(held.high))
-            low = self._value(held.low, unit, size)
-            high = self._value(held.high, unit, size)
-            first, last = held.ends
-            if len(facts.solution) == 1:
-                return f"{low} to {high}: dry friction holds it between them"
+        for low, high, (first, last) in held[:_MOST_HELD]:
+            size = max(abs(low), abs(high))
+            holds = f"{self._value(low, unit, size)} to {self._value(high, unit, size)}"
+            if len(self.solution) == 1:
+                return f"{holds}: dry friction holds it between them"
             if first == last:
-                parts.append(f"{low} to {high} at {self._place(first)}")
+                parts.append(f"{holds} at {self._place(first)}")
             else:
                 until = self._place(last, named=False)
-                parts.append(
-                    f"{low} to {high} over {self._place(first)} to {until}, a part of"
-                    " it at each position"
-                )
-        if len(facts.held) > _MOST_HELD:
-            parts.append(f"and at {len(facts.held) - _MOST_HELD} more places")
+                over = f"{self._place(first)} to {until}"
+                parts.append(f"{holds} over {over}, a part of it at each position")
+        if len(held) > _MOST_HELD:
+            parts.append(f"and at {len(held) - _MOST_HELD} more places")
         return f"{', '.join(parts)}: dry friction holds"
 
     def _without_rounding(self, value: float) -> float:
         """Return zero for a torque or force of the drive within its rounding."""
-        if self.facts.drive is not None and abs(value) <= self._rounding:
-            return 0.0
-        return value
+        return 0.0 if abs(value) <= self._rounding else value
 
     @cached_property
     def _rounding(self) -> float:
         """Rounding of the drive's torque or force, or its error bar if that is more."""
-        rounding = find_drive_rounding(self.facts.solution)
-        drive = self.facts.drive
-        if drive is None or drive.error is None:
+        rounding = find_drive_rounding(self.solution)
+        if self.drive is None or self.drive.error is None:
             return rounding
-        return max(rounding, float(np.nanmax(drive.error, initial=0.0)))
+        return max(rounding, float(np.nanmax(self.drive.error, initial=0.0)))
 
     def _is_balanced(self) -> bool:
         """Tell whether the drive has nothing to do: its peak is rounding alone."""
-        peak = self.facts.peak
-        drive = self.facts.drive
-        if peak is None or drive is None or drive.values is None:
-            return False
-        if not np.nan_to_num(drive.values).any():
+        peak, drive = self.facts.peak, self.drive
+        if peak is None or drive is None or not np.nan_to_num(drive.sizes).any():
             return False
         return not self._without_rounding(peak.value)
 
-    def _write_power(self) -> list[str]:
+    def _write_power(self) -> Iterator[str]:
         """Write power and energy of the drive, and what a motor must have."""
-        facts, duty, power = self.facts, self.facts.duty, self.facts.solution.power
+        facts, duty, power = self.facts, self.facts.duty, self.solution.power
         if duty is None:
-            one = float(power[0]) if power is not None else 0.0
-            if facts.peak is not None and not self._without_rounding(facts.peak.value):
-                one = 0.0
-            if one:
-                return [self._row("power", self._value(one, "W"))]
-            return []
+            idle = facts.peak is not None and self._is_rounding(facts.peak.value)
+            if power is not None and power[0] and not idle:
+                yield _row("power", self._value(float(power[0]), "W"))
+            return
         if duty.peak_power == 0.0 or self._is_balanced():
-            return []
+            return
         if duty.peak_power is None:
             row = self._write_growth("power")
         else:
             row = f"peak {self._value(duty.peak_power, 'W')}{self._of_positions}"
-        if (
-            facts.kind != "list"
-            and duty.energy_in is not None
-            and duty.energy_out is not None
-        ):
+        energies = duty.energy_in, duty.energy_out
+        if facts.kind != "list" and None not in energies:
             over = "over the motion" if facts.kind == "law" else "over the sweep"
             if facts.kind == "turn":
                 turns = round(abs(facts.ends[1] - facts.ends[0]) / (2.0 * math.pi))
                 over = "per turn" if turns == 1 else f"in {turns} turns"
-            most = max(duty.energy_in, duty.energy_out)
-            forward, back = (
-                self._value(energy, "J", most)
-                for energy in (duty.energy_in, duty.energy_out)
-            )
+            forward, back = self._cells(energies, "J")
             row += f"; {forward} {over} given, {back} taken back"
-        lines = [self._row("power", row), *self._write_cycle(duty)]
+        yield _row("power", row)
+        yield from self._write_cycle(duty)
         if not facts.linear:
-            lines.append(f"motor: {self._write_motor_needs(duty)}")
-        return lines
+            yield f"motor: {self._write_motor_needs(duty)}"
 
     def _write_motor_needs(self, duty: MotorDuty) -> str:
         """Write the torque, speed and power that a motor must have."""
@@ -678,46 +573,40 @@ class _SceneBlock:
         speed = self._value(duty.peak_speed, "rad/s")
         mean = ""
         if duty.rms_torque is not None:
-            rms = self._beside(duty.rms_torque, "N m", duty.peak_torque)
-            mean = f" (RMS {rms})"
+            mean = f" (RMS {self._beside(duty.rms_torque, 'N m', duty.peak_torque)})"
         power = self._value(duty.peak_power, "W")
         return f"at least {torque} at {speed}{mean}, {power}"
 
-    def _write_cycle(self, duty: MotorDuty) -> list[str]:
+    def _write_cycle(self, duty: MotorDuty) -> Iterator[str]:
         """Write the mean torque of a closed sweep, and what a flywheel must store."""
         if duty.energy_swing is None:
-            return []
+            return
+        mean = ""
+        if duty.mean_torque is not None:
+            torque = self._without_rounding(duty.mean_torque)
+            mean = f"mean torque {self._beside(torque, 'N m', duty.peak_torque)}; "
         energy = self._value(duty.energy_swing, "J")
-        swing = f"energy swings by {energy} about the mean"
-        if duty.mean_torque is None:
-            return [self._row("cycle", swing)]
-        mean_torque = self._without_rounding(duty.mean_torque)
-        mean = self._beside(mean_torque, "N m", duty.peak_torque)
-        return [self._row("cycle", f"mean torque {mean}; {swing}")]
+        yield _row("cycle", f"{mean}energy swings by {energy} about the mean")
 
     def _write_drive_head(self) -> str:
-        scene, motion = self.facts.scene, self.facts.scene.motion
+        scene, motion = self.scene, self.motion
         where = describe_drive(scene)
-        head = f"cylinder {where.removeprefix('along a line ')}"
-        if scene.drive is not None and not scene.drive.has_stroke:
-            head = f"force {where}"
         if scene.drive is None:
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
-        if motion.speed is None:
-            if motion.law is None:
-                return head
-            return f"{head}, by a law over time"
-        si = "rad/s" if motion.stroke is None else "m/s"
-        drives = motion.stroke is not None or (
-            scene.drive is None and scene.drive_bar == motion.bar
-        )
-        if np.any(motion.speed):
-            speed = write_ends(motion.speed, lambda x: self._value(x, si))
+        elif scene.drive.has_stroke:
+            head = f"cylinder {where.removeprefix('along a line ')}"
         else:
-            speed = "at rest"
-        if not drives:
-            at = "at " if np.any(motion.speed) else ""
-            speed = f"the {BAR_NAMES[motion.bar]} {at}{speed}"
+            head = f"force {where}"
+        if motion.speed is None:
+            return head if motion.law is None else f"{head}, by a law over time"
+        si = "rad/s" if motion.stroke is None else "m/s"
+        moves = np.any(motion.speed)
+        speed = "at rest"
+        if moves:
+            speed = write_ends(motion.speed, lambda x: self._value(x, si))
+        drives = scene.drive is None and scene.drive_bar == motion.bar
+        if not drives and motion.stroke is None:
+            speed = f"the {BAR_NAMES[motion.bar]} {'at ' if moves else ''}{speed}"
         if np.any(motion.acceleration):
             growth = write_ends(
                 motion.acceleration, lambda x: self._value(x, f"{si}^2")
@@ -725,257 +614,220 @@ class _SceneBlock:
             speed += f", {motion.names[2]} = {growth}"
         return f"{head}, {speed}"
 
-    def _write_stroke(self) -> list[str]:
+    def _write_stroke(self) -> Iterator[str]:
         """Write the stroke, over what it assembles, and its speed."""
         facts = self.facts
-        lines = list[str]()
-        assert facts.stroke_range is not None
-        low, high = (
-            self._value(x.value, "m", self.longest) for x in facts.stroke_range
-        )
+        if facts.stroke_range is None:
+            return
+        ends = [end.value for end in facts.stroke_range]
+        low, high = (self._value(end, "m", self.longest) for end in ends)
         row = low if facts.kind == "position" else f"{low} to {high}"
         if facts.stroke_limits is not None:
-            ends = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
-            row += "; assembles from {} to {}".format(*ends)
-        lines.append(self._row("stroke", row))
-        speed = facts.solution.stroke_speed
-        if (
-            speed is not None
-            and facts.scene.motion.stroke is None
-            and np.nanmax(np.abs(speed)) > 0.0
-        ):
-            largest = float(np.nanmax(np.abs(speed)))
-            if facts.duty is None:
-                row = self._value(largest, "m/s")
-            elif facts.duty.peak_speed is None:
-                row = self._write_growth("speed")
-            else:
-                peak = self._value(facts.duty.peak_speed, "m/s")
-                row = f"peak {peak}{self._of_positions}"
-            lines.append(self._row("speed", row))
-        return lines
+            limits = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
+            row += f"; assembles from {' to '.join(limits)}"
+        yield _row("stroke", row)
+        speed = self.solution.stroke_speed
+        if speed is None or self.motion.stroke is not None:
+            return
+        largest = float(np.nanmax(np.abs(speed)))
+        if not largest > 0.0:
+            return
+        if facts.duty is None:
+            row = self._value(largest, "m/s")
+        elif facts.duty.peak_speed is None:
+            row = self._write_growth("speed")
+        else:
+            peak = self._value(facts.duty.peak_speed, "m/s")
+            row = f"peak {peak}{self._of_positions}"
+        yield _row("speed", row)
 
-    def _write_bore(self, pressure: float) -> list[str]:
+    def _write_bore(self, pressure: float) -> Iterator[str]:
         """Write the bore that pushes, and the area that pulls, at a pressure."""
         if self.facts.peak is None:
-            none = "none is enough, as the force grows without bound"
-            return [self._row("bore", none)]
-        panels = self.facts.motion.panels
+            yield _row("bore", "none is enough, as the force grows without bound")
+            return
         parts = []
         for sense, does in (
             (1, " to push"),
             (-1, ", and the rod's area besides, to pull"),
         ):
-            force = sense * panels.find_peak(LINE.value, sense).value
+            peak = self.facts.motion.panels.find_peak(LINE.value, sense)
+            force = sense * peak.value
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
                 parts.append(
                     f"{self._value(bore, 'm')}{does} {self._value(force, 'N')}"
                 )
         if parts:
-            return [self._row("bore", f"at least {'; '.join(parts)}")]
-        return []
+            yield _row("bore", f"at least {'; '.join(parts)}")
 
-    def _write_pins(self) -> list[str]:
+    def _write_pins(self) -> Iterator[str]:
         """Write the loads of the four pins, side by side."""
-        facts, loads = self.facts, self.facts.pins.values()
-        if not loads:
-            return []
-        peaks = [load.peak for load in loads]
-        rows = [
-            ("pins", list(facts.pins)),
-            ("  peak", self._cells_of_peaks(peaks, "N")),
-            ("  at", self._places_of_peaks(peaks, [*PIN_FORCES])),
-        ]
-        means = [load.rms for load in loads]
+        pins = self.facts.pins
+        if not pins:
+            return
+        cells, places = self._write_peaks([*PIN_FORCES], "N")
+        rows = [("pins", [*pins]), ("  peak", cells), ("  at", places)]
+        means = [load.rms for load in pins.values()]
         if any(mean is not None for mean in means):
-            rows.append(("  RMS", self._cells(self._without_small(means), "N")))
-        lines = _align(rows, self.width)
-        if facts.kind in ("list", "released"):
-            return [*lines, "  peak and RMS are those of these positions"]
-        return lines
+            rows.append(("  RMS", self._cells(_drop_small(means), "N")))
+        yield from _align(rows, self.width)
+        if self.facts.kind in ("list", "released"):
+            yield "  peak and RMS are those of these positions"
 
-    def _write_bending(self) -> list[str]:
+    def _write_bending(self) -> Iterator[str]:
         """Write the largest bending moment of each bar, with its place and position."""
-        facts = self.facts
-        peaks = [bar.peak for bar in facts.bending.values()]
-        if all(peak is not None and peak.value == 0.0 for peak in peaks):
-            return []
-        names = [f"bending_{bar}" for bar in facts.bending]
-        places = self._places_of_peaks(peaks, names)
-        for index, bar in enumerate(facts.bending.values()):
-            if bar.peak is not None and bar.peak.value:
-                along = self._value(bar.x, "m", self.longest)
-                in_motion = "" if facts.kind == "position" else f", {places[index]}"
+        bending = self.facts.bending
+        if all(bar.peak is not None and not bar.peak.value for bar in bending.values()):
+            return
+        moments, places = self._write_peaks(
+            [f"bending_{bar}" for bar in bending], "N m"
+        )
+        stresses = list[float | None]()
+        for index, (bar, (peak, x, *_)) in enumerate(bending.items()):
+            if peak is not None and peak.value:
+                along = self._value(x, "m", self.longest)
+                in_motion = (
+                    "" if self.facts.kind == "position" else f", {places[index]}"
+                )
                 places[index] = f"{along}{in_motion}"
+            # a bar without a cross-section has none
+            modulus = self.linkage.bar(bar).section_modulus
+            stress = None
+            if peak is not None and modulus is not None:
+                stress = peak.value / modulus
+            stresses.append(stress)
         rows = [
-            ("bending", [f"bar {bar}" for bar in facts.bending]),
-            ("  moment", self._cells_of_peaks(peaks, "N m")),
+            ("bending", [f"bar {bar}" for bar in bending]),
+            ("  moment", moments),
             ("  at x", places),
         ]
-        stresses = self._write_stresses()
-        if any(stress != "-" for stress in stresses):
-            rows.append(("  stress", stresses))
-        return [*_align(rows, self.width), *list_couple_notes(facts.scene)]
+        if any(stress is not None for stress in stresses):
+            rows.append(("  stress", self._cells(stresses, "Pa")))
+        yield from _align(rows, self.width)
+        yield from list_couple_notes(self.scene)
 
-    def _write_stresses(self) -> list[str]:
-        """Write the largest bending stress of each bar.
+    def _write_peaks(self, names: list[str], unit: str) -> tuple[list[str], list[str]]:
+        """Write the largest sizes of curves of one kind, and where they are taken.
 
-        A bar without a cross-section has a dash.
+        A curve may grow without bound there.
         """
-        stresses = list[float | None]()
-        for bar, bending in self.facts.bending.items():
-            modulus = self.facts.scene.linkage.bar(bar).section_modulus
-            if bending.peak is None or modulus is None:
-                stresses.append(None)
-            else:
-                stresses.append(bending.peak.value / modulus)
-        return self._cells(stresses, "Pa")
-
-    def _list_sizes(self, peaks: list[Peak | None]) -> list[float | None]:
-        """List the values of peaks of one kind; None: without a bound."""
-        return self._without_small([peak and peak.value for peak in peaks])
-
-    @staticmethod
-    def _without_small(values: list[float | None]) -> list[float | None]:
-        """Return zero for what is rounding of the largest of their kind."""
-        largest = max((abs(value) for value in values if value), default=0.0)
-        least = SHOWN_AS_ZERO * largest
-        return [0.0 if value and abs(value) <= least else value for value in values]
-
-    def _cells_of_peaks(self, peaks: list[Peak | None], unit: str) -> list[str]:
-        """Write largest values of one kind, and which have no bound."""
-        return self._cells(self._list_sizes(peaks), unit, _NO_LARGEST)
-
-    def _places_of_peaks(
-        self,
-        peaks: list[Peak | None],
-        names: list[str],
-    ) -> list[str]:
-        """Write where largest values of one kind are taken, or grow without bound."""
-        panels = self.facts.motion.panels
+        peaks = [self.facts.find_peak(name) for name in names]
+        sizes = _drop_small([peak and peak.value for peak in peaks])
         places = []
-        for peak, size, name in zip(peaks, self._list_sizes(peaks), names, strict=True):
+        for peak, size, name in zip(peaks, sizes, names, strict=True):
             if peak is None:
-                places.append(self._place(panels.list_poles(name)[0], named=False))
+                place = self.facts.motion.panels.list_poles(name)[0]
             else:
-                places.append(self._place(peak.place, named=False) if size else "-")
-        return places
+                place = peak.place
+            is_taken = peak is None or size
+            places.append(self._place(place, named=False) if is_taken else "-")
+        return self._cells(sizes, unit, "unbounded"), places
 
     def _cells(
-        self, values: list[float | None], unit: str, missing: str = "-"
+        self, values: Iterable[float | None], unit: str, missing: str = "-"
     ) -> list[str]:
         """Write quantities of one kind; `missing` stands for none."""
+        values = [*values]
         largest = max((abs(value) for value in values if value), default=0.0)
         return [
             missing if value is None else self._value(value, unit, largest)
             for value in values
         ]
 
-    def _write_remarks(self) -> list[str]:
+    def _write_remarks(self) -> Iterator[str]:
         """Write where pin forces jump, and what rounding does."""
-        facts = self.facts
-        lines = list[str]()
-        if (
-            facts.solution.change_points
-            and facts.pins
-            and has_growing_forces(facts.scene, facts.solution)
-        ):
-            lines.append(
+        facts, scene, solution = self.facts, self.scene, self.solution
+        passes = facts.pins and solution.change_points
+        if passes and has_growing_forces(scene, solution):
+            yield (
                 "at a change point pin forces grow without bound: the peaks are those "
                 "of these instants"
             )
         if facts.pins and not facts.motion.is_steady:
-            lines.append(
-                "the positions are passed at no one speed: no RMS values, no energies"
-            )
+            yield "the positions are passed at no one speed: no RMS values, no energies"
         if facts.motion.reversals:
-            unit = facts.solution.at.unit
-            places = ", ".join(  # of a motion law too by its angle, not by its time
-                f"{self._value(place, unit, self.longest if unit == 'm' else None)}"
-                f" ({pin})"
+            # of a motion law too by its angle, not by its time
+            unit = solution.at.unit
+            largest = self.longest if unit == "m" else None
+            places = ", ".join(
+                f"{self._value(place, unit, largest)} ({pin})"
                 for place, pin in facts.motion.reversals
             )
-            name = facts.solution.commanded
-            lines.append(
+            name = solution.commanded
+            yield (
                 f"dry friction reverses, and the pin forces jump, at {name} = {places}"
             )
-        lines += self._warn()
-        lines += list_drawn_notes(facts.scene, self.units)
-        lines += list_arm_notes(facts.scene)
-        lines += list_law_notes(facts.scene, self.units)
-        lines += list_spring_notes(facts.scene, facts.solution, self.units)
-        if facts.drive is not None and self._is_balanced():
-            lines.append(f"the {facts.drive.name} is zero within rounding")
+        yield from self._warn()
+        yield from list_drawn_notes(scene, self.units)
+        yield from list_arm_notes(scene)
+        yield from list_law_notes(scene, self.units)
+        yield from list_spring_notes(scene, solution, self.units)
+        if self.drive is not None and self._is_balanced():
+            yield f"the {self.drive.name} is zero within rounding"
         elif facts.error is not None:
+            below = "zero"
             if facts.error:
                 below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
-            else:
-                below = "zero"
-            changed = "none of these" if facts.error < self._changes_a_digit else "some"
-            lines.append(
+            last_digit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
+            changed = "none of these" if facts.error < last_digit else "some"
+            yield (
                 f"rounding changes {changed} digits (worst error bar {below} of the"
                 " value)"
             )
-        return lines
 
-    @property
-    def _changes_a_digit(self) -> float:
-        """Part of a value that changes the last digit shown."""
-        return _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
-
-    def _warn(self) -> list[str]:
+    def _warn(self) -> Iterator[str]:
         """Write where the drive's torque or force has few digits left.
 
         The warning names the collinear bars that cost the digits.
         """
-        solution = self.facts.solution
-        drive = self.facts.drive
-        if (
-            drive is None
-            or drive.error is None
-            or solution.drive_condition is None
-            or drive.values is None
-        ):
-            return []
+        solution, drive = self.solution, self.drive
+        if drive is None or drive.error is None or solution.drive_condition is None:
+            return
         # of those that matter: one that passes through zero has no digits, and needs
         # none
+        sizes = drive.sizes
         with np.errstate(invalid="ignore"):
-            sizes = np.abs(drive.values)
             reference = np.maximum(sizes, np.nanmedian(sizes))
             reference[reference == 0.0] = np.nan
             share = drive.error / reference
-        largest = np.nanmax(np.abs(drive.values), initial=0.0)
-        if self._without_rounding(float(largest)) == 0.0:  # nothing has digits to lose
-            return []
+        if self._is_rounding(float(np.nanmax(sizes, initial=0.0))):
+            return  # nothing has digits to lose
         if not np.nanmax(share, initial=0.0) > _FEW_DIGITS:
-            return []
+            return
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)
-        place = solution.at.places if solution.time is None else solution.time
-        start = (
-            f"{digits} digits left of {drive.symbol} at"
-            f" {self._place(float(place[worst]))}"
-        )
+        place = self._place(float(solution.at.places[worst]))
+        start = f"{digits} digits left of {drive.symbol} at {place}"
         commanded = BARS_IN_LINE[solution.at.bar]
         sines = {commanded: solution.condition[worst]}
+        condition = solution.drive_condition[worst]
         if solution.drive is not None:
-            lever = solution.drive_condition[worst]
-            sine = sines[commanded]
-            return [
-                f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded}"
-                f" {sine:.2g} is left"
-            ]
-        sines[BARS_IN_LINE[solution.drive_bar]] = solution.drive_condition[worst]
+            yield (
+                f"{start}: of its lever {condition:.2g}, of the sine of bars"
+                f" {commanded} {sines[commanded]:.2g} is left"
+            )
+            return
+        sines[BARS_IN_LINE[solution.drive_bar]] = condition
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
         apart = write_short(gap, "rad", self.units, digits=2)
-        meeting = _name_meeting(bars)
-        return [f"{start}: bars {bars} are {apart} from being {meeting}"]
+        yield f"{start}: bars {bars} are {apart} from being {_name_meeting(bars)}"
 
-    @staticmethod
-    def _row(label: str, text: str) -> str:
-        return f"  {label:<{INDENT - 2}}{text}"
+    def _is_rounding(self, value: float) -> bool:
+        """Return True for a torque or force of the drive within its rounding."""
+        return self._without_rounding(value) == 0.0
+
+
+def _row(label: str, text: str) -> str:
+    return f"  {label:<{INDENT - 2}}{text}"
+
+
+def _drop_small(values: list[float | None]) -> list[float | None]:
+    """Return zero for what is rounding of the largest of their kind."""
+    largest = max((abs(value) for value in values if value), default=0.0)
+    least = SHOWN_AS_ZERO * largest
+    return [0.0 if value and abs(value) <= least else value for value in values]
 
 
 def _name_meeting(bars: str) -> str:
@@ -1011,24 +863,21 @@ def write_motor(
     if duty is None:
         return None
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
-    shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
-    force = find_unit_in("N", units)[1]
-    angle = find_unit_in("rad", units)[1]
 
-    def convert(number: float | None, factor: float) -> float | None:
-        return None if number is None else number * factor
+    def convert(number: float | None, unit: str) -> float | None:
+        return None if number is None else number * find_unit_in(unit, units)[1]
 
     loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
     return {
         "closed": duty.closed,
-        **{name: convert(getattr(duty, name), shown[name][1]) for name in si},
+        **{name: convert(getattr(duty, name), unit) for name, unit in si.items()},
         "pins": {
             pin: {
-                "peak": convert(load.largest, force),
-                "rms": convert(load.rms, force),
-                "theta_2": convert(load.where, angle),
+                "peak": convert(load.largest, "N"),
+                "rms": convert(load.rms, "N"),
+                "theta_2": convert(load.where, "rad"),
             }
             for pin, load in loads.items()
         },
-        "units": {name: unit for name, (unit, _) in shown.items()},
+        "units": {name: find_unit_in(unit, units)[0] for name, unit in si.items()},
     }

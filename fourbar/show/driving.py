@@ -30,6 +30,12 @@ class Driving(NamedTuple):
     speed_key: str
     """Name of the speed of the driven bar, or of the stroke."""
 
+    @property
+    def sizes(self) -> Array:
+        """Sizes of torque or force, (n,), where forces are known."""
+        assert self.values is not None
+        return np.abs(self.values)
+
 
 def read_drive_demand(solution: Solution) -> Driving:
     """Return torque or force of the drive, with its error bar."""
@@ -45,6 +51,13 @@ def read_drive_demand(solution: Solution) -> Driving:
     values = getattr(solution, names.value)
     error = getattr(solution, names.error)
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
+
+
+def name_places(solution: Solution) -> tuple[str, str]:
+    """Return the symbol and the SI unit of what the positions of a motion follow."""
+    if solution.time is not None:
+        return "t", "s"
+    return solution.commanded, solution.at.unit
 
 
 def describe_drive(scene: Scene) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError, expect, needing
 from fourbar.evaluation.case import compute_shown_state
-from fourbar.formulas.arithmetic import dot
-from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.formulas.torque import inertia
+from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
@@ -415,7 +415,7 @@ class _Energies(NamedTuple):
 def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     """Compute the kinetic energy, and the work of each effect and of the loads.
 
-        T = sum of m v_G^2/2 + I omega^2/2,
+        T = J omega_2^2/2, J the equivalent inertia,
         W(t) = integral of the power, by a cubic spline through the instants.
 
     Raises DependencyError where SciPy is not installed.
@@ -426,10 +426,8 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     assembly = find_signs(scene.linkage, motion.theta_2, motion.branch)
     of_input = Command(motion.theta_2, assembly, motion.omega_2, 0.0)
     state = compute_shown_state(scene, of_input)
-    groups = {
-        "loads": scene.loads,
-        **{effect.key: (effect,) for effect in scene.effects},
-    }
+    groups: dict[str, tuple[Any, ...]] = {"loads": scene.loads}
+    groups |= {effect.key: (effect,) for effect in scene.effects}
     work = {}
     for name, terms in groups.items():
         actions = Actions(state, list_bodies(scene.linkage)).add(terms)
@@ -440,12 +438,7 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
             spline = CubicSpline(motion.time[finite], power[finite])
             integral = spline.antiderivative()
             work[name] = integral(motion.time)
-    kinetic = np.zeros(len(motion))
     bodies = list_bodies(scene.linkage, scene.effects)
-    for number, body in zip(MOVING_BARS, bodies, strict=True):
-        v = state.velocity(number, body.z)
-        omega = state.omega(number)
-        of_centre = 0.5 * body.m * dot(v, v)
-        about_centre = 0.5 * body.I * np.square(omega)
-        kinetic = kinetic + of_centre + about_centre
-    return _Energies(kinetic, work)
+    length = scene.linkage.input.length
+    J = sum(inertia(length, bodies, state.position, state.k))
+    return _Energies(np.asarray(0.5 * J * np.square(motion.omega_2)), work)

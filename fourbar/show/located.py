@@ -5,6 +5,9 @@ one that comes nearest to it there may touch it. A column that changes its side 
 jump does not have the value.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError, name_unit, write_in_units
@@ -76,17 +79,9 @@ class _LocatedSearch:
         self.course = MotionCourse(scene, stage)
         self.places = self.course.places
         self.commanded = self.course.commanded
-        self._located = {"xatol": LOCATED * self.course.span, "xrtol": 0.0}
         column = read_column(scene, self.course.solution, name)
         self.unit = _find_column_unit(column)
         self.values = column.values
-
-    def _measure_gaps(self, values: Array) -> Array:
-        """Return how far values lie from the one sought, of angles modulo a turn."""
-        gaps = values - self.value
-        if self.unit == "rad":
-            gaps = np.angle(np.exp(1j * gaps))
-        return np.asarray(gaps)
 
     def _read(self, places: Array) -> Array:
         """Return the column at places in an array of any shape."""
@@ -97,6 +92,21 @@ class _LocatedSearch:
     def _gap(self, places: Array) -> Array:
         """Return the gaps at places in an array of any shape."""
         return self._measure_gaps(self._read(places))
+
+    def _measure_gaps(self, values: Array) -> Array:
+        """Return how far values lie from the one sought, of angles modulo a turn."""
+        gaps = values - self.value
+        if self.unit == "rad":
+            gaps = np.angle(np.exp(1j * gaps))
+        return np.asarray(gaps)
+
+    def _minimize(self, function: Callable[..., Array], rows: Any, *side: Array) -> Any:
+        """Locate the least values of a function about places of the course."""
+        from scipy.optimize.elementwise import find_minimum
+
+        bracket = tuple(self.places[rows + shift] for shift in (-1, 0, 1))
+        located = {"xatol": LOCATED * self.course.span, "xrtol": 0.0}
+        return find_minimum(function, bracket, args=side, tolerances=located)
 
     def locate(self, text: str) -> Command:
         """Locate the positions that have a value, in the order of the motion."""
@@ -122,16 +132,13 @@ class _LocatedSearch:
         touches, brackets = self._find_touches(gaps, extent)
         passed, jumps = self._find_crossings(gaps, brackets)
         found = np.concatenate([self.places[zeros], touches, passed])
-        if not found.size and jumps.size:
-            places = drop_rounding(np.sort(jumps), self.course.span).tolist()
-            where = ", ".join(write_place(self.commanded, place) for place in places)
-            raise self._refuse(
-                text,
-                f"it jumps over it at {self.commanded} = {where}",
-                finite,
-            )
         if not found.size:
-            raise self._refuse(text, "no position has it", finite)
+            why = "no position has it"
+            if jumps.size:
+                places = drop_rounding(np.sort(jumps), self.course.span).tolist()
+                jumped = [write_place(self.commanded, place) for place in places]
+                why = f"it jumps over it at {self.commanded} = {', '.join(jumped)}"
+            raise self._refuse(text, why, finite)
         order = np.argsort(found)
         if self.places[0] > self.places[-1]:
             order = order[::-1]
@@ -139,16 +146,12 @@ class _LocatedSearch:
 
     def _read_value(self, text: str) -> float:
         """Read the value that is sought; InputError where its unit is missing."""
-        if self.unit != "1" and NUMBER_TEXT.fullmatch(text):
-            likely = name_unit(self.unit)
-            raise InputError(
-                "value",
-                f"{self.name}={text}",
-                f'the unit is missing; did you mean "{text} {likely}"?',
-            )
-        if self.unit == "1" and NUMBER_TEXT.fullmatch(text):
+        if not NUMBER_TEXT.fullmatch(text):
+            return require("value", text, self.unit)
+        if self.unit == "1":
             return require("value", float(text))
-        return require("value", text, self.unit)
+        hint = f'the unit is missing; did you mean "{text} {name_unit(self.unit)}"?'
+        raise InputError("value", f"{self.name}={text}", hint)
 
     def _find_touches(self, gaps: Array, extent: float) -> tuple[Array, list[Array]]:
         """Find where the column turns round at the value, or beyond it.
@@ -156,10 +159,8 @@ class _LocatedSearch:
         A place beyond it is returned as two intervals, on each of which the column
         passes the value.
         """
-        from scipy.optimize.elementwise import find_minimum
-
         sides = np.sign(gaps)
-        before, here, after = np.abs(gaps[:-2]), np.abs(gaps[1:-1]), np.abs(gaps[2:])
+        before, here, after = np.abs([gaps[:-2], gaps[1:-1], gaps[2:]])
         # between two places a curve goes no farther beyond them than they are apart
         in_reach = here <= np.maximum(before, after) - here
         nearest = (here <= before) & (here <= after) & in_reach
@@ -167,21 +168,13 @@ class _LocatedSearch:
         rows = 1 + np.flatnonzero(nearest & alike & (sides[1:-1] != 0.0))
         if not rows.size:
             return np.empty(0), []
-        side = sides[rows]
-        low, middle, high = (self.places[rows + shift] for shift in (-1, 0, 1))
-        least = find_minimum(
-            lambda places, side: side * self._gap(places),
-            (low, middle, high),
-            args=(side,),
-            tolerances=self._located,
+        least = self._minimize(
+            lambda places, side: side * self._gap(places), rows, sides[rows]
         )
-        beyond = least.f_x < -TOUCHES * extent
+        ends = np.array([self.places[rows - 1], least.x, self.places[rows + 1]])
+        beyond = ends[:, least.f_x < -TOUCHES * extent]
         at = np.abs(least.f_x) <= TOUCHES * extent
-        between = [
-            np.stack([first[beyond], last[beyond]])
-            for first, last in ((low, least.x), (least.x, high))
-        ]
-        return least.x[at], between
+        return least.x[at], [beyond[:2], beyond[1:]]
 
     def _find_crossings(
         self,
@@ -227,45 +220,27 @@ class _LocatedSearch:
 
     def _refuse(self, text: str, why: str, values: Array) -> NotAssembledError:
         """Make the error of a value that no position has, with the column's range."""
-        ends = dict.fromkeys(self._find_extent(values))
+        located = np.array([self._find_extreme(side)[1] for side in EXTREMES.values()])
+        ends = dict.fromkeys(drop_rounding(located, np.abs(values).max()).tolist())
         usual = float(np.percentile(np.abs(values), USUAL))
-        if max(map(abs, ends)) > UNBOUNDED_BEYOND * usual:
-            return NotAssembledError(
-                f"--at {self.name} = {text}: {why}, and grows without bound"
-            )
+        start = f"--at {self.name} = {text}: {why}"
+        if np.abs(located).max() > UNBOUNDED_BEYOND * usual:
+            return NotAssembledError(f"{start}, and grows without bound")
         unit = "" if self.unit == "1" else self.unit
         extent = write_in_units(unit, *ends, between=" to ")
         word = "is" if len(ends) == 1 else "goes from"
-        return NotAssembledError(
-            f"--at {self.name} = {text}: {why}; {self.name} {word} {extent}"
-        )
-
-    def _find_extent(self, values: Array) -> list[float]:
-        """Find the least and the largest value of the column, located between places.
-
-        `values`: those that are finite.
-        """
-        ends = [self._find_extreme(side)[1] for side in EXTREMES.values()]
-        largest = float(np.abs(values).max())
-        cleaned: list[float] = drop_rounding(np.array(ends), largest).tolist()
-        return cleaned
+        return NotAssembledError(f"{start}; {self.name} {word} {extent}")
 
     def _find_extreme(self, side: float) -> tuple[float, float]:
         """Find the place and the value of the column's extreme on this side.
 
         `side`: one of `EXTREMES`.
         """
-        from scipy.optimize.elementwise import find_minimum
-
         row = int(np.nanargmin(side * self.values))
         place, value = self.places[row], self.values[row]
         around = self.values[row - 1 : row + 2]
         if 0 < row < len(self.values) - 1 and np.isfinite(around).all():
-            least = find_minimum(
-                lambda places: side * self._read(places),
-                tuple(self.places[row - 1 : row + 2]),
-                tolerances=self._located,
-            )
+            least = self._minimize(lambda places: side * self._read(places), row)
             place, value = least.x, side * least.f_x
         return float(place), float(value)
 

@@ -118,8 +118,7 @@ class MotionCurves:
         solution = self.solution
         if self.panels.located:
             solution = self.solve_at(np.array([place]), "position")
-        places = solution.at.places if solution.time is None else solution.time
-        return float(solution.theta_2[np.argmin(np.abs(places - place))])
+        return float(solution.theta_2[np.argmin(np.abs(solution.at.places - place))])
 
     @cached_property
     def stretches(self) -> list[Stretch]:
@@ -225,8 +224,7 @@ def _take_positions(
     solution: Solution, curves: dict[str, Array], share: Array
 ) -> Panels:
     """Take the positions of a solution for panels with nothing between them."""
-    places = solution.at.places if solution.time is None else solution.time
-    return Panels.of_positions(places, curves, share)
+    return Panels.of_positions(solution.at.places, curves, share)
 
 
 def goes_on_between(scene: Scene, solution: Solution) -> bool:
@@ -365,8 +363,7 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
     if scene.motion.free is not None:
         return curves
     # what a balanced linkage leaves of a load is rounding, and has no peak
-    assert drive.values is not None
-    idle = np.abs(drive.values) <= SHOWN_AS_ZERO * largest * _find_longest_arm(solution)
+    idle = drive.sizes <= SHOWN_AS_ZERO * largest * _find_longest_arm(solution)
     curves["speed"] = getattr(solution, drive.speed_key)
     for name in (drive.keys.value, "power"):
         curves[name] = np.where(idle, 0.0, getattr(solution, name))
@@ -468,34 +465,23 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     if solution.commanded == f"theta_{bar}":
         return  # as it is commanded
     curve = panels.curves[f"theta_{bar}"]
-    values = curve.values[..., 0]
-    # a panel in which the assembly ends has values on one side
-    known = np.flatnonzero(np.isfinite(values).any(axis=1))
-    assembles = np.isfinite(values[known])
-    gaps = (np.diff(known) > 1) | ~assembles[:-1, -1] | ~assembles[1:, 0]
-    rows = np.arange(len(known))
-    starts = values[known][rows, assembles.argmax(axis=1)]
-    stops = values[known][rows, -1 - assembles[:, ::-1].argmax(axis=1)]
-    turns = np.round((stops[:-1] - starts[1:]) / TURN)
-    turns = np.concatenate([[0.0], np.cumsum(np.where(gaps, 0.0, turns))])
-    values[known] += TURN * turns[:, None]
+    angles = curve.values.ravel()
+    rows = np.flatnonzero(np.isfinite(angles))
+    stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    for stretch in stretches:
+        angles[stretch] = np.unwrap(angles[stretch])
     coarse = getattr(solution, f"theta_{bar}")
     first = int(np.flatnonzero(np.isfinite(coarse))[0])
-    away = np.abs(panels.list_nodes()[known] - solution.at.places[first])
-    nearest = values[known].flat[np.argmin(np.where(assembles, away, np.inf))]
-    values += TURN * np.round((coarse[first] - nearest) / TURN)
-    low = np.inf
-    high = -np.inf
-    for stretch in np.split(known, np.flatnonzero(gaps) + 1):
-        start = np.nanmin(values[stretch])
-        stop = np.nanmax(values[stretch])
-        if low < high:
-            shift = TURN * _find_turns(start, stop, low, high)
-            values[stretch] += shift
-            start += shift
-            stop += shift
-        low = min(low, start)
-        high = max(high, stop)
+    away = np.abs(panels.list_nodes().ravel()[rows] - solution.at.places[first])
+    nearest = angles[rows[np.argmin(away)]]
+    angles += TURN * np.round((coarse[first] - nearest) / TURN)
+    low, high = np.inf, -np.inf
+    for stretch in stretches:
+        start, stop = angles[stretch].min(), angles[stretch].max()
+        turned = TURN * _find_turns(start, stop, low, high) if low < high else 0.0
+        angles[stretch] += turned
+        low, high = min(low, start + turned), max(high, stop + turned)
+    curve.values = angles.reshape(curve.values.shape)
 
 
 def _find_turns(start: float, stop: float, low: float, high: float) -> int:
@@ -507,9 +493,7 @@ def _find_turns(start: float, stop: float, low: float, high: float) -> int:
     nearest = round(distance / TURN)
 
     def measure(turns: int) -> tuple[int, int]:
-        top = max(high, stop + TURN * turns)
-        bottom = min(low, start + TURN * turns)
-        width = top - bottom
+        width = max(high, stop + TURN * turns) - min(low, start + TURN * turns)
         return round(width / _AS_WIDE), abs(turns)
 
     return min((nearest - 1, nearest, nearest + 1), key=measure)

@@ -173,22 +173,19 @@ class Panels:
 
         At the end of a panel a curve that jumps there may have a value of its own.
         """
-        start = np.concatenate([places, self.start])
+        start = np.append(places, self.start)
         rises = self.stop[0] > self.start[0]
         order = np.argsort(start if rises else -start, kind="stable")
         added = {}
         for name, curve in self.curves.items():
             points = curves[name].reshape(len(places), 1, -1)
-            values = np.repeat(points, curve.values.shape[1], axis=1)
-            error = np.concatenate([np.full(len(places), np.inf), curve.error])
-            poles = [panel + len(places) for panel in curve.poles]
-            added[name] = PanelCurve(
-                np.concatenate([values, curve.values])[order],
-                error[order],
-                np.flatnonzero(np.isin(order, poles)).tolist(),
-            )
-        stop = np.concatenate([places, self.stop])[order]
-        share = np.concatenate([0.0 * places, self.share])[order]
+            points = np.repeat(points, curve.values.shape[1], axis=1)
+            values = np.concatenate([points, curve.values])[order]
+            error = np.append(np.full(len(places), np.inf), curve.error)[order]
+            poles = np.flatnonzero(np.isin(order - len(places), curve.poles))
+            added[name] = PanelCurve(values, error, poles.tolist())
+        stop = np.append(places, self.stop)[order]
+        share = np.append(0.0 * places, self.share)[order]
         return Panels(start[order], stop, share, added)
 
     @property
@@ -281,9 +278,8 @@ class Panels:
 
     def _place(self, panel: int, x: Array) -> Array:
         """Convert places within a panel, from -1 to 1, to those of the motion."""
-        middle = 0.5 * (self.start[panel] + self.stop[panel])
-        half = 0.5 * (self.stop[panel] - self.start[panel])
-        return np.asarray(middle + half * x)
+        start, stop = self.start[panel], self.stop[panel]
+        return np.asarray(0.5 * (start + stop) + 0.5 * (stop - start) * x)
 
     def find_peak(self, name: str, sense: int = 0) -> Peak:
         """Find the largest value of a curve (1), the least (-1), or largest size (0).
@@ -373,6 +369,8 @@ class _Fit(NamedTuple):
     """Least value of a scalar, (p,); inf where all are missing, and of a vector."""
     size: Array
     """Largest size, (p,); 0 where all are missing."""
+    unsettled: NDArray[np.bool_]
+    """True for a panel that would have been halved again, (p,)."""
 
 
 def fit_panels(
@@ -390,43 +388,48 @@ def fit_panels(
     wanted : by name of a curve, what is asked of it.
     most_halvings : number of rounds after which a curve is taken as it is.
     """
-    start = edges[:-1]
-    stop = edges[1:]
+    start, stop = edges[:-1], edges[1:]
     length = edges[-1] - edges[0]
     fits = _fit_panels(compute, start, stop)
-    usual = {name: _find_usual_size(first.values) for name, first in fits.items()}
-    settled = dict.fromkeys(fits, (-np.inf, np.inf))
-    ends: list[tuple[Array, Array]] = []
-    fitted: dict[str, list[_Fit]] = {name: [] for name in fits}
-    kept = []
+    usual = {name: _find_usual_size(fit.values) for name, fit in fits.items()}
+    kept: dict[str, list[_Fit]] = {name: [] for name in fits}
+    ends = []
     for halvings in range(most_halvings + 1):
-        ends.append((start, stop))
+        share = (stop - start) / length
         opens = {}
         for name, fit in fits.items():
-            fitted[name].append(fit)
             # a node that a halving leaves out may have been next to a pole
-            most = max(settled[name][0], fit.most.max())
-            least = min(settled[name][1], fit.least.min())
-            share = (stop - start) / length
+            known = [*kept[name], fit]
+            most = max(part.most.max(initial=-np.inf) for part in known)
+            least = min(part.least.min(initial=np.inf) for part in known)
             is_open = _find_open(fit, share, usual[name], (most, least), wanted[name])
-            noise = _NOISE * 2.0**halvings
-            opens[name] = is_open & ~(fit.error <= noise * fit.size)
+            noise = _NOISE * 2.0**halvings * fit.size
+            opens[name] = is_open & ~(fit.error <= noise)
         is_open = np.any([*opens.values()], axis=0)
-        is_last = halvings == most_halvings or is_open.sum() > _MOST_OPEN
-        kept.append(~is_open | is_last)
-        if is_last or not is_open.any():
-            break
+        most_open = 0 if halvings == most_halvings else _MOST_OPEN
+        is_last = not 0 < is_open.sum() <= most_open
+        keep = ~is_open | is_last
+        ends.append((start[keep], stop[keep]))
         for name, fit in fits.items():
-            most = max(settled[name][0], fit.most[~is_open].max(initial=-np.inf))
-            least = min(settled[name][1], fit.least[~is_open].min(initial=np.inf))
-            settled[name] = most, least
+            part = fit._replace(unsettled=opens[name] & is_last)
+            kept[name].append(_Fit(*(column[keep] for column in part)))
+        if is_last:
+            break
         middle = 0.5 * (start[is_open] + stop[is_open])
         start, stop = (
             np.concatenate((start[is_open], middle)),
             np.concatenate((middle, stop[is_open])),
         )
         fits = _fit_panels(compute, start, stop)
-    return _join_panels(ends, fitted, kept, opens)
+    start, stop = map(np.concatenate, zip(*ends, strict=True))
+    order = np.argsort(start if stop[0] > start[0] else -start)
+    curves = {}
+    for name, parts in kept.items():
+        whole = _Fit(*(np.concatenate(c)[order] for c in zip(*parts, strict=True)))
+        curves[name] = PanelCurve(whole.values, whole.error, [])
+        curves[name].poles = _find_panels_at_poles(curves[name], whole.unsettled)
+    share = (stop - start) / (stop - start).sum()
+    return Panels(start[order], stop[order], share[order], curves)
 
 
 def _find_usual_size(values: Array) -> float:
@@ -460,34 +463,6 @@ def _find_open(
     if wanted.integrated:
         is_open |= ~(share * fit.error <= SETTLED * usual + wanted.rounding)
     return is_open
-
-
-def _join_panels(
-    ends: list[tuple[Array, Array]],
-    fitted: dict[str, list[_Fit]],
-    kept: list[NDArray[np.bool_]],
-    unsettled: dict[str, NDArray[np.bool_]],
-) -> Panels:
-    """Join the kept panels of all rounds in the order of the motion."""
-    start, stop = (
-        np.concatenate([side[keep] for side, keep in zip(sides, kept, strict=True)])
-        for sides in zip(*ends, strict=True)
-    )
-    order = np.argsort(start if stop[0] > start[0] else -start)
-    start = start[order]
-    stop = stop[order]
-    curves = {}
-    for name, rounds in fitted.items():
-        pairs = [*zip(rounds, kept, strict=True)]
-        values = np.concatenate([one.values[keep] for one, keep in pairs])[order]
-        error = np.concatenate([one.error[keep] for one, keep in pairs])[order]
-        late = np.zeros(len(order), dtype=bool)
-        late[-kept[-1].sum() :] = unsettled[name][kept[-1]]
-        curve = PanelCurve(values, error, [])
-        curve.poles = _find_panels_at_poles(curve, late[order])
-        curves[name] = curve
-    share = (stop - start) / (stop - start).sum()
-    return Panels(start, stop, share, curves)
 
 
 def _find_panels_at_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
@@ -535,5 +510,5 @@ def _fit_panels(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, 
         most = np.where(missing, -np.inf, sizes).max(axis=1)
         least = np.where(missing | (not single), np.inf, sizes).min(axis=1)
         size = np.where(missing, 0.0, np.abs(sizes)).max(axis=1)
-        fits[name] = _Fit(values, error, most, least, size)
+        fits[name] = _Fit(values, error, most, least, size, missing[:, 0])
     return fits

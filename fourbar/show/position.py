@@ -3,13 +3,14 @@
 Rows state bars, points, pin forces, ratios and instant centres.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import product
 
 import numpy as np
 
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import DERIVED_NAMES, Array
+from fourbar.quantities import DERIVED_NAMES, PIN_FORCES, Array
 from fourbar.scene import Scene
 from fourbar.show.change_point import NoSideError, find_limits
 from fourbar.show.columns import read_column
@@ -35,7 +36,6 @@ AT_INFINITY = 1e7
 """Times the places of A and B beyond which an instant centre is at infinity. Where a
 bar turns back, which is located to some 1e-9 of its turn, I13 is 1e8 times as far away.
 """
-_FORCE_HEADS = {pin: f"{name} at {pin}" for pin, name in PIN_FORCE.items()}
 
 
 class PositionSheet:
@@ -50,15 +50,18 @@ class PositionSheet:
     def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
         self.scene = scene
         self.units = units
-        self.without_side = ""
-        """Why a side of a change point cannot be asked for its pin forces."""
-        limits = None
+        self.on_change_point = ""
+        """What is said of the pin forces on a change point."""
+        self.solution = solution
         try:
             limits = find_limits(scene, solution)
         except NoSideError as error:
-            self.without_side = str(error)
-        self.has_limits = limits is not None
-        self.solution = solution if limits is None else limits
+            reason = f"on the change point pin forces have no value: {error}"
+            self.on_change_point = reason
+        else:
+            if limits is not None:
+                self.solution = limits
+                self.on_change_point = _say_limits(limits)
         stage = "position" if solution.omega_2 is None else "acceleration"
         at = solution.at._replace(origin=None)
         self.beside = [
@@ -66,14 +69,12 @@ class PositionSheet:
             for away in (-ROUNDING_OF_PLACE, ROUNDING_OF_PLACE)
         ]
 
-    def _read(self, name: str) -> Array | None:
+    def _read(self, name: str) -> Array:
         """Return a quantity of the motion, zero where it changes its sign.
 
         Angles stay: that of a whole turn has the sign of its rounding on either side.
         """
         values = find_values(self.solution, name)
-        if values is None:
-            return None
         if find_unit_of_quantity(name) == "rad":
             return np.asarray(values[0])
         before, after = (find_values(beside, name)[0] for beside in self.beside)
@@ -81,20 +82,19 @@ class PositionSheet:
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""
-        kinds = {"theta": "rad", "omega": "rad/s", "alpha": "rad/s^2"}
-        if self._rests():
-            del kinds["omega"], kinds["alpha"]
+        kinds = {"theta": "rad"}
+        if not self._rests():
+            kinds |= {"omega": "rad/s", "alpha": "rad/s^2"}
         columns: dict[str, list[str]] = {}
+        squared_speed = 0.0
         for letter, unit in kinds.items():
-            numbers = self._list_of_bars(letter)
-            if numbers is None:
-                continue
+            numbers = np.array([self._read(f"{letter}_{bar}") for bar in MOVING_BARS])
             largest = np.nanmax(np.abs(numbers), initial=0.0)
-            if letter == "alpha":
-                speeds = self._list_of_bars("omega")
-                assert speeds is not None
-                largest = max(largest, np.nanmax(np.square(speeds), initial=0.0))
-            if letter == "theta":
+            if letter == "omega":
+                squared_speed = largest**2
+            elif letter == "alpha":
+                largest = max(largest, squared_speed)
+            else:
                 largest = min(largest, TURN)
             numbers = drop_rounding(numbers, largest)
             factor, name = choose_unit(0.0, unit, self.units)
@@ -106,28 +106,10 @@ class PositionSheet:
             rows.append(_write_row(f"bar {bar}", cells))
         return rows
 
-    def _list_of_bars(self, letter: str) -> Array | None:
-        """List angle, speed or acceleration of the moving bars, (3,)."""
-        numbers = []
-        for bar in MOVING_BARS:
-            number = self._read(f"{letter}_{bar}")
-            if number is None:
-                return None
-            numbers.append(number)
-        return np.array(numbers)
-
     def _rests(self) -> bool:
-        """Return True if nothing moves or begins to move.
-
-        A static position has no rates to show.
-        """
-        solution = self.solution
-        rates = (
-            solution.omega_2,
-            solution.alpha_2,
-            solution.omega_4,
-            solution.alpha_4,
-        )
+        """Return True if nothing moves or begins to move: no rate is shown."""
+        names = ("omega_2", "alpha_2", "omega_4", "alpha_4")
+        rates = [getattr(self.solution, name) for name in names]
         return all(rate is None or rate[0] == 0.0 for rate in rates)
 
     def write_points(self) -> list[str]:
@@ -137,52 +119,37 @@ class PositionSheet:
         ]
         names = ["A", "B", *centres, *self.solution.points]
         rows = [_write_row("", ("x", "y", "size"))]
-        scales = {"": "m", "v_": "m/s", "a_": "m/s^2"}
-        if self._rests():
-            del scales["v_"], scales["a_"]
+        scales = {"": "m"}
+        if not self._rests():
+            scales |= {"v_": "m/s", "a_": "m/s^2"}
         largest = {start: self._find_largest(start, names) for start in scales}
         for name in names:
             for start, unit in scales.items():
-                vector = self._read(start + name)
-                if vector is None:
-                    continue
-                label = name if not start else f"  {start[0]}"
-                row = self._write_vector(
-                    label,
-                    vector,
-                    unit,
-                    largest[start],
-                    sized=bool(start),
-                )
-                rows.append(row)
+                label = f"  {start[0]}" if start else name
+                vector, most = self._read(start + name), largest[start]
+                sized = bool(start)
+                rows.append(self._write_vector(label, vector, unit, most, sized=sized))
         return rows
 
     def write_pin_forces(self) -> list[str]:
         """Write the pin forces, and the force and the moment on the frame."""
-        forces = {}
-        for pin, name in PIN_FORCE.items():
-            (force,) = getattr(self.solution, name)
-            forces[_FORCE_HEADS[pin]] = force
-        shaking = derive(self.solution, "shaking_force")
-        if shaking is not None:
-            (forces["shaking force"],) = shaking
+        forces = {
+            f"{name} at {pin}": getattr(self.solution, name)[0]
+            for pin, name in PIN_FORCE.items()
+        }
+        forces["shaking force"] = derive(self.solution, "shaking_force")[0]
         sizes = [float(np.hypot(x, y)) for x, y in forces.values()]
         largest = max(filter(np.isfinite, sizes), default=0.0)
         rows = [_write_row("", ("x", "y", "size"))]
         for label, force in forces.items():
             rows.append(self._write_vector(label, force, "N", largest))
         moment = derive(self.solution, "shaking_moment")
-        if moment is not None:
-            arm = max(self.scene.linkage.lengths)
-            moment = drop_rounding(moment, largest * arm)
-            factor, name = choose_unit(abs(float(moment[0])), "N m", self.units)
-            cells = [*_write_cells_of(factor * moment), "", "", f"{name} about O2"]
-            rows.append(_write_row("shaking moment", cells))
-        if self.has_limits:
-            rows.append(_say_limits([*forces.values()]))
-        if self.without_side:
-            reason = self.without_side
-            rows.append(f"on the change point pin forces have no value: {reason}")
+        moment = drop_rounding(moment, largest * max(self.scene.linkage.lengths))
+        factor, name = choose_unit(abs(float(moment[0])), "N m", self.units)
+        cells = [*_write_cells_of(factor * moment), "", "", f"{name} about O2"]
+        rows.append(_write_row("shaking moment", cells))
+        if self.on_change_point:
+            rows.append(self.on_change_point)
         return rows
 
     def write_ratios(self) -> list[str]:
@@ -196,7 +163,7 @@ class PositionSheet:
             label = "transmission angle" if name == "transmission" else name
             rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
         rows.append(self._write_advantage())
-        rows += [*self._write_force_ratios(), *self._write_drive_ratios()]
+        rows += self._write_force_ratios()
         for name in ("I13", "I24"):
             centre = derive(self.solution, name)
             label = f"centre {name}"
@@ -214,56 +181,37 @@ class PositionSheet:
             return f"{label:<{_NUMBER_LABEL}}without a bound: bar 4 stands still"
         return self._write_number(label, values, "1", "  (torque of bar 4 to bar 2)")
 
-    def _write_force_ratios(self) -> list[str]:
-        """Write the ratio of forces along the paths of two points.
+    def _write_force_ratios(self) -> Iterator[str]:
+        """Write ratios of forces along the paths of two points, and to the drive's.
 
-        Every point of the input is paired with every point of the output.
+        Every point of the input is paired with every point of the output, and the force
+        of the drive with points of bars 2 and 4 on which it does not act. By virtual
+        work the ratio of forces is that of the speeds, the other way round; the drive
+        does its work at the speed of its stroke.
         """
-        rows = []
         points = self.scene.points
         of_input, of_output = (
             [point.name for point in points if point.bar == bar] for bar in (2, 4)
         )
-        for start in of_input:
-            for end in of_output:
-                ratio = read_column(self.scene, self.solution, f"v_{start}/v_{end}")
-                text = f"  (forces along the paths of {end} and {start})"
-                rows.append(
-                    self._write_number(f"F_{end}/F_{start}", ratio.values, "1", text)
-                )
-        return rows
-
-    def _write_drive_ratios(self) -> list[str]:
-        """Write the forces along the paths of points to the force of the drive.
-
-        The points are those of bars 2 and 4 on which the drive does not act. By virtual
-        work the ratio is that of the speed at which the drive does its work to the
-        point's.
-        """
+        for start, end in product(of_input, of_output):
+            ratio = read_column(self.scene, self.solution, f"v_{start}/v_{end}")
+            text = f"  (forces along the paths of {end} and {start})"
+            yield self._write_number(f"F_{end}/F_{start}", ratio.values, "1", text)
         if self.scene.drive is None:
-            return []
+            return
         driven = {place.bar for _, place in self.scene.drive.ends}
-        rows = []
-        for point in self.scene.points:
+        for point in points:
             if point.bar in {2, 4} - driven:
                 column = f"stroke_speed/v_{point.name}"
-                ratio = np.abs(read_column(self.scene, self.solution, column).values)
+                values = np.abs(read_column(self.scene, self.solution, column).values)
                 label = f"F_{point.name}/drive_force"
                 text = f"  (force along the path of {point.name} to the drive's)"
-                rows.append(self._write_number(label, ratio, "1", text))
-        return rows
+                yield self._write_number(label, values, "1", text)
 
     def _find_largest(self, start: str, names: Iterable[str]) -> float:
         """Find the largest component of a kind: what is below its rounding is zero."""
-        largest = 0.0
-        for name in names:
-            vector = self._read(start + name)
-            if vector is None:
-                continue
-            size = float(np.max(np.abs(vector)))
-            if np.isfinite(size):
-                largest = max(largest, size)
-        return largest
+        sizes = np.abs([self._read(start + name) for name in names])
+        return float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
 
     def _write_vector(
         self,
@@ -289,20 +237,19 @@ class PositionSheet:
         unit: str,
         after: str = "",
     ) -> str:
-        factor = 1.0
-        name = ""
-        if unit in ("rad", "1"):  # of turns and of ratios, which are about 1
-            values = drop_rounding(values, 1.0)
-        if unit != "1":
+        """Write an angle or a ratio, which is about 1."""
+        values = drop_rounding(values, 1.0)
+        if unit == "rad":
             factor, name = choose_unit(abs(float(values[0])), unit, self.units)
-            name = f" {name}"
-        (text,) = _write_cells_of(factor * values)
-        return f"{label:<{_NUMBER_LABEL}}{text}{name}{after}"
+            values = factor * values
+            after = f" {name}{after}"
+        (text,) = _write_cells_of(values)
+        return f"{label:<{_NUMBER_LABEL}}{text}{after}"
 
 
-def _say_limits(forces: list[Array]) -> str:
+def _say_limits(limits: Solution) -> str:
     """Say what the pin forces of a change point are."""
-    bounded = [np.isfinite(force).all() for force in forces]
+    bounded = [np.isfinite(getattr(limits, name)).all() for name in PIN_FORCES]
     if all(bounded):
         return "on the change point: the limits from both sides"
     if not any(bounded):

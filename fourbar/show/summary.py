@@ -131,18 +131,12 @@ class Facts:
         return self.solution.drive is not None
 
     @property
-    def rates(self) -> dict[int, tuple[Peak | None, Peak | None]]:
-        """Return the largest speed and acceleration of the bars that follow.
-
-        Empty if no speed is stated. None: it grows without bound.
-        """
+    def following(self) -> list[int]:
+        """Return the bars that follow, over time all; none if no speed is stated."""
         if len(self.solution) == 1 or self.solution.omega_4 is None:
-            return {}
-        return {
-            bar: (self.find_peak(f"omega_{bar}"), self.find_peak(f"alpha_{bar}"))
-            for bar in MOVING_BARS
-            if bar != self.solution.at.bar or self.solution.time is not None
-        }
+            return []
+        commanded = 0 if self.solution.time is not None else self.solution.at.bar
+        return [bar for bar in MOVING_BARS if bar != commanded]
 
     def find_peak(self, name: str) -> Peak | None:
         """Find the largest size of a curve; None if it grows without bound."""
@@ -157,7 +151,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     """
     motion = describe_motion(solution)
     panels = motion.panels
-    places = solution.at.places if solution.time is None else solution.time
+    places = solution.at.places
 
     def find_range(name: str) -> tuple[Peak, Peak]:
         low, high = (motion.positions.find_peak(name, sense) for sense in (-1, 1))
@@ -167,8 +161,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     drive = None
     if scene.motion.free is None and solution.F12 is not None:
         drive = read_drive_demand(solution)
-        assert drive.values is not None
-        if not np.isfinite(drive.values).any():
+        if not np.isfinite(drive.sizes).any():
             drive = None
     has_forces = solution.F12 is not None and bool(np.isfinite(solution.F12).any())
     has_stroke = solution.stroke is not None
@@ -367,8 +360,8 @@ def _find_largest_error_bar(solution: Solution, drive: Driving | None) -> float 
         return None
     loads = compute_pin_loads(solution)
     pairs = [(solution.force_error, np.max([*loads.values()], axis=0))]
-    if drive is not None and drive.error is not None and drive.values is not None:
-        pairs.append((drive.error, np.abs(drive.values)))
+    if drive is not None and drive.error is not None:
+        pairs.append((drive.error, drive.sizes))
     largest = None
     for error, size in pairs:
         solved = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)

@@ -7,6 +7,7 @@ import math
 import re
 from functools import partial
 from itertools import cycle
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,13 +23,13 @@ from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
-    BAR_DASHES,
     FAINT,
     FORCE_COLOURS,
     FORCE_DASHES,
     INK,
     MUTED,
     RING_MARK,
+    choose_bar_line,
     choose_force_line,
     draw_zero_line,
     find_peak_index,
@@ -52,9 +53,7 @@ OUTLIER = 3.0
 CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 _Indices = NDArray[np.intp]
-_WORKS: tuple[tuple[str, Any], ...] = tuple(
-    (FORCE_COLOURS[name], FORCE_DASHES[name]) for name in PIN_FORCES
-)
+_SUBSCRIPTS = {2: "₂", 3: "₃", 4: "₄"}
 _BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 _POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
@@ -70,28 +69,17 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     over = axis.values
     here = axis.factor * float(view.here.at.places[0])
     axes.set_xlabel(f"{axis.label} ({axis.unit.strip()})")
-    low = float(over[0])
-    high = float(over[-1])
+    low, high = float(over[0]), float(over[-1])
     if high == low:
-        low = low - 1.0
-        high = high + 1.0
+        low, high = low - 1.0, high + 1.0
     axes.set_xlim(low, high)
     if axis.unit == "°":
         set_degree_ticks(axes.xaxis, high - low)
-    is_gap = np.concatenate([[False], ~view.sweep.assembled, [False]])
-    edges = np.flatnonzero(is_gap[1:] != is_gap[:-1])
-    for first, after in edges.reshape(-1, 2):
-        start = low if first == 0 else 0.5 * (over[first - 1] + over[first])
-        stop = high if after == len(over) else 0.5 * (over[after - 1] + over[after])
-        axes.axvspan(
-            start,
-            stop,
-            fc="#f1f1f1",
-            ec=FAINT,
-            hatch="////",
-            lw=0.0,
-            zorder=0,
-        )
+    edges = np.flatnonzero(np.diff([False, *~view.sweep.assembled, False]))
+    between = np.array([low, *0.5 * (over[:-1] + over[1:]), high])
+    look: dict[str, Any] = {"fc": "#f1f1f1", "ec": FAINT, "hatch": "////", "lw": 0.0}
+    for start, stop in between[edges].reshape(-1, 2):
+        axes.axvspan(start, stop, zorder=0, **look)
     if edges.size:
         note(view, "Hatched: the linkage does not assemble.")
     if low < here < high:
@@ -121,12 +109,10 @@ def find_poles(view: View) -> _Indices:
         assert case.drive is not None
         with np.errstate(all="ignore"):
             sine, _ = case.drive.leverage(state, case.sines(state.position))
-    elif view.scene.drive_bar == 2:
-        sine = np.sin(sweep.theta_4 - sweep.theta_3)
-    elif view.scene.drive_bar == 3:
-        sine = np.sin(sweep.theta_4 - sweep.theta_2)
     else:
-        sine = np.sin(sweep.theta_3 - sweep.theta_2)
+        others = [bar for bar in MOVING_BARS if bar != view.scene.drive_bar]
+        first, second = (getattr(sweep, f"theta_{bar}") for bar in others)
+        sine = np.sin(second - first)
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
 
 
@@ -135,9 +121,7 @@ def break_at_poles(values: Array, poles: _Indices) -> Array:
 
     No line then crosses the pole.
     """
-    out = np.array(values, dtype=float)
-    out[~np.isfinite(out)] = np.nan
-    return np.insert(out, poles + 1, np.nan)
+    return np.insert(np.where(np.isfinite(values), values, np.nan), poles + 1, np.nan)
 
 
 def plot_between_poles(
@@ -153,12 +137,10 @@ def plot_between_poles(
 
 def choose_limit(values: list[Array]) -> float | None:
     """Choose the end of a clipped axis; None if no value stands far out."""
-    every = np.concatenate(values)
-    sizes = np.abs(every[np.isfinite(every)])
-    if sizes.size == 0:
-        return None
-    ordinary = float(np.percentile(sizes, ORDINARY_PERCENTILE))
-    if ordinary > 0.0 and sizes.max() > OUTLIER * ordinary:
+    sizes = np.abs(np.concatenate(values))
+    sizes = sizes[np.isfinite(sizes)]
+    ordinary = float(np.percentile(sizes, ORDINARY_PERCENTILE)) if sizes.size else 0.0
+    if sizes.max(initial=0.0) > OUTLIER * ordinary > 0.0:
         return CLIPPED * ordinary
     return None
 
@@ -190,9 +172,8 @@ def clip(
     index = find_peak_index(worst)
     if abs(worst[index]) <= limit:
         return
-    if view.time is None:
-        words = view.axis.words(view.sweep.at.places[index], 5)
-    else:
+    words = view.axis.words(view.sweep.at.places[index], 5)
+    if view.time is not None:
         words = f"t = {view.time[index]:.4g} s"
     edge = f"{write_number(limit * factor)} {name_of_unit}"
     largest = write_labelled_quantity(worst[index], unit, view.units)
@@ -209,33 +190,18 @@ def clip(
 def draw_angles(axes: "Axes", view: View) -> None:
     """Draw the angles of the bars that are not the axis."""
     over = draw_axes(axes, view)
-    bars = [
-        bar
-        for bar in MOVING_BARS
-        if view.time is not None or f"theta_{bar}" != view.sweep.commanded
-    ]
-    for bar in bars:
-        values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
-        axes.plot(
-            over,
-            values,
-            color=BAR_COLOURS[bar],
-            ls=BAR_DASHES[bar],
-            label=rf"$\theta_{bar}$",
-        )
+    commanded = view.sweep.commanded if view.time is None else ""
+    bars = [bar for bar in MOVING_BARS if f"theta_{bar}" != commanded]
     shown = np.degrees([getattr(view.sweep, f"theta_{bar}") for bar in bars])
-    set_degree_ticks(
-        axes.yaxis,
-        1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9,
-    )
-    if len(bars) > 2:
-        axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
-    else:
-        ylabel = ",\\ ".join(rf"\theta_{bar}" for bar in bars)
-        axes.set(
-            ylabel=f"${ylabel}$ (°)",
-            title=f"Angles of {' and '.join(BAR_NAMES[bar] for bar in bars)}",
-        )
+    for bar, values in zip(bars, shown, strict=True):
+        axes.plot(over, values, label=rf"$\theta_{bar}$", **choose_bar_line(bar))
+    span = float(np.nanmax(shown) - np.nanmin(shown))
+    set_degree_ticks(axes.yaxis, 1.3 * span + 1e-9)
+    symbol, named = r"\theta", "the bars"
+    if len(bars) < 3:
+        symbol = ",\\ ".join(rf"\theta_{bar}" for bar in bars)
+        named = " and ".join(BAR_NAMES[bar] for bar in bars)
+    axes.set(ylabel=f"${symbol}$ (°)", title=f"Angles of {named}")
     place_legend(axes)
 
 
@@ -251,29 +217,17 @@ def _draw_rates(
     over = draw_axes(axes, view)
     driven = view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
-    digits = {2: "₂", 3: "₃", 4: "₄"}
-    others = [bar for bar in MOVING_BARS if bar != driven]
-    curves = {
-        name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in others
-    }
     factor, shown_unit = choose_unit(0.0, unit, view.units)
-    command = getattr(view.sweep, f"{letter}_{driven}")
-    if np.any(command):
-        axes.plot(
-            over,
-            factor * command,
-            color=BAR_COLOURS[driven],
-            lw=1.0,
-            label=rf"$\{letter}_{driven}$",
-        )
-    for bar, values in zip(others, curves.values(), strict=True):
-        axes.plot(
-            over,
-            factor * values,
-            color=BAR_COLOURS[bar],
-            ls=BAR_DASHES[bar],
-            label=rf"$\{letter}_{bar}$",
-        )
+    curves = {}
+    for bar in sorted(MOVING_BARS, key=lambda bar: bar != driven):
+        values = getattr(view.sweep, f"{letter}_{bar}")
+        look = choose_bar_line(bar)
+        if bar == driven:
+            look |= {"ls": "-", "lw": 1.0}
+        else:
+            curves[f"{name}{_SUBSCRIPTS[bar]}"] = values
+        if bar != driven or np.any(values):
+            axes.plot(over, factor * values, label=rf"$\{letter}_{bar}$", **look)
     draw_zero_line(axes)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
     clip(axes, view, curves, choose_limit([*curves.values()]), what, unit)
@@ -305,35 +259,19 @@ def _draw_point_sizes(
 ) -> None:
     """Draw the sizes at A, B, the mass centres and the scene's own points."""
     over = draw_axes(axes, view)
-    curves = {
-        name: np.hypot(*vector.T)
-        for name, vector in collect_point_vectors(
-            view.scene,
-            view.sweep,
-            letter,
-        ).items()
-    }
-    limit, factor, shown_unit = choose_scale(list(curves.values()), unit, view)
-    looks = {
-        "A": BAR_COLOURS[2],
-        "B": BAR_COLOURS[4],
-        **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS},
-    }
-    for (name, values), dashes in zip(
-        curves.items(),
-        cycle(("-", "--", "-.", ":")),
-        strict=False,
-    ):
-        colour = looks.get(name, FORCE_COLOURS["F43"])
-        width = 2.0 if name in view.sweep.points else 1.2
-        axes.plot(
-            over,
-            factor * values,
-            color=colour,
-            ls=":" if name[0] == "G" else dashes,
-            label=name,
-            lw=width,
-        )
+    vectors = collect_point_vectors(view.scene, view.sweep, letter)
+    curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
+    limit, factor, shown_unit = choose_scale([*curves.values()], unit, view)
+    colours = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4]}
+    colours |= {f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}
+    all_dashes = cycle(("-", "--", "-.", ":"))
+    for (name, values), dashes in zip(curves.items(), all_dashes, strict=False):
+        look: dict[str, Any] = {
+            "color": colours.get(name, FORCE_COLOURS["F43"]),
+            "ls": ":" if name[0] == "G" else dashes,
+            "lw": 2.0 if name in view.sweep.points else 1.2,
+        }
+        axes.plot(over, factor * values, label=name, **look)
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|{letter}|$ ({shown_unit})", title=title)
     clip(axes, view, curves, limit, title, unit)
@@ -368,36 +306,24 @@ def _draw_drive(
     poles = find_poles(view)
     values = getattr(view.sweep, name)
     limit, factor, shown_unit = choose_scale([values], unit, view)
-    symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
+    symbol, curve_name, on_bar = f"${letter}$", letter, ""
+    poles_of = "drive's force (its line has no lever)"
+    if bar:
+        symbol, curve_name = f"${letter}_{bar}$", f"{letter}{_SUBSCRIPTS[bar]}"
+        on_bar = f" on bar {bar}"
+        poles_of = f"torque{on_bar} ({_POLE_REASON[bar]})"
     plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
     for index in poles:
-        axes.axvline(
-            0.5 * float(over[index] + over[index + 1]),
-            color=MUTED,
-            lw=0.9,
-            ls=(0, (1, 1.5)),
-        )
+        middle = 0.5 * float(over[index] + over[index + 1])
+        axes.axvline(middle, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if poles.size:
-        if bar:
-            poles_of = f"torque on bar {bar} ({_POLE_REASON[bar]})"
-        else:
-            poles_of = "drive's force (its line has no lever)"
         note(view, f"Dotted: poles of the {poles_of}.")
     draw_zero_line(axes)
-    axes.set(
-        ylabel=f"{symbol} ({shown_unit})",
-        title=f"{what} of the drive{f' on bar {bar}' if bar else ''}",
-    )
+    title = f"{what} of the drive{on_bar}"
+    axes.set(ylabel=f"{symbol} ({shown_unit})", title=title)
     if limit is None:  # a clipped axis says its largest value in the caption
         mark_peak(axes, over, factor * values, shown_unit)
-    clip(
-        axes,
-        view,
-        {f"{letter}{'₂₃₄'[bar - 2]}" if bar else letter: values},
-        limit,
-        what,
-        unit,
-    )
+    clip(axes, view, {curve_name: values}, limit, what, unit)
 
 
 def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
@@ -405,25 +331,20 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
     if not np.isfinite(values).any():
         return
     index = find_peak_index(values)
-    place = float(over[index])
-    peak = float(values[index])
+    place, peak = float(over[index]), float(values[index])
     axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **RING_MARK)
     low, high = axes.get_xlim()
-    share = (place - low) / (high - low)
-    if share < 0.25:
-        side = "left"
-    elif share > 0.75:
-        side = "right"
-    else:
-        side = "center"
+    quarter = (place - low) / (high - low) * 4.0
+    side = "left" if quarter < 1.0 else "right" if quarter > 3.0 else "center"
     axes.margins(y=0.18)  # room for the words
+    above = peak >= 0.0
     axes.annotate(
         f"{write_number(peak)} {unit}",
         (place, peak),
-        xytext=(0.0, 5.0 if peak >= 0.0 else -5.0),
+        xytext=(0.0, 5.0 if above else -5.0),
         textcoords="offset points",
         ha=side,
-        va="bottom" if peak >= 0.0 else "top",
+        va="bottom" if above else "top",
         size=7.5,
     )
 
@@ -468,24 +389,16 @@ def draw_energy(axes: "Axes", view: View) -> None:
     most = largest_magnitude(energies.kinetic, *energies.work.values())
     factor, unit = choose_unit(most, "J", view.units)
     axes.plot(
-        over,
-        factor * energies.kinetic,
-        color=INK,
-        lw=2.2,
-        label="kinetic energy",
+        over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy"
     )
-    for (name, values), (colour, dashes) in zip(
-        energies.work.items(),
-        cycle(_WORKS),
-        strict=False,
+    for (name, values), force in zip(
+        energies.work.items(), cycle(PIN_FORCES), strict=False
     ):
-        axes.plot(
-            over,
-            factor * values,
-            color=colour,
-            ls=dashes,
-            label=name.replace("_", " "),
-        )
+        look: dict[str, Any] = {
+            "color": FORCE_COLOURS[force],
+            "ls": FORCE_DASHES[force],
+        }
+        axes.plot(over, factor * values, label=name.replace("_", " "), **look)
     draw_zero_line(axes)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
     place_legend(axes, 3)
@@ -511,9 +424,7 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     Limit and dead-centre positions are marked.
     """
     over = draw_axes(axes, view)
-    sweep = view.sweep
-    angle = derive(sweep, "transmission")
-    mu = np.degrees(angle)
+    mu = np.degrees(derive(view.sweep, "transmission"))
     axes.plot(over, mu, color=INK)
     axes.axhline(_RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = find_free_place(mu)
@@ -526,19 +437,9 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     }
     axes.annotate(f"{_RECOMMENDED:g}° recommended", corner, xytext=(0, 2), **look)
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
+    ring: dict[str, Any] = {"ms": 6.0, "mew": 1.1, "clip_on": False, **RING_MARK}
     for theta, height, marker, name in _list_marked(view):
-        axes.plot(
-            theta,
-            height,
-            marker,
-            ms=6.0,
-            mew=1.1,
-            ls="none",
-            label=name,
-            clip_on=False,
-            zorder=5,
-            **RING_MARK,
-        )
+        axes.plot(theta, height, marker, ls="none", label=name, zorder=5, **ring)
     axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
     if view.time is None:
         place_legend(axes, 1)
@@ -550,18 +451,16 @@ def find_free_place(mu: Array) -> float:
     The remark stands at 40 deg.
     """
     half = _REMARK / 2.0
-    best = 1.0 - half
-    clearance = -1.0
-    for place in np.linspace(1.0 - half, half, 25):
+    # the remark stands on the line of the recommended angle
+    distances = np.abs(mu - _RECOMMENDED - 3.0)
+    best = (-1.0, 1.0 - half)
+    for place in np.linspace(1.0 - half, half, 25).tolist():
         first = int((place - half) * len(mu))
         last = max(1, math.ceil((place + half) * len(mu)))
-        beside = mu[first:last]
-        # the remark stands on the line of the recommended angle
-        distances = np.abs(beside[np.isfinite(beside)] - _RECOMMENDED - 3.0)
-        if distances.size and distances.min() > clearance:
-            best = float(place)
-            clearance = float(distances.min())
-    return best
+        beside = distances[first:last]
+        if np.isfinite(beside).any():
+            best = max(best, (float(np.nanmin(beside)), place), key=itemgetter(0))
+    return best[1]
 
 
 def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
@@ -571,14 +470,13 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     """
     if view.time is not None:
         return []
-    positions = view.sweep.at
+    positions, linkage = view.sweep.at, view.scene.linkage
     degrees = np.degrees(positions.angle)
     order = np.argsort(degrees)
     margin = 0.0
     if len(degrees) > 1:
         margin = 1.5 * float(np.median(np.abs(np.diff(degrees))))
     one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
-    linkage = view.scene.linkage
     signs = find_signs(linkage, positions.angle, positions.branch, positions.bar)
 
     marked = list[tuple[list[float], list[float], str, str]]()
@@ -586,29 +484,25 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
         is_commanded = bar == positions.bar
         places = list[float]()
         heights = list[float]()
-        for limit in limit_positions(view.scene.linkage, bar):
-            theta = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
+        for limit in limit_positions(linkage, bar):
+            theta = dict(zip(MOVING_BARS, limit[:3], strict=True))
             sign = math.copysign(1.0, math.sin(theta[follower] - theta[one]))
-            difference = limit.theta_4 - limit.theta_3
-            sine = abs(math.sin(difference))
-            cosine = abs(math.cos(difference))
-            mu = math.degrees(math.atan2(sine, cosine))
+            difference = theta[4] - theta[3]
+            mu = math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))
             angle = theta[positions.bar]
             for place in _list_inside(degrees, angle, margin if is_commanded else 0.0):
                 nearest = np.argmin(np.abs(degrees - place))
                 if is_commanded or signs[nearest] == sign:
                     places.append(place)
-                    heights.append(mu)
+                    heights.append(math.degrees(mu))
         # over a stroke its bar's angle rises or falls throughout
         if positions.moves_stroke:
             places = np.interp(places, degrees[order], view.axis.values[order]).tolist()
         if not places:
             continue
         pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
-        if is_commanded:
-            marked.append((places, heights, "s", f"limit: bars {pair} in line"))
-        else:
-            marked.append((places, heights, "D", f"dead centre: bars {pair} in line"))
+        mark, word = ("s", "limit") if is_commanded else ("D", "dead centre")
+        marked.append((places, heights, mark, f"{word}: bars {pair} in line"))
     return marked
 
 

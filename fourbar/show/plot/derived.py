@@ -21,12 +21,14 @@ from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import choose_drawing_scale, draw_mechanism, locate_pins
 from fourbar.show.plot.style import (
     BAR_COLOURS,
-    BAR_DASHES,
     INK,
     MUTED,
     POINT,
+    choose_bar_line,
     draw_zero_line,
+    join_points,
     place_legend,
+    plot_points,
 )
 from fourbar.show.plot.view import View
 
@@ -97,13 +99,12 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
     curves = {_SYMBOLS[name]: derive(view.sweep, name) for name in names.values()}
     limit = choose_limit([*curves.values()])
     for bar, (symbol, values) in zip(names, curves.items(), strict=True):
-        before = values[:-1]
-        after = values[1:]
+        before, after = values[:-1], values[1:]
         # a ratio changes its sign at a pole, where it is large, or at zero
         is_large = np.minimum(np.abs(before), np.abs(after)) > 1.0
         poles = np.flatnonzero((before * after < 0.0) & is_large)
-        look = {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar], "label": symbol}
-        plot_between_poles(axes, over, values, poles, **look)
+        look = choose_bar_line(bar)
+        plot_between_poles(axes, over, values, poles, label=symbol, **look)
     draw_zero_line(axes)
     clip(axes, view, curves, limit, "Ratio", "1")
 
@@ -111,33 +112,17 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
 def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw the paths of the instant centres I13 and I24 near the linkage."""
     factor, unit, _ = choose_drawing_scale(view)
-    pins = np.array([*locate_pins(view, 1.0).values()])
-    middle = pins.mean(axis=0)
+    middle = sum(locate_pins(view).values()) / 4.0
     reach = FARTHEST_CENTRE * max(view.scene.linkage.lengths)
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
-        path = derive(view.sweep, name)
-        here = derive(view.here, name)
-        x, y = path.T
-        is_near = np.hypot(x - middle[0], y - middle[1]) <= reach
-        subscript = name[1:]
-        axes.plot(
-            factor * np.where(is_near, x, np.nan),
-            factor * np.where(is_near, y, np.nan),
-            color=colour,
-            ls=dashes,
-            lw=1.2,
-            label=f"$I_{{{subscript}}}$",
+        path, here = (
+            join_points(derive(solution, name)) for solution in (view.sweep, view.here)
         )
-        ((x_here, y_here),) = here
-        if np.hypot(x_here - middle[0], y_here - middle[1]) <= reach:
-            axes.plot(
-                factor * x_here,
-                factor * y_here,
-                "o",
-                ms=4.5,
-                color=colour,
-                zorder=6,
-            )
+        near = factor * np.where(np.abs(path - middle) <= reach, path, np.nan)
+        label = f"$I_{{{name[1:]}}}$"
+        plot_points(axes, near, color=colour, ls=dashes, lw=1.2, label=label)
+        if np.abs(here - middle) <= reach:
+            plot_points(axes, factor * here, "o", ms=4.5, color=colour, zorder=6)
     draw_mechanism(axes, view, view.here, 0, labels)
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(color=MUTED, alpha=0.2)

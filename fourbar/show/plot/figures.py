@@ -2,8 +2,9 @@
 
 import textwrap
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
@@ -11,7 +12,6 @@ from fourbar.scene import Scene
 from fourbar.show.columns import explain_static
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import curves, derived, freebody, linkage
-from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION_STYLE,
@@ -21,135 +21,118 @@ from fourbar.show.plot.style import (
     format_of,
     shorten_text,
 )
-from fourbar.show.plot.view import (
-    View,
-    is_over_time,
-    make_view,
-)
+from fourbar.show.plot.view import View, is_over_time, make_view
 from fourbar.solution import SI, Conversion, require_units
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-_Painter = Callable[["SubFigure", View, Labels], None]
+_LINKAGE_WIDER = [1.15, 1.0]
+"""Widths of two columns, of which the left one has the linkage."""
+_DRAWINGS: dict[str, Callable[["Axes", View, Labels], None]] = {
+    "linkage": linkage.draw_linkage,
+    "moving linkage": partial(linkage.draw_linkage, moving=True),
+    "coupler": linkage.draw_coupler_curves,
+    "centres": derived.draw_centres,
+}
+"""Panels that are drawn to scale."""
+_CURVES: dict[str, Callable[["Axes", View], None]] = {
+    "angles": curves.draw_angles,
+    "omega": curves.draw_velocities,
+    "alpha": curves.draw_accelerations,
+    "speeds": curves.draw_speeds,
+    "accelerations": curves.draw_point_accelerations,
+    "drive": curves.draw_drive,
+    "energy": curves.draw_energy,
+    "power": curves.draw_power,
+    "stroke": curves.draw_stroke,
+    "forces": curves.draw_forces,
+    "mu": curves.draw_transmission,
+    "shaking force": derived.draw_shaking_force,
+    "shaking moment": derived.draw_shaking_moment,
+    "ratios": derived.draw_speed_ratios,
+    "advantage": derived.draw_advantage,
+}
+"""Panels of curves, in the order in which their notes are written."""
+
+
+class FigureKind(NamedTuple):
+    """Declaration of a figure."""
+
+    size: tuple[float, float]
+    """Width and height, inches."""
+    paint: Callable[["SubFigure", View, Labels], None]
+    needs_speed: bool = False
+
+
+def _draw_panels(
+    figure: "SubFigure", shown: View, labels: Labels, *, rows: list[Any]
+) -> None:
+    """Draw panels by their names, row by row; a name that is repeated is one panel."""
+    widths = _LINKAGE_WIDER if len(rows[0]) == 2 else None
+    panels = figure.subplot_mosaic(rows, width_ratios=widths)
+    for name, draw_to_scale in _DRAWINGS.items():
+        if name in panels:
+            draw_to_scale(panels[name], shown, labels)
+    for name, draw_curves in _CURVES.items():
+        if name in panels:
+            draw_curves(panels[name], shown)
 
 
 def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     free = shown.scene.motion.free is not None
-    layout: list[Any]
-    widths = None
+    # what drives; in a free motion the work of loads and effects
+    rows = [["linkage", "linkage", "energy" if free else "drive"]]
     if not shown.moves:
-        layout = [["linkage", "angles"], ["linkage", "mu"]]
-        widths = [1.15, 1.0]
+        rows = [["linkage", "angles"], ["linkage", "mu"]]
     elif shown.rests:
-        layout = [
-            ["linkage", "linkage", "torque"],
-            ["linkage", "linkage", "angles"],
-            ["forces", "forces", "mu"],
-        ]
+        rows += [["linkage", "linkage", "angles"], ["forces", "forces", "mu"]]
     else:
-        layout = [
-            ["linkage", "linkage", "torque"],
+        rows += [
             ["linkage", "linkage", "forces" if free else "power"],
             ["angles", "omega", "alpha"],
             ["mu", "mu", "mu"] if free else ["forces", "forces", "mu"],
         ]
-    panels = figure.subplot_mosaic(layout, width_ratios=widths)
-    linkage.draw_linkage(panels["linkage"], shown, labels)
-    painters: dict[str, Callable[[Any, View], None]] = {
-        "angles": curves.draw_angles,
-        "omega": curves.draw_velocities,
-        "alpha": curves.draw_accelerations,
-        # what drives; in a free motion the work of loads and effects
-        "torque": curves.draw_energy if free else curves.draw_drive,
-        "power": curves.draw_power,
-        "forces": curves.draw_forces,
-        "mu": draw_transmission,
-    }
-    for name, paint in painters.items():
-        if name in panels:
-            paint(panels[name], shown)
+    _draw_panels(figure, shown, labels, rows=rows)
 
 
 def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    has_rates = shown.moves and not shown.rests
-    panels = figure.subplots(3 if has_rates else 1, 1, squeeze=False)[:, 0]
-    painters: tuple[Any, ...] = (
-        curves.draw_angles,
-        curves.draw_velocities,
-        curves.draw_accelerations,
-    )
-    for axes, paint in zip(panels, painters, strict=False):
-        paint(axes, shown)
+    rates = [["omega"], ["alpha"]] if shown.moves and not shown.rests else []
+    _draw_panels(figure, shown, labels, rows=[["angles"], *rates])
 
 
-def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    """Draw paths, speeds and accelerations of points."""
-    panels = figure.subplot_mosaic(
-        [["linkage", "speeds"], ["linkage", "accelerations"]],
-        width_ratios=[1.15, 1.0],
-    )
-    linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
-    curves.draw_speeds(panels["speeds"], shown)
-    curves.draw_point_accelerations(panels["accelerations"], shown)
+def _show(
+    size: tuple[float, float], *rows: list[str], needs_speed: bool = False
+) -> FigureKind:
+    """Declare a figure of the same panels for every scene."""
+    return FigureKind(size, partial(_draw_panels, rows=[*rows]), needs_speed)
 
 
-def _draw_one_panel(paint: Callable[[Any, View], None]) -> _Painter:
-    return lambda figure, shown, labels: paint(figure.subplots(), shown)
-
-
-def _draw_rows(*painters: Callable[[Any, View], None]) -> _Painter:
-    """Draw panels below each other."""
-
-    def paint(figure: "SubFigure", shown: View, labels: Labels) -> None:
-        for axes, painter in zip(
-            figure.subplots(len(painters), 1),
-            painters,
-            strict=True,
-        ):
-            painter(axes, shown)
-
-    return paint
-
-
-FIGURES: dict[str, tuple[_Painter, tuple[float, float], bool]] = {
-    "overview": (_draw_overview, (7.7, 9.2), False),
-    "linkage": (
-        lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of),
-        (5.6, 5.2),
-        False,
+FIGURES = {
+    "overview": FigureKind((7.7, 9.2), _draw_overview),
+    "linkage": _show((5.6, 5.2), ["linkage"]),
+    "coupler": _show((5.6, 5.4), ["coupler"]),
+    "kinematics": FigureKind((5.6, 6.8), _draw_kinematics),
+    "points": _show(
+        (11.0, 5.6),
+        ["moving linkage", "speeds"],
+        ["moving linkage", "accelerations"],
+        needs_speed=True,
     ),
-    "coupler": (
-        lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of),
-        (5.6, 5.4),
-        False,
+    "torque": _show((5.6, 3.2), ["drive"], needs_speed=True),
+    "stroke": _show((5.6, 3.2), ["stroke"]),
+    "forces": _show((5.6, 3.2), ["forces"], needs_speed=True),
+    "energy": _show((5.6, 3.2), ["energy"], needs_speed=True),
+    "transmission": _show((5.6, 3.2), ["mu"]),
+    "shaking": _show(
+        (5.6, 5.4), ["shaking force"], ["shaking moment"], needs_speed=True
     ),
-    "kinematics": (_draw_kinematics, (5.6, 6.8), False),
-    "points": (_draw_points, (11.0, 5.6), True),
-    "torque": (_draw_one_panel(curves.draw_drive), (5.6, 3.2), True),
-    "stroke": (_draw_one_panel(curves.draw_stroke), (5.6, 3.2), False),
-    "forces": (_draw_one_panel(curves.draw_forces), (5.6, 3.2), True),
-    "energy": (_draw_one_panel(curves.draw_energy), (5.6, 3.2), True),
-    "transmission": (_draw_one_panel(draw_transmission), (5.6, 3.2), False),
-    "shaking": (
-        _draw_rows(derived.draw_shaking_force, derived.draw_shaking_moment),
-        (5.6, 5.4),
-        True,
-    ),
-    "ratios": (
-        _draw_rows(derived.draw_speed_ratios, derived.draw_advantage),
-        (5.6, 5.4),
-        False,
-    ),
-    "centres": (
-        lambda figure, *of: derived.draw_centres(figure.subplots(), *of),
-        (5.6, 5.4),
-        False,
-    ),
-    "freebody": (freebody.draw_free_bodies, (9.6, 4.6), True),
-    "bars": (freebody.draw_internal_forces, (9.6, 6.2), True),
+    "ratios": _show((5.6, 5.4), ["ratios"], ["advantage"]),
+    "centres": _show((5.6, 5.4), ["centres"]),
+    "freebody": FigureKind((9.6, 4.6), freebody.draw_free_bodies, True),
+    "bars": FigureKind((9.6, 6.2), freebody.draw_internal_forces, True),
 }
-"""Painter of each figure, size of one branch in inches, and need of omega_2."""
 TAKERS = {
     "position": tuple(name for name in FIGURES if name != "bars"),
     "dimensions": ("overview", "linkage", "points"),
@@ -157,33 +140,33 @@ TAKERS = {
 """Figures in which one position is marked, and in which bars are numbered."""
 
 
-def _choose_painter(scene: Scene, figure: str) -> tuple[_Painter, tuple[float, float]]:
-    """Choose the painter and the size of a figure that the scene can show."""
+def _choose_figure(scene: Scene, figure: str) -> FigureKind:
+    """Choose a figure that the scene can show."""
     if not isinstance(figure, str) or figure not in FIGURES:
         raise InputError("figure", figure, "must be one of " + ", ".join(FIGURES))
-    painter, size, dynamic = FIGURES[figure]
-    if dynamic and scene.motion.speed is None and not is_over_time(scene):
+    motion, drive = scene.motion, scene.drive
+    if FIGURES[figure].needs_speed and motion.speed is None and not is_over_time(scene):
         raise InputError(
-            f"motion.{scene.motion.names[1]}",
+            f"motion.{motion.names[1]}",
             None,
             f"is needed for the figure {figure!r}; {explain_static(scene)}",
         )
-    stroked = scene.drive is not None and scene.drive.has_stroke
-    if figure == "stroke" and (not stroked or scene.motion.stroke is not None):
-        raise InputError(
-            "figure",
-            figure,
+    stroked = drive is not None and drive.has_stroke and motion.stroke is None
+    wanting = {
+        "stroke": (
+            not stroked,
             "needs a linear drive (drive.from, drive.to) whose stroke is not commanded",
-        )
-    if figure == "energy" and scene.motion.free is None:
-        raise InputError("figure", figure, "needs a free motion: motion.free")
-    if figure == "torque" and scene.motion.free is not None:
-        raise InputError(
-            "figure",
-            figure,
+        ),
+        "energy": (motion.free is None, "needs a free motion: motion.free"),
+        "torque": (
+            motion.free is not None,
             "a free motion has no driving torque; energy shows what moves it",
-        )
-    return painter, size
+        ),
+    }
+    is_wanting, reason = wanting.get(figure, (False, ""))
+    if is_wanting:
+        raise InputError("figure", figure, reason)
+    return FIGURES[figure]
 
 
 def draw_figure(
@@ -198,7 +181,7 @@ def draw_figure(
 
     `Scene.plot` describes the parameters.
     """
-    painter, size = _choose_painter(scene, figure)
+    kind = _choose_figure(scene, figure)
     require_units(units)
     for key, value in (("position", position), ("dimensions", dimensions or None)):
         if value is not None and figure not in TAKERS[key]:
@@ -214,7 +197,7 @@ def draw_figure(
         shown.units = units
         shown.dimensions = dimensions
         _look_between(shown)
-        return Drawing(_compose(painter, size, shown))
+        return Drawing(_compose(kind, shown))
 
 
 def _look_between(shown: View) -> None:
@@ -250,18 +233,17 @@ def draw(
     draw_figure(scene, figure, **options).save(path)
 
 
-def _compose(painter: _Painter, size: tuple[float, float], shown: View) -> "Figure":
+def _compose(kind: FigureKind, shown: View) -> "Figure":
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
-    width, _ = size
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=kind.size, layout="constrained")
     (part,) = figure.subfigures(squeeze=False).ravel()
     labels = Labels()
-    painter(part, shown, labels)
+    kind.paint(part, shown, labels)
     heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
     part.suptitle(heading, **TITLE)
-    caption = textwrap.fill(" ".join(shown.notes), int(width * 18.5))
+    caption = textwrap.fill(" ".join(shown.notes), int(kind.size[0] * 18.5))
     if caption:
         part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
     labels.settle(figure)

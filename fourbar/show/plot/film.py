@@ -23,7 +23,13 @@ from fourbar.show.plot.linkage import (
     draw_paths,
     write_path_legend,
 )
-from fourbar.show.plot.style import TITLE, apply_style, shorten_text
+from fourbar.show.plot.style import (
+    TITLE,
+    apply_style,
+    shorten_text,
+    split_complex,
+    split_points,
+)
 from fourbar.show.plot.view import View, make_view
 from fourbar.show.tables import show_running
 from fourbar.solution import SI, Conversion
@@ -243,7 +249,7 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     # the window holds what acts at every position
     for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
         for _, line, _ in put(int(index)).lines:
-            axes.update_datalim(line)
+            axes.update_datalim(split_points(line))
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title="θ")
@@ -276,12 +282,12 @@ def write_label(label: Label) -> Any:
     """
     from matplotlib.patheffects import withStroke
 
-    dx, dy = np.subtract(label.at, label.shun)
-    away = complex(dx, dy) / max(math.hypot(dx, dy), 1e-300)
+    away = label.at - label.shun
+    away /= max(abs(away), 1e-300)
     sides = ("center", "left", "right")  # -1 is the last
     return label.axes.annotate(
         label.text,
-        (label.at[0] + label.ring * away.real, label.at[1] + label.ring * away.imag),
+        split_complex(label.at + label.ring * away),
         (8.0 * away.real, 11.0 * away.imag),
         textcoords="offset points",
         ha=sides[round(away.real)],

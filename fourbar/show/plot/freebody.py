@@ -17,7 +17,12 @@ from fourbar.scene import Scene
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import draw_mass_centre, draw_plate, pin_name
+from fourbar.show.plot.linkage import (
+    draw_mass_centre,
+    draw_plate,
+    locate_pins,
+    pin_name,
+)
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     FORCE_COLOURS,
@@ -26,10 +31,12 @@ from fourbar.show.plot.style import (
     MUTED,
     RING_MARK,
     largest_magnitude,
+    plot_points,
+    split_complex,
+    split_points,
     write_force_name,
     write_labelled_quantity,
 )
-from fourbar.show.plot.symbols import place_of, split_complex
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.summary import locate_bending
 from fourbar.show.units import choose_unit
@@ -44,7 +51,6 @@ _PANEL, LINE_HEIGHT = 3.4, 0.16
 """Heights of a bar's panel and of a line of its couples, inches."""
 LABEL_SPACE = 1.3
 """The window is this much wider than what it shows: space for the labels."""
-Points = NDArray[np.float64]
 STATIONS_DRAWN = 401
 """Stations along a bar."""
 WITHOUT_VALUES = "they have a value at none of the positions"
@@ -81,39 +87,27 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
 
     With d'Alembert's they add up to zero.
     """
-    pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
-    turned = view.state().direction(bar)
+    pins = locate_pins(view)
     arrows: list[Arrow] = []
     couples: list[Couple] = []
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
-        sense = 1.0
+        force = complex(*getattr(view.here, name)[0])
         shown = name
         if name[2] != str(bar):
-            sense = -1.0
+            force = -force
             shown = f"F{name[2]}{name[1]}"
-        arrow = Arrow(
-            write_force_name(shown),
-            pins[pin] - pins[FIRST_PIN[bar]],
-            sense * complex(*getattr(view.here, name)[0]),
-            FORCE_COLOURS[name],
-        )
-        arrows.append(arrow)
+        arm = pins[pin] - pins[FIRST_PIN[bar]]
+        arrows.append(Arrow(write_force_name(shown), arm, force, FORCE_COLOURS[name]))
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))
     recorder = _record_actions(view)
     arrows += recorder.arrows[bar]
     couples += recorder.turns[bar]
     described = view.scene.linkage.bar(bar)
-    a_G = complex(*getattr(view.here, f"a_G{bar}")[0])
-    inertial_force = Arrow(
-        rf"$-m_{bar}\,a_{{G{bar}}}$",
-        _take_one(described.to_centre * turned),
-        -described.mass * a_G,
-        INK,
-        True,
-    )
-    arrows.append(inertial_force)
+    G = _take_one(described.to_centre * view.state().direction(bar))
+    inertial = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
+    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", G, inertial, INK, dashed=True))
     alpha = float(getattr(view.here, f"alpha_{bar}")[0])
     carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
     couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
@@ -144,14 +138,8 @@ class _ActionRecorder(Actions):
         `beyond`: arm from there in world axes.
         """
         arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
-        self.arrows[bar].append(
-            Arrow(
-                self.name.replace("#", str(bar)),
-                _take_one(arm),
-                _take_one(force),
-                INK,
-            )
-        )
+        name = self.name.replace("#", str(bar))
+        self.arrows[bar].append(Arrow(name, _take_one(arm), _take_one(force), INK))
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add both forces, between neighbours too.
@@ -162,9 +150,8 @@ class _ActionRecorder(Actions):
 
     def couple(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar."""
-        self.turns[bar].append(
-            Couple(self.name.replace("#", str(bar)), _take_one(moment).real)
-        )
+        name = self.name.replace("#", str(bar))
+        self.turns[bar].append(Couple(name, _take_one(moment).real))
 
     def pin_couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars at a pin, N m.
@@ -192,15 +179,13 @@ def _record_actions(view: View) -> _ActionRecorder:
     for count, load in enumerate(scene.loads, start=1):
         recorder.name = f"load {count}"
         load.act(recorder, state)
+    forces = {name: getattr(view.here, name) for name in PIN_FORCE.values()}
     for effect in scene.effects:
-        recorder.name = (
-            r"$m_#\,g$" if effect.key == "gravity" else effect.key.replace("_", " ")
-        )
+        recorder.name = effect.key.replace("_", " ")
+        if effect.key == "gravity":
+            recorder.name = r"$m_#\,g$"
         effect.act(recorder, state)
-        effect.act_known(
-            recorder,
-            {name: getattr(view.here, name) for name in PIN_FORCE.values()},
-        )
+        effect.act_known(recorder, forces)
     return recorder
 
 
@@ -216,28 +201,22 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         )
         raise InputError("figure", "freebody", reason)
     freed = [(bar, *list_actions(view, bar)) for bar in MOVING_BARS]
-    panels, below = figure.subplots(
-        2,
-        3,
-        height_ratios=[
-            _PANEL,
-            LINE_HEIGHT * max(len(couples) for *_, couples in freed),
-        ],
-    )
-    biggest = max(
-        (abs(arrow.force) for _, arrows, _ in freed for arrow in arrows),
-        default=0.0,
-    )
+    lines = max(len(couples) for *_, couples in freed)
+    panels, below = figure.subplots(2, 3, height_ratios=[_PANEL, LINE_HEIGHT * lines])
+    sizes = [abs(arrow.force) for _, arrows, _ in freed for arrow in arrows]
+    biggest = max(sizes, default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
+    windows = [_find_window(view, bar, arrows, scale) for bar, arrows, _ in freed]
     # one window size: the bars, too, are to one scale
-    span = LABEL_SPACE * max(
-        float(np.ptp(_reach(view, bar, arrows, scale), axis=0).max())
-        for bar, arrows, _ in freed
-    )
+    span = LABEL_SPACE * max(float(np.ptp(window, axis=0).max()) for window in windows)
     note(view, f"At {view.at}.")
-    for axes, text, (bar, arrows, couples) in zip(panels, below, freed, strict=True):
-        _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
+    for axes, text, (bar, arrows, couples), window in zip(
+        panels, below, freed, windows, strict=True
+    ):
+        _draw_one(axes, view, bar, arrows, scale, biggest, labels)
+        low, high = window.mean(axis=0) + 0.5 * span * np.array([[-1.0], [1.0]])
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
@@ -266,14 +245,9 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         for axes, name, si in panels_of_bar:
             curve = getattr(forces, name)[worst.row]
             scale, shown = choose_unit(largest_magnitude(curve), si, view.units)
-            axes.plot(factor * x, scale * curve, color=BAR_COLOURS[bar])
-            axes.fill_between(
-                factor * x,
-                scale * curve,
-                color=BAR_COLOURS[bar],
-                alpha=0.15,
-                lw=0.0,
-            )
+            line = factor * x, scale * curve
+            axes.plot(*line, color=BAR_COLOURS[bar])
+            axes.fill_between(*line, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"${name}$ ({shown})")
         first_pin = pin_name(FIRST_PIN[bar]).strip("$")
@@ -284,10 +258,8 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
             moment = write_labelled_quantity(worst.peak.value, "N m", view.units)
             largest = f"= {moment}"
         foot = write_labelled_quantity(worst.x, "m", view.units)
-        if forces.uniform:
-            spread = "weight and inertia as a uniform bar's"
-        else:
-            spread = "weight and inertia at G"
+        spread = "as a uniform bar's" if forces.uniform else "at G"
+        spread = f"weight and inertia {spread}"
         note(view, f"Bar {bar}: largest |M| {largest} at x = {foot}, {spread}.")
     note(
         view,
@@ -295,16 +267,20 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
     )
 
 
-def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
-    """List every point that a bar's panel has to show, from the bar's first pin, m."""
+def _find_window(
+    view: View, bar: int, arrows: list[Arrow], scale: float
+) -> NDArray[np.float64]:
+    """Return the lower left and the upper right corner of what a bar's panel shows.
+
+    Places are from the bar's first pin, m, (2, 2).
+    """
     described = view.scene.linkage.bar(bar)
     u = view.state().direction(bar)
-    second_pin = _take_one(described.length * u)
-    centre = _take_one(described.to_centre * u)
-    points = [0.0j, second_pin, centre]
+    points = [0.0j, _take_one(described.length * u), _take_one(described.to_centre * u)]
     for arrow in arrows:
         points += [arrow.at, arrow.at + scale * arrow.force]
-    return np.array([split_complex(point) for point in points])
+    places = split_points(points)
+    return np.array([places.min(axis=0), places.max(axis=0)])
 
 
 def _draw_one(
@@ -315,26 +291,23 @@ def _draw_one(
     scale: float,
     biggest: float,
     labels: Labels,
-    span: float,
 ) -> None:
-    pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
+    """Draw a bar freed from its pins, with the arrows of the forces on it."""
+    pins = locate_pins(view)
     first_pin, second_pin = ENDS[bar]
-    along = pins[second_pin] - pins[first_pin]
-    end = split_complex(along)
-    middle = split_complex(0.5 * along)
-    axes.plot(
-        [0.0, end[0]],
-        [0.0, end[1]],
-        color=BAR_COLOURS[bar],
-        lw=5.0,
-        alpha=0.45,
-        solid_capstyle="round",
-        zorder=2,
-    )
-    labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
-    for name, (x, y) in zip(ENDS[bar], ((0.0, 0.0), end), strict=True):
-        axes.plot([x], [y], "o", ms=5.5, mew=1.1, zorder=6, **RING_MARK)
-        labels.add(Label(axes, pin_name(name), (x, y), middle, MUTED, 8.0, 2.5))
+    end = pins[second_pin] - pins[first_pin]
+    middle = 0.5 * end
+    look: dict[str, Any] = {
+        "lw": 5.0,
+        "alpha": 0.45,
+        "solid_capstyle": "round",
+        "zorder": 2,
+    }
+    plot_points(axes, [0.0j, end], color=BAR_COLOURS[bar], **look)
+    labels.keep_off(axes, 0.0j, end, width=5.0)
+    for name, pin in ((first_pin, 0.0j), (second_pin, end)):
+        plot_points(axes, pin, "o", ms=5.5, mew=1.1, zorder=6, **RING_MARK)
+        labels.add(Label(axes, pin_name(name), pin, middle, MUTED, 8.0, 2.5))
     short: list[str] = []
     for arrow in arrows:
         size = abs(arrow.force)
@@ -344,39 +317,28 @@ def _draw_one(
             plain = plain.replace("-", "−")
             short.append(f"{plain} = {value}")
             continue
-        draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
-        foot = split_complex(arrow.at)
-        tip = split_complex(arrow.at + scale * arrow.force)
-        look = {
-            **HEADED,
-            "color": arrow.colour,
-            "mutation_scale": 9,
-            "ls": "--" if arrow.dashed else "-",
-        }
+        draw_plate(axes, bar, (0.0j, arrow.at, end), labels)
+        tip = arrow.at + scale * arrow.force
+        look = {"color": arrow.colour, "ls": "--" if arrow.dashed else "-"}
         axes.annotate(
             "",
-            xy=tip,
-            xytext=foot,
-            arrowprops=look,
+            split_complex(tip),
+            split_complex(arrow.at),
+            arrowprops={**HEADED, "mutation_scale": 9, **look},
             zorder=5,
             annotation_clip=False,
         )
-        labels.keep_off(axes, foot, tip)
+        labels.keep_off(axes, arrow.at, tip)
         text = f"{arrow.text} = {value}"
-        labels.add(Label(axes, text, tip, foot, arrow.colour, 7.5))
+        labels.add(Label(axes, text, tip, arrow.at, arrow.colour, 7.5))
     if short:
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
-    centre = view.scene.linkage.bar(bar)
-    if centre.mass > 0.0:
-        G = _take_one(centre.to_centre * view.state().direction(bar))
-        x, y = split_complex(G)
-        draw_plate(axes, bar, (0.0j, G, along), labels)
-        draw_mass_centre(axes, (x, y), 6.0)
-        labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
-    reach = _reach(view, bar, arrows, scale)
-    x, y = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
-    axes.set_xlim(x - 0.5 * span, x + 0.5 * span)
-    axes.set_ylim(y - 0.5 * span, y + 0.5 * span)
+    described = view.scene.linkage.bar(bar)
+    if described.mass > 0.0:
+        G = _take_one(described.to_centre * view.state().direction(bar))
+        draw_plate(axes, bar, (0.0j, G, end), labels)
+        draw_mass_centre(axes, G, 6.0)
+        labels.add(Label(axes, f"$G_{bar}$", G, middle, MUTED, 8.0, 3.0))
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
@@ -389,19 +351,10 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
         size = write_labelled_quantity(abs(couple.moment), "N m", view.units)
         lines.append(f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} = {size}")
     axes.set_axis_off()
-    look: dict[str, Any] = {
-        "va": "top",
-        "size": 7.5,
-        "linespacing": 1.45,
-        "color": INK if lines else MUTED,
-    }
-    axes.text(
-        0.0,
-        1.0,
-        "\n".join(lines) or "no couples",
-        transform=axes.transAxes,
-        **look,
-    )
+    text = "\n".join(lines) or "no couples"
+    look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45}
+    colour = INK if lines else MUTED
+    axes.text(0.0, 1.0, text, transform=axes.transAxes, color=colour, **look)
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
@@ -410,27 +363,13 @@ def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) ->
         return
     factor, unit = choose_unit(biggest, "N", units)
     step = 10.0 ** math.floor(math.log10(factor * biggest))
-    round_force = (
-        next(
-            m * step
-            for m in (5.0, 2.0, 1.0)
-            if 2.0 * m * step <= factor * biggest or m == 1.0
-        )
-        / factor
-    )
-    x = axes.get_xlim()[0]
-    y = axes.get_ylim()[0]
-    axes.plot(
-        [x, x + scale * round_force],
-        [y, y],
-        color=INK,
-        lw=2.0,
-        solid_capstyle="butt",
-        clip_on=False,
-    )
-    text = f"{factor * round_force:g} {unit}"
+    fitting = (m * step for m in (5.0, 2.0) if 2.0 * m * step <= factor * biggest)
+    round_force = next(fitting, step) / factor
+    x, y = axes.get_xlim()[0], axes.get_ylim()[0]
+    look: dict[str, Any] = {"lw": 2.0, "solid_capstyle": "butt", "clip_on": False}
+    axes.plot([x, x + scale * round_force], [y, y], color=INK, **look)
     axes.annotate(
-        text,
+        f"{factor * round_force:g} {unit}",
         (x, y),
         xytext=(0, 4),
         textcoords="offset points",

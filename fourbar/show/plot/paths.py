@@ -12,6 +12,7 @@ from fourbar.formulas.points import list_circuit
 from fourbar.quantities import Array
 from fourbar.scene import Command, command_at
 from fourbar.scene.motion import Sweep
+from fourbar.show.plot.style import Points, join_points, split_points
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -31,14 +32,14 @@ class Trace(NamedTuple):
     circuit: bool
     """True for the whole circuit, through both branches where the input has limits."""
 
-    def path(self, points: Array) -> Array:
-        """Return the path of a point, (k, 2), m.
+    def path(self, points: Array) -> Points:
+        """Return the path of a point, whose places are (n, 2), m.
 
         Positions that stand closer than needed are left out.
         """
-        shown = np.where(self.solution.assembled[:, None], points, np.nan)
+        shown = np.where(self.solution.assembled, join_points(points), np.nan)
         if self.circuit:
-            shown = np.concatenate([shown, shown[:1]])
+            shown = np.append(shown, shown[0])
         return _thin(shown)
 
 
@@ -63,40 +64,32 @@ def trace(view: View) -> Trace:
             at = command_at(view.scene, np.linspace(first, last, steps + 1))
         solution = solve(view.scene, "position", at=at)
         followed = [solution.A, solution.B, *solution.points.values()]
-        if all(_longest_chord(points) <= _CHORD for points in followed):
+        if all(map(_has_short_chords, followed)):
             break
     return Trace(solution, circuit)
 
 
 def _list_circuit_commands(view: View, steps: int) -> Command:
-    linkage = view.scene.linkage
-    here = view.here
+    linkage, here = view.scene.linkage, view.here
     number = int(find_circuit(linkage, here.theta_2, here.branch)[0])
-    theta_2, assembly, _ = list_circuit(
-        linkage,
-        number,
-        view.scene.motion.branch,
-        steps,
-    )
+    branch = view.scene.motion.branch
+    theta_2, assembly, _ = list_circuit(linkage, number, branch, steps)
     return Command(theta_2, assembly.astype(np.int8), None, 0.0)
 
 
-def _measure_chords(points: Array) -> tuple[Array, float]:
+def _measure_chords(path: Points) -> tuple[Array, float]:
     """Return the chord of each step of a path, NaN beside a gap, and its extent, m."""
-    dx, dy = np.diff(points, axis=0).T
-    extents = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
-    return np.hypot(dx, dy), float(np.nanmax(extents))
+    coordinates = split_points(path[np.isfinite(path)])
+    return np.abs(np.diff(path)), float(np.ptp(coordinates, axis=0).max())
 
 
-def _longest_chord(points: Array) -> float:
-    """Return the longest chord of positions that assemble, over the path's extent."""
-    chords, extent = _measure_chords(points)
-    if extent:
-        return float(np.nanmax(chords, initial=0.0)) / extent
-    return 0.0
+def _has_short_chords(points: Array) -> bool:
+    """Return True if no chord between positions that assemble is seen as one."""
+    chords, extent = _measure_chords(join_points(points))
+    return bool(np.nanmax(chords, initial=0.0) <= _CHORD * extent)
 
 
-def _thin(path: Array) -> Array:
+def _thin(path: Points) -> Points:
     """Leave out positions that lie within half a chord of the one before.
 
     Gaps and ends stay.
@@ -105,13 +98,11 @@ def _thin(path: Array) -> Array:
     step = 0.5 * _CHORD * extent
     if step == 0.0:
         return path[[0, -1]]
-    is_gap = np.asarray(np.isnan(path).any(axis=1))
-    before_edge = is_gap[1:] != is_gap[:-1]
+    before_edge = np.diff(np.isnan(path))
     lengths = np.cumsum(np.nan_to_num(chords))
-    steps_passed = np.floor(np.concatenate([[0.0], lengths]) / step)
+    steps_passed = np.floor(np.append(0.0, lengths) / step)
     kept = np.diff(steps_passed, prepend=-1.0) > 0.0
     kept[:-1] |= before_edge
     kept[1:] |= before_edge
-    kept[0] = True
-    kept[-1] = True
+    kept[[0, -1]] = True
     return np.asarray(path[kept])

@@ -13,6 +13,7 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import InputError, clean_line, expect, needing
 from fourbar.quantities import Array
@@ -53,6 +54,11 @@ _FORCE_WIDTHS = {"F12": 2.6, "F32": 2.0, "F43": 1.6, "F14": 1.1}
 """Thick beneath thin: forces that are equal still show all four lines."""
 
 
+def choose_bar_line(bar: int) -> dict[str, Any]:
+    """Return the style of the curve of a bar."""
+    return {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar]}
+
+
 def choose_force_line(name: str) -> dict[str, Any]:
     """Return the style and the label of the curve of a pin force."""
     look = {
@@ -85,6 +91,15 @@ CAPTION_STYLE: dict[str, Any] = {
 """Styles of the texts of a whole figure, above and below its panels."""
 RING_MARK: dict[str, Any] = {"mfc": "white", "mec": INK}
 """A mark that is a ring."""
+GROUND_LINE: dict[str, Any] = {
+    "color": MUTED,
+    "lw": 1.0,
+    "ls": (0, (8, 3, 2, 3)),
+    "zorder": 1,
+}
+"""The line of the ground."""
+Points = NDArray[np.complex128]
+"""Points of a drawing as complex numbers x + iy."""
 HEADED: dict[str, Any] = {
     "arrowstyle": "-|>",
     "lw": 1.5,
@@ -202,6 +217,27 @@ def shorten_text(text: str, width: int) -> str:
     return line[: width - 1].rstrip() + "…"
 
 
+def split_complex(z: complex) -> tuple[float, float]:
+    """Split a point into x and y."""
+    return (z.real, z.imag)
+
+
+def split_points(points: Any) -> Array:
+    """Split points into x and y, (n, 2)."""
+    return np.stack([np.real(points), np.imag(points)], axis=-1)
+
+
+def join_points(coordinates: Array) -> Points:
+    """Join coordinates (..., 2) to points."""
+    return np.asarray(coordinates[..., 0] + 1j * coordinates[..., 1])
+
+
+def plot_points(axes: "Axes", points: Any, *marks: str, **look: Any) -> list[Any]:
+    """Plot a line through points, or marks at them."""
+    x, y = split_points(np.atleast_1d(points)).T
+    return [*axes.plot(x, y, *marks, **look)]
+
+
 def largest_magnitude(*values: Array) -> float:
     """Return the largest finite magnitude, or 0."""
     flat = np.concatenate([np.abs(np.ravel(value)) for value in values])
@@ -211,8 +247,7 @@ def largest_magnitude(*values: Array) -> float:
 
 def find_peak_index(values: Array) -> int:
     """Return the index of the largest finite magnitude; one is finite."""
-    sizes = np.where(np.isfinite(values), np.abs(values), np.nan)
-    return int(np.nanargmax(sizes))
+    return int(np.argmax(np.where(np.isfinite(values), np.abs(values), -1.0)))
 
 
 RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

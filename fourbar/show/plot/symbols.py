@@ -10,18 +10,33 @@ import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import ForceDrive, Gravity, LinearDrive, PointDrive
+from fourbar.effects import Gravity, LinearDrive, PointDrive
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import At, Line
-from fourbar.linkage import FIRST_PIN, Entries, FourBar, OfBar, list_declared
+from fourbar.linkage import (
+    FIRST_PIN,
+    MOVING_BARS,
+    Entries,
+    FourBar,
+    OfBar,
+    list_declared,
+)
 from fourbar.scene import Scene
 from fourbar.show.plot.curves import choose_limit
-from fourbar.show.plot.labels import DrawnPoint
-from fourbar.show.plot.style import HEADED, INK, MUTED, largest_magnitude
+from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.style import (
+    HEADED,
+    INK,
+    MUTED,
+    largest_magnitude,
+    plot_points,
+    split_complex,
+)
 from fourbar.show.plot.view import View, collect_point_vectors
 from fourbar.solution import Solution
 
@@ -32,19 +47,15 @@ LOAD_COLOUR = "#8A3B78"
 SPRING = "#6b5b00"
 PIN_COLOUR = "#4d5b70"
 SYMBOL_COLOURS = {
-    **{
-        "force": LOAD_COLOUR,
-        "moment": LOAD_COLOUR,
-        "drive": INK,
-        "push": INK,
-        "gravity": MUTED,
-        "spring": SPRING,
-        "torsion": SPRING,
-    },
-    **{
-        "cylinder": INK,
-        "flywheel": MUTED,
-    },
+    "force": LOAD_COLOUR,
+    "moment": LOAD_COLOUR,
+    "drive": INK,
+    "push": INK,
+    "cylinder": INK,
+    "gravity": MUTED,
+    "flywheel": MUTED,
+    "spring": SPRING,
+    "torsion": SPRING,
 }
 SYMBOL_SIZES = {
     "force": 7.0,
@@ -127,47 +138,20 @@ class Symbol(NamedTuple):
 
 def list_acting(scene: Scene) -> list[Symbol]:
     """List everything that acts, the drive first; nothing that has no size."""
-    symbols = []
+    symbols = list[Symbol]()
     scene = scene.settled()
-    if scene.drive is not None and scene.motion.free is None:
-        symbols.append(_make_drive(scene.drive))
-    elif scene.motion.free is None:
-        symbols.append(
-            Symbol(
-                "drive",
-                f"T{scene.drive_bar}",
-                scene.drive_bar,
-                pin=FIRST_PIN[scene.drive_bar],
-            )
-        )
+    if scene.motion.free is None:
+        symbols.append(_make_drive(scene))
     for number, load in enumerate(scene.loads, 1):
-        G = scene.linkage.bar(load.bar).to_centre
+        at = load.foot(scene.linkage.bar(load.bar).to_centre)
+        arm = 0j if load.arm is None else cmath.rect(*load.arm)
+        of_load = Symbol("", f"load {number}", load.bar, at, arm, table=load.table)
         if load.force is not None and load.force[0] != 0.0:
-            arm = 0j if load.arm is None else cmath.rect(*load.arm)
-            symbols.append(
-                Symbol(
-                    "force",
-                    f"load {number}",
-                    load.bar,
-                    load.foot(G),
-                    arm,
-                    cmath.rect(*load.force),
-                    load.frame == "bar",
-                    table=load.table,
-                )
-            )
+            vector = cmath.rect(*load.force)
+            turns = load.frame == "bar"
+            symbols.append(of_load._replace(kind="force", vector=vector, turns=turns))
         if load.moment != 0.0:
-            symbols.append(
-                Symbol(
-                    "moment",
-                    f"load {number}",
-                    load.bar,
-                    load.foot(G),
-                    0.0j if load.arm is None else cmath.rect(*load.arm),
-                    moment=load.moment,
-                    table=load.table,
-                )
-            )
+            symbols.append(of_load._replace(kind="moment", moment=load.moment))
     for effect in scene.effects:
         symbols += _list_symbols(effect.key, effect)
     return symbols
@@ -199,29 +183,25 @@ def _list_symbols(kind: str, one: Any) -> list[Symbol]:
     return symbols
 
 
-def _make_drive(drive: ForceDrive) -> Symbol:
-    """Make the symbol of a drive that exerts a force."""
+def _make_drive(scene: Scene) -> Symbol:
+    """Make the symbol of the drive, which exerts a torque or a force."""
+    drive, bar = scene.drive, scene.drive_bar
     if isinstance(drive, LinearDrive):
         return _join_ends("cylinder", "F", drive)
+    if drive is None:
+        return Symbol("drive", f"T{bar}", bar, pin=FIRST_PIN[bar])
     assert isinstance(drive, PointDrive)
-    bar = drive.place.bar
     at = drive.place.vector()
     direction = cmath.rect(1.0, drive.direction)
     turns = drive.frame == "bar"
-    return Symbol("push", "F", bar, at, vector=direction, turns=turns)
+    return Symbol("push", "F", drive.place.bar, at, vector=direction, turns=turns)
 
 
 def _join_ends(kind: str, name: str, line: Any) -> Symbol:
     """Make the symbol of a line between two points."""
-    start = line.start
-    end = line.end
-    return Symbol(
-        kind,
-        name,
-        start.bar,
-        start.vector(),
-        end=(end.bar, end.vector()),
-    )
+    start, end = line.start, line.end
+    end_of_line = (end.bar, end.vector())
+    return Symbol(kind, name, start.bar, start.vector(), end=end_of_line)
 
 
 class Pose(NamedTuple):
@@ -245,13 +225,13 @@ class Pose(NamedTuple):
 
         At full size the symbol would hide the bar.
         """
-        loop = list(self.pins.values())  # in the order of the loop
-        here = self.pins[pin]
-        index = list(self.pins).index(pin)
-        before = loop[index - 1]
-        after = loop[(index + 1) % len(loop)]
-        shortest = min(abs(before - here), abs(after - here))
-        return min(size, max(SMALLEST * size, _SHARE * shortest))
+        loop = [*self.pins.items(), *self.pins.items()]
+        lengths = [
+            abs(second - first)
+            for (name, first), (next_name, second) in pairwise(loop)
+            if pin in (name, next_name)
+        ]
+        return min(size, max(SMALLEST * size, _SHARE * min(lengths)))
 
     def point(self, bar: int, z: complex) -> complex:
         """Place a point given in the frame of a bar."""
@@ -267,24 +247,17 @@ class Pose(NamedTuple):
 
 
 @dataclass(slots=True)
-class _DrawnSymbol:
-    """One symbol at one position, and the parts of a drawing that it has added."""
+class _Pen:
+    """Draws one symbol at one position, and keeps what it has drawn."""
 
     axes: "Axes"
     symbol: Symbol
     place: Pose
     size: float
     """Size of a support."""
-    text: str
-    artists: list[Any] = field(default_factory=list)
-    lines: list[list[DrawnPoint]] = field(default_factory=list)
-    """Lines that labels avoid and that a window has to show."""
-    label: DrawnPoint | None = None
-    """Place of the text; None: it is placed already."""
-    away: complex = 0.0j
-    """Direction from there outwards, of length 1."""
-    ring: float = 0.0
-    """Radius around the place of the text, next to which the text may stand."""
+    labels: Labels
+    """Labels of the drawing, which keep off the lines of the symbol."""
+    drawn: list[Any] = field(default_factory=list)
 
     @property
     def colour(self) -> str:
@@ -293,22 +266,25 @@ class _DrawnSymbol:
 
     def draw_line(self, points: Any, width: float) -> None:
         """Draw a line over the supports and under the bars."""
-        x = np.real(points)
-        y = np.imag(points)
-        self.artists += self.axes.plot(x, y, color=self.colour, lw=width, zorder=3.5)
-        self.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
+        look: dict[str, Any] = {"color": self.colour, "lw": width, "zorder": 3.5}
+        self.drawn += plot_points(self.axes, points, **look)
+        self.labels.keep_off(self.axes, *points)
 
     def draw_arrow(self, tail: complex, tip: complex) -> None:
         """Draw an arrow over the bars."""
         from matplotlib.patches import FancyArrowPatch
 
-        ends = [split_complex(tail), split_complex(tip)]
-        arrow = FancyArrowPatch(
-            *ends, zorder=8, color=self.colour, mutation_scale=10.0, **HEADED
-        )
-        self.artists.append(self.axes.add_patch(arrow))
-        self.axes.update_datalim(ends)
-        self.lines.append(ends)
+        start, end = split_complex(tail), split_complex(tip)
+        look = {**HEADED, "color": self.colour, "mutation_scale": 10.0}
+        arrow = FancyArrowPatch(start, end, zorder=8, **look)
+        self.drawn.append(self.axes.add_patch(arrow))
+        self.axes.update_datalim([start, end])
+        self.labels.keep_off(self.axes, tail, tip)
+
+    def write(self, text: str, at: complex, away: complex, ring: float = 0.0) -> None:
+        """Write next to a point, or to a ring about it, in a direction from there."""
+        label = Label(self.axes, text, at, at - away, self.colour, 8.0, ring=ring)
+        self.labels.add(label)
 
     def shrink(self) -> float:
         """Return the size of what stands around the pin, smaller at a short bar."""
@@ -318,15 +294,10 @@ class _DrawnSymbol:
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Pose:
     """Collect what symbols need of one position of a solution."""
-    theta_2 = float(solution.theta_2[index])
-    theta_3 = float(solution.theta_3[index])
-    theta_4 = float(solution.theta_4[index])
-    directions = {
-        1: cmath.rect(1.0, linkage.ground_angle),
-        2: cmath.rect(1.0, theta_2),
-        3: cmath.rect(1.0, theta_3),
-        4: cmath.rect(1.0, theta_4),
-    }
+    angles = {1: linkage.ground_angle}
+    for bar in MOVING_BARS:
+        angles[bar] = float(getattr(solution, f"theta_{bar}")[index])
+    directions = {bar: cmath.rect(1.0, angle) for bar, angle in angles.items()}
     pins = {
         "O2": 0.0j,
         "A": factor * complex(*solution.A[index]),
@@ -337,79 +308,79 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
     torque = math.nan
     if solution.torque is not None:
         torque = float(solution.torque[index])
-    return Pose(feet, directions, pins, factor, theta_2, torque)
+    return Pose(feet, directions, pins, factor, angles[2], torque)
 
 
-def draw_symbol(axes: "Axes", symbol: Symbol, place: Pose, size: float) -> _DrawnSymbol:
-    """Draw one symbol at one position; `size` is that of a support."""
-    drawn = _DrawnSymbol(axes, symbol, place, size, symbol.name)
+def draw_symbol(
+    axes: "Axes", symbol: Symbol, place: Pose, size: float, labels: Labels
+) -> list[Any]:
+    """Draw one symbol at one position, and return what was drawn.
+
+    `size`: that of a support.
+    """
+    pen = _Pen(axes, symbol, place, size, labels)
     if symbol.kind == "gravity":
-        _draw_gravity(drawn)
+        _draw_gravity(pen)
     elif symbol.end is not None:
-        _draw_between_ends(drawn, symbol.end)
+        _draw_between_ends(pen, symbol.end)
     elif symbol.kind in ("force", "push"):
-        _draw_force(drawn)
+        _draw_force(pen)
     elif symbol.kind in ("moment", "drive"):
-        _draw_couple(drawn)
+        _draw_couple(pen)
     else:
-        _draw_ring(drawn)
-    return drawn
+        _draw_ring(pen)
+    return pen.drawn
 
 
-def _draw_between_ends(drawn: _DrawnSymbol, other_end: tuple[int, complex]) -> None:
+def _draw_between_ends(pen: _Pen, other_end: tuple[int, complex]) -> None:
     """Draw a spring as a zigzag, a cylinder as its rod and barrel, and both ends."""
-    symbol, place = drawn.symbol, drawn.place
+    symbol, place = pen.symbol, pen.place
     start = place.point(symbol.bar, symbol.at)
     end = place.point(*other_end)
     if symbol.kind == "spring":
-        drawn.draw_line(_draw_zigzag(start, end, 0.6 * drawn.size), 1.0)
+        pen.draw_line(_draw_zigzag(start, end, 0.6 * pen.size), 1.0)
     else:
         along = (end - start) / abs(end - start)
-        rod = np.array([start, end])
-        barrel = start + np.array([0.1, 1.0]) * place.barrel * along
-        drawn.draw_line(rod, 1.2)
-        drawn.draw_line(barrel, 4.5)
-        drawn.text = f"${symbol.name}$"
-        drawn.away = 1j * along
-        drawn.label = split_complex(start + 0.5 * place.barrel * along)
-    x = (start.real, end.real)
-    y = (start.imag, end.imag)
-    drawn.artists += drawn.axes.plot(x, y, "o", ms=3.5, color=drawn.colour, zorder=5.5)
+        pen.draw_line([start, end], 1.2)
+        pen.draw_line(start + np.array([0.1, 1.0]) * place.barrel * along, 4.5)
+        middle = start + 0.5 * place.barrel * along
+        pen.write(f"${symbol.name}$", middle, 1j * along)
+    look: dict[str, Any] = {"ms": 3.5, "color": pen.colour, "zorder": 5.5}
+    pen.drawn += plot_points(pen.axes, [start, end], "o", **look)
 
 
-def _draw_couple(drawn: _DrawnSymbol) -> None:
+def _draw_couple(pen: _Pen) -> None:
     """Draw a moment, or the torque of the drive, as an arrow that turns."""
-    symbol, place = drawn.symbol, drawn.place
+    symbol, place = pen.symbol, pen.place
+    text = symbol.name
     if symbol.kind == "moment":
         centre = place.point(symbol.bar, symbol.at) + symbol.beyond
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
     else:
+        centre = place.pins[symbol.pin]
         if symbol.bar == 3:
             centre = 0.5 * (place.pins["A"] + place.pins["B"])
-        else:
-            centre = place.pins[symbol.pin]
         turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
-        drawn.text = f"$T_{symbol.bar}$"
+        text = f"$T_{symbol.bar}$"
     if turn == 0.0:
         return
-    radius = SYMBOL_SIZES[symbol.kind] * drawn.shrink()
+    radius = SYMBOL_SIZES[symbol.kind] * pen.shrink()
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
     points = centre + radius * np.exp(1j * angles)
-    drawn.draw_line(points, 1.5)
+    pen.draw_line(points, 1.5)
     before_last, last = points[-2:]
-    drawn.draw_arrow(before_last, last + 2.0 * (last - before_last))
-    drawn.label = split_complex(points[20])
-    drawn.away = (points[20] - centre) / radius
+    pen.draw_arrow(before_last, last + 2.0 * (last - before_last))
+    pen.write(text, points[20], (points[20] - centre) / radius)
 
 
-def _draw_ring(drawn: _DrawnSymbol) -> None:
+def _draw_ring(pen: _Pen) -> None:
     """Draw what acts at a pin or a place as a ring; a torsion spring is a spiral."""
-    symbol, place = drawn.symbol, drawn.place
-    at_place = place.point(symbol.bar, symbol.at)
-    centre = place.pins[symbol.pin] if symbol.pin else at_place
-    kind = symbol.kind
+    symbol, place, kind = pen.symbol, pen.place, pen.symbol.kind
+    centre = place.point(symbol.bar, symbol.at)
+    if symbol.pin:
+        centre = place.pins[symbol.pin]
     relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
-    radius = drawn.shrink() * relative
+    radius = pen.shrink() * relative
     radii: Any = radius
     turns = 1.0
     if kind == "torsion":
@@ -417,28 +388,22 @@ def _draw_ring(drawn: _DrawnSymbol) -> None:
         turns = 2.5
     angles = np.linspace(0.0, turns * math.tau, 90)
     ring = centre + radii * np.exp(1j * angles)
-    drawn.draw_line(ring, 2.2 if kind == "flywheel" else 1.2)
-    drawn.away = cmath.rect(1.0, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
-    drawn.label = split_complex(centre)
-    drawn.ring = radius
+    pen.draw_line(ring, 2.2 if kind == "flywheel" else 1.2)
+    away = cmath.rect(1.0, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
+    pen.write(symbol.name, centre, away, radius)
 
 
-def split_complex(z: complex) -> DrawnPoint:
-    """Split z into x and y."""
-    return (z.real, z.imag)
-
-
-def _draw_force(drawn: _DrawnSymbol) -> None:
+def _draw_force(pen: _Pen) -> None:
     """Draw an arrow of one length at the place where a force acts."""
-    symbol, place = drawn.symbol, drawn.place
+    symbol, place = pen.symbol, pen.place
     tail = place.tail(symbol)
     sign = symbol.sign(place.theta_2)
     if sign == 0.0:
         return
     towards = place.direction(symbol) * symbol.vector / abs(symbol.vector)
-    tip = tail + sign * SYMBOL_SIZES["force"] * drawn.size * towards
-    drawn.draw_arrow(tail, tip)
-    drawn.label, drawn.away = split_complex(tip), (tip - tail) / abs(tip - tail)
+    tip = tail + sign * SYMBOL_SIZES["force"] * pen.size * towards
+    pen.draw_arrow(tail, tip)
+    pen.write(symbol.name, tip, (tip - tail) / abs(tip - tail))
 
 
 def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
@@ -454,31 +419,31 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     return np.array(points)
 
 
-def _draw_gravity(drawn: _DrawnSymbol) -> None:
+def _draw_gravity(pen: _Pen) -> None:
     """Draw an arrow in the corner, of no length in the plane."""
-    vector = drawn.symbol.vector
+    vector = pen.symbol.vector
     if vector == 0.0:
         return
     x, y = split_complex(24.0 * vector / abs(vector))
-    style = {**HEADED, "color": drawn.colour, "lw": 1.3}
     corner: dict[str, Any] = {
+        "xy": (0.95, 0.9),
         "xycoords": "axes fraction",
         "textcoords": "offset points",
         "annotation_clip": False,
     }
-    middle = (0.95, 0.9)
-    write = drawn.axes.annotate
-    drawn.artists += [
-        write("", xy=middle, xytext=(-x, -y), arrowprops=style, **corner),
-        write(
-            "$g$",
-            xy=middle,
-            xytext=(-x - 8.0, -y),
-            color=drawn.colour,
-            size=9.0,
-            **corner,
-        ),
+    style = {**HEADED, "color": pen.colour, "lw": 1.3}
+    name: dict[str, Any] = {"color": pen.colour, "size": 9.0}
+    pen.drawn += [
+        pen.axes.annotate("", xytext=(-x, -y), arrowprops=style, **corner),
+        pen.axes.annotate("$g$", xytext=(-x - 8.0, -y), **name, **corner),
     ]
+
+
+def _locate(solution: Solution, name: str) -> Any:
+    """Return the places of a pin, a mass centre or a point of the scene, (n, 2)."""
+    if name in solution.points:
+        return solution.points[name]
+    return getattr(solution, name)
 
 
 def draw_vectors(
@@ -495,51 +460,33 @@ def draw_vectors(
     Returns the function that moves them to another position, and returns them.
     """
     drawn = []
+    look: dict[str, Any] = {
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1.0,
+        "width": 0.0045,
+        "zorder": 7,
+    }
     for letter, (colour, label) in _ARROWS.items():
-        sizes = [
-            np.hypot(*values.T)
-            for values in collect_point_vectors(view.scene, view.sweep, letter).values()
-        ]
+        of_sweep = collect_point_vectors(view.scene, view.sweep, letter)
+        sizes = [np.hypot(*values.T) for values in of_sweep.values()]
         if not (top := choose_limit(sizes) or largest_magnitude(*sizes)):
             continue
         vectors = collect_point_vectors(view.scene, solution, letter)
-        feet = []
-        shafts = []
-        tips_of_points = []
-        for name, vector in vectors.items():
-            if name in solution.points:
-                foot = solution.points[name]
-            else:
-                foot = getattr(solution, name)
-            longest = np.maximum(np.hypot(vector[:, 0], vector[:, 1]), top)
-            shaft = LONGEST_ARROW * size * vector / longest[:, None]
-            feet.append(foot)
-            shafts.append(shaft)
-            tips_of_points.append(factor * foot + shaft)
-        tips = np.concatenate(tips_of_points)
+        feet = np.array([factor * _locate(solution, name) for name in vectors])
+        shafts = np.array([*vectors.values()])
+        longest = np.maximum(np.hypot(*np.moveaxis(shafts, -1, 0)), top)
+        shafts = LONGEST_ARROW * size * shafts / longest[..., None]
+        tips = (feet + shafts).reshape(-1, 2)
         axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
-        look: dict[str, Any] = {
-            "angles": "xy",
-            "scale_units": "xy",
-            "scale": 1.0,
-            "width": 0.0045,
-            "zorder": 7,
-        }
         start = np.zeros((2, len(vectors)))
-        drawn.append(
-            (
-                axes.quiver(*start, *start, color=colour, label=label, **look),
-                feet,
-                shafts,
-            )
-        )
+        arrows = axes.quiver(*start, *start, color=colour, label=label, **look)
+        drawn.append((arrows, feet, np.nan_to_num(shafts)))
 
     def move(index: int) -> list[Any]:
         for arrows, feet, shafts in drawn:
-            arrows.set_offsets(factor * np.array([foot[index] for foot in feet]))
-            arrows.set_UVC(
-                *np.nan_to_num(np.array([shaft[index] for shaft in shafts])).T
-            )
+            arrows.set_offsets(feet[:, index])
+            arrows.set_UVC(*shafts[:, index].T)
         return [arrows for arrows, _, _ in drawn]
 
     move(0)

@@ -67,10 +67,11 @@ class View:
     @property
     def at(self) -> str:
         """The position drawn, in words."""
-        if self.here.time is None:
-            return self.axis.words(float(self.here.at.places[0]))
+        place = float(self.here.at.places[0])
+        if self.time is None:
+            return self.axis.words(place)
         theta = f"θ₂ = {math.degrees(float(self.here.theta_2[0])):.4g}°"
-        return f"{theta}, t = {self.here.time[0]:.4g} s".replace("-", "−")
+        return f"{theta}, t = {place:.4g} s".replace("-", "−")
 
     @property
     def moves(self) -> bool:
@@ -81,12 +82,8 @@ class View:
     def rests(self) -> bool:
         """Return True if each position is one at rest: nothing has a speed or power."""
         motion = self.scene.motion
-        prescribed = motion.law is None and motion.free is None
-        return (
-            prescribed
-            and self.moves
-            and not (np.any(motion.speed) or np.any(motion.acceleration))
-        )
+        has_rates = np.any(motion.speed) or np.any(motion.acceleration)
+        return self.moves and not (is_over_time(self.scene) or has_rates)
 
     @property
     def branch_name(self) -> str:
@@ -136,9 +133,10 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
 def where_in_words(solution: Solution) -> str:
     """Say the first position of a solution as the scene's file has it."""
     if solution.at.moves_stroke:
-        stroke = float(solution.at.stated[0][0])
-        return f"{solution.commanded} = {write_in_units('m', stroke)}"
-    return f"{solution.commanded} = {math.degrees(solution.at.angle[0]):.6g} deg"
+        where = write_in_units("m", float(solution.at.stated[0][0]))
+    else:
+        where = f"{math.degrees(solution.at.angle[0]):.6g} deg"
+    return f"{solution.commanded} = {where}"
 
 
 def collect_point_vectors(
@@ -150,11 +148,8 @@ def collect_point_vectors(
 
     The points are A, B, mass centres of bars that have mass, and the scene's own.
     """
-    drawn = (
-        "A",
-        "B",
-        *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0),
-    )
+    massive = [bar for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0]
+    drawn = ["A", "B", *(f"G{bar}" for bar in massive)]
     vectors = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
     vectors |= solution.velocity if letter == "v" else solution.acceleration
     return {name: values for name, values in vectors.items() if values is not None}
@@ -240,12 +235,10 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     if position is None:
         position = _choose_position(sweep)
     here = solve(scene, at=command_at(scene, np.array([position])))
-    shown = View(scene, sweep, here)
-    if not shown.here.assembled[0]:
-        raise NotAssembledError(
-            f"the linkage does not assemble at {where_in_words(shown.here)}"
-        )
-    return shown
+    if not here.assembled[0]:
+        where = where_in_words(here)
+        raise NotAssembledError(f"the linkage does not assemble at {where}")
+    return View(scene, sweep, here)
 
 
 def _require_drawable(sweep: Solution) -> None:
@@ -284,10 +277,8 @@ def _view_motion(scene: Scene, position: float | None) -> View:
 
 def _choose_position(sweep: Solution) -> float:
     """Choose a well-conditioned position that shows the bars apart."""
-    assembled = np.concatenate([[False], sweep.assembled, [False]])
-    edges = np.flatnonzero(assembled[1:] != assembled[:-1])
-    starts = edges[::2]
-    stops = edges[1::2]
+    edges = np.flatnonzero(np.diff([False, *sweep.assembled, False]))
+    starts, stops = edges.reshape(-1, 2).T
     longest = int(np.argmax(stops - starts))
     run = slice(starts[longest], stops[longest])
     places = sweep.at.places[run]

@@ -243,9 +243,7 @@ def draw_work_precision(
         color=BAND,
         label="cheapest of everything stepped",
     )
-    labels.keep_off(
-        axes, *zip(*_take_coordinates(front, quantity), strict=True), width=8.0
-    )
+    labels.keep_off(axes, *map(complex, *_take_coordinates(front, quantity)), width=8.0)
     for name, look in METHOD_LOOKS.items():
         label = name
         if look.curve == "recommended":
@@ -258,7 +256,7 @@ def draw_work_precision(
         ]
         if row:
             _draw_look(axes, *_take_coordinates(row, quantity), label, look)
-            places = zip(*_take_coordinates(row, quantity), strict=True)
+            places = map(complex, *_take_coordinates(row, quantity))
             labels.keep_off(axes, *places, width=1.8)
     default = find_default(curves)
     if default is not None and getattr(default.errors, quantity) < LARGEST_DRAWN_ERROR:
@@ -311,8 +309,8 @@ def _name_point(
 ) -> None:
     """Write next to a point, where it covers nothing."""
     (x,), (y,) = _take_coordinates([point], quantity)
-    labels.keep_off(axes, (x, y), (x, y))
-    labels.add(Label(axes, text, (x, y), (0.5 * x, y), INK, TEXT))
+    labels.keep_off(axes, complex(x, y))
+    labels.add(Label(axes, text, complex(x, y), complex(0.5 * x, y), INK, TEXT))
 
 
 def _mark_exact(

@@ -34,6 +34,10 @@ def list_lines(figure, scene=SCENE):
     }
 
 
+def join(path):
+    return path @ np.array([1.0, 1.0j])
+
+
 @pytest.mark.slow
 def test_the_shaking_force_is_drawn_with_its_components():
     lines = list_lines("shaking")
@@ -74,8 +78,8 @@ def measure_chords(path):
 
     The sharpest turn between two, deg, is returned too.
     """
-    steps = np.diff(path, axis=0) @ np.array([1.0, 1.0j])
-    extent = float(np.ptp(path, axis=0).max())
+    steps = np.diff(path)
+    extent = float(max(np.ptp(path.real), np.ptp(path.imag)))
     turns = np.abs(np.angle(steps[1:] / steps[:-1]))
     return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
 
@@ -90,15 +94,15 @@ def test_the_whole_circuit_is_traced_without_a_corner_and_drawn():
     assert path[0] == approx(path[-1])
     longest, sharpest = measure_chords(path)
     assert longest < LONGEST and sharpest < 30.0 and len(path) < 2000
-    away = path - view.here.points["E"][0]
-    assert np.hypot(*away.T).min() < 0.5 * LONGEST * np.ptp(path, axis=0).max()
+    away = np.abs(path - join(view.here.points["E"][0]))
+    assert away.min() < 0.5 * LONGEST * np.ptp(path.real)
     # the curve of the formulas, by many more positions
     curve = fourbar.coupler_curve(view.scene, "E", steps=200_000)
-    dense = np.stack([curve.x, curve.y], axis=1)
-    apart = np.hypot(*np.diff(dense, axis=0).T).max()
+    dense = curve.x + 1j * curve.y
+    apart = np.abs(np.diff(dense)).max()
     for point in path[:: len(path) // 40]:
-        assert np.hypot(*(dense - point).T).min() < apart
-    assert list_lines("coupler", view.scene)["E"] == approx(path)
+        assert np.abs(dense - point).min() < apart
+    assert join(list_lines("coupler", view.scene)["E"]) == approx(path)
 
 
 def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s():
@@ -108,8 +112,8 @@ def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s
     traced = trace(view)
     path = traced.path(traced.solution.points["P"])
     assert not traced.circuit
-    assert path[[0, -1]] == approx(view.sweep.points["P"][[0, -1]])
+    assert path[[0, -1]] == approx(join(view.sweep.points["P"][[0, -1]]))
     assert measure_chords(path)[0] < LONGEST
     drawn = list_lines("coupler", scene)
     assert [name for name in drawn if name[0] != "_"] == ["$A$", "$B$", "P"]
-    assert drawn["P"] == approx(path)
+    assert join(drawn["P"]) == approx(path)

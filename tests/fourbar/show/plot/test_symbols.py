@@ -68,8 +68,10 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
 
     def ends(name):
         (symbol,) = (one for one in list_acting(everything) if one.name == name)
-        line = symbols.draw_symbol(axes, symbol, place, 0.01).lines[0]
-        return complex(*line[0]), complex(*line[-1] if name == "spring" else line[1])
+        labels = Labels()
+        symbols.draw_symbol(axes, symbol, place, 0.01, labels)
+        _, line, _ = labels.lines[0]
+        return line[0], line[-1 if name == "spring" else 1]
 
     theta_3, theta_4 = solution.theta_3[index], solution.theta_4[index]
     G3, G4 = (complex(*solution[name][index]) for name in ("G3", "G4"))
