@@ -428,6 +428,7 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
     weight = scene.effects[0]
     assert weight.magnitude == approx(gravity)
+    assert scene.motion.omega_2 == approx(2.0 * math.pi)
     for entry in ("mass", "centre", "inertia", "force", "moment"):
         stated = re.search(rf'^(?:# )?{entry} = \[?"[-\d.]+ ([^"]*)"', text, re.M)
         assert stated is not None and stated[1] in units, entry

@@ -1,7 +1,5 @@
 """Scenes and solutions in a notebook, as tables, and new scene files."""
 
-import csv
-import io
 import math
 import subprocess
 import sys
@@ -57,20 +55,12 @@ def test_a_solution_shows_its_ends_and_says_what_is_between():
     assert short.count("<tr>") == 2 and "more" not in short
 
 
-def test_a_solution_as_pandas_and_csv_says_the_same_bit_for_bit(tmp_path):
+def test_a_solution_as_pandas_has_every_number_bit_for_bit():
     solution = solve(crank_rocker())
     table = solution.to_pandas()
-    assert len(table) == len(solution)
-    assert np.array_equal(table["torque"].to_numpy(), solution.torque)
-    assert np.array_equal(table[["F12_x", "F12_y"]].to_numpy(), solution.F12)
-    text = solution.to_csv()
-    assert solution.to_csv(tmp_path / "a.csv") is None
-    assert (tmp_path / "a.csv").read_text() == text
-    rows = list(csv.DictReader(io.StringIO(text)))
-    assert [float(row["F14_y"]) for row in rows] == solution.F14[:, 1].tolist()
-    assert set(table.columns) <= set(rows[0])
-    positions = solve(crank_rocker(), "position").to_pandas()
-    assert "torque" not in positions and "theta_3" in positions
+    assert_array_equal(table["torque"], solution.torque)
+    assert_array_equal(table[["F12_x", "F12_y"]], solution.F12)
+    assert "torque" not in solve(crank_rocker(), "position").to_pandas()
 
 
 def test_without_pandas_one_line_says_what_to_install(monkeypatch):

@@ -17,8 +17,9 @@ from fourbar import Motion, Scene, Sweep, Tolerance, solve, uniform, units
 from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.show import animate
+from fourbar.show.duty import compute_energies
 from fourbar.show.tolerances import PAGE_SAMPLES
-from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED, embedded
+from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 PRINTED = 6e-5
@@ -38,11 +39,6 @@ significant ones.
 """
 
 
-ROUNDED = 1e-12
-"""m: a point of the page is its angle's cosine and sine times a length of half a metre.
-"""
-
-
 PIXEL = 0.01
 """Coordinates in the picture are exact but for rounding; a hundredth of a pixel is far
 below what is seen.
@@ -53,45 +49,82 @@ def number(text):
     return float(text.replace("−", "-"))
 
 
-def shown(driver, *ids):
-    return [number(driver.find_element("id", name).text) for name in ids]
+class Page:
+    """A page in the browser; its elements are items by their id."""
 
+    def __init__(self, driver):
+        self.driver = driver
+        self.run = driver.execute_script
 
-def require_shown(driver, s, row, *names):
-    """The page shows these numbers of a position, and draws A and B there."""
-    for name in names:
-        quantity, _, axis = name.partition("_" if name[0] == "F" else " ")
-        value = getattr(s, quantity)[row]
-        if axis:
-            value = value["xy".index(axis)]
-        if name.startswith("theta"):
-            expected = approx(math.degrees(value), abs=PRINTED_DEG)
-        else:
+    def __getitem__(self, name):
+        return self.page[name]
+
+    def state(self, expression):
+        return self.run(f"return {expression};")
+
+    def list(self, selector):
+        return self.page.list(selector)
+
+    def numbers(self, *names):
+        return [number(self[name].text) for name in names]
+
+    def print(self):
+        media = {"media": "print"}
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+
+    def pins(self):
+        """The pins as drawn, in lengths of the ground from O2 and in its axes."""
+        script = """
+            const place = name => {
+              const e = document.getElementById("pin-" + name);
+              return [name, ["cx", "cy"].map(k => Number(e.getAttribute(k)))];
+            };
+            return Object.fromEntries(["O2", "A", "B", "O4"].map(place));
+        """
+        points = {name: np.array([x, -y]) for name, (x, y) in self.run(script).items()}
+        return {name: point - points["O2"] for name, point in points.items()}
+
+    def require(self, s, row, *names):
+        """The page shows these numbers of a position, and draws A and B there."""
+        for name in names:
+            quantity, _, axis = name.partition("_" if name[0] == "F" else " ")
+            value = getattr(s, quantity)[row]
+            if axis:
+                value = value["xy".index(axis)]
             expected = approx(value, rel=PRINTED)
-        assert shown(driver, name) == [expected], name
-    drawn = pins(driver)
-    scale = np.hypot(*drawn["O4"]) / s.scene.linkage.ground
-    for pin in ("A", "B"):
-        assert_allclose(drawn[pin], scale * getattr(s, pin)[row], atol=PIXEL)
+            if name.startswith("theta"):
+                expected = approx(math.degrees(value), abs=PRINTED_DEG)
+            assert self.numbers(name) == [expected], name
+        drawn = self.pins()
+        scale = np.hypot(*drawn["O4"]) / s.scene.linkage.ground
+        for pin in ("A", "B"):
+            assert_allclose(drawn[pin], scale * getattr(s, pin)[row], atol=PIXEL)
+
+    def play(self, ticks):
+        """Play without waiting: frames 50 ms apart, and the row after each."""
+        script = """
+            window.requestAnimationFrame = () => 0;
+            play(true);
+            const rows = [];
+            for (let i = 0; i < arguments[0]; i++) {
+              frame(50 * i);
+              rows.push(row);
+            }
+            play(false);
+            return rows;
+        """
+        return self.run(script, ticks)
 
 
-def pins(driver):
-    """The pins as drawn, in lengths of the ground from O2 and in the plane's axes."""
-    script = """
-        const place = name => {
-          const e = document.getElementById("pin-" + name);
-          return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]];
-        };
-        return Object.fromEntries(["O2", "A", "B", "O4"].map(place));
-    """
-    points = {
-        name: np.array(point) for name, point in driver.execute_script(script).items()
-    }
-    return {name: point - points["O2"] for name, point in points.items()}
+@pytest.fixture
+def show(browse):
+    """Opens the page of a scene."""
 
+    def open_page(scene, *width, dark=False, still=False, **options):
+        text = animate.write_page(scene, **options)
+        return Page(browse(text, *width, dark=dark, still=still))
 
-def state_of(driver, expression):
-    return driver.execute_script(f"return {expression};")
+    return open_page
 
 
 POINTS = """
@@ -102,117 +135,100 @@ const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
 
 
 @pytest.mark.slow
-def test_numbers_are_shown_in_the_units_of_the_page(browse):
+def test_numbers_are_shown_in_the_units_of_the_page(show):
     scene = crank_rocker()
-    driver = browse(animate.write_page(scene, units=units("mm kN N.mm rpm")))
+    page = show(scene, units=units("mm kN N.mm rpm"))
     s = solve(scene)
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / pi]
-    assert shown(driver, "torque", "F43_x", "omega_4") == approx(expected, rel=PRINTED)
-    text = driver.find_element("tag name", "body").text
+    assert page.numbers("torque", "F43_x", "omega_4") == approx(expected, rel=PRINTED)
+    text = page.list("body")[0].text
     for unit in ("N mm", "kN", "rpm", "rad/s²"):
         assert unit in text
-    options = driver.find_elements("css selector", "#quantity option")
+    options = page.list("#quantity option")
     labels = {"torque on bar 2, N mm", "|F₁₂|, kN", "acceleration of G₄, mm/s²"}
     assert labels <= {option.text for option in options}
-    assert len(driver.find_elements("css selector", "#traces .b2, #traces .b4")) == 2
-    texts = driver.find_elements("css selector", "#chart text")[-3:]
+    assert len(page.list("#traces .b2, #traces .b4")) == 2
+    texts = page.list("#chart text")[-3:]
     top = max(number(text.text) for text in texts if text.text)
     assert top == approx(1e3 * s.torque.max(), rel=0.01)
 
 
 @pytest.fixture
-def turning(browse):
+def turning(show):
     """The page of the crank-rocker, and its solution."""
-    return browse(animate.write_page(crank_rocker())), solve(crank_rocker())
+    return show(crank_rocker()), solve(crank_rocker())
 
 
 def test_each_step_and_each_branch_shows_the_numbers_of_its_position(turning):
-    driver, s = turning
-    assert driver.title == "crank-rocker"
+    page, s = turning
+    assert page.driver.title == "crank-rocker"
     angles = ("theta_2", "theta_3", "theta_4", "omega_3", "alpha_4")
     forces = ("torque", "F12_x", "F43_x", "F14_y", "F32_y")
     for row in (0, 1, 2, 3):
-        require_shown(driver, s, row, *angles, *forces)
-        driver.find_element("id", "forward").click()
-    driver.find_element("id", "back").click()
-    require_shown(driver, s, 3, "torque")
-    assert "torque" in state_of(driver, "document.getElementById('live').textContent")
-    driver.execute_script("chooseBranch(-1)")
+        page.require(s, row, *angles, *forces)
+        page["forward"].click()
+    page["back"].click()
+    page.require(s, 3, "torque")
+    assert "torque" in page.state("document.getElementById('live').textContent")
+    page.run("chooseBranch(-1)")
     crossed = s.scene.motion.replace(branch=-1)
-    require_shown(driver, solve(replace(s.scene, motion=crossed)), 3, *forces)
+    page.require(solve(replace(s.scene, motion=crossed)), 3, *forces)
 
 
 @pytest.mark.slow
 def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
-    driver, s = turning
-    start = pins(driver)["A"]
-    driver.find_element("id", "play").click()
-    assert driver.find_element("id", "play").text == "Pause"
+    page, s = turning
+    start = page.pins()["A"]
+    page["play"].click()
+    assert page["play"].text == "Pause"
     deadline = time.monotonic() + 10.0
-    while state_of(driver, "row") < 4:
+    while page.state("row") < 4:
         assert time.monotonic() < deadline, "the linkage does not move"
-    driver.find_element("id", "play").click()
-    assert np.hypot(*(pins(driver)["A"] - start)) > 10
-    require_shown(driver, s, state_of(driver, "row"), "torque", "omega_4")
-
-
-def clockwork(driver, ticks):
-    """Play without waiting: frames 50 ms apart, and the row after each."""
-    script = """
-        window.requestAnimationFrame = () => 0;
-        play(true);
-        const rows = [];
-        for (let i = 0; i < arguments[0]; i++) {
-          frame(50 * i);
-          rows.push(row);
-        }
-        play(false);
-        return rows;
-    """
-    return driver.execute_script(script, ticks)
+    page["play"].click()
+    assert np.hypot(*(page.pins()["A"] - start)) > 10
+    page.require(s, page.state("row"), "torque", "omega_4")
 
 
 @pytest.mark.slow
-def test_an_input_that_turns_fully_goes_round(browse):
-    driver = browse(animate.write_page(crank_rocker()))
-    rows = clockwork(driver, 241)  # 12 s: two sweeps
+def test_an_input_that_turns_fully_goes_round(show):
+    page = show(crank_rocker())
+    rows = page.play(241)  # 12 s: two sweeps
     assert set(range(60)) <= set(rows) <= set(range(61))
     assert sum(np.diff(rows) < 0) == 2
 
 
 @pytest.mark.slow
-def test_an_input_that_does_not_turn_fully_swings(browse):
+def test_an_input_that_does_not_turn_fully_swings(show):
     scene = thesis(Sweep(0.0, 2 * pi, 180))
-    driver = browse(animate.write_page(scene))
+    page = show(scene)
     # less than a row per frame
     slow = "go(100); document.getElementById('speed').value = '0.5'"
-    driver.execute_script(slow)
-    rows = clockwork(driver, 600)
+    page.run(slow)
+    rows = page.play(600)
     closes = np.flatnonzero(solve(scene).assembled[10:]) + 10
     assert (min(rows), max(rows)) == (closes[0], closes[-1])
     assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
 
 
 @pytest.mark.slow
-def test_a_free_motion_plays_once_in_its_own_time(browse):
-    text = animate.write_page(RELEASED)
-    driver, s = browse(text), solve(RELEASED)
+def test_a_free_motion_plays_once_in_its_own_time(show):
+    page, s = show(RELEASED), solve(RELEASED)
     # it has one branch: no key promises another, and none takes the linkage away
     for name in ("branch", "torque", "branch-key"):
-        assert not driver.find_element("id", name).is_displayed(), name
-    driver.find_element("id", "picture").send_keys("b")
-    assert state_of(driver, "branch") == 1
-    rows = clockwork(driver, 20)  # 0.95 s: the first frame starts the clock
+        assert not page[name].is_displayed(), name
+    page["picture"].send_keys("b")
+    assert page.state("branch") == 1
+    rows = page.play(20)  # 0.95 s: the first frame starts the clock
     half_a_row = 0.011
     assert_allclose(s.time[rows], 0.05 * np.arange(20), atol=half_a_row)
-    assert clockwork(driver, 41)[-1] == 90 and not state_of(driver, "playing")
-    driver.execute_script("go(37)")
-    assert driver.find_element("id", "theta-text").text == "0.740 s"
-    spoken = driver.find_element("id", "theta").get_attribute("aria-valuetext")
+    assert page.play(41)[-1] == 90 and not page.state("playing")
+    page.run("go(37)")
+    assert page["theta-text"].text == "0.740 s"
+    spoken = page["theta"].get_attribute("aria-valuetext")
     assert spoken == "0.740 seconds"
-    require_shown(driver, s, 37, "omega_2", "alpha_4")
-    kinetic = embedded(text)["branches"]["1"]["energy"][37]
-    assert shown(driver, "energy") == approx([kinetic], rel=PRINTED)
+    page.require(s, 37, "omega_2", "alpha_4")
+    kinetic = compute_energies(RELEASED, s).kinetic[37]
+    assert page.numbers("energy") == approx([kinetic], rel=PRINTED)
 
 
 STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
@@ -231,66 +247,41 @@ OUTPUT = Motion(theta_4=Sweep(1.75, 2.95, 40), omega_4=4.0)
     ],
 )
 def test_another_command_is_the_axis_and_the_linkage_follows(
-    browse, motion, place, over, pace
+    show, motion, place, over, pace
 ):
     scene = crank_rocker(motion=motion, drive=CYLINDER)
-    driver, s = browse(animate.write_page(scene)), solve(scene)
-    driver.execute_script("go(20)")
-    assert driver.find_element("id", "theta-text").text == place
-    assert driver.find_element("id", "over").text == over
-    assert pace in driver.find_element("id", "pace").text
-    assert not driver.find_element("id", "branch").is_displayed()
+    page, s = show(scene), solve(scene)
+    page.run("go(20)")
+    assert page["theta-text"].text == place
+    assert page["over"].text == over
+    assert pace in page["pace"].text
+    assert not page["branch"].is_displayed()
     angles = ("theta_2", "theta_3", "theta_4")
-    require_shown(driver, s, 20, *angles, "drive_force", "condition")
+    page.require(s, 20, *angles, "drive_force", "condition")
     millimetres = 1000.0 * s.stroke[20]
-    assert shown(driver, "stroke") == approx([millimetres], rel=PRINTED)
-    assert state_of(driver, "plotted.over") == approx(s.at.places)
-    driver.find_element("id", "chart").click()  # its middle
-    assert abs(state_of(driver, "row") - 20) <= 2
-    closed, rows = np.flatnonzero(s.assembled), clockwork(driver, 400)
+    assert page.numbers("stroke") == approx([millimetres], rel=PRINTED)
+    assert page.state("plotted.over") == approx(s.at.places)
+    page["chart"].click()  # its middle
+    assert abs(page.state("row") - 20) <= 2
+    closed, rows = np.flatnonzero(s.assembled), page.play(400)
     assert (min(rows), max(rows)) == (closed[0], closed[-1])
     assert np.abs(np.diff(rows)).max() <= 1
-    driver.execute_script("play(false); go(0)")
-    assert driver.find_element("id", "status").is_displayed() == (not s.assembled[0])
+    page.run("play(false); go(0)")
+    assert page["status"].is_displayed() == (not s.assembled[0])
 
 
 @pytest.mark.slow
-def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(browse):
-    """A linkage of three bars that swing, on both branches.
-
-    Some of its positions do not assemble.
-    """
-    scene = thesis(Sweep(0.0, 2.0 * pi, 72))
-    driver = browse(animate.write_page(scene))
-    named = driver.find_element("id", "type").text
-    assert named == fourbar.classify(scene.linkage).name
-    moved = "pointMotion(i, POINTS.find(point => point[0] === 'G3'))"
-    rows = f"grid.map((_, i) => at(i) && [at(i).A, at(i).B, ...{moved}])"
-    for sign in (1, -1):
-        driver.execute_script("chooseBranch(arguments[0])", sign)
-        s = solve(replace(scene, motion=scene.motion.replace(branch=sign)))
-        drawn = state_of(driver, rows)
-        assert [row is not None for row in drawn] == s.assembled.tolist()
-        here = np.flatnonzero(s.assembled)
-        for k, (vectors, close) in enumerate(
-            ((s.A, ROUNDED), (s.B, ROUNDED), (s.v_G3, 1e-9), (s.a_G3, 1e-9))
-        ):
-            page = [drawn[i][k] for i in here]
-            assert_allclose(page, vectors[here], rtol=close, atol=close)
-
-
-@pytest.mark.slow
-def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path):
+def test_what_is_downloaded_is_the_scene_on_the_branch_shown(show, tmp_path):
     motion = Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
     scene = crank_rocker(title="a\\nb", motion=motion)
-    driver = browse(animate.write_page(scene))
+    page = show(scene)
     said = "at ω₂ = 10 rad/s the mechanism takes 0.03 s."
-    assert said in driver.find_element("id", "pace").text
-    assert loads(state_of(driver, "sceneFile()")).motion.branch == 1
-    driver.execute_script("chooseBranch(-1)")
+    assert said in page["pace"].text
+    assert loads(page.state("sceneFile()")).motion.branch == 1
+    page.run("chooseBranch(-1)")
     folder = {"behavior": "allow", "downloadPath": str(tmp_path)}
-    driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
-    driver.find_element("id", "download").click()
+    page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
+    page["download"].click()
     until = time.monotonic() + 10.0
     file = tmp_path / "linkage.toml"  # made empty at first
     while not (file.exists() and file.stat().st_size) and time.monotonic() < until:
@@ -301,14 +292,14 @@ def test_what_is_downloaded_is_the_scene_on_the_branch_shown(browse, tmp_path):
     assert saved.motion.angle.tolist() == scene.motion.angle.tolist()
 
 
-def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
+def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     spring = fourbar.Spring(Place(1, (0.1, -0.5)), Place(4, (0.08, 0.0)), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
     scene = crank_rocker(
         loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity())
     )
-    driver = browse(animate.write_page(scene))
-    driver.execute_script("go(20); toggle('show-v'); toggle('show-a')")
+    page = show(scene)
+    page.run("go(20); toggle('show-v'); toggle('show-a')")
     s = solve(scene)
     theta_3, theta_4 = s.theta_3[20], s.theta_4[20]
     script = f"""{POINTS}
@@ -316,7 +307,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
           e.getAttribute("class"),
           points(e).map(p => [(p[0] - view.x) / view.k, (view.y - p[1]) / view.k])]);
     """
-    acting = dict(driver.execute_script(script))
+    acting = dict(page.run(script))
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
     along = np.array([math.cos(theta_4), math.sin(theta_4)])
     end = s.B[20] + (0.08 - 0.22) * along
@@ -326,24 +317,26 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse):
     assert_allclose(tail, s.G3[20] + off, atol=1e-4)
     assert atan2(*(tip - tail)[::-1]) == approx(theta_3 + 0.5, abs=0.01)
     script = f'{POINTS}return [...document.querySelectorAll("#motion path.act")]'
-    arrows = np.array(driver.execute_script(script + ".map(points)"))
+    arrows = np.array(page.run(script + ".map(points)"))
     assert len(arrows) == 2 * 5
-    for arrow, expected in zip(arrows[[0, 5]], (s.v_A[20], s.a_A[20]), strict=True):
-        x, y = arrow[1] - arrow[0]
-        assert atan2(-y, x) == approx(atan2(*expected[::-1]), abs=0.001)
+    moving = (f"{of}_{point}" for of in "va" for point in ("A", "B", "G2", "G3", "G4"))
+    for (start, stop), name in zip(arrows, moving, strict=True):
+        x, y = stop - start
+        expected = getattr(s, name)[20]
+        assert atan2(-y, x) == approx(atan2(*expected[::-1]), abs=0.001), name
     names = (
         "['1', '3'].map(k => parts.label[k]).map(e => [e.textContent, e.style.display])"
     )
-    assert state_of(driver, names) == [["1", "none"], ["3", ""]]
-    driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
-    words = [text for text, _ in state_of(driver, names)]
+    assert page.state(names) == [["1", "none"], ["3", ""]]
+    page.run("toggle('show-dimensions'); toggle('show-acting')")
+    words = [text for text, _ in page.state(names)]
     assert words == ["1: 300 mm", "3: 250 mm"]
-    assert not driver.find_elements("css selector", "#acting *, #under .act")
+    assert not page.list("#acting *, #under .act")
 
 
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
 def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scaling):
-    driver, s = turning
+    page, s = turning
     choose = """
         const e = document.getElementById("arrow-scale");
         e.value = arguments[0];
@@ -352,17 +345,17 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
         const bar = document.querySelector("#force-scale line");
         return Number(bar.getAttribute("x2")) - Number(bar.getAttribute("x1"));
     """
-    length = driver.execute_script(choose, scaling)
+    length = page.run(choose, scaling)
     script = """
         const shaft = document.getElementById("arrow-" + arguments[0]);
         const n = k => Number(shaft.getAttribute(k));
         const tip = shaft.nextElementSibling.getAttribute("d").match(/M(\\S+) ([^L]+)/);
         return [Number(tip[1]) - n("x1"), n("y1") - Number(tip[2])];
     """
-    text = driver.find_element("css selector", "#force-scale text").text
+    (text,) = (one.text for one in page.list("#force-scale text"))
     scale = length / float(text.split()[0])
     for name in ("F12", "F32", "F43", "F14"):
-        drawn = np.array(driver.execute_script(script, name))
+        drawn = np.array(page.run(script, name))
         assert_allclose(drawn, getattr(s, name)[50] * scale, atol=PIXEL)
 
 
@@ -371,10 +364,8 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
     "width, scaling",
     [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
 )
-def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width, scaling):
-    driver = browse(
-        animate.write_page(thesis() if scaling == "position" else crank_rocker()), width
-    )
+def test_no_arrow_and_no_name_of_one_leaves_the_picture(show, width, scaling):
+    page = show(thesis() if scaling == "position" else crank_rocker(), width)
     script = """
         const choice = document.getElementById("arrow-scale");
         choice.value = arguments[0];
@@ -391,7 +382,7 @@ def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width, scaling):
         }
         return least;
     """
-    distances = driver.execute_script(script, scaling)
+    distances = page.run(script, scaling)
     assert (
         len(distances) > 30 and min(distances) > 15.0
     )  # its name stands beyond the tip
@@ -402,31 +393,29 @@ def test_keyboard_drives_it(turning):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 
-    driver, _ = turning
-    press = lambda *keys: ActionChains(driver).send_keys(*keys).perform()  # noqa: E731
+    page, _ = turning
+    press = lambda *keys: ActionChains(page.driver).send_keys(*keys).perform()  # noqa: E731
     press(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT, Keys.ARROW_RIGHT)
-    assert state_of(driver, "row") == 2
+    assert page.state("row") == 2
     press(Keys.SPACE)
-    assert state_of(driver, "playing")
+    assert page.state("playing")
     press(Keys.SPACE)
-    assert not state_of(driver, "playing")
+    assert not page.state("playing")
     press(Keys.HOME)
-    assert state_of(driver, "row") == 0
+    assert page.state("row") == 0
     press("b")
-    assert (
-        state_of(driver, "branch") == 1
-    )  # single letters act only on the picture in focus
-    driver.execute_script("document.getElementById('picture').focus()")
-    assert driver.find_element("id", "branch-key").is_displayed()
+    assert page.state("branch") == 1  # single letters act only on the picture in focus
+    page.run("document.getElementById('picture').focus()")
+    assert page["branch-key"].is_displayed()
     press("b", "f")
-    assert state_of(driver, "branch") == -1
-    assert not state_of(driver, "document.getElementById('show-forces').checked")
-    assert not driver.find_element("id", "arrow-F12").is_displayed()
+    assert page.state("branch") == -1
+    assert not page.state("document.getElementById('show-forces').checked")
+    assert not page["arrow-F12"].is_displayed()
     order = []
-    driver.execute_script("document.body.tabIndex = -1; document.body.focus()")
+    page.run("document.body.tabIndex = -1; document.body.focus()")
     for _ in range(6):
         press(Keys.TAB)
-        order.append(state_of(driver, "document.activeElement.id"))
+        order.append(page.state("document.activeElement.id"))
     assert order == [
         "",
         "picture",
@@ -439,17 +428,13 @@ def test_keyboard_drives_it(turning):
 
 @pytest.mark.slow
 def test_every_control_has_a_name(turning):
-    driver, _ = turning
-    controls = driver.find_elements("css selector", "button, select, input, [role=img]")
+    page, _ = turning
+    controls = page.list("button, select, input, [role=img]")
     assert len(controls) > 15
     for control in (c for c in controls if c.is_displayed()):
         assert control.accessible_name.strip(), control.get_attribute("id")
-    driver.execute_script("go(3)")
-    assert (
-        driver.find_element("id", "theta")
-        .get_attribute("aria-valuetext")
-        .endswith("degrees")
-    )
+    page.run("go(3)")
+    assert page["theta"].get_attribute("aria-valuetext").endswith("degrees")
 
 
 @pytest.mark.slow
@@ -457,18 +442,14 @@ def test_every_control_has_a_name(turning):
 @pytest.mark.parametrize(
     "scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis")
 )
-def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene, dark):
-    driver = browse(animate.write_page(scene), 360, dark=dark)
-    assert state_of(driver, "document.documentElement.scrollWidth") <= 360
+def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(show, scene, dark):
+    page = show(scene, 360, dark=dark)
+    assert page.state("document.documentElement.scrollWidth") <= 360
     assert (
-        state_of(
-            driver, "document.getElementById('picture').getBoundingClientRect().width"
-        )
+        page.state("document.getElementById('picture').getBoundingClientRect().width")
         > 300
     )
-    for control in driver.find_elements(
-        "css selector", "button, select, input[type=number], input[type=range]"
-    ):
+    for control in page.list("button, select, input[type=number], input[type=range]"):
         if control.is_displayed():
             assert control.size["height"] >= 40  # large enough for a finger
     script = """
@@ -488,13 +469,11 @@ def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene
             return [getComputedStyle(e).color, background(ground), text];
           });
     """
-    seen = driver.execute_script(script)
+    seen = page.run(script)
     assert len(seen) > 40
     for colour, ground, text in seen:
         assert contrast(colour, ground) >= 4.5, (text, colour, ground)  # WCAG AA
-    page = luminance(
-        state_of(driver, "getComputedStyle(document.body).backgroundColor")
-    )
+    page = luminance(page.state("getComputedStyle(document.body).backgroundColor"))
     assert page < 0.05 if dark else page > 0.9
 
 
@@ -535,34 +514,32 @@ CROWDED = (ROOT / "models" / "thesis.toml", ROOT / "models" / "crank_rocker.toml
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1024, 1440])
-def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(browse, width):
+def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(show, width):
     for path in (*GALLERY, *CROWDED):
-        driver = browse(animate.write_page(fourbar.load(path), vectors=True), width)
-        driver.execute_script("byId('show-dimensions').click()")
+        page = show(fourbar.load(path), width, vectors=True)
+        page.run("byId('show-dimensions').click()")
         for sixth in range(6):
-            driver.execute_script(f"go(Math.floor({sixth} * grid.length / 6))")
-            assert driver.execute_script(COVERED) == [], (path.stem, sixth)
-            shown = driver.execute_script(
-                "return wanted.map(one => one.element.style.display)"
-            )
+            page.run(f"go(Math.floor({sixth} * grid.length / 6))")
+            assert page.run(COVERED) == [], (path.stem, sixth)
+            shown = page.run("return wanted.map(one => one.element.style.display)")
             assert len(shown) > 10, (path.stem, sixth)
             assert "none" not in shown, (path.stem, sixth)
 
 
-def test_hostile_titles_do_nothing_but_appear(browse):
-    driver = browse(animate.write_page(replace(crank_rocker(), title=HOSTILE)))
-    assert "<script>alert(1)</script>" in driver.find_element("css selector", "h1").text
-    driver.find_element("id", "forward").click()
-    assert state_of(driver, "row") == 1
+def test_hostile_titles_do_nothing_but_appear(show):
+    page = show(replace(crank_rocker(), title=HOSTILE))
+    assert "<script>alert(1)</script>" in page.list("h1")[0].text
+    page["forward"].click()
+    assert page.state("row") == 1
 
 
-def test_a_picture_lies_along_its_bar(browse, tmp_path):
+def test_a_picture_lies_along_its_bar(show, tmp_path):
     picture = tmp_path / "bar.png"
     picture.write_bytes(PNG)
-    driver = browse(animate.write_page(crank_rocker(), {"output": picture}))
-    driver.execute_script("go(9)")
-    element = driver.find_element("id", "picture-4")
-    drawn = pins(driver)
+    page = show(crank_rocker(), {"output": picture})
+    page.run("go(9)")
+    element = page["picture-4"]
+    drawn = page.pins()
     length = np.hypot(*(drawn["B"] - drawn["O4"]))
     assert float(element.get_attribute("width")) == approx(length)
     turn = element.get_attribute("transform")
@@ -571,8 +548,8 @@ def test_a_picture_lies_along_its_bar(browse, tmp_path):
     assert away == approx(0, abs=1e-6)
 
 
-def test_with_reduced_motion_it_moves_twice_a_second(browse):
-    driver = browse(animate.write_page(crank_rocker()), still=True)
+def test_with_reduced_motion_it_moves_twice_a_second(show):
+    page = show(crank_rocker(), still=True)
     script = """
         window.requestAnimationFrame = () => 0;
         play(true);
@@ -585,19 +562,19 @@ def test_with_reduced_motion_it_moves_twice_a_second(browse):
         play(false);
         return seen.size;
     """
-    assert 4 <= driver.execute_script(script) <= 8  # 3 s
+    assert 4 <= page.run(script) <= 8  # 3 s
 
 
-def test_positions_alone_show_no_dynamics(browse):
+def test_positions_alone_show_no_dynamics(show):
     scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36)))
-    driver = browse(animate.write_page(scene))
-    assert not driver.find_element("id", "forces").is_displayed()
-    assert driver.find_element("id", "omega_3").text == "–"
-    driver.find_element("id", "forward").click()
-    assert shown(driver, "theta_2") == approx([10.0], abs=PRINTED_DEG)
+    page = show(scene)
+    assert not page["forces"].is_displayed()
+    assert page["omega_3"].text == "–"
+    page["forward"].click()
+    assert page.numbers("theta_2") == approx([10.0], abs=PRINTED_DEG)
 
 
-def test_it_says_why_a_position_has_no_forces(browse):
+def test_it_says_why_a_position_has_no_forces(show):
     """T3 of a parallelogram exists nowhere.
 
     On its input the drive has forces everywhere, and no remark is shown.
@@ -608,24 +585,22 @@ def test_it_says_why_a_position_has_no_forces(browse):
         (2, ""),
     ):
         scene = Scene(uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
-        status = browse(animate.write_page(scene)).find_element("id", "status")
+        status = show(scene).find_element("id", "status")
         assert (remark in status.text) and status.is_displayed() == bool(remark)
 
 
 @pytest.mark.slow
-def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
+def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(show):
     loose = (
         Tolerance("lengths.input", 5e-5),
         Tolerance("bars.coupler.mass", 0.001, True),
     )
     scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
-    driver = browse(animate.write_page(scene, units=units("N.mm")), 360)
+    page = show(scene, 360, units=units("N.mm"))
     study = fourbar.tolerances(scene, PAGE_SAMPLES)
-    driver.execute_script("go(20)")
+    page.run("go(20)")
     rows = {}
-    for row in driver.find_elements(
-        "css selector", "#spreads tbody tr, #shares tbody tr"
-    ):
+    for row in page.list("#spreads tbody tr, #shares tbody tr"):
         heading, *cells = row.find_elements("css selector", "th, td")
         rows[heading.text] = [number(cell.text.replace("±", "")) for cell in cells]
     names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
@@ -641,23 +616,23 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse):
     shares = study.spreads["torque"].shares[:, 20]
     shown_shares = [rows[tolerance.key][0] for tolerance in loose]
     assert shown_shares == approx(100 * shares / shares.sum(), abs=0.51)
-    assert state_of(driver, "document.documentElement.scrollWidth") <= 360
-    box = driver.find_element("css selector", "#bands .band").rect
+    assert page.state("document.documentElement.scrollWidth") <= 360
+    box = page.list("#bands .band")[0].rect
     assert box["height"] > 40 and box["width"] > 200
-    driver.execute_script("chooseBranch(-1)")
-    assert not driver.find_element("id", "spreads").is_displayed()
-    note = driver.find_element("id", "tolerance-note").text
+    page.run("chooseBranch(-1)")
+    assert not page["spreads"].is_displayed()
+    note = page["tolerance-note"].text
     assert "belong to the branch of the scene" in note
 
 
 @pytest.mark.slow
-def test_a_scene_without_bands_says_why_or_shows_nothing(browse):
+def test_a_scene_without_bands_says_why_or_shows_nothing(show):
     loose = (Tolerance("lengths.input", 5e-5),)
-    driver = browse(animate.write_page(replace(RELEASED, tolerances=loose)))
-    assert "free motion" in driver.find_element("id", "tolerance-note").text
-    assert not driver.find_element("id", "bands").is_displayed()
-    driver = browse(animate.write_page(crank_rocker()))
-    assert not driver.find_element("id", "tolerances").is_displayed()
+    page = show(replace(RELEASED, tolerances=loose))
+    assert "free motion" in page["tolerance-note"].text
+    assert not page["bands"].is_displayed()
+    page = show(crank_rocker())
+    assert not page["tolerances"].is_displayed()
 
 
 @pytest.mark.slow
@@ -669,14 +644,14 @@ def test_a_scene_without_bands_says_why_or_shows_nothing(browse):
     ],
 )
 def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
-    browse, names, head, mass, length
+    show, names, head, mass, length
 ):
     """`mass`, `length`: the units of the heads in kg and m."""
     scene = crank_rocker()
-    driver = browse(animate.write_page(scene, units=units(names)))
-    assert not driver.find_element("id", "bars").is_displayed()
-    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    table = driver.find_element("id", "bars")
+    page = show(scene, units=units(names))
+    assert not page["bars"].is_displayed()
+    page.print()
+    table = page["bars"]
     assert head in table.text
     drawn = 0.001 if names == "mm N" else length
     rows = table.find_elements("css selector", "tbody tr")
@@ -711,26 +686,27 @@ return least;
 
 
 @pytest.mark.slow
-def test_a_printed_page_is_one_sheet_with_lengths_and_the_chart_s_name(browse):
-    driver = browse(animate.write_page(crank_rocker()), dark=True)
-    printed = driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+def test_a_printed_page_is_one_sheet_with_lengths_and_the_chart_s_name(show):
+    page = show(crank_rocker(), dark=True)
+    options = {"printBackground": True}
+    printed = page.driver.execute_cdp_cmd("Page.printToPDF", options)
     pdf = base64.b64decode(printed["data"])
     assert pdf.count(b"/Type /Page\n") == 1
 
-    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    driver.execute_script("window.dispatchEvent(new Event('beforeprint'))")
-    labels = driver.find_element("id", "labels").text
+    page.print()
+    page.run("window.dispatchEvent(new Event('beforeprint'))")
+    labels = page["labels"].text
     for text in ("1: 300 mm", "2: 100 mm", "3: 250 mm", "4: 220 mm"):
         assert text in labels
-    assert driver.find_element("id", "plotted").text == "torque on bar 2, N m"
+    assert page["plotted"].text == "torque on bar 2, N m"
     for bar in (2, 3, 4):  # no length stands on its bar, at no position
         for row in (60, 140, 300):
-            clear = driver.execute_script(CLEAR_OF_ITS_BAR, bar, row)
+            clear = page.run(CLEAR_OF_ITS_BAR, bar, row)
             assert clear > 3.0, (bar, row)
     background = "getComputedStyle(document.body).backgroundColor"
-    assert state_of(driver, background) == "rgb(255, 255, 255)"
+    assert page.state(background) == "rgb(255, 255, 255)"
     hidden = ("play", "show-labels", "quantity", "download")
-    assert not any(driver.find_element("id", name).is_displayed() for name in hidden)
+    assert not any(page[name].is_displayed() for name in hidden)
 
-    driver.execute_script("window.dispatchEvent(new Event('afterprint'))")
-    assert "300 mm" not in driver.find_element("id", "labels").text
+    page.run("window.dispatchEvent(new Event('afterprint'))")
+    assert "300 mm" not in page["labels"].text

@@ -91,19 +91,6 @@ def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
     assert "time" not in str(solve(growing).to_csv())
 
 
-@pytest.mark.slow
-def test_the_table_names_its_units(capsys):
-    lines = show(capsys, "--units", "mm kN N.mm", "--table", "--all").splitlines()
-    heading = next(n for n, line in enumerate(lines) if line.startswith(" theta_2"))
-    named = (
-        "deg N mm W kN kN kN kN deg deg rad/s rad/s rad/s^2 rad/s^2 of T s kN kN kN"
-        " N mm deg mm mm mm mm"
-    )
-    assert lines[heading + 1].split() == named.split()
-    torque = [float(line.split()[1]) for line in lines[heading + 3 :]]
-    assert torque == approx(list(1000.0 * solve(load(MODEL)).torque), rel=1e-4)
-
-
 REFUSED = read_rows("""
 furlong | unit
 mm in | unit
@@ -129,16 +116,6 @@ def test_units_are_read_as_people_write_them():
     assert units("Imperial") == units("imperial")
     assert not units("si")
     assert units("in lb lbf")["N"][0] == "lbf"
-
-
-@pytest.mark.slow
-def test_plots_say_theirs():
-    from fourbar.show.plot.figures import draw_figure
-
-    scene, imperial = crank_rocker(), units("imperial")
-    for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
-        axes = draw_figure(scene, name, units=imperial).figure.subfigs[0].axes[0]
-        assert axes.get_ylabel() == label
 
 
 @pytest.mark.parametrize(
