@@ -72,21 +72,18 @@ def write_type(
     mobility = classify(linkage)
     relation = {1.0: "<", -1.0: ">", 0.0: "="}[float(np.sign(mobility.surplus))]
     outer = min(linkage.lengths) + max(linkage.lengths)
-    factor, unit = (
-        (1.0, "") if units is None else choose_unit(max(linkage.lengths), "m", units)
-    )
+    factor, unit = 1.0, ""
+    if units is not None:
+        factor, unit = choose_unit(max(linkage.lengths), "m", units)
 
     def write(length: float) -> str:
         return f"{factor * length:.6g} {unit}".rstrip()
 
+    inner = sum(linkage.lengths) - outer
+    turning = ", ".join(BAR_NAMES[number] for number in mobility.turning)
     yield mobility.name
-    yield (
-        f"s + l = {write(outer)} {relation} p + q ="
-        f" {write(sum(linkage.lengths) - outer)}"
-    )
-    yield "bars that turn fully: " + (
-        ", ".join(BAR_NAMES[number] for number in mobility.turning) or "none"
-    )
+    yield f"s + l = {write(outer)} {relation} p + q = {write(inner)}"
+    yield f"bars that turn fully: {turning or 'none'}"
     if mobility.barker is not None:  # a structure does not move
         yield from _write_mobility(linkage, write, everything)
 
@@ -144,23 +141,16 @@ def _write_mobility(
         names = "".join(f"{name:>10}" for name in ("theta_2", "theta_3", "theta_4"))
         yield f"{'limit positions (deg)':<34}{names}  branch"
     for bar, limit in limits:
-        in_line = ", ".join(
-            BAR_NAMES[number] for number in MOVING_BARS if number != bar
-        )
-        what = (
-            f"  {BAR_NAMES[bar]}: {in_line}"
-            f" {'stretched' if limit.stretched else 'folded'}"
-        )
+        others = ", ".join(BAR_NAMES[other] for other in MOVING_BARS if other != bar)
+        how = "stretched" if limit.stretched else "folded"
+        what = f"  {BAR_NAMES[bar]}: {others} {how}"
         angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
         yield f"{what:<34}{angles}  {BRANCH_NAMES.get(limit.branch, 'both')}"
     for bar in MOVING_BARS:
         if turns_fully(linkage, bar):
             yield from _explain_turning(linkage, bar, write)
     if points := change_points(linkage):
-        yield (
-            "change points: theta_2 ="
-            f" {' and '.join(_write_angle(point) for point in points)}"
-        )
+        yield f"change points: theta_2 = {' and '.join(map(_write_angle, points))}"
     transmission = transmission_extremes(linkage)
     yield (
         f"angle between coupler and output: {_write_angle(transmission.least)} "
@@ -230,9 +220,7 @@ def find_largest(derivatives: Sensitivity, quantity: str) -> float:
     """Return the largest magnitude of a quantity; NaN if no position has a value."""
     value = derivatives.value(quantity)
     size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-    if np.isfinite(size).any():
-        return float(np.nanmax(size))
-    return math.nan
+    return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
 
 
 def write_sensitivity(derivatives: Sensitivity, width: int | None = None) -> str:
@@ -248,21 +236,16 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None = None) -> str
         f"largest change over the positions {derivatives.describe_steps()};"
         " pin forces by their magnitude"
     ]
-    for name in names:
-        angles = [
-            row for row in influences[name] if derivatives.keys[row.key].unit == "rad"
-        ]
-        most = [
-            rows[0]
-            for rows in ([row for row in influences[name] if row not in angles], angles)
-            if rows
-        ]
+    for name, ranked in influences.items():
+        most = dict[bool, str]()
+        for row in ranked:
+            place = f"(at theta_2 = {math.degrees(row.theta_2):.6g} deg)"
+            most.setdefault(
+                derivatives.keys[row.key].unit == "rad", f"{row.key} {place}"
+            )
         if most:
-            parts = [
-                f"{row.key} (at theta_2 = {math.degrees(row.theta_2):.6g} deg)"
-                for row in most
-            ]
-            lines.append(f"{name} depends most on " + ", of the angles on ".join(parts))
+            named = ", of the angles on ".join(most[key] for key in sorted(most))
+            lines.append(f"{name} depends most on {named}")
     without = [status for status in derivatives.status if status != "ok"]
     if without:
         counts = ", ".join(
@@ -292,14 +275,13 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
 
     The rank follows from their largest share of a largest value.
     """
-    largest_shares: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for name in names:
         size = find_largest(derivatives, name)
         for row in derivatives.influences(name):
             share = abs(row.change) / size if size > 0.0 else 0.0
-            before = largest_shares.get(row.key, 0.0)
-            largest_shares[row.key] = max(before, share)
-    return sorted(largest_shares, key=lambda key: -largest_shares[key])
+            shares[row.key] = max(shares.get(row.key, 0.0), share)
+    return sorted(shares, key=lambda key: -shares[key])
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
@@ -461,13 +443,8 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]
-    return [*lines, *_list_notes(rest, units)]
-
-
-def _list_notes(rest: Equilibria, units: Conversion) -> list[str]:
-    """List where gas springs of the scene are beyond their stroke."""
-    scene = rest.positions.scene
-    return list_spring_notes(scene, rest.positions, units)
+    positions = rest.positions
+    return [*lines, *list_spring_notes(positions.scene, positions, units)]
 
 
 def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]:
@@ -486,11 +463,13 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     else:
         columns[f"from ({unit})"] = write_cells(factor * low)
         columns[f"to ({unit})"] = write_cells(factor * high)
-    columns["released"] = []
     undecided = np.isin(positions.status_code, _WITHOUT_MOVE)
-    moves = zip(positions.status, undecided, rest.moves, strict=True)
-    for status, is_undecided, move in moves:
-        columns["released"].append(status if is_undecided else _MOVES[move])
+    columns["released"] = [
+        status if is_undecided else _MOVES[move]
+        for status, is_undecided, move in zip(
+            positions.status, undecided, rest.moves, strict=True
+        )
+    ]
     rows = list(zip(*columns.values(), strict=True))
     every = math.ceil(len(positions) / MOST_ROWS_PRINTED)
 
@@ -526,12 +505,10 @@ def _write_equilibrium(equilibrium: Equilibrium, units: Conversion) -> list[str]
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
     first, last = ends
     apart = math.remainder(last.theta_2 - first.theta_2, TURN)
-    if first.branch == last.branch and abs(apart) < _SAME_PLACE:
-        return "everywhere on its circuit"
     text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"
-    if first.branch == last.branch:
-        return text
-    return f"{text} through a limit"
+    if first.branch != last.branch:
+        return f"{text} through a limit"
+    return "everywhere on its circuit" if abs(apart) < _SAME_PLACE else text
 
 
 _SAME_PLACE = 1e-9
@@ -555,7 +532,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
         indifferent=rest.indifferent,
         held=rest.held,
         not_decided=rest.not_decided,
-        notes=_list_notes(rest, COMMON),
+        notes=list_spring_notes(positions.scene, positions, COMMON),
         positions={
             "drive_bar": positions.drive_bar,
             "status": positions.status,

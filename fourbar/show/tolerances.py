@@ -53,22 +53,14 @@ def list_shown_parts(spreads: Tolerances) -> list[str]:
     If the scene states no speed, or nothing loads its drive at any position, angles
     replace torque and forces.
     """
-    points = [
-        f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"
-    ]
-    drive = [
+    parts = [
         name
         for name in (COUPLE.value, LINE.value)
         if name in spreads.spreads and np.any(spreads.spreads[name].nominal)
     ]
-    return [
-        *(
-            [*drive, *(f"|{name}|" for name in PIN_FORCES)]
-            if drive
-            else ["theta_3", "theta_4"]
-        ),
-        *points,
-    ]
+    parts += [f"|{name}|" for name in PIN_FORCES] if parts else ["theta_3", "theta_4"]
+    points = [point.name for point in spreads.scene.points]
+    return [*parts, *(f"{name}_{letter}" for name in points for letter in "xy")]
 
 
 def find_part_unit(part: str) -> str:
@@ -125,39 +117,20 @@ def _tabulate_parts(
     angle_unit, of_angle = find_unit_in("rad", units)
     for part, worst in shown.items():
         spread = spreads.spreads[part]
-        columns = (
-            spread.nominal,
-            spread.deviation,
-            spread.low,
-            spread.high,
-            spread.least,
-            spread.greatest,
-        )
+        names = ("nominal", "deviation", "low", "high", "least", "greatest")
+        columns = np.array([getattr(spread, name) for name in names])
         unit, factor = find_unit_in(find_part_unit(part), units)
-        largest = max(np.nanmax(np.abs(column), initial=0.0) for column in columns)
-        at_worst = np.array([column[worst] for column in columns])
-        cleaned = factor * drop_rounding(at_worst, largest)
-        numbers = [write_cell(number, f".{digits}g") for number in cleaned.tolist()]
-        numbers[1] = write_cell(float(cleaned[1]), ".3g")
+        largest = np.nanmax(np.abs(columns), initial=0.0)
+        cleaned = (factor * drop_rounding(columns[:, worst], largest)).tolist()
+        numbers = [write_cell(number, f".{digits}g") for number in cleaned]
+        numbers[1] = write_cell(cleaned[1], ".3g")
         angle = write_cell(of_angle * spreads.theta_2[worst], f".{digits}g")
-        rows.append(
-            [part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"]
-        )
-    heads = (
-        "",
-        "\nunit",
-        f"theta_2\n{angle_unit}",
-        "\nnominal",
-        "\nsigma",
-        f"\n{BAND_PERCENTILES[0]:g} %",
-        f"\n{BAND_PERCENTILES[1]:g} %",
-    )
-    return make_plain_table(
-        (*heads, "\nleast", "\ngreatest", "worst\n+-"),
-        rows,
-        left=("",),
-        gap=0,
-    )
+        most = f"{factor * spread.worst[worst]:.3g}"
+        rows.append([part, unit, angle, *numbers, most])
+    band = [f"\n{percentile:g} %" for percentile in BAND_PERCENTILES]
+    heads = ["", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", *band]
+    heads += ["\nleast", "\ngreatest", "worst\n+-"]
+    return make_plain_table(heads, rows, left=("",), gap=0)
 
 
 def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
@@ -165,35 +138,27 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
 
     The last lines say where first order and samples part.
     """
-    n = len(spreads.theta_2)
-    count = f"{len(spreads.scene.tolerances)} tolerance" + (
-        "s" if len(spreads.scene.tolerances) > 1 else ""
+    samples, count = spreads.samples, len(spreads.scene.tolerances)
+    tolerance = f"{count} tolerance{'s' if count > 1 else ''}"
+    drawn = f"{samples} samples ({spreads.describe_seed()})"
+    lines = [f"{tolerance}, {drawn}, {len(spreads.theta_2)} positions"]
+    for lost, why in (
+        (
+            spreads.invalid,
+            "have an impossible dimension, such as a length below 0",
+        ),
+        (
+            spreads.apart,
+            "do not assemble at some position at which the nominal linkage does",
+        ),
+    ):
+        if lost:
+            share = 100.0 * lost / samples
+            lines.append(f"{lost} of {samples} samples ({share:.3g} %) {why}")
+    parted = (
+        describe_parted(spreads, part, units) for part in list_shown_parts(spreads)
     )
-    drawn = f"{spreads.samples} samples ({spreads.describe_seed()})"
-    lines = [f"{count}, {drawn}, {n} positions"]
-    if spreads.invalid:
-        lines.append(
-            f"{_write_share_of_members(spreads.invalid, spreads)} have an impossible"
-            " dimension, such as a length below 0"
-        )
-    if spreads.apart:
-        lines.append(
-            f"{_write_share_of_members(spreads.apart, spreads)} do not assemble at some"
-            " position at which the nominal linkage does"
-        )
-    lines += [
-        line
-        for part in list_shown_parts(spreads)
-        if (line := describe_parted(spreads, part, units))
-    ]
-    return lines
-
-
-def _write_share_of_members(count: int, spreads: Tolerances) -> str:
-    return (
-        f"{count} of {spreads.samples} samples"
-        f" ({100.0 * count / spreads.samples:.3g} %)"
-    )
+    return [*lines, *filter(None, parted)]
 
 
 def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES) -> str:
@@ -251,9 +216,8 @@ def collect_tolerances(
         motion = scene.motion.replace(angle=np.array(places))
         positions = replace(scene, motion=motion)
     shown: AbstractContextManager[Callable[[float], None] | None]
-    if progress is not None or scene.motion.free is not None:
-        shown = nullcontext(progress)
-    else:
+    shown = nullcontext(progress)
+    if progress is None and scene.motion.free is None:
         shown = show_running("the samples of the tolerances are solved")
     try:
         with shown as report:
@@ -272,19 +236,16 @@ def collect_tolerances(
     parts: dict[str, Any] = {}
     for part in list_shown_parts(spreads):
         spread = spreads.spreads[part]
-        ends = {
-            name: getattr(spread, name) - spread.nominal
-            for name in ("low", "high", "least", "greatest")
-        }
-        away = {**ends, "worst": spread.worst, "deviation": spread.deviation}
         with np.errstate(all="ignore"):
             shares = spread.shares / spread.shares.sum(axis=0)
-        parts[part] = {
-            "unit": find_part_unit(part),
-            "nominal": short(spread.nominal, 9),
-            **{name: short(values, 4) for name, values in away.items()},
-            "shares": [short(share, 3) for share in shares],
-        }
+        entry: dict[str, Any] = {"unit": find_part_unit(part)}
+        entry["nominal"] = short(spread.nominal, 9)
+        for name in ("low", "high", "least", "greatest"):
+            entry[name] = short(getattr(spread, name) - spread.nominal, 4)
+        entry["worst"] = short(spread.worst, 4)
+        entry["deviation"] = short(spread.deviation, 4)
+        entry["shares"] = [short(share, 3) for share in shares]
+        parts[part] = entry
     return {
         "lines": _describe_counts(spreads),
         "keys": [tolerance.key for tolerance in scene.tolerances],

@@ -20,7 +20,6 @@ from fourbar.show.plot.style import (
     Drawing,
     apply_style,
     format_of,
-    largest_magnitude,
     set_degree_ticks,
     shorten_text,
 )
@@ -89,14 +88,10 @@ def draw_tolerances(
             " samples; thin: least and greatest sampled; dashed: first-order worst"
             " case."
         )
-        lines = [
-            caption,
-            *(line for part in parts if (line := describe_parted(spreads, part))),
-        ]
-        figure.supxlabel(
-            "\n".join(textwrap.fill(line, 52 * columns) for line in lines),
-            **CAPTION_STYLE,
-        )
+        parted = (describe_parted(spreads, part) for part in parts)
+        lines = [caption, *filter(None, parted)]
+        text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
+        figure.supxlabel(text, **CAPTION_STYLE)
         Drawing(figure).save(path)
 
 
@@ -112,31 +107,20 @@ def _lay_out_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> 
 def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
     spread = spreads.spreads[part]
     over = _lay_out_positions(axes, spreads, units)
-    low = spread.low - spread.nominal
-    high = spread.high - spread.nominal
-    least = spread.least - spread.nominal
-    greatest = spread.greatest - spread.nominal
-    sizes = np.abs(np.concatenate([low, high, least, greatest, spread.worst]))
+    ends = np.array([spread.low, spread.high, spread.least, spread.greatest])
+    lines = np.concatenate([ends - spread.nominal, [spread.worst, -spread.worst]])
+    sizes = np.abs(lines[:5])
     sizes = sizes[np.isfinite(sizes)]
-    most = 0.0
-    if sizes.size:
-        most = 1.1 * float(np.percentile(sizes, _OFF_SCALE))
+    most = 1.1 * float(np.percentile(sizes, _OFF_SCALE)) if sizes.size else 0.0
     factor, unit = choose_unit(most, find_part_unit(part), units)
+    low, high, least, greatest, *worst = factor * lines
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
-    axes.fill_between(
-        over,
-        factor * low,
-        factor * high,
-        color=colour,
-        alpha=0.35,
-        lw=0.0,
-    )
+    axes.fill_between(over, low, high, color=colour, alpha=0.35, lw=0.0)
     for line in (least, greatest):
-        axes.plot(over, factor * line, color=colour, lw=0.7)
-    for sign in (1.0, -1.0):
-        worst = sign * factor * spread.worst
-        axes.plot(over, worst, color=INK, lw=0.9, ls=(0, (4, 2)))
-    if sizes.size and largest_magnitude(sizes) > 2.0 * most > 0.0:
+        axes.plot(over, line, color=colour, lw=0.7)
+    for line in worst:
+        axes.plot(over, line, color=INK, lw=0.9, ls=(0, (4, 2)))
+    if sizes.max(initial=0.0) > 2.0 * most > 0.0:
         axes.set_ylim(-factor * most, factor * most)
     axes.axhline(0.0, color=INK, lw=0.6)
     axes.set(ylabel=f"deviation ({unit})", title=part)
@@ -167,12 +151,8 @@ def _draw_shares(
         title=f"{part}: from which dimension",
     )
     # below the axis and its name
-    below = offset_copy(
-        axes.transAxes,
-        axes.get_figure(root=True),
-        y=-_BELOW,
-        units="points",
-    )
+    figure = axes.get_figure(root=True)
+    below = offset_copy(axes.transAxes, figure, y=-_BELOW, units="points")
     axes.legend(
         loc="upper left",
         bbox_to_anchor=(0.0, 0.0),
