@@ -44,7 +44,7 @@ long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
 
 long-kills:
-	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py tests/whole/test_kills_of_writers.py \
+	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py \
 		tests/whole/test_ending.py
 	MUTATIONS=1000 $(BIN)/python -m pytest tests/whole/test_surroundings.py
 long-package:
