@@ -100,7 +100,7 @@ JUDGED_BY = {
     "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
     "validation/robots/test_command.py": "validation/robots: options",
     "validation/published/test_published.py": (
-        "validation/published: comparison figures program textbook thesis thirteen"
+        "validation/published: comparison figures textbook thesis thirteen"
     ),
     "validation/regression/test_regression.py": (
         "validation/regression: accept engines history record render rules scenes"

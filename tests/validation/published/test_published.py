@@ -31,23 +31,19 @@ from fourbar_validation.published.figures import (
     compare_figure,
     read_printed,
 )
-from fourbar_validation.published.program import (
-    BAR_LENGTHS,
-    ERRATA_IN_ORDER,
-    THETA_1,
-    THETA_2,
-    ProgramErrors,
-    bound_round_off,
-    climb_ladder,
-    compute_right_unknowns,
-    compute_thesis_program,
-    make_equations,
-    make_model_scene,
-)
 from fourbar_validation.published.textbook import (
     TEXTBOOK_FOLDER,
     compare_textbooks,
     list_answers,
+)
+from fourbar_validation.published.thesis import (
+    BAR_LENGTHS,
+    LADDER,
+    THETA_1,
+    THETA_2,
+    ThesisProgram,
+    compute_right_unknowns,
+    make_model_scene,
 )
 from tests.support import scenes
 
@@ -61,7 +57,7 @@ PRINTED_GAP = 20.0 * np.radians(0.5e-5) + 55.0 * np.radians(0.5e-6)
 """cm; theta_4 is printed to five decimals of a degree at least, theta_3 to six: half a
 unit of each, by its bar.
 """
-LADDER = {
+LISTED_UNKNOWNS = {
     "T4": """309.30935923198564 309.330779939797 309.313000742774 309.304477356844
              309.002005400392 308.804407126702 308.8044071267012 308.80440716278196""",
     "F12x": """7.033117757022 7.033839565011 161.418472567466 161.418320162565
@@ -77,21 +73,20 @@ def list_all():
 
 
 def test_the_published_torque_error_by_error():
-    steps = zip(climb_ladder(), ERRATA_IN_ORDER, strict=True)
-    for number, ((_, x), (_, *step)) in enumerate(steps):
-        for name, listed in LADDER.items():
-            for figure in listed.split()[number : number + 1]:
-                allowed = LISTED + bound_round_off(*step)[name]
-                assert abs(x[name] - float(figure)) <= allowed
-    assert number + 1 == len(LADDER["T4"].split())
+    assert len(LADDER) + 1 == len(LISTED_UNKNOWNS["T4"].split())
+    for name, listed in LISTED_UNKNOWNS.items():
+        for step, figure in enumerate(listed.split()):
+            program = ThesisProgram(LADDER[:step])
+            allowed = LISTED + program.bound_round_off()[name]
+            assert abs(program.unknowns()[name] - float(figure)) <= allowed
 
 
 def test_the_thesis_without_its_errors_is_ours():
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
-    right, (_, program) = compute_right_unknowns(), climb_ladder()[0]
-    apart = bound_round_off(ProgramErrors())
-    assert program.keys() == right.keys()
-    for name, unknown in program.items():
+    right, program = compute_right_unknowns(), ThesisProgram()
+    apart = program.bound_round_off()
+    assert apart.keys() == right.keys()
+    for name, unknown in program.unknowns().items():
         assert unknown == pytest.approx(right[name], rel=0.0, abs=apart[name])
 
 
@@ -100,7 +95,7 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise():
 
     The bound is not idle either.
     """
-    matrix, sides = make_equations(ProgramErrors())
+    matrix, sides = ThesisProgram().equations
     with mpmath.workdps(50):
         system = (mpmath.matrix(numbers.tolist()) for numbers in (matrix, sides))
         exact = [float(x) for x in mpmath.lu_solve(*system)]
@@ -112,7 +107,7 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise():
             for x in (matrix[rows], sides[rows])
         )
         worst = np.maximum(worst, np.abs(np.linalg.solve(typed, right) - exact))
-    ratio = worst / list(bound_round_off(ProgramErrors()).values())
+    ratio = worst / list(ThesisProgram().bound_round_off().values())
     assert ratio.min() > 0.01 and ratio.max() < 1.0
 
 
@@ -217,8 +212,7 @@ def solve_as_printed(sides, arms):
 
 def test_torques_that_the_errata_state():
     def program(*made):
-        errors = ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5)))
-        return compute_thesis_program(errors)["T4"]
+        return ThesisProgram([*map(str, made)]).unknowns()["T4"]
 
     right = program()
     k, matrix = (
@@ -250,7 +244,7 @@ def test_torques_that_the_errata_state():
         (13, f"{hand(matrix):.6f}"),
     ):
         assert words in ERRATA[str(erratum)].effect
-    last = float(LADDER["T4"].split()[-1])
+    last = float(LISTED_UNKNOWNS["T4"].split()[-1])
     assert f"{hand(k, 'k3_5', 'k4x'):.4f}" == f"{last:.4f}"
 
 

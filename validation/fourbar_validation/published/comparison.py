@@ -16,13 +16,16 @@ from fourbar_validation.places import HARNESS_PROGRAM
 from fourbar_validation.published.figures import (
     ERRATA,
     FIGURE_VERDICTS,
-    POSITIONS,
     PublishedFigure,
     read_printed,
 )
-from fourbar_validation.published.program import ERRATA_IN_ORDER, climb_ladder
 from fourbar_validation.published.textbook import compare_textbooks, compute_worksheet
-from fourbar_validation.published.thesis import ComputedTable, compute_tables
+from fourbar_validation.published.thesis import (
+    LADDER,
+    ThesisProgram,
+    compute_tables,
+    find_noise,
+)
 from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
 
@@ -34,14 +37,17 @@ def list_figures() -> Iterator[PublishedFigure]:
 
     The sources are the thesis, the Maple worksheet, and public test cases.
     """
-    printed = read_printed()
-    computed = compute_tables(printed[POSITIONS])
-    computed["Maple"] = ComputedTable(compute_worksheet())
-    for table, figures in printed.items():
-        ours, made, noise = computed[table]
+    noise = find_noise()
+    for table, figures in read_printed().items():
         for name, (text, errata) in figures.items():
-            numbers = ours[name], errata, made.get(name), noise.get(name, 0.0)
-            yield PublishedFigure(table, name, text, *numbers)
+            ours, made = (
+                compute_worksheet() if table == "Maple" else compute_tables(ids)[table]
+                for ids in ((), errata)
+            )
+            apart = noise.get(table, {}).get(name, 0.0)
+            yield PublishedFigure(
+                table, name, text, ours[name], errata, made[name], apart
+            )
     yield from compare_textbooks()
 
 
@@ -61,8 +67,7 @@ def explain_difference(figure: PublishedFigure) -> str:
     """Explain in a phrase why a figure differs."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return "no erratum explains this"
-    steps = tuple(name for name, _, _ in ERRATA_IN_ORDER if name in ERRATA)
-    if len(figure.errata) > 3 and set(figure.errata) <= set(steps):
+    if len(figure.errata) > 3 and set(figure.errata) <= set(LADDER):
         text = "#" + " #".join(figure.errata) + ", the steps of the table above"
     else:
         text = "; ".join(f"#{name} {ERRATA[name].title}" for name in figure.errata)
@@ -86,39 +91,31 @@ def compare_figures(show_all: bool) -> int:
 
     console = Console(highlight=False, markup=False)
     page = min(PAGE_WIDTH, console.width)
-    counts: Counter[tuple[str, str]] = Counter()
-    met: Counter[str] = Counter()
-    unexplained = []
-    reproduced = 0
     which = "" if show_all else " that differ from ours, and why"
     console.print(f"Printed figures{which}:")
-    for figure in list_figures():
+    figures = list(list_figures())
+    differing = [figure for figure in figures if figure.verdict() == "differs"]
+    for figure in figures if show_all else differing:
         verdict = figure.verdict()
-        counts[figure.table, verdict] += 1
         differs = verdict == "differs"
-        if not (differs or show_all):
-            continue
         ours = f"ours {figure.ours:.10g}" + f", {verdict}" * (not differs)
         line = f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
         click.echo("\n".join(wrap_line(line, console.width)))
         if differs:
-            met.update(figure.errata)
-            reproduced += figure.reproduced()
-            if not is_explained(figure):
-                unexplained.append(figure)
             why = explain_difference(figure)
             click.echo(click.wrap_text(why, page, "    ", "    "))
-    title = "Printed figures against ours"
-    total = FoldedTable("table", *FIGURE_VERDICTS, title=title)
-    tables = {table: None for table, _ in counts}
-    for table in tables:
-        of_table = [counts[table, verdict] for verdict in FIGURE_VERDICTS]
-        total.add_row(table, *map(str, of_table))
+    met = {erratum for figure in differing for erratum in figure.errata}
+    unexplained = [figure for figure in differing if not is_explained(figure)]
+    reproduced = sum(figure.reproduced() for figure in differing)
+    counts = Counter((figure.table, figure.verdict()) for figure in figures)
+    total = FoldedTable("table", *FIGURE_VERDICTS, title="Printed figures against ours")
+    tables = dict.fromkeys(figure.table for figure in figures)
+    rows = [[counts[table, one] for one in FIGURE_VERDICTS] for table in tables]
+    for table, row in zip(tables, rows, strict=True):
+        total.add_row(table, *map(str, row))
     total.add_section()
-    sums = [
-        sum(counts[table, verdict] for table in tables) for verdict in FIGURE_VERDICTS
-    ]
-    total.add_row(f"{sum(sums)} figures", *map(str, sums))
+    sums = [sum(column) for column in zip(*rows, strict=True)] or [0, 0, 0]
+    total.add_row(f"{len(figures)} figures", *map(str, sums))
     console.print(total)
     misprints = sums[2] - reproduced - len(unexplained)
     summary = (
@@ -129,7 +126,7 @@ def compare_figures(show_all: bool) -> int:
     click.echo(click.wrap_text(summary, page) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
     for name, erratum in ERRATA.items():
-        if met[name]:
+        if name in met:
             text = (
                 f"#{name} {erratum.where}: printed {erratum.printed}. Right:"
                 f" {erratum.right}. "
@@ -138,9 +135,9 @@ def compare_figures(show_all: bool) -> int:
             click.echo(click.wrap_text(text, page, "", "    "))
     if unexplained:
         console.print(f"No erratum explains {len(unexplained)} of the differences.")
-    if not sum(sums):
+    if not figures:
         console.print("Nothing was compared: there is no figure.")
-    if unexplained or not sum(sums):
+    if unexplained or not figures:
         return FAILED
     return HOLDS
 
@@ -169,7 +166,8 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
 
     names = ("T4", "F12x", "F12y")
     rows: list[tuple[str, ...]] = []
-    for erratum, x in climb_ladder():
+    for step, erratum in enumerate(("", *LADDER)):
+        x = ThesisProgram(LADDER[:step]).unknowns()
         did = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
         right = "the answer of this project"
         if erratum in ERRATA:

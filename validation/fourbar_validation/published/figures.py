@@ -77,7 +77,7 @@ class PublishedFigure(NamedTuple):
     they are made.
     """
     made: float | None = None
-    """Ours after these errata; None where they cannot be computed."""
+    """Ours after those of these errata that can be computed."""
     noise: float = 0.0
     """Round-off of whoever printed 15 digits or more, in the unit printed."""
 

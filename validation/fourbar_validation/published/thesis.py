@@ -1,94 +1,325 @@
-"""The thesis's printed tables, computed: our numbers, and what errata make of them.
+"""The thesis's own program and printed tables, with any of its errata made.
 
-Sections 2.4, 4.12 and 5.7, table 3.2 and the tables of the manual. Ours come from
-`fourbar.solve` and `fourbar.formulas.mobility`, or from the thesis's formula for a
-constant that nobody else defines. Units as printed: cm, deg, rad/s, cm/s^2, N, N cm.
+Sections 2.4, 4.12 and 5.7, table 3.2 and the tables of the manual. Without errata the
+numbers come from `fourbar.solve` and `fourbar.formulas.mobility`, or from the thesis's
+formula for a constant that nobody else defines. Units as printed: cm, deg, rad/s,
+cm/s^2, N, N cm.
+
+Source: I. Linares Mendoza, "Analisis cinematico y dinamico asistido por computadora de
+mecanismos de cuatro barras", UNAM FES Cuautitlan, sections 4.12 and 5.7 and the
+program's tables in the manual.
 """
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import NamedTuple
+from collections.abc import Sequence
+from functools import cache, cached_property
 
 import numpy as np
 
+import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
-from fourbar_validation.published.figures import POSITIONS, PrintedFigure
-from fourbar_validation.published.program import (
-    BAR_LENGTHS,
-    CENTRE,
-    COUPLE_ON_A_BAR,
-    ERRATA_IN_ORDER,
-    FORCE_ON_BAR_2,
-    INERTIA_2,
-    LOAD_ANGLE,
-    LOAD_ARM,
-    MASSES,
-    OMEGA_2,
-    THETA_1,
-    THETA_2,
-    Kinematics,
-    ProgramErrors,
-    bound_round_off,
-    compute_inertia,
-    compute_motion,
-    compute_right_unknowns,
-    compute_thesis_program,
-    make_equations,
-    make_model_scene,
-    split_components,
-    to_degrees,
-    to_ours,
-)
+from fourbar_validation.compare.pins import resolve
+from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.published.figures import POSITIONS, read_printed
+from fourbar_validation.published.thirteen import EquationTerms, assemble_equations
 
+_PRINTED_FORCES = ("F12", "F32", "F23", "F43", "F14", "F34")
+PRINTED_UNKNOWNS = (*(f"{pin}{axis}" for pin in _PRINTED_FORCES for axis in "xy"), "T4")
+BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
+"""Bars 1 to 4, cm."""
+MASSES = {2: 57.0, 3: 0.544, 4: 0.2}
+"""kg."""
+INERTIA_2 = 57.0 * 153.0**2 / 12.0
+"""kg cm^2; bar 2 is 153 cm long in all."""
+BAR_WIDTH = 2.54
+"""cm."""
+OMEGA_2 = 0.2244
+"""rad/s."""
+THETA_1, THETA_2 = math.radians(225.0), math.radians(135.0)
+"""Angles of sections 4.12 and 5.7 in the thesis's convention, rad."""
+CENTRE = {2: 76.5, 3: 27.5, 4: 10.0}
+"""Distance from the bar's first pin to G, cm."""
+FORCE_ON_BAR_2, LOAD_ARM, LOAD_ANGLE = 10.0, 5.0, math.radians(265.0)
+"""Force along x on bar 2, N, and where it acts from G2, cm and rad."""
+COUPLE_ON_A_BAR = -15.0
+"""Couple on each of bars 2, 3, 4, N cm."""
+TO_N = 0.01
+"""1 kg cm/s^2 in N, and 1 kg cm^2/s^2 in N cm."""
+AS_PRINTED = "manual"
+"""Name, beside the errata, of the inertias that the manual prints."""
+TYPED_INERTIAS = {
+    AS_PRINTED: (0.2924725333, 0.1075266667),
+    "5b": (0.292472, 0.107526),
+}
+"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2, solved back from the
+printed unknowns.
+"""
+LADDER = ("3", "1", "2", "4", "5", AS_PRINTED, "5b")
+"""Errata in the order in which they are made, from right to published."""
+CUT_DECIMALS = {2: 6, 4: 10}
+"""Decimals after which erratum 12c cuts the accelerations of G2 and G4."""
 _ANGLE_NOISE = 4e-15
 """Four steps of a double near 360 deg, rad. The program carries such angles, where a
 step is 5.7e-14 deg = 1e-15 rad.
 """
 d, a, b, c = BAR_LENGTHS
-Numbers = Mapping[str, float]
+Numbers = dict[str, float]
+"""Numbers of a printed table, by the names of its figures."""
 
 
-class ComputedTable(NamedTuple):
-    """Our numbers of a printed table, by the names of its figures."""
-
-    ours: Numbers
-    made: Numbers = MappingProxyType({})
-    """Ours after the errata of the figure, where these can be computed."""
-    noise: Numbers = MappingProxyType({})
-    """Round-off of digits that the program printed in full."""
+def to_degrees(angle: float) -> float:
+    """Convert to degrees in [0, 360), as the thesis has them."""
+    return math.degrees(angle) % 360.0
 
 
-def compute_tables(
-    printed: Mapping[str, PrintedFigure],
-) -> dict[str, ComputedTable]:
-    """Compute every table of the thesis by its name.
+def truncate(value: float, decimals: int) -> float:
+    """Cut off further decimals."""
+    return math.trunc(value * 10.0**decimals) / 10.0**decimals
 
-    `printed`: the table of positions, whose angles go on over turns.
+
+def to_ours(theta: float) -> float:
+    """Convert theta_1 or theta_4 of the thesis to our convention, or back, rad.
+
+    The thesis's polygon sums to zero.
     """
-    k = Kinematics()
-    kinematics = _compute_kinematics(k)
-    slips = _compute_slips(k)
-    arms = {name: _compute_cut_arm(k, 6) for name in ("R23_j", "R43_j")}
-    arms["R43_j"] *= -1.0
+    return math.remainder(theta + math.pi, 2.0 * math.pi)
+
+
+def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
+    """Return I_G of bar 3 or 4, kg cm^2.
+
+    I_G is m (L^2 + w^2)/12, or m w^2/12 as the thesis has it.
+    """
+    across = 0.0 if about_long_axis else BAR_LENGTHS[bar - 1] ** 2
+    return MASSES[bar] * (across + BAR_WIDTH**2) / 12.0
+
+
+def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
+    """Make the model mechanism for our formulas, SI, uniform bars of `BAR_WIDTH`."""
+    inertias = {2: INERTIA_2, 3: compute_inertia(3), 4: compute_inertia(4)}
+    bars = [
+        fourbar.Bar(
+            0.01 * BAR_LENGTHS[bar - 1],
+            MASSES[bar],
+            1e-4 * inertias[bar],
+            (0.01 * CENTRE[bar], 0.0),
+        )
+        for bar in MOVING_BARS
+    ]
+    linkage = fourbar.FourBar(0.01 * d, *bars, ground_angle=to_ours(THETA_1))
+    arm = (0.01 * LOAD_ARM, LOAD_ANGLE)
+    couples = [fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR) for bar in MOVING_BARS]
+    loads = (fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=arm), *couples)
+    motion = fourbar.Motion(theta_2, OMEGA_2, branch=branch)
+    return fourbar.Scene(linkage, motion, drive_bar=4, loads=loads)
+
+
+def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
+    """Compute position to accelerations of the model mechanism by our formulas, SI."""
+    return fourbar.solve(make_model_scene(theta_2, branch), "acceleration")
+
+
+def compute_right_unknowns() -> Numbers:
+    """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
+    s = fourbar.solve(make_model_scene(THETA_2))
+    pins = (s.F12, s.F32, -s.F32, s.F43, s.F14, -s.F43)
+    unknowns = np.concatenate([*(pin[0] for pin in pins), 100.0 * s.torque])
+    return dict(zip(PRINTED_UNKNOWNS, unknowns.tolist(), strict=True))
+
+
+class ThesisProgram:
+    """The thesis's calculation at theta_2 = 135 deg, by our motion, with errata made.
+
+    Lengths are in cm, angles as the thesis counts them.
+
+    Parameters
+    ----------
+    errata : ids of the errata that are made, and the keys of `TYPED_INERTIAS`.
+    decimals : of theta_3, deg, that erratum 12 leaves in the arms of bar 3.
+    """
+
+    def __init__(self, errata: Sequence[str] = (), decimals: int = 6) -> None:
+        self.errata = errata
+        s = compute_motion(np.array([THETA_2]))
+        self.theta_3 = float(s.theta_3[0])
+        self.theta_4 = to_ours(float(s.theta_4[0]))
+        self.omega, self.alpha = (
+            {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS}
+            for name in ("omega", "alpha")
+        )
+        self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
+        self.a_A = 100.0 * s.a_A[0]
+        if "4" in errata:
+            # -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20
+            slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
+            self.a_G[3][0] += slip
+        if "5" in errata:  # index 5 for 6
+            self.a_G[4][0] = self.alpha[3]
+        if "12c" in errata:
+            for bar, kept in CUT_DECIMALS.items():
+                self.a_G[bar] = np.array([truncate(x, kept) for x in self.a_G[bar]])
+        in_arms = self.theta_3
+        if "12" in errata:
+            in_arms = math.radians(truncate(to_degrees(in_arms), decimals))
+        self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
+            "R12": resolve(-CENTRE[2], THETA_2),
+            "R32": resolve(a - CENTRE[2], THETA_2),
+            "R23": resolve(-CENTRE[3], in_arms),
+            "R43": resolve(b - CENTRE[3], in_arms),
+            "R14": resolve(CENTRE[4], self.theta_4),
+            "R34": resolve(CENTRE[4] - c, self.theta_4),
+        }
+        inertias = [compute_inertia(bar, "3" in errata) for bar in (3, 4)]
+        for name, typed in TYPED_INERTIAS.items():
+            if name in errata:
+                inertias = [*typed]
+        self.inertias = {2: INERTIA_2, 3: inertias[0], 4: inertias[1]}
+
+    @cached_property
+    def equations(self) -> tuple[Array, Array]:
+        """Matrix and right side of section 5.7, N and N cm.
+
+        sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
+        """
+        per_mass = 1.0 if "1" in self.errata else TO_N
+        per_inertia = 1.0 if "2" in self.errata else TO_N
+        force = {}
+        moment = {}
+        for bar in MOVING_BARS:
+            force[bar] = per_mass * MASSES[bar] * self.a_G[bar]
+            inertial = per_inertia * self.inertias[bar] * self.alpha[bar]
+            if bar == 3 and "7" in self.errata:
+                inertial = -inertial
+            moment[bar] = np.array([inertial - COUPLE_ON_A_BAR])
+        force[2][0] -= FORCE_ON_BAR_2
+        _, y = resolve(LOAD_ARM, LOAD_ANGLE)
+        moment[2] += y * FORCE_ON_BAR_2  # minus the moment of the load, -y F
+        first, second = (
+            {bar: np.array([self.arms[name]]) for bar, name in enumerate(names, 2)}
+            for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
+        )
+        terms = EquationTerms(first, second, force, moment)
+        matrix, right = assemble_equations(terms, 4)
+        return matrix[0], right[0]
+
+    def unknowns(self) -> Numbers:
+        """Compute the 13 unknowns of section 5.7, N and N cm."""
+        solved = np.linalg.solve(*self.equations)
+        return dict(zip(PRINTED_UNKNOWNS, solved.tolist(), strict=True))
+
+    def bound_round_off(self) -> Numbers:
+        """Bound how far an elimination of these equations may be off, N and N cm.
+
+        The bound is for each unknown, whoever eliminates. 13 eps |A^-1| (|A| |x| +
+        |b|): each number of the system carries up to as many roundings as there are
+        unknowns, from its own making and from the elimination (Higham, Accuracy and
+        Stability, 7.2 and 9.3).
+        """
+        matrix, right = self.equations
+        terms = np.abs(matrix) @ np.abs(np.linalg.solve(matrix, right)) + np.abs(right)
+        moved = np.abs(np.linalg.inv(matrix)) @ terms
+        bounds = len(PRINTED_UNKNOWNS) * EPS * moved
+        return dict(zip(PRINTED_UNKNOWNS, bounds.tolist(), strict=True))
+
+    def kinematics(self) -> Numbers:
+        """Compute the numbers of section 4.12 and of the manual's table.
+
+        A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
+        """
+        turned = [
+            a * OMEGA_2**2 * np.exp(1j * THETA_2),
+            b * self.omega[3] ** 2 * np.exp(1j * self.theta_3),
+            c * self.omega[4] ** 2 * np.exp(1j * self.theta_4),
+        ]
+        right = -sum(turned)
+        values = {
+            "theta3_deg": to_degrees(self.theta_3),
+            "theta4_deg": to_degrees(self.theta_4),
+            **{f"omega{bar}": omega for bar, omega in self.omega.items()},
+            **{f"alpha{bar}": alpha for bar, alpha in self.alpha.items()},
+            "A": b * math.sin(self.theta_3),
+            "B": c * math.sin(self.theta_4),
+            "C": float(right.real),
+            "D": -b * math.cos(self.theta_3),
+            "E": -c * math.cos(self.theta_4),
+            "F": float(right.imag),
+        }
+        vectors = {f"A_G{bar}": a_G for bar, a_G in self.a_G.items()} | self.arms
+        vectors |= {"A_A": self.a_A, "A_G3/A": self.a_G[3] - self.a_A}
+        for name, (x, y) in vectors.items():
+            values[f"{name}_i"] = float(x)
+            values[f"{name}_j"] = float(y)
+            values[f"{name}_mod"] = math.hypot(x, y)
+            angle = math.atan(y / x) if "10" in self.errata else math.atan2(y, x)
+            values[f"{name}_ang_deg"] = to_degrees(angle)
+        return values
+
+    def constants(self) -> Numbers:
+        """Name the numbers of section 5.7's equations as the thesis does."""
+        matrix, right = self.equations
+        x, y = resolve(LOAD_ARM, LOAD_ANGLE)
+        named = {
+            "T4 in row 9": matrix[8, 12],
+            "R_ext_i": x,
+            "R_ext_j": y,
+            "moment_of_force_N_cm": -y * FORCE_ON_BAR_2,
+        }
+        named |= {f"right side, row {row}": right[row - 1] for row in range(10, 14)}
+        for bar in MOVING_BARS:
+            row = 3 * (bar - 2)
+            for i, key in enumerate(("x", "y", "_5")):
+                named[f"k{bar}{key}"] = right[row + i]
+            arms = matrix[row + 2, 4 * (bar - 2) :]
+            named |= {f"k{bar}_{number}": arms[number - 1] for number in (1, 2, 3, 4)}
+        return {name: float(number) for name, number in named.items()}
+
+
+@cache
+def compute_tables(errata: tuple[str, ...] = ()) -> dict[str, Numbers]:
+    """Compute every table of the thesis by its name, with these errata made."""
+    program = ThesisProgram(errata)
+    kinematics = program.kinematics()
+    constants = program.constants()
+    in_eq_5_6 = ThesisProgram(errata, decimals=8).constants()
+    again = {f"k3_{n}_in_eq_5_6": in_eq_5_6[f"k3_{n}"] for n in (1, 2, 3, 4)}
+    if errata:
+        unknowns = program.unknowns()
+        manual = ThesisProgram((*errata, AS_PRINTED)).unknowns()
+    else:
+        unknowns = manual = compute_right_unknowns()
+    return {
+        POSITIONS: _compute_positions("6" in errata),
+        "2.4 constants": _compute_half_angle_constants(),
+        "3.2 limits": _compute_limits("14" in errata),
+        "manual, window": _compute_window(),
+        "4.12": kinematics,
+        "manual, kinematics": kinematics,
+        "5.7 inertias": {f"I_G{bar}": x for bar, x in program.inertias.items()},
+        "5.7 constants": constants | again,
+        "5.7 matrix": constants,
+        "manual, unknowns": manual,
+        "5.7 unknowns": unknowns,
+    }
+
+
+@cache
+def find_noise() -> dict[str, Numbers]:
+    """Find the round-off of the digits that the program printed in full, by table."""
     sizes = {
         "t": math.degrees(1.0),
-        "R": abs(CENTRE[2]),
-        "A": float(np.abs(k.a_G[2]).max()),
+        "R": CENTRE[2],
+        "A": float(np.abs(ThesisProgram().a_G[2]).max()),
     }
-    noise = {name: _ANGLE_NOISE * sizes.get(name[0], 1.0) for name in kinematics}
+    names = compute_tables()["manual, kinematics"]
+    manual, published = (ThesisProgram(LADDER[:steps]) for steps in (-1, None))
     return {
-        POSITIONS: _compute_positions(printed),
-        "2.4 constants": ComputedTable(_compute_half_angle_constants()),
-        "3.2 limits": _compute_limits(),
-        "manual, window": ComputedTable(_compute_window()),
-        "4.12": ComputedTable(kinematics, slips | arms),
-        "manual, kinematics": ComputedTable(kinematics, slips, noise),
-        **_compute_constants(k),
-        "manual, unknowns": _compute_unknowns(-2),
-        "5.7 unknowns": _compute_unknowns(-1),
+        "manual, kinematics": {
+            name: _ANGLE_NOISE * sizes.get(name[0], 1.0) for name in names
+        },
+        "manual, unknowns": manual.bound_round_off(),
+        "5.7 unknowns": published.bound_round_off(),
     }
 
 
@@ -102,8 +333,12 @@ def _solve_roots(theta_2: Array) -> dict[str, Array]:
     return roots
 
 
-def _compute_positions(printed: Mapping[str, PrintedFigure]) -> ComputedTable:
-    """Compute section 2.4's table of 281 positions, angles to the turn as printed."""
+def _compute_positions(tenfold: bool) -> Numbers:
+    """Compute section 2.4's table of 281 positions, angles to the turn as printed.
+
+    `tenfold`: one of them is printed with its point one digit too far (erratum 6).
+    """
+    printed = read_printed()[POSITIONS]
     places = [name.split() for name in printed]
     roots = _solve_roots(np.radians([float(theta_2) for theta_2, _ in places]))
     ours = {}
@@ -111,10 +346,12 @@ def _compute_positions(printed: Mapping[str, PrintedFigure]) -> ComputedTable:
         degrees = float(roots[places[row][1]][row])
         turns = round((float(figure.printed) - degrees) / 360.0)
         ours[place] = degrees + 360.0 * turns
-    return ComputedTable(ours, {"136 theta3_1": 10.0 * ours["136 theta3_1"]})
+    if tenfold:
+        ours["136 theta3_1"] *= 10.0
+    return ours
 
 
-def _compute_half_angle_constants() -> dict[str, float]:
+def _compute_half_angle_constants() -> Numbers:
     """Compute section 2.4 at theta_2 = 90 deg.
 
     k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2).
@@ -135,7 +372,7 @@ def _compute_half_angle_constants() -> dict[str, float]:
     return ours
 
 
-def _compute_window() -> dict[str, float]:
+def _compute_window() -> Numbers:
     """Compute the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
     s = compute_motion(np.array([0.0]))
     angles = {
@@ -148,130 +385,20 @@ def _compute_window() -> dict[str, float]:
     return ours | {f"{name}_deg": to_degrees(angle) for name, angle in angles.items()}
 
 
-def _compute_limits() -> ComputedTable:
-    """Compute table 3.2: cosines whose existence decides, and limits that exist."""
+def _compute_limits(from_ground: bool) -> Numbers:
+    """Compute table 3.2: cosines whose existence decides, and limits that exist.
+
+    `from_ground`: the limit of row 2 is counted from the ground's line (erratum 14).
+    """
     linkage = make_model_scene(THETA_2).linkage
     second = to_degrees(limit_positions(linkage, 4)[-1].theta_2)
     fourth = to_degrees(limit_positions(linkage, 2)[0].theta_2)
-    ours = {
+    return {
         "row 1 cosine": ((a + b) ** 2 + d**2 - c**2) / (2.0 * (a + b) * d),
         "row 2 cosine": ((a - b) ** 2 + d**2 - c**2) / (2.0 * abs(a - b) * d),
-        "row 2 theta_2": second,
+        "row 2 theta_2": second - (to_degrees(THETA_1) if from_ground else 0.0),
         "row 3 cosine": (a**2 + d**2 - (b + c) ** 2) / (2.0 * a * d),
         "row 4 cosine": (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
         "row 4 theta_2": fourth,
         "row 4 arc cosine": fourth - math.degrees(to_ours(THETA_1)),
     }
-    return ComputedTable(ours, {"row 2 theta_2": second - to_degrees(THETA_1)})
-
-
-def truncate(value: float, decimals: int) -> float:
-    """Cut off further decimals."""
-    return math.trunc(value * 10.0**decimals) / 10.0**decimals
-
-
-def _compute_cut_arm(k: Kinematics, decimals: int) -> float:
-    """Return y of R23 in cm, theta_3 cut to some decimals of a degree (erratum 12)."""
-    theta_3 = math.radians(truncate(to_degrees(k.theta_3), decimals))
-    return -CENTRE[3] * math.sin(theta_3)
-
-
-def _compute_kinematics(k: Kinematics) -> dict[str, float]:
-    """Compute ours by the names of section 4.12 and of the manual's table.
-
-    A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F.
-    """
-    turned = [
-        a * OMEGA_2**2 * np.exp(1j * THETA_2),
-        b * k.omega[3] ** 2 * np.exp(1j * k.theta_3),
-        c * k.omega[4] ** 2 * np.exp(1j * k.theta_4),
-    ]
-    right = -sum(turned)
-    values = {
-        "theta3_deg": to_degrees(k.theta_3),
-        "theta4_deg": to_degrees(k.theta_4),
-        **{f"omega{bar}": omega for bar, omega in k.omega.items()},
-        **{f"alpha{bar}": alpha for bar, alpha in k.alpha.items()},
-        "A": b * math.sin(k.theta_3),
-        "B": c * math.sin(k.theta_4),
-        "C": float(right.real),
-        "D": -b * math.cos(k.theta_3),
-        "E": -c * math.cos(k.theta_4),
-        "F": float(right.imag),
-    }
-    centres = {f"A_G{bar}": a_G for bar, a_G in k.a_G.items()}
-    relative = k.a_G[3] - k.a_A
-    vectors = {**centres, "A_A": k.a_A, "A_G3/A": relative, **k.arms}
-    for name, (x, y) in vectors.items():
-        values[f"{name}_i"] = float(x)
-        values[f"{name}_j"] = float(y)
-        values[f"{name}_mod"] = math.hypot(x, y)
-        values[f"{name}_ang_deg"] = to_degrees(math.atan2(y, x))
-    return values
-
-
-def _compute_slips(k: Kinematics) -> dict[str, float]:
-    """Compute the figures of these tables that errata 4 and 10 touch."""
-    x, y = k.a_G[3]
-    slipped = x + k.slip
-    x_4, y_4 = k.a_G[4]
-    return {
-        "A_G3/A_i": slipped - k.a_A[0],
-        "A_G3_i": slipped,
-        "A_G3_mod": math.hypot(slipped, y),
-        "A_G3_ang_deg": to_degrees(math.atan2(y, slipped)),
-        "A_G4_ang_deg": to_degrees(math.atan(y_4 / x_4)),
-    }
-
-
-def _compute_constants(k: Kinematics) -> dict[str, ComputedTable]:
-    """Compute the constants of section 5.7: inertias, right sides, arms, the matrix."""
-    ours = _name_equations(ProgramErrors())
-    # by four errata; the sign of I alpha is wrong for bar 3 alone, erratum 7
-    made = _name_equations(ERRATA_IN_ORDER[4][1])
-    made["k3_5"] = -made["k3_5"] - 2.0 * COUPLE_ON_A_BAR
-    for number, sign in ((1, -1.0), (3, 1.0)):
-        made[f"k3_{number}"] = sign * _compute_cut_arm(k, 6)
-        made[f"k3_{number}_in_eq_5_6"] = sign * _compute_cut_arm(k, 8)
-    force_2 = MASSES[2] * truncate(k.a_G[2][0], 6)
-    by_hand = {
-        "k2x": force_2 - FORCE_ON_BAR_2,
-        "k2y": MASSES[2] * truncate(k.a_G[2][1], 6),
-        "k4x": MASSES[4] * truncate(k.a_G[4][0], 10),
-    }
-    x, y = split_components(LOAD_ARM, LOAD_ANGLE)
-    load = {"R_ext_i": x, "R_ext_j": y, "moment_of_force_N_cm": -y * FORCE_ON_BAR_2}
-    again = {f"k3_{n}_in_eq_5_6": ours[f"k3_{n}"] for n in (1, 2, 3, 4)}
-    inertias, about_long_axis = (
-        {f"I_G{bar}": compute_inertia(bar, wrong) for bar in (3, 4)}
-        for wrong in (False, True)
-    )
-    return {
-        "5.7 inertias": ComputedTable({"I_G2": INERTIA_2} | inertias, about_long_axis),
-        "5.7 constants": ComputedTable(ours | load | again, made | by_hand),
-        "5.7 matrix": ComputedTable(ours, made),
-    }
-
-
-def _name_equations(errors: ProgramErrors) -> dict[str, float]:
-    """Name the numbers of section 5.7's equations as the thesis does."""
-    matrix, right = make_equations(errors)
-    named = {f"right side, row {row}": right[row - 1] for row in range(10, 14)}
-    named["T4 in row 9"] = matrix[8, 12]
-    for bar in MOVING_BARS:
-        row = 3 * (bar - 2)
-        named |= {f"k{bar}{key}": right[row + i] for i, key in enumerate(("x", "y"))}
-        named[f"k{bar}_5"] = right[row + 2]
-        arms = matrix[row + 2, 4 * (bar - 2) :]
-        named |= {f"k{bar}_{number}": arms[number - 1] for number in (1, 2, 3, 4)}
-    return {name: float(number) for name, number in named.items()}
-
-
-def _compute_unknowns(step: int) -> ComputedTable:
-    """Compute the 13 unknowns, and those of the program with its errors to a step."""
-    _, errors, inertias = ERRATA_IN_ORDER[step]
-    return ComputedTable(
-        compute_right_unknowns(),
-        compute_thesis_program(errors, inertias),
-        bound_round_off(errors, inertias),
-    )
