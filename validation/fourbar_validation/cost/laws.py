@@ -125,12 +125,14 @@ def _group_quantities(pairs: Sequence[tuple[str, str]]) -> list[str]:
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Fit the slope of log y over log x by least squares.
 
-    Return it and its standard error.
+    Return it and its standard error; no number of fewer points than FEWEST_FITTED.
     """
+    if len(x) < FEWEST_FITTED:
+        return math.nan, math.inf
     from scipy.stats import linregress
 
     line = linregress(np.log(x), np.log(y))
-    return float(line.slope), float(line.stderr) if len(x) > 2 else math.inf
+    return float(line.slope), float(line.stderr)
 
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
@@ -192,39 +194,28 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
 
     A law is fitted as far as its curves exist.
     """
-    laws = []
     one_state = [
         point for point in curves.get("one state", ()) if point.setting_value > 0.0
     ]
     ladders = [
-        ("softness in (1-d)", curves.get("softness d", ()), 1.0),
-        ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow", ()), 1.0),
+        *(
+            (f"order of {name} in the timestep", curves.get(f"{name}, tc held"), order)
+            for name, order in _EXPECTED_ORDER.items()
+        ),
+        ("softness in (1-d)", curves.get("softness d"), 1.0),
+        ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow"), 1.0),
         ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
     ]
-    for integrator, order in _EXPECTED_ORDER.items():
-        points = curves.get(f"{integrator}, tc held", ())
-        name = f"order of {integrator} in the timestep"
-        laws += [
-            _fit_law(name, quantity, points, order, by_steps=True)
-            for quantity in ERROR_NAMES
-            if points
-        ]
-    laws += [
-        _fit_law(name, quantity, points, n)
-        for name, points, n in ladders
-        for quantity in ERROR_NAMES
+    laws = [
+        _fit_law(name, quantity, points, order, by_steps=name.startswith("order"))
+        for name, points, order in ladders
         if points
-    ]
-    laws += [
-        _fit_sag(curves, quantity)
         for quantity in ERROR_NAMES
-        if curves.get("sag tc, slow")
     ]
-    return laws + [
-        law
-        for quantity in ERROR_NAMES
-        if (law := _fit_stiff(curves, quantity)).points > 0
-    ]
+    if curves.get("sag tc, slow"):
+        laws += [_fit_sag(curves, quantity) for quantity in ERROR_NAMES]
+    stiff = [_fit_stiff(curves, quantity) for quantity in ERROR_NAMES]
+    return laws + [law for law in stiff if law.points > 0]
 
 
 def _fit_law(
@@ -251,27 +242,9 @@ def _fit_law(
         for p in ordered
         if _ABOVE_FLOOR * least < _error_at_steps(p, quantity) < LARGEST_LAWFUL_ERROR
     ]
-    if len(used) < FEWEST_FITTED:
-        return ErrorLaw(
-            name,
-            quantity,
-            math.nan,
-            math.inf,
-            expected,
-            len(used),
-            leaps,
-        )
     x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
-    slope, sigma = fit(x, [_error_at_steps(p, quantity) for p in used])
-    return ErrorLaw(
-        name,
-        quantity,
-        slope,
-        sigma,
-        expected,
-        len(used),
-        leaps,
-    )
+    slope = fit(x, [_error_at_steps(p, quantity) for p in used])
+    return ErrorLaw(name, quantity, *slope, expected, len(used), leaps)
 
 
 def _error_at_steps(point: CostPoint, quantity: str) -> float:
@@ -321,24 +294,8 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
         if (least := find_floor(points, quantity)) is not None
     }
     name = "floor of RK4 in tc/h"
-    if len(floors) < FEWEST_FITTED:
-        return ErrorLaw(
-            name,
-            quantity,
-            math.nan,
-            math.inf,
-            -_FOURTH_ORDER,
-            len(floors),
-        )
-    slope, sigma = fit(list(floors), list(floors.values()))
-    return ErrorLaw(
-        name,
-        quantity,
-        slope,
-        sigma,
-        -_FOURTH_ORDER,
-        len(floors),
-    )
+    slope = fit(list(floors), list(floors.values()))
+    return ErrorLaw(name, quantity, *slope, -_FOURTH_ORDER, len(floors))
 
 
 def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:

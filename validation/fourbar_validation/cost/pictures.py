@@ -130,23 +130,15 @@ def draw_pictures(
 
 def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     """Make the figures of the curves that there are, by name."""
-    makers: dict[str, tuple[str, Callable[[], Any]]] = {
-        "timestep": (
-            "RK4, pads, tc = 10 steps",
-            lambda: _draw_timestep(curves, title),
-        ),
-        "integrator": ("RK4, tc held", lambda: _draw_integrator(curves, title)),
-        "softness": ("softness d", lambda: _draw_softness(curves, title)),
-        "solver": ("tolerance, Newton", lambda: _draw_solver(curves, title)),
-        "orders": ("RK4, tc held", lambda: draw_orders(curves, title)),
-    }
     made = {
         f"work-precision-{quantity}": draw_work_precision(curves, quantity, title)
         for quantity in QUANTITY_WORDS
     }
-    for name, (curve, make) in makers.items():
-        if curves.get(curve):
-            made[name] = make()
+    for name, picture in SETTING_PICTURES.items():
+        if curves.get(picture.needs):
+            made[name] = _draw_setting(curves, title, picture)
+    if curves.get("RK4, tc held"):
+        made["orders"] = draw_orders(curves, title)
     return made
 
 
@@ -431,104 +423,83 @@ def _measure_distance(curves: Curves, quantity: str) -> float:
     return most
 
 
-def _draw_worst(
-    axes: Any,
-    curves: Curves,
-    looks: Mapping[str, Look],
-    abscissa: Callable[[CostPoint], float],
-) -> None:
-    """Draw the worst error of torque and pin forces at the steps."""
-    for label, look in looks.items():
-        row = sorted(
-            (
-                point
-                for point in curves.get(look.curve, ())
-                if point.at_steps.worst < LARGEST_DRAWN_ERROR
-            ),
-            key=abscissa,
-        )
-        x = [abscissa(point) for point in row]
-        y = [point.at_steps.worst for point in row]
-        _draw_look(axes, x, y, label, look)
-    axes.set_ylabel("worst error of torque and pin forces")
+def _take_timestep(point: CostPoint) -> float:
+    """Return the timestep as a part of a revolution."""
+    return 1.0 / point.setting_value
 
 
-def _draw_single(
-    curves: Curves,
-    title: str,
-    statement: str,
-    looks: Mapping[str, Look],
-    abscissa: Callable[[CostPoint], float],
-    xlabel: str,
-) -> tuple[Any, Any]:
-    figure = make_figure(4.4, statement, title)
-    axes = figure.add_axes((0.135, 0.12, 0.84, 0.565))
-    _draw_worst(axes, curves, looks, abscissa)
-    axes.set_xlabel(xlabel)
-    set_axes(axes)
-    return figure, axes
+class SettingPicture(NamedTuple):
+    """Worst error of torque and pin forces at the steps over one setting."""
+
+    needs: str
+    """Curve without which there is no picture."""
+    statement: str
+    looks: Mapping[str, Look]
+    abscissa: Callable[[CostPoint], float]
+    xlabel: str
+    slopes: tuple[tuple[float, float, float], ...] = ()
+    """Exponents that are drawn, and where."""
 
 
-def _draw_timestep(curves: Curves, title: str) -> Any:
-    """Draw RK4 with time constants of several lengths over the timestep."""
-    figure, _ = _draw_single(
-        curves,
-        title,
+_TIMESTEP = "timestep, part of a revolution"
+SETTING_PICTURES = {
+    "timestep": SettingPicture(
+        "RK4, pads, tc = 10 steps",
         "A timestep buys digits until the closure's\ntime constant (tc) stops it",
         TIMESTEPS,
-        lambda point: 1.0 / point.setting_value,
-        "timestep, part of a revolution",
-    )
-    return figure
-
-
-def _draw_integrator(curves: Curves, title: str) -> Any:
-    """Draw each integrator over the timestep.
-
-    Slopes of first and fourth order are drawn too.
-    """
-    figure, axes = _draw_single(
-        curves,
-        title,
+        _take_timestep,
+        _TIMESTEP,
+    ),
+    "integrator": SettingPicture(
+        "RK4, tc held",
         "RK4 gains four digits where the others\ngain one",
         INTEGRATOR_LOOKS,
-        lambda point: 1.0 / point.setting_value,
-        "timestep, part of a revolution",
-    )
-    _draw_slope(axes, 1.0, 4e-4, 2e-4, "slope 1")
-    _draw_slope(axes, 4.0, 3e-3, 1e-9, "slope 4")
-    return figure
-
-
-def _draw_softness(curves: Curves, title: str) -> Any:
-    """Draw the error over what the impedance lacks to 1."""
-    figure, axes = _draw_single(
-        curves,
-        title,
+        _take_timestep,
+        _TIMESTEP,
+        ((1.0, 4e-4, 2e-4), (4.0, 3e-3, 1e-9)),
+    ),
+    "softness": SettingPicture(
+        "softness d",
         "The error goes as 1 - d; under loads a slow\nlinkage sags, which is far worse",
         SOFTNESS_LOOKS,
         lambda point: point.setting_value,
         "1 - d (d: impedance of solimp; MuJoCo's own 0.9)",
-    )
-    _draw_slope(axes, 1.0, 2e-3, 1e-5, "slope 1")
-    return figure
-
-
-def _draw_solver(curves: Curves, title: str) -> Any:
-    """Draw each solver over its tolerance."""
-    figure, axes = _draw_single(
-        curves,
-        title,
+        ((1.0, 2e-3, 1e-5),),
+    ),
+    "solver": SettingPicture(
+        "tolerance, Newton",
         f"Beside a flywheel of {write_one_digit(BEST.flywheel)} Newton's solver needs\n"
         "a tolerance of 0",
         SOLVERS,
         lambda point: point.setting_value or ZERO_TOLERANCE_PLACE,
         "tolerance of the solver",
-    )
-    axes.set_xticks(
-        [ZERO_TOLERANCE_PLACE, 1e-15, 1e-12, 1e-9, 1e-6],
-        ["0", "1e-15", "1e-12", "1e-9", "1e-6"],
-    )
+    ),
+}
+"""Pictures of each setting by itself, by name."""
+
+
+def _draw_setting(curves: Curves, title: str, picture: SettingPicture) -> Any:
+    figure = make_figure(4.4, picture.statement, title)
+    axes = figure.add_axes((0.135, 0.12, 0.84, 0.565))
+    for label, look in picture.looks.items():
+        row = [
+            point
+            for point in curves.get(look.curve, ())
+            if point.at_steps.worst < LARGEST_DRAWN_ERROR
+        ]
+        row.sort(key=picture.abscissa)
+        y = [point.at_steps.worst for point in row]
+        _draw_look(axes, [*map(picture.abscissa, row)], y, label, look)
+    axes.set_ylabel("worst error of torque and pin forces")
+    axes.set_xlabel(picture.xlabel)
+    set_axes(axes)
+    for slope in picture.slopes:
+        _draw_slope(axes, *slope)
+    if picture.looks is SOLVERS:
+        axes.set_xticks(
+            [ZERO_TOLERANCE_PLACE, 1e-15, 1e-12, 1e-9, 1e-6],
+            ["0", "1e-15", "1e-12", "1e-9", "1e-6"],
+        )
     return figure
 
 
@@ -537,12 +508,11 @@ def _draw_slope(
     exponent: float,
     x: float,
     y: float,
-    name: str,
 ) -> None:
     """Draw a slope with its exponent next to it."""
     axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
     axes.annotate(
-        name,
+        f"slope {exponent:g}",
         (2.0 * x, y * 2.0**exponent),
         xytext=(6, -10),
         textcoords="offset points",

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -93,26 +93,28 @@ class CostPoint:
         return f"{self.curve}, {self.setting}"
 
 
-COST_COLUMNS = (
-    *("curve", "kind", "setting", "setting_value", "steps", "steps_per_revolution"),
-    *ERROR_NAMES,
-    *(f"{quantity}_at_steps" for quantity in ERROR_NAMES),
-    *("seconds_per_second", "seconds_per_revolution", "scatter", "broken"),
+_COLUMNS_OF = {
+    "errors": ERROR_NAMES,
+    "at_steps": tuple(f"{quantity}_at_steps" for quantity in ERROR_NAMES),
+}
+COST_COLUMNS = tuple(
+    column
+    for field in fields(CostPoint)
+    for column in _COLUMNS_OF.get(field.name, (field.name,))
 )
 
 
 def list_cells(point: CostPoint) -> list[Any]:
     """List the values of a point under COST_COLUMNS."""
-    p = point
-    return [
-        *(p.curve, p.kind, p.setting, p.setting_value, p.steps),
-        *(p.steps_per_revolution, *p.errors, *p.at_steps),
-        *(p.seconds_per_second, p.seconds_per_revolution, p.scatter, p.broken),
-    ]
+    cells: list[Any] = []
+    for field in fields(point):
+        value = getattr(point, field.name)
+        cells += value if field.name in _COLUMNS_OF else (value,)
+    return cells
 
 
 def _read_cost_point(row: dict[str, Any]) -> CostPoint:
-    errors = {name: WorstErrors(*row[name]) for name in ("errors", "at_steps")}
+    errors = {name: WorstErrors(*row[name]) for name in _COLUMNS_OF}
     return CostPoint(**{**row, **errors})
 
 

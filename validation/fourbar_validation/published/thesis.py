@@ -99,7 +99,7 @@ def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
 def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     """Make the model mechanism for our formulas, SI, uniform bars of `BAR_WIDTH`."""
     inertias = {2: INERTIA_2, 3: compute_inertia(3), 4: compute_inertia(4)}
-    bars = [
+    two, three, four = (
         fourbar.Bar(
             0.01 * BAR_LENGTHS[bar - 1],
             MASSES[bar],
@@ -107,8 +107,9 @@ def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
             (0.01 * CENTRE[bar], 0.0),
         )
         for bar in MOVING_BARS
-    ]
-    linkage = fourbar.FourBar(0.01 * d, *bars, ground_angle=to_ours(THETA_1))
+    )
+    theta_1 = to_ours(THETA_1)
+    linkage = fourbar.FourBar(0.01 * d, two, three, four, ground_angle=theta_1)
     arm = (0.01 * LOAD_ARM, LOAD_ANGLE)
     couples = [fourbar.Load(bar, moment=0.01 * COUPLE_ON_A_BAR) for bar in MOVING_BARS]
     loads = (fourbar.Load(2, (FORCE_ON_BAR_2, 0.0), arm=arm), *couples)
