@@ -202,7 +202,10 @@ def _refine(
             gaps.append(arm * np.abs(force) - couples[pin])
         for row, pin in enumerate(arms):
             for column, gap in enumerate(gaps):
-                couples[pin] = couples[pin] + inverse[..., row, column] * gap
+                rate = inverse[..., row, column]
+                if isinstance(gap, np.ndarray):  # of single precision, for one
+                    rate = rate.astype(gap.dtype)
+                couples[pin] = couples[pin] + rate * gap
     return couples
 
 
