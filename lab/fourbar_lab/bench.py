@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import click
 import numpy as np
@@ -203,36 +203,6 @@ class Measured(NamedTuple):
     not_run: dict[str, str]
 
 
-def import_cost() -> float:
-    """Return the CPU time of `import fourbar` beyond NumPy's, relative to NumPy's.
-
-    The median over seven fresh interpreters.
-    """
-    clock = "time.process_time()"
-    code = (
-        f"import time; a = {clock}; import numpy; b = {clock};"
-        " from fourbar import Motion, Scene, solve, uniform;"
-        f" print(({clock} - b) / (b - a))"
-    )
-    kept = {
-        name: value
-        for name, value in os.environ.items()
-        if name != "PYTHONDONTWRITEBYTECODE"
-    }
-    # the first one compiles what is not compiled yet, which is no cost of importing
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            encoding="utf-8",
-            check=True,
-            env=kept,
-        )
-        for _ in range(7)
-    ]
-    return median(float(run.stdout) for run in runs)
-
-
 def _measure_memory(n: int) -> float:
     """Measure the MB allocated at the peak beyond arguments and results."""
     command = command_positions(n)
@@ -306,29 +276,18 @@ def bench(
     rows: list[tuple[str, ...]] = []
     broken: list[str] = []
     for what, measured in measurement.rows.items():
-        limit = SPEED_LIMITS.get(what)
-        if limit is None:
-            rows.append(
-                (
-                    what,
-                    (
-                        f"{1e-6 * measured:.1f} ms"
-                        if what == JUDGED_SCENE
-                        else f"{measured:.1f} ns/position"
-                    ),
-                )
-            )
-            continue
-        holds = limit.holds(measured)
-        rows.append(
-            (
-                what,
-                f"{measured:.2f}",
-                f"{limit.sign} {limit.bound:g}",
-                "holds" if holds else "fails",
-            )
-        )
-        broken += [] if holds else [f"{what}: {limit.reason}"]
+        if what == JUDGED_SCENE:
+            rows.append((what, f"{1e-6 * measured:.1f} ms"))
+        elif what not in SPEED_LIMITS:
+            rows.append((what, f"{measured:.1f} ns/position"))
+        else:
+            limit = SPEED_LIMITS[what]
+            needed = f"{limit.sign} {limit.bound:g}"
+            verdict = "holds"
+            if not limit.holds(measured):
+                verdict = "fails"
+                broken.append(f"{what}: {limit.reason}")
+            rows.append((what, f"{measured:.2f}", needed, verdict))
     console = Console()
     title = (
         f"{positions} positions, one core, medians of {ROUNDS} interleaved rounds;"
@@ -370,56 +329,49 @@ def measure_speed(
     everything = allocate(UNKNOWNS, command)
     angles = allocate(ANGLES, command)
     batch = min(positions, _THIRTEEN_BATCH)
-    solved = command_positions(min(positions, SOLVED))
+    many = min(positions, SOLVED)
+    solved = command_positions(many)
     bodies = make_bodies(scene, command_positions(batch))
-    many = len(solved.theta_2)
     alone = make_example(theta_2=1.0)
     lone = make_bodies(scene, command_positions(1))
-    peers = collect_loops()
+    loops, not_run = collect_loops()
+
+    def repeated(call: Callable[..., object], *words: Any) -> Callable[[], object]:
+        return lambda: [call(*words) for _ in range(SINGLE_CALLS)]
+
+    single = repeated(solve, alone)
     actions: dict[str, tuple[int, Callable[[], object]]] = {
-        ALL: (positions, lambda: solve(scene, at=command, out=everything)),
-        _ANGLES_ALONE: (positions, lambda: solve(scene, at=command, out=angles)),
-        _SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
+        ALL: (positions, partial(solve, scene, at=command, out=everything)),
+        _ANGLES_ALONE: (positions, partial(solve, scene, at=command, out=angles)),
+        _SYSTEM: (batch, partial(solve_thirteen, bodies, 2)),
         FLOOR_OF_TIMES: (positions, _make_floor(command.theta_2, angles)),
         "input between limits: all": (
             positions,
-            lambda: solve(limits, at=swing, out=everything),
+            partial(solve, limits, at=swing, out=everything),
         ),
         "input between limits: positions only": (
             positions,
-            lambda: solve(limits, at=swing, out=angles),
+            partial(solve, limits, at=swing, out=angles),
         ),
-        TO_FORCES: (many, lambda: solve(scene, "force", at=solved)),
-        WITH_ERROR_BARS: (many, lambda: solve(scene, "error", at=solved)),
-        "13x13 of one position": (
-            SINGLE_CALLS,
-            lambda: [solve_thirteen(lone, 2) for _ in range(SINGLE_CALLS)],
-        ),
-        ONE_POSITION: (
-            SINGLE_CALLS,
-            lambda: [solve(alone) for _ in range(SINGLE_CALLS)],
-        ),
-        "one position with error bars": (
-            SINGLE_CALLS,
-            lambda: [solve(alone, "error") for _ in range(SINGLE_CALLS)],
-        ),
+        TO_FORCES: (many, partial(solve, scene, "force", at=solved)),
+        WITH_ERROR_BARS: (many, partial(solve, scene, "error", at=solved)),
+        "13x13 of one position": (SINGLE_CALLS, repeated(solve_thirteen, lone, 2)),
+        ONE_POSITION: (SINGLE_CALLS, single),
+        "one position with error bars": (SINGLE_CALLS, repeated(solve, alone, "error")),
     }
-    if "C" in peers.here:
-        actions["C, all"] = (
-            positions,
-            partial(peers.here["C"], command.theta_2, np.zeros((15, positions))),
-        )
+    if "C" in loops:
+        into = np.zeros((15, positions))
+        actions["C, all"] = positions, partial(loops["C"], command.theta_2, into)
     times = time_interleaved(
         {name: action for name, (_, action) in actions.items()}, rounds
     )
     rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
-    by_positions = time_positions(peers.here, largest, rounds)
+    by_positions = time_positions(loops, largest, rounds)
     by_linkages = time_linkages(positions, rounds)
     cost = by_positions["NumPy"]
     most = max(by_linkages[STUDY])
     exact = [engine for engine in ENGINES if not engine.through_time]
     if not any(engine.missing() for engine in exact):
-        _, single = actions[ONE_POSITION]
         scenes = max(1, positions // _PER_SCENE)
         seconds, ratio = _time_judging(exact, scenes, single)
         rows[JUDGED_SCENE] = 1e9 * seconds
@@ -435,10 +387,9 @@ def measure_speed(
         ),
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": _measure_memory(min(positions, 1_000_000)),
-        "import fourbar / import numpy": import_cost(),
         **measure_starts(),
     }
-    return Measured(rows, by_positions, by_linkages, peers.not_run)
+    return Measured(rows, by_positions, by_linkages, not_run)
 
 
 def _time_judging(
@@ -453,14 +404,12 @@ def _time_judging(
     within seconds.
     """
     suite = Random(scenes + 1, 0, tuple(DrawnType))
-    judgings = (
-        partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False)
-        for i in range(scenes + 1)
-    )
     times = []
     ratios = []
-    for action in judgings:
-        times.append(time_call(action))
+    for i in range(scenes + 1):
+        name, scene = suite.name(i), suite.scene(i)
+        judge = partial(judge_for_report, name, scene, engines, draw=False)
+        times.append(time_call(judge))
         ratios.append(times[-1] * SINGLE_CALLS / time_call(single))
     # the first one imports the engines
     return median(times[1:]), median(ratios[1:])

@@ -5,14 +5,13 @@ Timed are many positions of one linkage, and many linkages at one position.
 
 import ctypes
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from fourbar.scene import Command
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.solving import solve
 from fourbar_validation.cost.study import time_call, time_in_turns
+from fourbar_validation.engines.processes import run_to_end
 from fourbar_validation.report.machine import name_machine
 
 if TYPE_CHECKING:
@@ -59,13 +59,6 @@ ONE_LINKAGE = "one linkage, as many positions"
 _LOOPED = "one after the other"
 CONTENDED_LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
-
-
-class _Peers(NamedTuple):
-    """Libraries that can be run here, and the reasons why the others were not run."""
-
-    here: dict[str, TimedLoop]
-    not_run: dict[str, str]
 
 
 def make_example(
@@ -120,36 +113,28 @@ def time_interleaved(
     }
 
 
-def collect_loops() -> _Peers:
+def collect_loops() -> tuple[dict[str, TimedLoop], dict[str, str]]:
     """Return the implementations of the closed formulas that write into given arrays.
 
-    An implementation that cannot be made here is named with the reason.
+    The second dictionary names those that cannot be made here, with the reason.
     """
-    loops: dict[str, TimedLoop | str] = {
-        "NumPy": _make_solve_loop(),
-        "C": _compile_loop(),
-    }
-    reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
-    return _Peers(
-        {name: loop for name, loop in loops.items() if not isinstance(loop, str)},
-        reasons,
-    )
+    loop = _compile_loop()
+    if isinstance(loop, str):
+        return {"NumPy": _make_solve_loop()}, {"C": loop}
+    return {"NumPy": _make_solve_loop(), "C": loop}, {}
 
 
 def _make_solve_loop() -> TimedLoop:
     scene = make_example()
 
     def call(theta_2: Any, out: Any) -> None:
-        rows = iter(range(len(out)))
         into = {}
+        row = 0
         for name in UNKNOWNS:
-            row = next(rows)
-            into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
-        solve(
-            scene,
-            at=command_positions(len(theta_2))._replace(angle=theta_2),
-            out=into,
-        )
+            into[name] = out[row : row + 2].T if name in VECTORS else out[row]
+            row += 2 if name in VECTORS else 1
+        at = command_positions(len(theta_2))._replace(angle=theta_2)
+        solve(scene, at=at, out=into)
 
     return call
 
@@ -161,28 +146,11 @@ def _compile_loop() -> TimedLoop | str:
         return "no C compiler is installed"
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "loop.so"
-        line = [
-            compiler,
-            *FLAGS,
-            "-fPIC",
-            "-shared",
-            str(_SOURCE),
-            "-o",
-            str(library),
-            "-lm",
-        ]
-        made = subprocess.run(
-            line,
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
-        if made.returncode != 0:
-            return (
-                f"{compiler} fails:"
-                f" {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
-            )
+        words = [*FLAGS, "-fPIC", "-shared", _SOURCE, "-o", library, "-lm"]
+        made = run_to_end([compiler, *words])
+        if made.failed:
+            first, *_ = [*made.errors.strip().splitlines(), "without a word"]
+            return f"{compiler} fails: {first}"
         loop = ctypes.CDLL(str(library)).loop
     pointer = ctypes.POINTER(ctypes.c_double)
 
@@ -212,11 +180,8 @@ def time_positions(
         theta_2 = command_positions(at_once).theta_2
         out = np.zeros((15, at_once))
         actions = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
-        for name, value in time_interleaved(
-            actions,
-            rounds if n <= POSITIONS_OF_ONE_CALL else 1,
-            calls,
-        ).items():
+        once_each = rounds if n <= POSITIONS_OF_ONE_CALL else 1
+        for name, value in time_interleaved(actions, once_each, calls).items():
             times[name][n] = 1e9 * value / at_once
     return times
 
@@ -234,10 +199,8 @@ def time_linkages(largest: int, rounds: int) -> Times:
 
     def looped(lengths: Any) -> None:
         for length in lengths.tolist():
-            linkage = replace(
-                scene.linkage,
-                coupler=replace(scene.linkage.coupler, length=length),
-            )
+            coupler = replace(scene.linkage.coupler, length=length)
+            linkage = replace(scene.linkage, coupler=coupler)
             solve(replace(scene, linkage=linkage))
 
     for m in [10**k for k in range(6) if 10**k <= min(largest, _MOST_LINKAGES)]:
@@ -248,11 +211,8 @@ def time_linkages(largest: int, rounds: int) -> Times:
         }
         if m <= MOST_LOOPED:
             actions[_LOOPED] = partial(looped, lengths)
-        for name, value in time_interleaved(
-            actions,
-            rounds,
-            max(1, MOST_LOOPED // m),
-        ).items():
+        calls = max(1, MOST_LOOPED // m)
+        for name, value in time_interleaved(actions, rounds, calls).items():
             times[name][m] = 1e9 * value / m
     return times
 
@@ -267,19 +227,16 @@ def draw_bench(
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.4, 4.0), layout="constrained")
-        positions_axes, linkages_axes = figure.subplots(1, 2)
-        _draw_panel(
-            positions_axes,
-            over_positions,
-            "ns per position, every unknown",
-            "positions",
+        panels = (
+            (over_positions, "ns per position, every unknown", "positions"),
+            (
+                over_linkages,
+                "ns per linkage, every force at one position",
+                "linkages",
+            ),
         )
-        _draw_panel(
-            linkages_axes,
-            over_linkages,
-            "ns per linkage, every force at one position",
-            "linkages",
-        )
+        for axes, panel in zip(figure.subplots(1, 2), panels, strict=True):
+            _draw_panel(axes, *panel)
         figure.supxlabel(
             f"One core: {name_machine()}",
             size=6.8,
@@ -298,8 +255,7 @@ def _draw_panel(
 ) -> None:
     for (who, timed), (colour, mark) in zip(times.items(), _LOOKS, strict=False):
         axes.loglog(
-            list(timed),
-            list(timed.values()),
+            *zip(*timed.items(), strict=True),
             color=colour,
             marker=mark,
             ms=3.5,

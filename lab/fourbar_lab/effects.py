@@ -6,7 +6,9 @@ The flags are those of MuJoCo; each engine is timed.
 import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,33 +18,28 @@ import numpy as np
 from fourbar import effects as kinds
 from fourbar.errors import DependencyError, InputError
 from fourbar.files import loads
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import PINS
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
-from fourbar.writing import write_text
+from fourbar_lab.contenders import CONTENDED_LINKAGE
+from fourbar_lab.tables import show_table
 from fourbar_validation.cost.study import time_call, time_in_turns
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES
-from fourbar_validation.report.machine import describe_setup
-from fourbar_validation.report.sentences import make_words_table
-from fourbar_validation.report.templating import render
 
 LENGTHS_TEXT = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
+_OTHER_PINS = ("O2", "A", "O4")
+_LOAD = kinds.Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2)
 EFFECTS: dict[str, kinds.Effect | None] = {
     "none": None,
     "gravity": kinds.Gravity(9.81),
-    "viscous": kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
+    "viscous": kinds.Viscous.at(**dict.fromkeys(_OTHER_PINS, 0.01)),
     "viscous at pin B": kinds.Viscous.at(B=0.01),
-    "friction": kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
+    "friction": kinds.Friction.at(**dict.fromkeys(_OTHER_PINS, 0.01)),
     "friction at pin B": kinds.Friction.at(B=0.01),
-    "pin_friction": kinds.PinFriction.at(
-        O2=(0.1, 0.01),
-        A=(0.1, 0.01),
-        B=(0.1, 0.01),
-        O4=(0.1, 0.01),
-    ),
+    "pin_friction": kinds.PinFriction.at(**dict.fromkeys(PINS, (0.1, 0.01))),
     "torsion": kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
     "springs": kinds.Springs(
         (
@@ -56,14 +53,9 @@ EFFECTS: dict[str, kinds.Effect | None] = {
         )
     ),
     "flywheel": kinds.Flywheel(0.02),
-    "load": kinds.Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2),
-    "load over theta_2": kinds.Load(
-        4,
-        (3.0, 0.7),
-        arm=(0.05, 1.0),
-        moment=0.2,
-        frame="world",
-        table=kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0)),
+    "load": _LOAD,
+    "load over theta_2": replace(
+        _LOAD, table=kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
     ),
 }
 EFFECTS |= {
@@ -105,12 +97,11 @@ CAPTION_OF_THE_TABLE = (
 
 def make_effect_scene(effect: str, positions: int) -> Scene:
     """Build a crank-rocker of uniform bars with one effect."""
-    linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
     acting = EFFECTS[effect]
     loads = (acting,) if isinstance(acting, kinds.Load) else ()
     effects = () if acting is None or loads else (acting,)
     return Scene(
-        linkage,
+        CONTENDED_LINKAGE,
         Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0),
         loads=loads,
         effects=effects,
@@ -159,10 +150,8 @@ def _prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
 WORKLOADS: dict[str, Callable[[str], Callable[[int], Any]]] = {
     "formulas": _prepare_formulas,
     SIMULATION: prepare_simulation,
-    **{
-        name: partial(_prepare_answers, name)
-        for name in ("mujoco-inverse", "pinocchio-inverse")
-    },
+    "mujoco-inverse": partial(_prepare_answers, "mujoco-inverse"),
+    "pinocchio-inverse": partial(_prepare_answers, "pinocchio-inverse"),
 }
 
 
@@ -192,13 +181,11 @@ def measure_effect(
     Other work on the machine slows both runs of a pair alike.
     """
     amount = _AMOUNTS[engine]
-    works = {
-        which: partial(WORKLOADS[engine](name), amount)
-        for which, name in enumerate(("none", effect))
-    }
-    for work in works.values():
+    clocks = {}
+    for which, name in enumerate(("none", effect)):
+        work = partial(WORKLOADS[engine](name), amount)
         work()
-    clocks = {which: partial(time_call, work) for which, work in works.items()}
+        clocks[which] = partial(time_call, work)
     bare, loaded = map(np.array, time_in_turns(clocks, rounds).values())
     units = amount * (POSITIONS_OF_A_CALL if engine == "formulas" else 1)
     return EffectCost(
@@ -239,17 +226,10 @@ def list_pairs(
 
     The simulation is paired with each flag that the bare scene switches off.
     """
-    chosen = [
-        (engine, effect)
-        for engine in engines
-        for effect in effects
-        if (engine, effect) not in NO_COUNTERPART
-    ]
-    return chosen + [
-        (SIMULATION, name)
-        for name in (DEFAULT_FLAGS, *_list_flags())
-        if SIMULATION in engines
-    ]
+    chosen = [pair for pair in product(engines, effects) if pair not in NO_COUNTERPART]
+    if SIMULATION in engines:
+        chosen += [(SIMULATION, name) for name in (DEFAULT_FLAGS, *_list_flags())]
+    return chosen
 
 
 @click.command()
@@ -273,7 +253,6 @@ def effects(
     out: Path | None,
 ) -> int:
     """Time each effect in each engine, and each flag of MuJoCo; a minute."""
-    from rich.console import Console
     from rich.progress import track
 
     wanted = tuple(name.strip() for name in engines.split(","))
@@ -300,16 +279,5 @@ def effects(
         )
     ]
     columns, rows = list_cost_rows(costs)
-    Console().print(
-        make_words_table(["effect", *columns], rows, caption=CAPTION_OF_THE_TABLE)
-    )
-    if out is not None:
-        what = {
-            "about": CAPTION_OF_THE_TABLE,
-            "head": ["", *columns],
-            "rows": rows,
-            "setup": describe_setup(),
-        }
-        write_text(out, render("fourbar_lab", "effects.md.j2", **what))
-        click.echo(f"written to {out}")
+    show_table("effects", CAPTION_OF_THE_TABLE, ["effect", *columns], rows, out)
     return 0

@@ -12,6 +12,7 @@ import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from itertools import chain
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
@@ -34,26 +35,20 @@ from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question
 
 EXCHANGED_OPERATORS = (
-    *(
-        (ast.Add, ast.Sub),
-        (ast.Mult, ast.Div),
-        (ast.Lt, ast.LtE),
-        (ast.Gt, ast.GtE),
-        (ast.Eq, ast.NotEq),
-    ),
-    *(
-        (ast.And, ast.Or),
-        (ast.Is, ast.IsNot),
-        (ast.In, ast.NotIn),
-        (ast.USub, ast.UAdd),
-        (ast.BitAnd, ast.BitOr),
-    ),
+    (ast.Add, ast.Sub),
+    (ast.Mult, ast.Div),
+    (ast.Lt, ast.LtE),
+    (ast.Gt, ast.GtE),
+    (ast.Eq, ast.NotEq),
+    (ast.And, ast.Or),
+    (ast.Is, ast.IsNot),
+    (ast.In, ast.NotIn),
+    (ast.USub, ast.UAdd),
+    (ast.BitAnd, ast.BitOr),
 )
-OTHER: dict[type, type] = (
-    {a: b for a, b in EXCHANGED_OPERATORS}
-    | {b: a for a, b in EXCHANGED_OPERATORS}
-    | {ast.Pow: ast.Mult}
-)
+OTHER: dict[type, type] = {ast.Pow: ast.Mult}
+for _one, _other in EXCHANGED_OPERATORS:
+    OTHER |= {_one: _other, _other: _one}
 """Replacement of each operator."""
 _CHANGES = 1e-9
 MUTANT_SECONDS = 20
@@ -94,31 +89,34 @@ class Mutant(NamedTuple):
 def compile_mutants(module: ModuleType) -> Iterator[Mutant]:
     """Compile every mutant of the functions and methods of a module."""
     tree = ast.parse(inspect.getsource(module))
-    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
-    for prefix, body in (
-        ("", tree.body),
-        *((f"{each.name}.", each.body) for each in classes),
-    ):
+    bodies = {"": tree.body}
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            bodies[f"{node.name}."] = node.body
+    for prefix, body in bodies.items():
         for definition in body:
-            if not isinstance(definition, ast.FunctionDef):
-                continue
-            qualified = prefix + definition.name
-            for node in (
-                inner for statement in definition.body for inner in ast.walk(statement)
-            ):
-                for field, changed in _list_changes(node):
-                    original = getattr(node, field)
-                    before = ast.unparse(node)
-                    setattr(node, field, changed)
-                    code = _find_code(
-                        compile(tree, inspect.getfile(module), "exec"), qualified
-                    )
-                    line = node.lineno  # type: ignore[attr-defined]
-                    name = f"{module.__name__}.{qualified}, line {line}"
-                    name += f": {before} -> {ast.unparse(node)}"
-                    setattr(node, field, original)
-                    assert code is not None
-                    yield Mutant(name, _find_function(module, qualified), code)
+            if isinstance(definition, ast.FunctionDef):
+                qualified = prefix + definition.name
+                yield from _compile_function(module, tree, definition, qualified)
+
+
+def _compile_function(
+    module: ModuleType, tree: ast.Module, definition: ast.FunctionDef, qualified: str
+) -> Iterator[Mutant]:
+    function = _find_function(module, qualified)
+    for node in chain.from_iterable(map(ast.walk, definition.body)):
+        for field, changed in _list_changes(node):
+            original = getattr(node, field)
+            before = ast.unparse(node)
+            setattr(node, field, changed)
+            compiled = compile(tree, inspect.getfile(module), "exec")
+            line = node.lineno  # type: ignore[attr-defined]
+            name = f"{module.__name__}.{qualified}, line {line}"
+            name += f": {before} -> {ast.unparse(node)}"
+            setattr(node, field, original)
+            code = _find_code(compiled, qualified)
+            assert code is not None
+            yield Mutant(name, function, code)
 
 
 def _list_changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
@@ -189,13 +187,9 @@ def choose_scenes() -> list[Scene]:
 def compute_numbers(scene: Scene, command: Command) -> dict[str, Any]:
     """Compute every number that `solve` returns for a scene."""
     solution = solve(scene, "force", at=command)
-    numbers = {
-        name: getattr(solution, name)
-        for name in UNITS
-        if getattr(solution, name) is not None
-    }
+    numbers = {name: getattr(solution, name) for name in UNITS}
     numbers["status"] = solution.status_code.astype(float)
-    return numbers
+    return {name: value for name, value in numbers.items() if value is not None}
 
 
 def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
@@ -210,31 +204,6 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     return False
 
 
-def is_caught(
-    scene: Scene,
-    command: Command,
-    answers: list[tuple[Engine, Answer]],
-) -> bool:
-    """Check a scene: whether any comparison or identity fails."""
-    question = Question("", scene, command)
-    solution = question.solution
-    rows = list(check_identities(question))
-    for engine, answer in answers:
-        rows += Comparison(
-            "",
-            scene,
-            answer,
-            solution,
-            make_demands(engine, scene, command, answer),
-        ).rows()
-        if (
-            engine.name == FREE_BODY
-            and (reference := make_reference(scene, answer)) is not None
-        ):
-            rows.append(compare_status(question, reference))
-    return any(row.verdict == FAILS for row in rows)
-
-
 class Baseline(NamedTuple):
     """A scene, and what engines and formulas say of it without a mutant."""
 
@@ -244,20 +213,33 @@ class Baseline(NamedTuple):
     before: dict[str, Any]
 
 
-def make_baselines() -> list[Baseline]:
-    """Solve the scenes; RuntimeError where the harness fails on one of them."""
-    made = []
-    for scene in choose_scenes():
-        command = command_of(scene)
-        answers = [
-            (w, ask_at(w.start(), scene, command))
-            for w in ENGINES
-            if w.name in EXACT_ENGINE_NAMES
-        ]
-        if is_caught(scene, command, answers):
-            raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
-        made.append(Baseline(scene, command, answers, compute_numbers(scene, command)))
-    return made
+def is_caught(baseline: Baseline) -> bool:
+    """Check a scene: whether any comparison or identity fails."""
+    scene, command, answers, _ = baseline
+    question = Question("", scene, command)
+    rows = list(check_identities(question))
+    for engine, answer in answers:
+        held = make_demands(engine, scene, command, answer)
+        rows += Comparison("", scene, answer, question.solution, held).rows()
+        if engine.name == FREE_BODY:
+            reference = make_reference(scene, answer)
+            if reference is not None:
+                rows.append(compare_status(question, reference))
+    return any(row.verdict == FAILS for row in rows)
+
+
+def make_baseline(scene: Scene) -> Baseline:
+    """Solve a scene; RuntimeError where the harness fails on it."""
+    command = command_of(scene)
+    answers = [
+        (engine, ask_at(engine.start(), scene, command))
+        for engine in ENGINES
+        if engine.name in EXACT_ENGINE_NAMES
+    ]
+    baseline = Baseline(scene, command, answers, compute_numbers(scene, command))
+    if is_caught(baseline):
+        raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
+    return baseline
 
 
 def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
@@ -266,10 +248,11 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     signal.alarm(MUTANT_SECONDS)
     try:
         with np.errstate(all="ignore"), mutant.active():
-            for scene, command, answers, before in tried:
+            for baseline in tried:
+                scene, command, _, before = baseline
                 if is_changed(before, compute_numbers(scene, command)):
                     differs = True
-                    if is_caught(scene, command, answers):
+                    if is_caught(baseline):
                         return True
     except Exception:  # a mutant that raises or hangs ends the run: that is noticed
         return True
@@ -298,7 +281,7 @@ def mutants_command(module: str | None) -> int:
         raise _HangError
 
     before = signal.signal(signal.SIGALRM, alarm)
-    tried = make_baselines()
+    tried = [make_baseline(scene) for scene in choose_scenes()]
     shown = Console(stderr=True)
     changing = 0
     missed = list[str]()

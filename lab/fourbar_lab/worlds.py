@@ -6,6 +6,7 @@ MJX and MuJoCo Warp evaluate them on a GPU, MuJoCo and the formulas on one core.
 import math
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -19,15 +20,12 @@ from fourbar.errors import BROKEN, HOLDS, InputError
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
-from fourbar.writing import write_text
 from fourbar_lab.contenders import allocate
 from fourbar_lab.simulators.problems import PROBLEMS
+from fourbar_lab.tables import show_table
 from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.engines import protocol
-from fourbar_validation.report.machine import describe_setup
-from fourbar_validation.report.sentences import make_words_table
-from fourbar_validation.report.templating import render
 
 _PROBLEM = "crank_rocker"
 """Problem whose positions are repeated over the worlds."""
@@ -43,15 +41,13 @@ class Contender(NamedTuple):
 
     adapter: str
     needs_gpu: bool
-    double: bool | None = None
-    """Precision that `in_worlds` is asked for. None: it has one alone."""
 
 
 FORMULAS_ON_ONE_CORE = "formulas, NumPy, one core"
 CONTENDERS = {
     "MuJoCo, one core": Contender("mujoco_c:MujocoFile", False),
-    "MJX-JAX, double precision": Contender("mujoco_mjx:MujocoMjx", True, double=True),
-    "MJX-JAX, single precision": Contender("mujoco_mjx:MujocoMjx", True, double=False),
+    "MJX-JAX, double precision": Contender("mujoco_mjx:MujocoMjx", True),
+    "MJX-JAX, single precision": Contender("mujoco_mjx:MjxInSinglePrecision", True),
     "MuJoCo Warp, single precision": Contender("mujoco_warp:MujocoWarp", True),
 }
 _ABOUT = (
@@ -95,10 +91,14 @@ def _time_wall_clock(call: Callable[[], object]) -> float:
     """Time a call in s of wall-clock time, the median of several."""
     times: list[float] = []
     while len(times) < _MOST_TIMINGS and sum(times) < _LONGEST:
-        began = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - began)
+        times.append(_time_once(call))
     return median(times)
+
+
+def _time_once(call: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    call()
+    return time.perf_counter() - began
 
 
 def _measure_formulas(worlds: int) -> WorldsCost:
@@ -108,23 +108,18 @@ def _measure_formulas(worlds: int) -> WorldsCost:
         angle=np.resize(command.angle, worlds),
         branch=np.resize(command.branch, worlds),
     )
-    into = allocate(UNKNOWNS, repeated)
-    call = partial(solve, scene, at=repeated, out=into)
-    began = time.perf_counter()
-    call()
-    first = time.perf_counter() - began
+    call = partial(solve, scene, at=repeated, out=allocate(UNKNOWNS, repeated))
+    first = _time_once(call)
     seconds = _time_wall_clock(call)
     return WorldsCost(FORMULAS_ON_ONE_CORE, worlds, seconds, seconds, first)
 
 
 def measure_worlds(name: str, worlds: int) -> WorldsCost:
     """Time a contender, and judge the last worlds, one for each position."""
-    contender = CONTENDERS[name]
     problem, scene, command = _read_question()
-    simulator = load_simulator(contender.adapter)()
+    simulator = load_simulator(CONTENDERS[name].adapter)()
     began = time.perf_counter()
-    chosen = {} if contender.double is None else {"double": contender.double}
-    prepared = simulator.in_worlds(scene, worlds, **chosen)
+    prepared = simulator.in_worlds(scene, worlds)
     prepared.evaluate()
     first = time.perf_counter() - began
     seconds = _time_wall_clock(prepared.evaluate)
@@ -132,8 +127,12 @@ def measure_worlds(name: str, worlds: int) -> WorldsCost:
     readings = prepared.read(prepared.exchange())
     rows = np.arange(len(command.angle))
     answer = simulator.make_answer(scene, command, simulator.setting, readings, rows)
-    errors = _judge_forces(problem, protocol.answer_to_json(scene, command, answer))
-    return WorldsCost(name, worlds, seconds, exchanged, first, *errors)
+    result = protocol.answer_to_json(scene, command, answer)
+    errors = {row.quantity: row.error for row in judge_answers(problem, result)}
+    # NaN stays NaN
+    force = float(np.max([errors[name] for name in PIN_FORCES]))
+    torque = errors["torque"]
+    return WorldsCost(name, worlds, seconds, exchanged, first, torque, force)
 
 
 def load_simulator(adapter: str) -> Any:
@@ -142,39 +141,25 @@ def load_simulator(adapter: str) -> Any:
     return getattr(import_module(f"fourbar_lab.simulators.{module}"), name)
 
 
-def _judge_forces(
-    problem: dict[str, Any],
-    result: dict[str, Any],
-) -> tuple[float, float]:
-    """Return the errors of the torque and of the worst pin force."""
-    errors = {row.quantity: row.error for row in judge_answers(problem, result)}
-    # NaN stays NaN
-    force = np.max([errors[name] for name in PIN_FORCES])
-    return errors["torque"], float(force)
-
-
 def _find_obstacle(contender: Contender, on_any_device: bool) -> str:
     """Return why a contender cannot be run here, or an empty text."""
     try:
         simulator = load_simulator(contender.adapter)
     except ImportError as error:
-        return f"not run: {write_one_line(str(error))}"
+        return write_one_line(str(error))
     if contender.needs_gpu and not on_any_device and not simulator.on_gpu:
-        return "not run: no GPU"
+        return "no GPU"
     return ""
 
 
 def _list_devices() -> list[str]:
     """Name the device of each contender whose adapter can be imported."""
-    adapters = dict.fromkeys(one.adapter for one in CONTENDERS.values())
     devices = []
-    for adapter in adapters:
-        try:
-            simulator = load_simulator(adapter)
-        except ImportError:
-            continue
-        devices.append(f"{simulator.name} {simulator.version} on {simulator.device}")
-    return devices
+    for adapter, _ in CONTENDERS.values():
+        with suppress(ImportError):
+            one = load_simulator(adapter)
+            devices.append(f"{one.name} {one.version} on {one.device}")
+    return list(dict.fromkeys(devices))
 
 
 def list_worlds_rows(costs: Iterable[WorldsCost]) -> tuple[list[str], list[list[str]]]:
@@ -249,22 +234,21 @@ def worlds_command(
     MuJoCo and the formulas stand beside it, on one core. What is not run is named with
     the reason, and the exit status is 3.
     """
-    from rich.console import Console
-
     _, _, positions = _read_question()
     numbers = _read_worlds(worlds, len(positions.angle))
     obstacles = {
         name: _find_obstacle(contender, any_device)
         for name, contender in CONTENDERS.items()
     }
-    not_run = [f"{name}: {reason}" for name, reason in obstacles.items() if reason]
+    not_run = [
+        f"{name}: not run: {reason}" for name, reason in obstacles.items() if reason
+    ]
     costs: list[WorldsCost] = []
     for number in numbers:
-        actions = {FORMULAS_ON_ONE_CORE: partial(_measure_formulas, number)} | {
-            name: partial(measure_worlds, name, number)
-            for name, reason in obstacles.items()
-            if not reason
-        }
+        actions = {FORMULAS_ON_ONE_CORE: partial(_measure_formulas, number)}
+        for name, reason in obstacles.items():
+            if not reason:
+                actions[name] = partial(measure_worlds, name, number)
         for name, action in actions.items():
             what = f"{name}, {number} worlds"
             try:
@@ -274,13 +258,5 @@ def worlds_command(
                 continue
             click.echo(f"{what}: {1e9 * costs[-1].seconds / number:.0f} ns a position")
     columns, rows = list_worlds_rows(costs)
-    Console().print(make_words_table(columns, rows, caption=_ABOUT))
-    for line in not_run:
-        click.echo(line)
-    setup = "; ".join((describe_setup(), *_list_devices()))
-    if out is not None:
-        page = {"about": _ABOUT, "head": columns, "rows": rows, "setup": setup}
-        text = render("fourbar_lab", "worlds.md.j2", **page, not_run=not_run)
-        write_text(out, text)
-        click.echo(f"written to {out}")
+    show_table("worlds", _ABOUT, columns, rows, out, not_run, _list_devices())
     return BROKEN if not_run else HOLDS

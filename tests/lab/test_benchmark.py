@@ -26,7 +26,6 @@ from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.engines.environments import read_engines, read_engines_of
 from tests.whole.test_imports import ROOT
 
-PROBLEMS_ASKED = ("crank_rocker", "slider_crank", "sprung")
 WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 
 
@@ -43,10 +42,9 @@ def folder(tmp_path):
     (tmp_path / "mine.py").write_text(code)
     (tmp_path / "wrong.py").write_text(code.replace(*WRONG))
     (tmp_path / "dead.py").write_text("raise SystemExit('no licence')")
-    names = ("mine", "wrong", "dead")
     entries = [
         f'[[engine]]\nname = "{name}"\ncommand = ["python", "{tmp_path / name}.py"]\n'
-        for name in names
+        for name in ("mine", "wrong", "dead")
     ]
     entries.append('[[engine]]\nname = "absent"\ncommand = ["no_such_program"]\n')
     (tmp_path / "engines.toml").write_text("\n".join(entries))
@@ -54,53 +52,36 @@ def folder(tmp_path):
 
 
 def run(folder, *problems):
-    """The letters of a run, by engine and problem."""
-    options = [
-        option for name in problems or PROBLEMS_ASKED for option in ("--problem", name)
-    ]
-    line = [
-        "benchmark",
-        "--engines",
-        str(folder / "engines.toml"),
-        "-o",
-        str(folder / "out"),
-        "--time-limit",
-        "60",
-    ]
-    assert status([*line, *options]) == 0
-    table = list(
-        csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines())
-    )
-    return {
+    """Return the letters of a run by engine and problem, and the rows of its table."""
+    out = folder / "out"
+    words = ["--engines", folder / "engines.toml", "-o", out, "--time-limit", 60]
+    for problem in problems:
+        words += ["--problem", problem]
+    assert status(["benchmark", *map(str, words)]) == 0
+    table = list(csv.DictReader((out / "benchmark.csv").read_text().splitlines()))
+    letters = {
         (row["engine"], row["problem"]): read_cell_text(row["letters"])
         for row in table
         if row["letters"]
     }
+    return letters, table
+
+
+def find_rows(table, column, **values):
+    """Return the rows with these values by one of their columns."""
+    return {row[column]: row for row in table if values.items() <= row.items()}
 
 
 @pytest.mark.slow
 def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder):
-    letters = run(folder)
-    assert (
-        letters["mine", "crank_rocker"] == "AA"
-        and letters["wrong", "crank_rocker"] == "AD"
-    )
+    letters, table = run(folder, "crank_rocker", "slider_crank", "sprung")
+    first = {engine: letters[engine, "crank_rocker"] for engine, _ in letters}
+    assert first == {"mine": "AA", "wrong": "AD", "dead": "-", "absent": "-"}
     assert letters["mine", "slider_crank"] == letters["mine", "sprung"] == REFUSED
-    assert {letters[name, "crank_rocker"] for name in ("dead", "absent")} == {"-"}
-    table = list(
-        csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines())
-    )
-    reasons = {
-        row["engine"]: row["reason"]
-        for row in table
-        if row["problem"] == "crank_rocker"
-    }
-    assert "no licence" in reasons["dead"] and "no_such_program" in reasons["absent"]
-    wrong = {
-        row["quantity"]: row
-        for row in table
-        if row["engine"] == "wrong" and row["problem"] == "crank_rocker"
-    }
+    rows = find_rows(table, "engine", problem="crank_rocker")
+    assert "no licence" in rows["dead"]["reason"]
+    assert "no_such_program" in rows["absent"]["reason"]
+    wrong = find_rows(table, "quantity", engine="wrong", problem="crank_rocker")
     assert wrong["torque"]["level"] == "D" and wrong["F12"]["level"] == "A"
     assert 5e-3 < float(wrong["torque"]["error"]) < 2e-1
     page = (folder / "out" / "benchmark.html").read_text()
@@ -114,33 +95,24 @@ def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder):
 def test_what_was_answered_is_not_asked_again(folder):
     first = run(folder, "crank_rocker")
     code = (folder / "mine.py").read_text()
-    (folder / "mine.py").write_text(
-        code.replace('question["ask"] == "answer"', "1 / 0")
-    )  # hello too
-    (folder / "mine.py").write_text(
-        code.replace("        told = [", "        1 / 0\n        told = [")
-    )
+    told = "        told = ["
+    (folder / "mine.py").write_text(code.replace(told, f"        1 / 0\n{told}"))
     assert run(folder, "crank_rocker") == first
     file = folder / "out" / "results" / "mine" / "crank_rocker.json"
     problem = read_problem(PROBLEMS / "crank_rocker.json")
-    assert {
-        row.level for row in judge_answers(problem, read_result(file, problem))
-    } == {"A"}
+    judged = judge_answers(problem, read_result(file, problem))
+    assert {row.level for row in judged} == {"A"}
     file.unlink()
-    assert run(folder, "crank_rocker")["mine", "crank_rocker"] == "-"
+    assert run(folder, "crank_rocker")[0]["mine", "crank_rocker"] == "-"
 
 
 def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too():
-    engines, reasons = (
-        read_engines_of(BENCHMARKED_ENGINES),
-        read_reasons(BENCHMARKED_ENGINES),
-    )
+    engines = read_engines_of(BENCHMARKED_ENGINES)
     assert len(engines) >= 25 and engines.items() <= read_engines([]).items()
-    assert not [name for name in engines if "," in name], (
-        "`run --engines` takes a comma-separated list"
-    )
-    rows = {name.partition(":")[0] for name in engines}
-    assert all(any(reason.startswith(row) for row in rows) for reason in reasons)
+    # `run --engines` takes a comma-separated list
+    assert not [name for name in engines if "," in name]
+    rows = tuple(name.partition(":")[0] for name in engines)
+    assert all(reason.startswith(rows) for reason in read_reasons(BENCHMARKED_ENGINES))
 
 
 def test_a_row_names_its_version_before_its_way():
@@ -164,18 +136,8 @@ def test_a_row_names_its_version_before_its_way():
 def test_entries_that_cannot_be_read_are_named_in_one_line(text, tmp_path, capsys):
     if text is not None:
         (tmp_path / "engines.toml").write_text(text)
-    assert (
-        status(
-            [
-                "benchmark",
-                "--engines",
-                str(tmp_path / "engines.toml"),
-                "-o",
-                str(tmp_path / "out"),
-            ]
-        )
-        == 2
-    )
+    words = ["--engines", tmp_path / "engines.toml", "-o", tmp_path / "out"]
+    assert status(["benchmark", *map(str, words)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
@@ -187,7 +149,7 @@ def test_an_engine_answers_the_slider_cranks(library, folder):
     (folder / "engines.toml").write_text(
         f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n'
     )
-    letters = run(folder, "slider_crank", "slider_crank_offset", "crank_rocker")
+    letters, _ = run(folder, "slider_crank", "slider_crank_offset", "crank_rocker")
     assert sorted(letters.values()) == ["AA", "AA", REFUSED]
 
 
@@ -234,37 +196,21 @@ def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(fol
         '[because]\n"slow: bad" = "its torque is wrong on purpose"\n'
         '"slow" = "another reason"\n'
     )
-    letters = run(folder, "crank_rocker", "sprung")
-    assert (
-        letters["slow: good", "crank_rocker"] == "AA"
-        and letters["slow: bad", "crank_rocker"] == "AC"
-    )
+    letters, table = run(folder, "crank_rocker", "sprung")
+    assert letters["slow: good", "crank_rocker"] == "AA"
+    assert letters["slow: bad", "crank_rocker"] == "AC"
     assert letters["slow: bad", "sprung"] == REFUSED
-    table = list(
-        csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines())
-    )
-    torque = {
-        row["setting"]: row
-        for row in table
-        if row["engine"] == "slow: bad" and row["quantity"] == "torque"
-    }
+    torque = find_rows(table, "setting", engine="slow: bad", quantity="torque")
     assert {setting: row["level"] for setting, row in torque.items()} == {
         "RK4 100/rev": "",
         "RK4 1000/rev": "C",
     }
     assert torque["RK4 1000/rev"]["reason"] == "its torque is wrong on purpose"
-    missing = [
-        row
-        for row in table
-        if row["engine"] == "slow: good" and row["quantity"] == "F43" and row["level"]
-    ]
-    assert [(row["level"], row["reason"]) for row in missing] == [("-", "not read")]
+    missing = find_rows(table, "level", engine="slow: good", quantity="F43")
+    assert missing["-"]["reason"] == "not read" and missing.keys() == {"-", ""}
     page = (folder / "out" / "benchmark.html").read_text()
-    assert (
-        "order 2.0" in page
-        and "Derivatives of the torque, by hand" in page
-        and "slow 2: bad" in page
-    )
+    for text in ("order 2.0", "Derivatives of the torque, by hand", "slow 2: bad"):
+        assert text in page
 
 
 @pytest.mark.slow
@@ -274,9 +220,8 @@ def test_a_simulator_answers_single_states_at_its_own_motion(folder):
     (folder / "engines.toml").write_text(
         f'[[engine]]\nname = "it"\nadapter = "{adapter}"\nsetting = "generated file"\n'
     )
-    letters = run(
-        folder, "crank_rocker", "sprung", "change_point", "second_on_the_crank"
-    )
+    problems = ("crank_rocker", "sprung", "change_point", "second_on_the_crank")
+    letters, _ = run(folder, *problems)
     assert sorted(letters.values()) == ["AA", REFUSED, REFUSED, REFUSED]
     (file,) = (folder / "out" / "results").glob("*/crank_rocker.json")
     assert "at" in json.loads(file.read_text())
@@ -290,15 +235,10 @@ def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(folder):
         '[[engine]]\nname = "it"\nadapter = "pinocchio-inverse"\n'
         f'[[engine]]\nname = "it (released)"\nadapter = "{released}"\n'
     )
-    letters = run(folder, "crank_rocker", "gz_physics_987", "slider_crank")
-    assert (
-        letters["it", "crank_rocker"] == "AA"
-        and letters["it", "slider_crank"] == REFUSED
-    )
-    assert (
-        letters["it", "gz_physics_987"][:1] == "-"
-        and letters["it", "gz_physics_987"][1:] in "AB"
-    )
+    letters, _ = run(folder, "crank_rocker", "gz_physics_987", "slider_crank")
+    assert letters["it", "crank_rocker"] == "AA"
+    assert letters["it", "slider_crank"] == REFUSED
+    assert letters["it", "gz_physics_987"] in ("-A", "-B")
 
 
 def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family():

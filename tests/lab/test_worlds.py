@@ -4,6 +4,7 @@ MJX and MuJoCo Warp need not be there. Where they are, they run on any device.
 """
 
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,8 +12,7 @@ import pytest
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS
 from fourbar_lab import worlds
 from fourbar_lab.cli import status
-from fourbar_lab.simulators import mujoco_c
-from fourbar_lab.simulators.mujoco_c import MujocoFile, repeat_states
+from fourbar_lab.simulators.mujoco_c import MujocoFile
 from fourbar_lab.worlds import (
     CONTENDERS,
     FORMULAS_ON_ONE_CORE,
@@ -21,7 +21,6 @@ from fourbar_lab.worlds import (
     measure_worlds,
 )
 from tests.lab.simulators.test_simulators import ask_position
-from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
 MUJOCO = "MuJoCo, one core"
@@ -55,8 +54,7 @@ def test_the_last_worlds_are_judged_and_every_world_has_a_state():
     check_errors(MUJOCO, cost.torque, cost.force)
     assert cost.first > 0.5 * cost.seconds and cost.exchanged > 0.5 * cost.seconds
     scene, command = ask_position()
-    written = mujoco_c.write_opened_mjcf(scene, 100, "mujoco")
-    q, v = repeat_states(written, scene, TWO_TURNS)
+    q, v, *_ = MujocoFile().in_worlds(scene, TWO_TURNS).exchange()
     turned = np.remainder(q[:, 0] - np.resize(command.theta_2, TWO_TURNS), math.tau)
     assert np.minimum(turned, math.tau - turned).max() < 1e-12
     assert len(v) == TWO_TURNS
@@ -74,20 +72,20 @@ def test_a_world_that_is_not_finite_fails():
 
 
 def test_a_wrong_world_is_seen(monkeypatch):
-    plain = MujocoFile.in_worlds
+    plain = MujocoFile.prepare
 
-    def with_an_error(self, scene, count):
-        prepared = plain(self, scene, count)
+    def with_an_error(*arguments):
+        evaluate, exchange = plain(*arguments)
 
-        def exchange():
-            results = prepared.exchange()
+        def exchange_wrong():
+            results = exchange()
             # the closing force of the last position
             results[4][-1] *= 1.1
             return results
 
-        return prepared._replace(exchange=exchange)
+        return evaluate, exchange_wrong
 
-    monkeypatch.setattr(MujocoFile, "in_worlds", with_an_error)
+    monkeypatch.setattr(MujocoFile, "prepare", with_an_error)
     cost = measure_worlds(MUJOCO, TWO_TURNS)
     assert cost.force > 1e-3 and cost.torque < EXACT
 
@@ -116,53 +114,51 @@ def test_times_are_divided_by_those_of_the_formulas():
     ]
 
 
-def test_without_a_gpu_nothing_is_claimed_of_one(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(worlds, "load_simulator", lambda _: MujocoFile)
+class OnGpu(MujocoFile):
+    """MuJoCo in the place of a simulator on a GPU."""
+
+    on_gpu = True
+
+
+def load_without_warp(adapter):
+    if "warp" in adapter:
+        raise ModuleNotFoundError("No module named 'warp'")
+    return OnGpu
+
+
+NO_GPU = {name: "no GPU" for name, one in CONTENDERS.items() if one.needs_gpu}
+NO_WARP = {"MuJoCo Warp, single precision": "No module named 'warp'"}
+
+
+@pytest.mark.parametrize(
+    ("load", "options", "left_out"),
+    [
+        (lambda _: MujocoFile, [], NO_GPU),
+        (load_without_warp, [], NO_WARP),
+        (lambda _: OnGpu, [], {}),
+        pytest.param(
+            lambda _: MujocoFile, ["--any-device"], {}, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_what_is_not_run_is_named_and_nothing_is_claimed_of_it(
+    load, options, left_out, monkeypatch, tmp_path, capsys
+):
+    monkeypatch.setattr(worlds, "load_simulator", load)
     out = tmp_path / "worlds.md"
-    assert status(["worlds", "--worlds", str(TWO_TURNS), "-o", str(out)]) == BROKEN
+    words = ["worlds", "--worlds", str(TWO_TURNS), "-o", str(out), *options]
+    assert status(words) == (BROKEN if left_out else HOLDS)
     printed, page = capsys.readouterr().out, out.read_text(encoding="utf-8")
-    for name, contender in CONTENDERS.items():
-        line = f"{name}: not run: no GPU"
-        assert (line in printed) == (line in page) == contender.needs_gpu
-    assert f"| {MUJOCO} |" in page and "| MuJoCo Warp" not in page
-
-
-class Elsewhere(MujocoFile):
-    """MuJoCo in the place of a simulator for GPUs."""
-
-    def in_worlds(self, scene, count, double=True):
-        return super().in_worlds(scene, count)
-
-
-@pytest.mark.parametrize("on_gpu", slow_but({True}, [True, False]))
-def test_with_a_gpu_or_on_any_device_all_are_run(on_gpu, monkeypatch, capsys):
-    monkeypatch.setattr(Elsewhere, "on_gpu", on_gpu)
-    monkeypatch.setattr(worlds, "load_simulator", lambda _: Elsewhere)
-    words = ["worlds", "--worlds", str(TWO_TURNS)]
-    if not on_gpu:
-        words.append("--any-device")
-    assert status(words) == HOLDS
-    printed = capsys.readouterr().out
-    assert "not run" not in printed
     for name in CONTENDERS:
-        assert f"{name}, {TWO_TURNS} worlds: " in printed
-
-
-def test_what_is_not_installed_is_named(monkeypatch, capsys):
-    def refuse(adapter):
-        if "warp" in adapter:
-            raise ModuleNotFoundError("No module named 'warp'")
-        return MujocoFile
-
-    monkeypatch.setattr(worlds, "load_simulator", refuse)
-    assert status(["worlds", "--worlds", str(TWO_TURNS)]) == BROKEN
-    assert "not run: No module named 'warp'" in capsys.readouterr().out
+        reason = left_out.get(name)
+        assert (f"{name}, {TWO_TURNS} worlds: " in printed) == (reason is None)
+        assert (f"| {name} |" in page) == (reason is None)
+        line = f"{name}: not run: {reason}"
+        assert (line in printed) == (line in page) == (reason is not None)
 
 
 def test_a_call_that_fails_costs_its_own_row(monkeypatch, capsys):
-    def fail(*_):
-        raise MemoryError("out of memory")
-
+    fail = Mock(side_effect=MemoryError("out of memory"))
     monkeypatch.setattr(worlds, "measure_worlds", fail)
     assert status(["worlds", "--worlds", str(TWO_TURNS)]) == BROKEN
     printed = capsys.readouterr().out

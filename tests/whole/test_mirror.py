@@ -111,6 +111,7 @@ JUDGED_BY = {
     ),
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders starts",
+    "lab/test_effects.py": "lab: tables",
     "lab/test_stability.py": "lab: families slopes tally",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas pictures study",

@@ -14,8 +14,9 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
+    bar_directions,
     gravity_field,
-    run_through,
+    read_flywheel,
     start,
 )
 from fourbar_validation.engines.description import list_moving_parts, rotate
@@ -75,31 +76,19 @@ class Dart(Simulator):
         )
         joints = [linkage.getJoint(number) for number in range(3)]
 
-        def advance(steps: int) -> tuple[Any, float]:
-            for _ in range(steps - 1):
-                world.step()
-            q = np.array(linkage.getPositions())
-            speed = float(linkage.getVelocities()[0])
-            world.step()
-            return q, speed
+        def look() -> tuple[Any, float]:
+            return np.array(linkage.getPositions()), float(linkage.getVelocities()[0])
 
         def read(before: tuple[Any, float]) -> Instant:
             q, speed = before
-            theta = (q[0], q[0] + q[1], q[2])
-            alpha = (float(linkage.getVelocities()[0]) - speed) / course.timestep
-            wrenches = [
-                joint.getWrenchToChildBodyNode()[3:5] for joint in joints
-            ]  # by the child, in its axes
+            theta = bar_directions(q)
+            # by the child, in its axes
             F21, F32, F41 = (
-                np.array(rotate(angle, *w))
-                for angle, w in zip(theta, wrenches, strict=True)
+                np.array(rotate(angle, *joint.getWrenchToChildBodyNode()[3:5]))
+                for angle, joint in zip(theta, joints, strict=True)
             )
-            return Instant(
-                theta,
-                speed,
-                alpha,
-                -inertia * alpha,
-                {"F12": -F21, "F32": F32, "F14": -F41},
-            )
+            speeds = speed, float(linkage.getVelocities()[0])
+            forces = {"F12": -F21, "F32": F32, "F14": -F41}
+            return read_flywheel(course, inertia, theta, speeds, forces)
 
-        return run_through(scene, course, advance, read)
+        return self.run_by_steps(scene, course, world.step, look, read)

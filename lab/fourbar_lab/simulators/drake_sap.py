@@ -20,8 +20,9 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
+    bar_directions,
     gravity_field,
-    run_through,
+    read_flywheel,
     start,
 )
 from fourbar_validation.engines.description import PIN_OF_MOVING_BAR, rotate
@@ -72,6 +73,11 @@ class DrakeSap(Simulator):
         Parser(plant).AddModelsFromString(write_sdf(scene, written_for, begin), "sdf")
         plant.mutable_gravity_field().set_gravity_vector(gravity_field(scene))
         joints = [plant.GetJointByName(name) for name in PIN_OF_MOVING_BAR.values()]
+        joint_speeds = [*begin.qvel]
+        if written_for == "gazebo":
+            # bar 3 on bar 4
+            joints.append(plant.GetJointByName("B"))
+            joint_speeds.append(begin.qvel[0] + begin.qvel[1] - begin.qvel[2])
         actuator = plant.AddJointActuator("drive", joints[0])
         actuator.set_default_rotor_inertia(inertia)
         actuator.set_default_gear_ratio(1.0)
@@ -80,46 +86,38 @@ class DrakeSap(Simulator):
         plant.get_actuation_input_port().FixValue(
             context, np.zeros(plant.num_actuators())
         )  # also one of every other joint
-        for joint, speed in zip(joints, begin.qvel, strict=True):
+        for joint, speed in zip(joints, joint_speeds, strict=True):
             joint.set_angular_rate(context, speed)
-        closing = (
-            plant.GetJointByName("B") if written_for == "gazebo" else None
-        )  # bar 3 on bar 4
-        if closing is not None:
-            closing.set_angular_rate(
-                context, begin.qvel[0] + begin.qvel[1] - begin.qvel[2]
-            )
         simulator = analysis.Simulator(plant, context)
         done = 0
 
-        def advance(steps: int) -> tuple[list[float], float, dict[str, Any]]:
+        def advance(steps: int) -> tuple[Any, float, dict[str, Any]]:
             nonlocal done
             simulator.AdvanceTo((done + steps - 1) * timestep)
-            angles = [
-                joint.get_angle(context) + q
-                for joint, q in zip(joints, begin.qpos, strict=True)
-            ]
-            theta = [angles[0], angles[0] + angles[1], angles[2]]
+            theta = bar_directions(
+                [
+                    joint.get_angle(context) + q
+                    for joint, q in zip(joints[:3], begin.qpos, strict=True)
+                ]
+            )
             speed = joints[0].get_angular_rate(context)
             reactions = plant.get_reaction_forces_output_port().Eval(context)
-            on_child = (
-                reactions[int(joint.index())].translational()[:2] for joint in joints
-            )
-            O2, A, O4 = (
-                np.array(rotate(angle, *force))
-                for angle, force in zip(theta, on_child, strict=True)
+            # on the child, in its axes; the child of B is the coupler
+            O2, A, O4, *B = (
+                np.array(
+                    rotate(angle, *reactions[int(joint.index())].translational()[:2])
+                )
+                for angle, joint in zip((*theta, theta[1]), joints, strict=False)
             )
             forces = {"F12": O2, "F32": -A, "F14": O4}
-            if closing is not None:
-                on_coupler = reactions[int(closing.index())].translational()[:2]
-                forces["F43"] = np.array(rotate(theta[1], *on_coupler))
+            forces |= zip(("F43",), B, strict=False)
             done += steps
             simulator.AdvanceTo(done * timestep)
             return theta, speed, forces
 
-        def read(before: tuple[list[float], float, dict[str, Any]]) -> Instant:
+        def read(before: tuple[Any, float, dict[str, Any]]) -> Instant:
             theta, speed, forces = before
-            alpha = (joints[0].get_angular_rate(context) - speed) / timestep
-            return Instant(theta, speed, alpha, -inertia * alpha, forces)
+            speeds = speed, joints[0].get_angular_rate(context)
+            return read_flywheel(course, inertia, theta, speeds, forces)
 
-        return run_through(scene, course, advance, read)
+        return self.run(scene, course, advance, read)

@@ -69,31 +69,17 @@ class ExudynIntegrators(Simulator):
             nonlocal done
             done += 1
             if done in course.stops:
-                q, v, a = (
-                    np.array(get())
-                    for get in (
-                        state.GetODE2Coordinates,
-                        state.GetODE2Coordinates_t,
-                        state.GetODE2Coordinates_tt,
-                    )
-                )
-                exerted = -np.array(
-                    state.GetAECoordinates()
-                )  # its multipliers stand on the other side of M a = f
-                forces = {
-                    PIN_FORCE[pin]: exerted[2 * number : 2 * number + 2]
-                    for number, pin in enumerate(JOINTS)
-                }
+                q = np.array(state.GetODE2Coordinates())
+                v = np.array(state.GetODE2Coordinates_t())
+                a = np.array(state.GetODE2Coordinates_tt())
+                # its multipliers stand on the other side of M a = f
+                exerted = -np.array(state.GetAECoordinates())
+                pins = zip(JOINTS, exerted[:-1].reshape(4, 2), strict=True)
+                forces = {PIN_FORCE[pin]: force for pin, force in pins}
                 theta = [q[turn] for turn in bars.turn.values()]
+                turn = bars.turn[2]
                 readings.read(
-                    scene,
-                    Instant(
-                        theta,
-                        v[bars.turn[2]],
-                        a[bars.turn[2]],
-                        exerted[-1],
-                        forces,
-                    ),
+                    scene, Instant(theta, v[turn], a[turn], exerted[-1], forces)
                 )
             return True
 

@@ -13,8 +13,8 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
+    bar_directions,
     gravity_field,
-    run_through,
     start,
     write_temp,
 )
@@ -83,24 +83,15 @@ class GenesisRigid(Simulator):
         armature = float(bars.get_dofs_armature()[0])
         solver = world.sim.rigid_solver
 
-        def advance(steps: int) -> tuple[Any, float]:
-            for _ in range(steps - 1):
-                world.step()
+        def look() -> tuple[Any, float]:
             q = bars.get_qpos().cpu().numpy().copy()
-            speed = float(bars.get_dofs_velocity()[0])
-            world.step()
-            return q, speed
+            return q, float(bars.get_dofs_velocity()[0])
 
         def read(before: tuple[Any, float]) -> Instant:
             q, speed = before
             alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
             closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
-            return Instant(
-                (q[0], q[0] + q[1], q[2]),
-                speed,
-                alpha,
-                -armature * alpha,
-                {"F43": closing},
-            )
+            torque = -armature * alpha
+            return Instant(bar_directions(q), speed, alpha, torque, {"F43": closing})
 
-        return run_through(scene, course, advance, read)
+        return self.run_by_steps(scene, course, world.step, look, read)

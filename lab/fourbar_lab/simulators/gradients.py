@@ -6,17 +6,17 @@ change with a number of the scene is taken from two scenes to either side, each
 assembled by MuJoCo.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.quantities import Array
-from fourbar.scene import Scene, find_signs
+from fourbar.scene import Scene
 from fourbar.studies.keys import command_key, list_entries, read_number, replace_numbers
 from fourbar_lab.simulators.motion import start
-from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
-from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
+from fourbar_lab.simulators.mujoco_c import states_of, write_opened_mjcf
+from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 STEPS_OF_A_TURN = 156
 """Steps in a turn; a quarter of them is run through."""
@@ -43,13 +43,9 @@ def compile_and_assemble(
     The state has the scene's speed.
     """
     written = write_opened_mjcf(scene, STEPS_OF_A_TURN, reader)
-    loop = ClosedLoop(written)
-    model, data = open_model(written)
-    signs = find_signs(scene.linkage, np.array([theta_2]), scene.motion.branch)
-    q = Assembler(loop).find(theta_2, int(signs[0]))
-    assert q is not None
-    loop.set_state(q, scene.motion.omega_2 or 0.0)
-    return ClosedState(model, data, loop.data.qpos.copy(), loop.data.qvel.copy())
+    placed = replace(scene, motion=scene.motion.replace(angle=theta_2))
+    ((q, v),) = states_of(written, placed)
+    return ClosedState(*open_model(written), q, v)
 
 
 def list_keys(scene: Scene) -> tuple[str, ...]:
@@ -66,17 +62,14 @@ def assemble_either_side(
     """Assemble the scene with a number a little greater, and a little less."""
     sides = []
     for step in (DIFFERENCE, -DIFFERENCE):
+        changed = scene
+        angle = theta_2
         if key == command_key(scene):
-            sides.append(compile_and_assemble(scene, theta_2 + step, reader))
+            angle += step
         else:
-            number = float(read_number(scene, list_entries(scene)[key])) + step
-            sides.append(
-                compile_and_assemble(
-                    replace_numbers(scene, {key: number}),
-                    theta_2,
-                    reader,
-                )
-            )
+            number = float(read_number(scene, list_entries(scene)[key]))
+            changed = replace_numbers(scene, {key: number + step})
+        sides.append(compile_and_assemble(changed, angle, reader))
     return sides
 
 

@@ -81,20 +81,8 @@ class Readings:
 
     def read(self, scene: Scene, now: Instant) -> None:
         """Add a reading, as a copy: a simulator may hand out views of its state."""
-        theta = (float(now.theta[0]), float(now.theta[1]), float(now.theta[2]))
-        forces = {
-            name: np.array(force[:2], float) for name, force in now.forces.items()
-        }
-        self.instants.append(
-            Instant(
-                theta,
-                float(now.omega_2),
-                float(now.alpha_2),
-                float(now.torque),
-                forces,
-            )
-        )
-        gap = compute_gap_at_B(scene, theta)
+        self.instants.append(copy.deepcopy(now))
+        gap = compute_gap_at_B(scene, now.theta)
         self.gap = float(np.maximum(self.gap, gap))  # NaN stays NaN
 
 
@@ -151,11 +139,55 @@ class Simulator:
         chosen.steps = steps_per_turn or self.steps
         return chosen
 
-    def choose_clock(self) -> Callable[[], float]:
-        """Choose the clock of the wall on a GPU, and of the processor elsewhere."""
-        if self.on_gpu:
-            return time.perf_counter
-        return time.process_time
+    def run(
+        self,
+        scene: Scene,
+        course: Course,
+        advance: Callable[[int], Any],
+        read: Callable[[Any], Instant],
+    ) -> Readings:
+        """Run through a course.
+
+        Parameters
+        ----------
+        advance : so many steps further; what it returns is read.
+        """
+        # the clock of the wall on a GPU, of the processor elsewhere
+        clock = time.perf_counter if self.on_gpu else time.process_time
+        readings = Readings()
+        done = 0
+        for stop in course.stops:
+            began = clock()
+            reached = advance(stop - done)
+            readings.seconds += clock() - began
+            done = stop
+            readings.read(scene, read(reached))
+        return readings
+
+    def run_by_steps(
+        self,
+        scene: Scene,
+        course: Course,
+        step: Callable[[], Any],
+        look: Callable[[], Any],
+        read: Callable[[Any], Instant],
+    ) -> Readings:
+        """Run through a course whose forces are those of a step.
+
+        Parameters
+        ----------
+        look : the state in which the last step before a stop begins.
+        read : the instant of that state, after the step.
+        """
+
+        def advance(steps: int) -> Any:
+            for _ in range(steps - 1):
+                step()
+            before = look()
+            step()
+            return before
+
+        return self.run(scene, course, advance, read)
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Step through a course, and return a reading at each of its stops."""
@@ -167,26 +199,19 @@ class Simulator:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer at the motion that was made."""
-        n = len(command.angle)
-        rows: NDArray[np.intp] = np.arange(n)
-        steps = self.steps
-        if steps is None:
-            how = "single states"
-        else:
-            how = f"{steps}/rev"
+        rows: NDArray[np.intp] = np.arange(len(command.angle))
+        how = "single states" if self.steps is None else f"{self.steps}/rev"
         setting = f"{self.setting}, {how}"
         try:
-            if steps is None:
+            if self.steps is None:
                 _refuse_what_no_simulator_holds(scene, command)
                 readings = self.states(scene)
             else:
-                led, course = lay_out(scene, command, steps)
+                led, course = lay_out(scene, command, self.steps)
                 rows = course.rows
                 readings = self.through(led, course)
-        except (
-            InputError,
-            LimitError,
-        ) as limit:  # InputError: a scene that no file for this simulator can hold
+        # InputError: a scene that no file for this simulator can hold
+        except (InputError, LimitError) as limit:
             return Answer(self.name, setting, refusal=str(limit))
         return self.make_answer(scene, command, setting, readings, rows)
 
@@ -202,34 +227,29 @@ class Simulator:
 
         `rows`: reading of each position of the command, (n,).
         """
-        if len(readings.instants) != len(set(rows.tolist())):
-            raise NotAssembledError(
-                f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were"
-                " read"
-            )
-        read = [readings.instants[row] for row in rows]
-        theta = np.array([instant.theta for instant in read])
-        moved = [
-            np.array([getattr(instant, name) for instant in read])
-            for name in ("omega_2", "alpha_2")
-        ]
-        if not (np.isfinite(theta).all() and np.isfinite(moved).all()):
+        count = len(readings.instants)
+        asked = len(np.unique(rows))
+        if count != asked:
+            raise NotAssembledError(f"{count} of {asked} positions were read")
+        read = zip(*(readings.instants[row] for row in rows), strict=True)
+        theta, omega, alpha, torque, forces = read
+        theta_2, theta_3, theta_4 = np.array(theta, float).T
+        motion = np.array([omega, alpha], float)
+        if not (np.isfinite(theta).all() and np.isfinite(motion).all()):
             raise ArithmeticError("the simulation diverged")
-        values = {"theta_3": theta[:, 1], "theta_4": theta[:, 2]}
-        values["torque"] = np.array([instant.torque for instant in read])
-        values |= {
-            name: np.array([instant.forces[name] for instant in read])
-            for name in read[0].forces
+        values = {
+            "theta_3": theta_3,
+            "theta_4": theta_4,
+            "torque": np.array(torque, float),
         }
-        turned = (
-            np.remainder(theta[:, 0] - command.theta_2 + np.pi, 2.0 * np.pi) - np.pi
-        )
-        made = Command(command.theta_2 + turned, command.branch, moved[0], moved[1])
+        for name in forces[0]:
+            values[name] = np.array([of_pins[name] for of_pins in forces], float)
+        turned = np.remainder(theta_2 - command.theta_2 + np.pi, math.tau) - np.pi
         gap = readings.gap / max(scene.linkage.lengths)
         return Answer(
             self.name,
             setting,
-            made,
+            Command(command.theta_2 + turned, command.branch, *motion),
             np.ones(len(rows), bool),
             values,
             evidence={"gap": gap},
@@ -306,29 +326,6 @@ def find_timestep(scene: Scene, steps: int) -> float:
     return math.tau / abs(float(scene.motion.omega_2 or math.nan)) / steps
 
 
-def run_through(
-    scene: Scene,
-    course: Course,
-    advance: Callable[[int], Any],
-    read: Callable[[Any], Instant],
-    clock: Callable[[], float] = time.process_time,
-) -> Readings:
-    """Run through a course.
-
-    `advance`: so many steps further, by the clock; what it returns is read.
-    `clock`: of the processor; of a GPU that of the wall.
-    """
-    readings = Readings()
-    done = 0
-    for stop in course.stops:
-        began = clock()
-        reached = advance(stop - done)
-        readings.seconds += clock() - began
-        done = stop
-        readings.read(scene, read(reached))
-    return readings
-
-
 def start(scene: Scene) -> Start:
     """Return the state at the first position that closes, in the sense of motion.
 
@@ -385,15 +382,32 @@ def write_temp(text: str, name: str) -> Iterator[str]:
         yield str(file)
 
 
-def compute_gap_at_B(scene: Scene, theta: tuple[float, float, float]) -> float:
+def bar_directions(q: Any) -> tuple[Any, Any, Any]:
+    """Return theta_2, theta_3, theta_4 of the joint angles at O2, A and O4, rad."""
+    return q[0], q[0] + q[1], q[2]
+
+
+def read_flywheel(
+    course: Course,
+    inertia: float,
+    theta: Sequence[Any],
+    speeds: tuple[float, float],
+    forces: dict[str, Any],
+) -> Instant:
+    """Return the instant in which a step begins.
+
+    Parameters
+    ----------
+    inertia : of the flywheel, whose change of momentum is the torque, kg m^2.
+    speeds : omega_2 before and after the step, rad/s.
+    """
+    before, after = speeds
+    alpha = (after - before) / course.timestep
+    return Instant(theta, before, alpha, -inertia * alpha, forces)
+
+
+def compute_gap_at_B(scene: Scene, theta: Sequence[float]) -> float:
     """Compute the distance of B on bar 3 from B on bar 4 at the bars' directions, m."""
-    linkage = scene.linkage
-    a, b, c = (
-        bar.length * np.exp(1j * angle)
-        for bar, angle in zip(
-            (linkage.input, linkage.coupler, linkage.output),
-            theta,
-            strict=True,
-        )
-    )
-    return float(abs(a + b - c - linkage.ground * np.exp(1j * linkage.ground_angle)))
+    d, *lengths = scene.linkage.lengths
+    a, b, c = lengths * np.exp(1j * np.asarray(theta))
+    return float(abs(a + b - c - d * np.exp(1j * scene.linkage.ground_angle)))

@@ -3,6 +3,7 @@
 Runs are made with the file's settings and with MuJoCo's defaults.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
@@ -21,8 +22,8 @@ from fourbar_lab.simulators.motion import (
     Readings,
     Simulator,
     Worlds,
+    bar_directions,
     find_timestep,
-    run_through,
     start,
 )
 from fourbar_validation.engines.loop import Assembler
@@ -59,34 +60,19 @@ def write_opened_mjcf(
     return remove_attributes(written, _BY_DEFAULT)
 
 
-def reading(
-    model: Any,
-    q: Any,
-    v: Any,
-    a: Any,
-    drive: float,
-    closing: Any,
-    borne: Any,
-) -> Instant:
-    """Read as the comment in the file says; q, v, a in the joints' coordinates.
+def reading(model: Any, results: Sequence[Any]) -> Instant:
+    """Read torque and pin forces as the comment in the file says.
 
-    `borne`: cfrc_int of input, coupler and output, whose last three numbers are the
-    force of the parent on the body.
+    Parameters
+    ----------
+    results : qpos, qvel, qacc, actuator_force, closing force and cfrc_int; of each
+        body the last three numbers of cfrc_int are the force of its parent.
     """
-    torque = drive - model.dof_armature[0] * a[0]
-    F12, F23, F14 = (wrench[3:5] for wrench in borne)
-    return Instant(
-        (q[0], q[0] + q[1], q[2]),
-        v[0],
-        a[0],
-        torque,
-        {"F12": F12, "F32": -F23, "F43": closing, "F14": F14},
-    )
-
-
-def find_bar_bodies(model: Any) -> list[int]:
-    """Find the bodies of input, coupler and output."""
-    return [model.body(bar).id for bar in ("input", "coupler", "output")]
+    q, v, a, driving, closing, borne = results
+    torque = driving[0] - model.dof_armature[0] * a[0]
+    F12, F23, F14 = (borne[body, 3:5] for body in model.jnt_bodyid[:3])
+    forces = {"F12": F12, "F32": -F23, "F43": closing[:2], "F14": F14}
+    return Instant(bar_directions(q), v[0], a[0], torque, forces)
 
 
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
@@ -105,43 +91,61 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     return states
 
 
-def repeat_states(
-    written: str,
-    scene: Scene,
-    worlds: int,
-) -> tuple[Array, Array]:
-    """Repeat the scene's assembled positions over many worlds.
+class FileSimulator(Simulator):
+    """A simulator of MuJoCo's family, which reads the generated file.
 
-    Returns qpos and qvel, a row a world; the last world has the last position.
+    It evaluates states of many worlds at once; single states are as many worlds.
     """
-    q, v = map(np.array, zip(*states_of(written, scene), strict=True))
-    return np.resize(q, (worlds, q.shape[1])), np.resize(v, (worlds, v.shape[1]))
+
+    single_states = True
+
+    def write(self, scene: Scene, steps: int = DEFAULT_STEPS_OF_A_TURN) -> str:
+        """Write the file for the setting."""
+        return write_opened_mjcf(scene, steps, self.settings[self.setting])
+
+    def states(self, scene: Scene) -> Readings:
+        """Evaluate single states, each set by itself."""
+        worlds = self.in_worlds(scene)
+        return worlds.read(worlds.exchange())
+
+    def in_worlds(self, scene: Scene, worlds: int | None = None) -> Worlds:
+        """Prepare single states of many worlds, without a number one of each state."""
+        written = self.write(scene)
+        model, data = open_model(written)
+        states = states_of(written, scene)
+        q, v = map(np.array, zip(*states, strict=True))
+        # the last world has the last position
+        count = worlds or len(states)
+        placed = np.resize(q, (count, q.shape[1])), np.resize(v, (count, v.shape[1]))
+        read = partial(_read_last, scene, model, len(states))
+        return Worlds(*self.prepare(model, data, *placed), read)
+
+    def prepare(
+        self, model: Any, data: Any, q: Array, v: Array
+    ) -> tuple[Callable[[], Any], Callable[[], tuple[Floats, ...]]]:
+        """Return `evaluate` and `exchange` of worlds with these states, a row each."""
+        raise NotImplementedError
 
 
-def read_last(
+def _read_last(
     scene: Scene,
     model: Any,
+    count: int,
     results: tuple[Floats, ...],
 ) -> Readings:
-    """Read the last worlds, one for each position of the scene.
+    """Read so many last worlds, one for each position of the scene.
 
     Raises ArithmeticError if a number of any world is not finite.
     """
     if not all(np.isfinite(array).all() for array in results):
         raise ArithmeticError("a world diverged")
-    drive = model.actuator("drive").id
-    bars = find_bar_bodies(model)
-    count = len(command(scene).theta_2)
-    last = [array[-count:].astype(float) for array in results]
     readings = Readings()
-    for q, v, a, forces, closing, borne in zip(*last, strict=True):
-        readings.read(
-            scene, reading(model, q, v, a, forces[drive], closing, borne[bars])
-        )
+    for world in zip(*(array[-count:].astype(float) for array in results), strict=True):
+        readings.read(scene, reading(model, world))
     return readings
 
 
-class MujocoFile(Simulator):
+class MujocoFile(FileSimulator):
     """MuJoCo with the generated file."""
 
     name = "MuJoCo"
@@ -153,72 +157,40 @@ class MujocoFile(Simulator):
         "generated file": "mujoco",
         "its defaults": None,
     }
-    single_states = True
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        model, data = open_model(
-            write_opened_mjcf(scene, course.steps, self.settings[self.setting])
-        )
+        model, data = open_model(self.write(scene, course.steps))
         advance = partial(mujoco.mj_step, model, data)
-        return run_through(
-            scene,
-            course,
-            advance,
-            lambda _: _evaluate_mujoco(model, data),
+        return self.run(
+            scene, course, advance, lambda _: reading(model, evaluate(model, data))
         )
 
-    def states(self, scene: Scene) -> Readings:
-        """Evaluate single states, each set by itself."""
-        written = write_opened_mjcf(
-            scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting]
-        )
-        model, data = open_model(written)
-        readings = Readings()
-        for q, v in states_of(written, scene):
-            data.qpos[:], data.qvel[:] = q, v
-            readings.read(scene, _evaluate_mujoco(model, data))
-        return readings
+    def prepare(self, model: Any, data: Any, q: Array, v: Array) -> Any:
+        """Evaluate the worlds one after the other on one core."""
+        shapes = [array.shape for array in evaluate(model, data)]
+        results = tuple(np.empty((len(q), *shape)) for shape in shapes)
 
-    def in_worlds(self, scene: Scene, worlds: int) -> Worlds:
-        """Prepare single states of many worlds, one after the other on one core."""
-        written = write_opened_mjcf(
-            scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting]
-        )
-        model, data = open_model(written)
-        q, v = repeat_states(written, scene, worlds)
-        shapes = ((model.nv,), (model.nu,), (2,), (model.nbody, 6))
-        results = tuple(np.empty((worlds, *shape)) for shape in shapes)
-
-        def evaluate() -> tuple[Floats, ...]:
-            for world in range(worlds):
+        def evaluate_all() -> tuple[Floats, ...]:
+            for world in range(len(q)):
                 data.qpos[:] = q[world]
                 data.qvel[:] = v[world]
-                mujoco.mj_forward(model, data)
-                mujoco.mj_rnePostConstraint(model, data)
-                evaluated = (
-                    data.qacc,
-                    data.actuator_force,
-                    data.efc_force[:2],
-                    data.cfrc_int,
-                )
-                for array, value in zip(results, evaluated, strict=True):
+                for array, value in zip(results, evaluate(model, data), strict=True):
                     array[world] = value
-            return q, v, *results
+            return results
 
-        return Worlds(evaluate, evaluate, partial(read_last, scene, model))
+        return evaluate_all, evaluate_all
 
 
-def _evaluate_mujoco(model: Any, data: Any) -> Instant:
+def evaluate(model: Any, data: Any) -> tuple[Floats, ...]:
+    """Evaluate a state of MuJoCo, and return what `reading` takes."""
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
-    drive = data.actuator_force[model.actuator("drive").id]
-    return reading(
-        model,
+    return (
         data.qpos,
         data.qvel,
         data.qacc,
-        drive,
+        data.actuator_force,
         data.efc_force[:2],
-        data.cfrc_int[find_bar_bodies(model)],
+        data.cfrc_int,
     )

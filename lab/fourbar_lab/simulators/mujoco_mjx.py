@@ -1,4 +1,4 @@
-"""MuJoCo MJX (JAX), in double precision."""
+"""MuJoCo MJX (JAX), in double precision; of many worlds in single precision too."""
 
 from collections.abc import Callable
 from functools import partial
@@ -9,35 +9,14 @@ import jax
 import numpy as np
 from mujoco import mjx
 
+from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
-from fourbar_lab.simulators.motion import (
-    DEFAULT_STEPS_OF_A_TURN,
-    Course,
-    Floats,
-    Instant,
-    Readings,
-    Simulator,
-    Worlds,
-    run_through,
-)
-from fourbar_lab.simulators.mujoco_c import (
-    find_bar_bodies,
-    read_last,
-    reading,
-    repeat_states,
-    states_of,
-    write_opened_mjcf,
-)
+from fourbar_lab.simulators.motion import Course, Floats, Instant, Readings
+from fourbar_lab.simulators.mujoco_c import FileSimulator, reading
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 jax.config.update("jax_enable_x64", True)
-
-
-@jax.jit  # type: ignore[untyped-decorator]
-def forward(model: Any, state: Any) -> Any:
-    """Evaluate a state, and what every body bears."""
-    return mjx.rne_postconstraint(model, mjx.forward(model, state))
 
 
 @jax.jit  # type: ignore[untyped-decorator]
@@ -54,13 +33,14 @@ def _forward_all(
     q: Any,
     v: Any,
 ) -> tuple[Any, ...]:
-    """Evaluate states, and return what torque and pin forces are read from."""
-    now = forward(model, state.replace(qpos=q, qvel=v))
+    """Evaluate states, and return what `reading` takes."""
+    placed = state.replace(qpos=q, qvel=v)
+    now = mjx.rne_postconstraint(model, mjx.forward(model, placed))
     inner = getattr(now, "_impl", now)
-    return now.qacc, now.actuator_force, inner.efc_force[:2], inner.cfrc_int
+    return q, v, now.qacc, now.actuator_force, inner.efc_force[:2], inner.cfrc_int
 
 
-class MujocoMjx(Simulator):
+class MujocoMjx(FileSimulator):
     """MJX in JAX, which takes a GPU where it has one."""
 
     name = "MJX-JAX"
@@ -75,78 +55,45 @@ class MujocoMjx(Simulator):
     """The file written for MJX yields within two timesteps. That makes up for the term
     that MJX leaves out.
     """
-    single_states = True
+    double = True
+    """True in double precision."""
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        model, data = open_model(
-            write_opened_mjcf(scene, course.steps, self.settings[self.setting])
-        )
+        model, data = open_model(self.write(scene, course.steps))
         theirs = mjx.put_model(model)
         state = mjx.put_data(model, data)
-        jax.block_until_ready(
-            advance(theirs, state, 1)
-        )  # compiled before the clock runs
+        # compiled before the clock runs
+        jax.block_until_ready(advance(theirs, state, 1))
 
         def further(steps: int) -> Any:
             nonlocal state
             state = jax.block_until_ready(advance(theirs, state, steps))
             return state
 
-        return run_through(
-            scene,
-            course,
-            further,
-            lambda now: _evaluate_mjx(model, forward(theirs, now)),
-            self.choose_clock(),
-        )
+        def read(now: Any) -> Instant:
+            world = _forward_all(theirs, now, now.qpos[None], now.qvel[None])
+            return reading(model, [np.array(array)[0] for array in world])
 
-    def states(self, scene: Scene) -> Readings:
-        """Evaluate single states, each set by itself."""
-        written = write_opened_mjcf(
-            scene, DEFAULT_STEPS_OF_A_TURN, self.settings[self.setting]
-        )
-        model, data = open_model(written)
-        theirs = mjx.put_model(model)
-        state = mjx.put_data(model, data)
-        readings = Readings()
-        for q, v in states_of(written, scene):
-            placed = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
-            readings.read(scene, _evaluate_mjx(model, forward(theirs, placed)))
-        return readings
+        return self.run(scene, course, further, read)
 
-    def in_worlds(
-        self,
-        scene: Scene,
-        worlds: int,
-        double: bool = True,
-    ) -> Worlds:
-        """Prepare single states of many worlds, in double or single precision.
-
-        In single precision the file is that for Warp, whose flywheel is light: beside
-        the heavy one the linkage's accelerations keep no digit.
-        """
-        reader = "warp"
-        if double:
-            reader = self.settings[self.setting]
-        written = write_opened_mjcf(scene, DEFAULT_STEPS_OF_A_TURN, reader)
-        model, data = open_model(written)
-        q, v = repeat_states(written, scene, worlds)
-        with jax.enable_x64(double):
+    def prepare(self, model: Any, data: Any, q: Array, v: Array) -> Any:
+        """Evaluate the worlds in one call, in the precision that was chosen."""
+        with jax.enable_x64(self.double):
             theirs = mjx.put_model(model)
             state = mjx.put_data(model, data)
             placed = jax.numpy.array(q), jax.numpy.array(v)
 
         def evaluate(states: tuple[Any, Any] = placed) -> Any:
-            with jax.enable_x64(double):
+            with jax.enable_x64(self.double):
                 return jax.block_until_ready(_forward_all(theirs, state, *states))
 
         def exchange() -> tuple[Floats, ...]:
-            with jax.enable_x64(double):
+            with jax.enable_x64(self.double):
                 states = jax.numpy.array(q), jax.numpy.array(v)
-            return tuple(map(np.array, (*states, *evaluate(states))))
+            return tuple(map(np.array, evaluate(states)))
 
-        return Worlds(evaluate, exchange, partial(read_last, scene, model))
+        return evaluate, exchange
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
         """Differentiate the driving torque by JAX, forwards and backwards.
@@ -154,47 +101,37 @@ class MujocoMjx(Simulator):
         Forwards at a set state and through a quarter turn, backwards at the set state.
         """
         begin, end = gradients.choose_quarter(scene)
-        ways = [
-            ("jax.jvp at a set state", end, 0),
-            ("jax.jvp through a quarter turn", begin, gradients.STEPS_OF_A_TURN // 4),
-        ]
-        ways_tried = [
-            _slopes(scene, how, state, partial(_forwards, steps=steps))
-            for how, state, steps in ways
-        ]
-        try:
-            ways_tried.append(
-                _slopes(scene, "jax.grad at a set state", end, _backwards)
-            )
-        except ValueError as error:
-            ways_tried.append({"how": f"jax.grad: {error}"})
-        return [
-            *ways_tried,
-            _slopes(
-                scene,
-                'jax.grad at a set state, iterations="1"',
+        quarter = gradients.STEPS_OF_A_TURN // 4
+        ways: dict[str, tuple[float, Callable[..., Any]]] = {
+            "jax.jvp at a set state": (end, partial(_forwards, steps=0)),
+            "jax.jvp through a quarter turn": (
+                begin,
+                partial(_forwards, steps=quarter),
+            ),
+            "jax.grad at a set state": (end, _backwards),
+            'jax.grad at a set state, iterations="1"': (
                 end,
                 partial(_backwards, iterations=1),
             ),
-        ]
+        }
+        tried = []
+        for how, (theta_2, differentiate) in ways.items():
+            try:
+                tried.append(_slopes(scene, how, theta_2, differentiate))
+            except ValueError as error:
+                tried.append({"how": f"jax.grad: {error}"})
+        return tried
 
 
-def _evaluate_mjx(model: Any, state: Any) -> Instant:
-    q, v, a, drive = (
-        np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force)
-    )
-    inner = getattr(state, "_impl", state)
-    closing = np.array(inner.efc_force)[:2]
-    on_bodies = np.array(inner.cfrc_int)
-    return reading(
-        model,
-        q,
-        v,
-        a,
-        drive[model.actuator("drive").id],
-        closing,
-        on_bodies[find_bar_bodies(model)],
-    )
+class MjxInSinglePrecision(MujocoMjx):
+    """MJX in single precision, with the file for Warp.
+
+    The flywheel of that file is light: beside the heavy one the linkage's accelerations
+    keep no digit.
+    """
+
+    double = False
+    settings: ClassVar[dict[str, str]] = {"written for Warp": "warp"}
 
 
 def _slopes(

@@ -11,6 +11,7 @@ import mujoco_warp as mjw
 import numpy as np
 import warp
 
+from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
 from fourbar_lab.simulators.motion import (
@@ -19,15 +20,10 @@ from fourbar_lab.simulators.motion import (
     Floats,
     Instant,
     Readings,
-    Simulator,
-    Worlds,
-    run_through,
 )
 from fourbar_lab.simulators.mujoco_c import (
-    find_bar_bodies,
-    read_last,
+    FileSimulator,
     reading,
-    repeat_states,
     states_of,
     write_opened_mjcf,
 )
@@ -37,7 +33,7 @@ VARIED_FIELDS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_arma
 """Fields of a model that change with a bar's length or mass, or with theta_2."""
 
 
-class MujocoWarp(Simulator):
+class MujocoWarp(FileSimulator):
     """MuJoCo Warp with the generated file, on a GPU if there is one."""
 
     name = "MuJoCo Warp"
@@ -51,12 +47,14 @@ class MujocoWarp(Simulator):
     )
     settings: ClassVar[dict[str, int]] = {"forward twice": 2, "forward once": 1}
     """Number of evaluations of a state."""
-    single_states = True
+
+    def write(self, scene: Scene, steps: int = DEFAULT_STEPS_OF_A_TURN) -> str:
+        """Write the file; a setting changes nothing of it."""
+        return write_opened_mjcf(scene, steps, "warp")
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course."""
-        model, data = open_model(write_opened_mjcf(scene, course.steps, "warp"))
-        times = self.settings[self.setting]
+        model, data = open_model(self.write(scene, course.steps))
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
         # compiled before the clock runs
@@ -67,43 +65,30 @@ class MujocoWarp(Simulator):
                 mjw.step(theirs, state)
             warp.synchronize()
 
-        return run_through(
-            scene,
-            course,
-            advance,
-            lambda _: _evaluate_warp(model, theirs, state, times),
-            self.choose_clock(),
-        )
+        def read(_: None) -> Instant:
+            return read_warp(model, theirs, state, self.settings[self.setting])
+
+        return self.run(scene, course, advance, read)
 
     def states(self, scene: Scene) -> Readings:
-        """Evaluate single states, each set by itself."""
-        written = write_opened_mjcf(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
+        """Evaluate single states, each after one at another velocity."""
+        written = self.write(scene)
         model, data = open_model(written)
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
         readings = Readings()
         for q, v in states_of(written, scene):
-            state.qpos.assign(np.array([q], dtype=np.float32))
-            state.qvel.assign(np.array([v], dtype=np.float32))
-            readings.read(
-                scene, _evaluate_warp(model, theirs, state, self.settings[self.setting])
-            )
+            _set_states(state, [q], [v])
+            now = read_warp(model, theirs, state, self.settings[self.setting])
+            readings.read(scene, now)
         return readings
 
-    def in_worlds(self, scene: Scene, worlds: int) -> Worlds:
-        """Prepare single states of many worlds.
-
-        On a GPU the kernels are launched as one graph.
-        """
-        written = write_opened_mjcf(scene, DEFAULT_STEPS_OF_A_TURN, "warp")
-        model, data = open_model(written)
-        q, v = (
-            array.astype(np.float32) for array in repeat_states(written, scene, worlds)
-        )
+    def prepare(self, model: Any, data: Any, q: Array, v: Array) -> Any:
+        """Evaluate the worlds; on a GPU the kernels are launched as one graph."""
         theirs = mjw.put_model(model)
-        state = mjw.put_data(model, data, nworld=worlds)
-        state.qpos.assign(q)
-        state.qvel.assign(v)
+        state = mjw.put_data(model, data, nworld=len(q))
+        placed = q.astype(np.float32), v.astype(np.float32)
+        _set_states(state, *placed)
         launch = partial(_evaluate_states, theirs, state, self.settings[self.setting])
         # compiled before a graph of the launches is made
         launch()
@@ -117,19 +102,11 @@ class MujocoWarp(Simulator):
             warp.synchronize()
 
         def exchange() -> tuple[Floats, ...]:
-            state.qpos.assign(q)
-            state.qvel.assign(v)
+            _set_states(state, *placed)
             evaluate()
-            return (
-                q,
-                v,
-                state.qacc.numpy(),
-                state.actuator_force.numpy(),
-                state.efc.force.numpy()[:, :2],
-                state.cfrc_int.numpy(),
-            )
+            return _read_states(state)
 
-        return Worlds(evaluate, exchange, partial(read_last, scene, model))
+        return evaluate, exchange
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
         """Differentiate the driving torque at a set state, backwards by Warp's tape.
@@ -140,8 +117,7 @@ class MujocoWarp(Simulator):
         model, data, q, v = gradients.compile_and_assemble(scene, theta_2, "warp")
         theirs = mjw.put_model(model)
         state = mjw.put_data(model, data)
-        state.qpos.assign(np.array([q], dtype=np.float32))
-        state.qvel.assign(np.array([v], dtype=np.float32))
+        _set_states(state, [q], [v])
         inputs = {name: getattr(theirs, name) for name in VARIED_FIELDS} | {
             "qpos": state.qpos,
             "qvel": state.qvel,
@@ -149,7 +125,7 @@ class MujocoWarp(Simulator):
         for array in (*inputs.values(), state.qacc, state.actuator_force):
             array.requires_grad = True
         with warp.Tape() as tape:
-            now = _evaluate_warp(model, theirs, state, 2)
+            now = read_warp(model, theirs, state, 2)
         drive = warp.full_like(state.actuator_force, 1.0)
         tape.backward(
             grads={
@@ -187,22 +163,20 @@ def _evaluate_states(theirs: Any, state: Any, times: int) -> None:
     mjw.rne_postconstraint(theirs, state)
 
 
-def _evaluate_warp(
-    model: Any,
-    theirs: Any,
-    state: Any,
-    times: int,
-) -> Instant:
+def _set_states(state: Any, q: Any, v: Any) -> None:
+    """Set positions and speeds of the worlds, a row each."""
+    state.qpos.assign(np.asarray(q, dtype=np.float32))
+    state.qvel.assign(np.asarray(v, dtype=np.float32))
+
+
+def _read_states(state: Any) -> tuple[Floats, ...]:
+    """Return what `reading` takes, a row for each world."""
+    q, v, a = state.qpos.numpy(), state.qvel.numpy(), state.qacc.numpy()
+    closing = state.efc.force.numpy()[:, :2]
+    return q, v, a, state.actuator_force.numpy(), closing, state.cfrc_int.numpy()
+
+
+def read_warp(model: Any, theirs: Any, state: Any, times: int) -> Instant:
+    """Evaluate the last world so many times, and read it."""
     _evaluate_states(theirs, state, times)
-    arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
-    q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)
-    closing = state.efc.force.numpy()[-1, :2].astype(float)
-    return reading(
-        model,
-        q,
-        v,
-        a,
-        drive[model.actuator("drive").id],
-        closing,
-        on_bodies[find_bar_bodies(model)],
-    )
+    return reading(model, [array[-1].astype(float) for array in _read_states(state)])

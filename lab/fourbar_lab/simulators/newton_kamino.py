@@ -22,7 +22,7 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
-    run_through,
+    read_flywheel,
     start,
     write_temp,
 )
@@ -79,49 +79,38 @@ class NewtonKamino(Simulator):
         speeds[:3] = begin.qvel
         now.joint_qd.assign(speeds)
         newton.eval_fk(model, now.joint_q, now.joint_qd, now)
-        newton.solvers.SolverKamino(model, config).step(
-            now,
-            then,
-            control,
-            None,
-            course.timestep,
-        )  # compiled before the clock runs
+        # compiled before the clock runs
+        warmed_up = newton.solvers.SolverKamino(model, config)
+        warmed_up.step(now, then, control, None, course.timestep)
         t_2, t_32, t_4 = begin.qpos
         laid = {"O2": t_2, "A": t_32, "O4": t_4, "B": t_2 + t_32 - t_4}
 
-        def advance(steps: int) -> tuple[Array, float]:
+        def step() -> None:
             nonlocal now, then
-            for _ in range(steps - 1):
-                solver.step(now, then, control, None, course.timestep)
-                now, then = then, now
-            theta = directions(now)
-            speed = float(now.joint_qd.numpy()[0])
             solver.step(now, then, control, None, course.timestep)
             now, then = then, now
-            return theta, speed
+
+        def look() -> tuple[Array, float]:
+            return directions(now), float(now.joint_qd.numpy()[0])
 
         def read(before: tuple[Array, float]) -> Instant:
             theta, speed = before
-            alpha = (float(now.joint_qd.numpy()[0]) - speed) / course.timestep
-            rows = (
-                solver._solver_kamino.data.joints.lambda_kin_j.numpy()
-                .astype(float)
-                .reshape(4, 5)[:, 1:3]
-            )
-            forces = {}
+            multipliers = solver._solver_kamino.data.joints.lambda_kin_j.numpy()
+            rows = multipliers.astype(float).reshape(4, 5)[:, 1:3]
+            on_pins = {}
             for row, (pin, parent) in zip(rows, _PARENTS.items(), strict=True):
-                forces[pin] = np.array(
-                    rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row)
-                )
-            on_pins = {
-                "F12": forces["O2"],
-                "F32": -forces["A"],
-                "F43": forces["B"],
-                "F14": forces["O4"],
+                turned = laid[pin] + (0.0 if parent is None else theta[parent])
+                on_pins[pin] = np.array(rotate(turned, *row))
+            forces = {
+                "F12": on_pins["O2"],
+                "F32": -on_pins["A"],
+                "F43": on_pins["B"],
+                "F14": on_pins["O4"],
             }
-            return Instant(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
+            speeds = speed, float(now.joint_qd.numpy()[0])
+            return read_flywheel(course, inertia, theta.tolist(), speeds, forces)
 
-        return run_through(scene, course, advance, read)
+        return self.run_by_steps(scene, course, step, look, read)
 
 
 def directions(state: newton.State) -> Array:

@@ -3,7 +3,6 @@
 from importlib.metadata import version
 from typing import ClassVar
 
-import mujoco_warp as mjw
 import newton
 import warp
 
@@ -14,11 +13,11 @@ from fourbar_lab.simulators.motion import (
     Readings,
     Simulator,
     gravity_field,
-    run_through,
     start,
     write_temp,
 )
-from fourbar_lab.simulators.mujoco_c import reading, write_opened_mjcf
+from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
+from fourbar_lab.simulators.mujoco_warp import read_warp
 
 
 class NewtonMujoco(Simulator):
@@ -49,21 +48,9 @@ class NewtonMujoco(Simulator):
         speeds = now.joint_qd.numpy()
         speeds[:3] = start(scene).qvel
         now.joint_qd.assign(speeds)
-        newton.solvers.SolverMuJoCo(model).step(
-            now,
-            then,
-            control,
-            None,
-            course.timestep,
-        )  # compiled before the clock runs
-        names = [
-            solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)
-        ]
-        assert [name.rpartition("_")[2] for name in names[2:]] == [
-            "input",
-            "coupler",
-            "output",
-        ]
+        # compiled before the clock runs
+        warmed_up = newton.solvers.SolverMuJoCo(model)
+        warmed_up.step(now, then, control, None, course.timestep)
 
         def advance(steps: int) -> None:
             nonlocal now, then
@@ -72,19 +59,6 @@ class NewtonMujoco(Simulator):
                 now, then = then, now
 
         def read(_: None) -> Instant:
-            data = solver.mjw_data
-            for _again in range(2):
-                mjw.forward(solver.mjw_model, data)
-            mjw.rne_postconstraint(solver.mjw_model, data)
-            arrays = (
-                data.qpos,
-                data.qvel,
-                data.qacc,
-                data.actuator_force,
-                data.cfrc_int,
-            )
-            q, v, a, drive, on_bodies = (x.numpy()[0].astype(float) for x in arrays)
-            closing = data.efc.force.numpy()[0, :2].astype(float)
-            return reading(solver.mj_model, q, v, a, drive[0], closing, on_bodies[2:5])
+            return read_warp(solver.mj_model, solver.mjw_model, solver.mjw_data, 2)
 
-        return run_through(scene, course, advance, read)
+        return self.run(scene, course, advance, read)

@@ -20,8 +20,8 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
+    bar_directions,
     find_timestep,
-    run_through,
     start,
 )
 from fourbar_validation.engines.pinocchio import ClosedTree, PinocchioTree, make_step
@@ -101,66 +101,39 @@ class _Impulses:
         self.models, self.closure_data = [self.closure], [self.closure.createData()]
         self.cholesky: Any = None
         self.solver = getattr(pin, f"{solver}ConstraintSolver")()
-        self.settings, self.result = (
-            getattr(pin, f"{solver}SolverSettings")(),
-            getattr(pin, f"{solver}SolverResult")(),
-        )
+        self.settings = getattr(pin, f"{solver}SolverSettings")()
+        self.result = getattr(pin, f"{solver}SolverResult")()
         self.settings.max_iterations = 10000
-        for kind in (
-            "absolute_feasibility",
-            "relative_feasibility",
-            "absolute_complementarity",
-            "relative_complementarity",
-        ):
-            setattr(self.settings, f"{kind}_tol", _ACCURATE)
+        for part in ("feasibility", "complementarity"):
+            setattr(self.settings, f"absolute_{part}_tol", _ACCURATE)
+            setattr(self.settings, f"relative_{part}_tol", _ACCURATE)
 
     def step(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Compute the speeds a step later, and F43 in the mean of the step."""
         model = self.model
         data = self.data
         h = self.h
+        loops = self.models, self.closure_data
         none = np.zeros(3)
         pin.crba(model, data, q, pin.Convention.WORLD)
         free = v + h * pin.aba(model, data, q, v, none)
         self.closure.calc(model, data, self.closure_data[0])
         if self.cholesky is None:
-            self.cholesky = pin.ConstraintCholeskyDecomposition(
-                model,
-                data,
-                self.models,
-                self.closure_data,
-            )
-        self.cholesky.compute(
-            model,
-            data,
-            self.models,
-            self.closure_data,
-            DELASSUS_DIAGONAL,
-        )
-        jacobian = pin.getConstraintsJacobian(
-            model,
-            data,
-            self.models,
-            self.closure_data,
-        )
-        g = (
-            jacobian @ free
-            + self.closure_data[0].extract().constraint_position_error / h
-        )
+            self.cholesky = pin.ConstraintCholeskyDecomposition(model, data, *loops)
+        self.cholesky.compute(model, data, *loops, DELASSUS_DIAGONAL)
+        jacobian = pin.getConstraintsJacobian(model, data, *loops)
+        apart = self.closure_data[0].extract().constraint_position_error
         self.solver.solve(
             self.cholesky.getDelassusOperatorCholeskyExpression(),
-            g,
-            self.models,
-            self.closure_data,
+            jacobian @ free + apart / h,
+            *loops,
             self.settings,
             self.result,
         )
         force = np.array(self.result.retrieveConstraintImpulses()) / h
         self.tree.place(q.tolist())
-        return (
-            v + h * pin.aba(model, data, q, v, jacobian.T @ force),
-            -self.tree.rotation(3) @ force[:2],
-        )
+        speeds = v + h * pin.aba(model, data, q, v, jacobian.T @ force)
+        return speeds, -self.tree.rotation(3) @ force[:2]
 
 
 class PinocchioSolvers(Simulator):
@@ -186,35 +159,39 @@ class PinocchioSolvers(Simulator):
         solver = self.settings[self.setting]
         begin = start(scene)
         tree = PinocchioTree(scene)
-        if isinstance(solver, str):
-            return _run_by_impulses(
-                scene,
-                course,
-                _Impulses(tree, course.timestep, solver),
-            )
         q = np.array(begin.qpos)
         v = np.array(begin.qvel)
-        inertia = size_flywheel(scene)
-        loop = solver(tree, _SOFTNESS_STEPS * course.timestep)
+        if not isinstance(solver, str):
+            loop = _carry(scene, tree, solver, course.timestep)
 
-        def advance(steps: int) -> tuple[Array, Array]:
-            nonlocal q, v
-            tree.model.armature = np.array([inertia, 0.0, 0.0])
-            for _ in range(steps):
-                q, v = make_step(
-                    lambda q, v: loop.acceleration(q, v, np.zeros(3)),
-                    q,
-                    v,
-                    course.timestep,
-                )
-            return q, v
+            def advance(steps: int) -> tuple[Array, Array]:
+                nonlocal q, v
+                for _ in range(steps):
+                    q, v = make_step(
+                        lambda q, v: loop.acceleration(q, v, np.zeros(3)),
+                        q,
+                        v,
+                        course.timestep,
+                    )
+                return q, v
 
-        return run_through(
-            scene,
-            course,
-            advance,
-            lambda state: _evaluate_pinocchio(tree, loop, inertia, *state),
-        )
+            return self.run(
+                scene, course, advance, lambda now: _evaluate_loop(loop, *now)
+            )
+        impulses = _Impulses(tree, course.timestep, solver)
+        _set_flywheel(tree, size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL))
+        force = np.zeros(2)
+
+        def step() -> None:
+            nonlocal q, v, force
+            v, force = impulses.step(q, v)
+            q = q + course.timestep * v
+
+        def read(before: tuple[Array, Array]) -> Instant:
+            acceleration = (v - before[1]) / course.timestep
+            return _read_joint_forces(tree, *before, acceleration, force)
+
+        return self.run_by_steps(scene, course, step, lambda: (q, v), read)
 
     def states(self, scene: Scene) -> Readings:
         """Evaluate single states.
@@ -224,13 +201,9 @@ class PinocchioSolvers(Simulator):
         solver = self.settings[self.setting]
         if isinstance(solver, str):
             raise LimitError("an impulse solver has no single states")
-        tree = PinocchioTree(scene)
+        timestep = find_timestep(scene, DEFAULT_STEPS_OF_A_TURN)
+        loop = _carry(scene, PinocchioTree(scene), solver, timestep)
         readings = Readings()
-        inertia = size_flywheel(scene)
-        loop = solver(
-            tree, _SOFTNESS_STEPS * find_timestep(scene, DEFAULT_STEPS_OF_A_TURN)
-        )
-        tree.model.armature = np.array([inertia, 0.0, 0.0])
         told = with_signs(scene.linkage, list_positions(scene))
         for theta_2, sign in zip(
             told.theta_2.tolist(),
@@ -239,54 +212,30 @@ class PinocchioSolvers(Simulator):
         ):
             state = loop.start(theta_2, sign, scene.motion.omega_2 or 0.0)
             if state is not None:
-                readings.read(scene, _evaluate_pinocchio(tree, loop, inertia, *state))
+                readings.read(scene, _evaluate_loop(loop, *state))
         return readings
 
 
-def _run_by_impulses(
-    scene: Scene,
-    course: Course,
-    loop: _Impulses,
-) -> Readings:
-    begin = start(scene)
-    inertia = size_flywheel(scene, RECIPE_WITH_A_LIGHT_FLYWHEEL)
-    q = np.array(begin.qpos)
-    v = np.array(begin.qvel)
-
-    def advance(steps: int) -> tuple[Array, ...]:
-        """Return the state in which the last step began, its acceleration and force."""
-        nonlocal q, v
-        loop.model.armature = np.array([inertia, 0.0, 0.0])
-        for _ in range(steps):
-            before = q, v
-            v, force = loop.step(q, v)
-            q = q + loop.h * v
-        return *before, (v - before[1]) / loop.h, force
-
-    return run_through(
-        scene,
-        course,
-        advance,
-        lambda ended: _read_joint_forces(loop.tree, inertia, *ended),
-    )
-
-
-def _evaluate_pinocchio(
-    tree: PinocchioTree,
-    loop: ClosedTree,
-    inertia: float,
-    q: Array,
-    v: Array,
-) -> Instant:
+def _set_flywheel(tree: PinocchioTree, inertia: float) -> None:
+    """Let the input carry a flywheel, kg m^2."""
     tree.model.armature = np.array([inertia, 0.0, 0.0])
-    a = loop.acceleration(q, v, np.zeros(3))
-    tree.place(q.tolist())
-    return _read_joint_forces(tree, inertia, q, v, a, loop.loop_force())
+
+
+def _carry(scene: Scene, tree: PinocchioTree, solver: Any, timestep: float) -> Any:
+    """Return the closed loop of a solver, whose input carries a flywheel."""
+    loop = solver(tree, _SOFTNESS_STEPS * timestep)
+    _set_flywheel(tree, size_flywheel(scene))
+    return loop
+
+
+def _evaluate_loop(loop: ClosedTree, q: Array, v: Array) -> Instant:
+    acceleration = loop.acceleration(q, v, np.zeros(3))
+    loop.tree.place(q.tolist())
+    return _read_joint_forces(loop.tree, q, v, acceleration, loop.loop_force())
 
 
 def _read_joint_forces(
     tree: PinocchioTree,
-    inertia: float,
     q: Array,
     v: Array,
     a: Array,
@@ -294,18 +243,15 @@ def _read_joint_forces(
 ) -> Instant:
     """Return pin forces (N) and torque (N m) of a state, by Pinocchio's RNEA.
 
-    The closing force is the one that Pinocchio found.
+    The closing force is the one that Pinocchio found; the flywheel loads no pin.
     """
-    tree.model.armature = np.zeros(3)
+    inertia = float(tree.model.armature[0])
+    _set_flywheel(tree, 0.0)
     tree.place(q.tolist())
     tree.moving(v, a)
     tree.torques()
+    _set_flywheel(tree, inertia)
     torque = float(-inertia * a[0])
     x, y = loop_force.tolist()
-    return Instant(
-        (q[0], q[0] + q[1], q[2]),
-        v[0],
-        a[0],
-        torque,
-        {"F43": loop_force, **tree.forces((x, y), torque)},
-    )
+    forces = {"F43": loop_force, **tree.forces((x, y), torque)}
+    return Instant(bar_directions(q), v[0], a[0], torque, forces)

@@ -15,8 +15,8 @@ from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     Simulator,
+    bar_directions,
     gravity_field,
-    run_through,
     start,
     write_temp,
 )
@@ -124,37 +124,29 @@ class PyBullet(Simulator):
             )
             bullet.changeConstraint(ball, maxForce=_STRONG)
 
-            def advance(steps: int) -> list[Any]:
-                for _ in range(steps - 1):
-                    bullet.stepSimulation()
-                before = [bullet.getJointState(body, joint)[:2] for joint in range(3)]
-                bullet.stepSimulation()
-                return before
+            def look() -> list[Any]:
+                return [bullet.getJointState(body, joint)[:2] for joint in range(3)]
 
             def read(before: list[Any]) -> Instant:
-                after = bullet.getJointState(body, 0)
-                q = [state[0] for state in before]
-                speed = before[0][1]
-                force = [
-                    -part for part in bullet.getConstraintState(ball)[:2]
-                ]  # it speaks of the force on the child
-                theta = (q[0], q[0] + q[1], q[2])
-                wrenches = [
-                    bullet.getJointState(body, joint)[2] for joint in range(3)
-                ]  # by the parent, in the link's axes
+                q, (speed, *_) = zip(*before, strict=True)
+                theta = bar_directions(q)
+                # by the parent, in the link's axes
                 F12, F23, F14 = (
-                    rotate(angle, *wrench[:2])
-                    for angle, wrench in zip(theta, wrenches, strict=True)
+                    rotate(angle, *bullet.getJointState(body, joint)[2][:2])
+                    for joint, angle in enumerate(theta)
                 )
-                pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
-                return Instant(
-                    theta,
-                    speed,
-                    (after[1] - speed) / course.timestep,
-                    after[3],
-                    pins,
-                )
+                # of the force on the child
+                x, y, *_ = bullet.getConstraintState(ball)
+                forces = {
+                    "F12": F12,
+                    "F32": (-F23[0], -F23[1]),
+                    "F43": (-x, -y),
+                    "F14": F14,
+                }
+                _, after, _, torque = bullet.getJointState(body, 0)
+                alpha = (after - speed) / course.timestep
+                return Instant(theta, speed, alpha, torque, forces)
 
-            return run_through(scene, course, advance, read)
+            return self.run_by_steps(scene, course, bullet.stepSimulation, look, read)
         finally:
             bullet.disconnect(client)

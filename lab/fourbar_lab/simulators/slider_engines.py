@@ -43,67 +43,71 @@ class SliderBar(NamedTuple):
 
     mass: float
     inertia: float
-    centre: tuple[float, float]
+    centre: list[float]
 
 
-class _CutLoop(Protocol):
-    """Interface of an engine to the slider-crank's tree, cut at the rod's end.
+class SliderCrank(NamedTuple):
+    """The description, SI units."""
 
-    Three joints turn the crank and the rod and move the slider.
+    crank: float
+    rod: float
+    offset: float
+    bars: list[SliderBar]
+    """Crank, rod and slider."""
+    gravity: Array
+    """(2,), m/s^2."""
+    push: Array
+    """Force on the slider, (2,), N."""
+
+
+class CutLoop(Protocol):
+    """The slider-crank as the tree of an engine, cut at the rod's end.
+
+    Three joints turn the crank and the rod and move the slider. Ends of the cut are the
+    rod's (0) and the slider's (1).
     """
 
     def set(self, q: Array, v: Array) -> None:
         """Set joint positions and speeds."""
 
-    def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider (2,), its Jacobian and its drift.
+    def follow(self, end: int) -> tuple[Array, Array, Array]:
+        """Return place (2,), Jacobian (2, 3) and drift (2,) of an end of the cut.
 
-        The Jacobian is (2, 3); the drift (2,) is the acceleration while all of q have
-        none.
+        The drift is the acceleration while all of q have none.
         """
 
     def inverse(self, a: Array) -> Array:
-        """Return the joint forces of accelerations a, without the closing force."""
+        """Return the joint forces (3,) of accelerations a, with no force at the cut."""
 
-    def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
-        """Return the force of each body on the next, (2,) each, in N.
+    def borne(self, a: Array, on_ends: tuple[Array, Array]) -> list[Array]:
+        """Return the force of each body on the next, (2,), N, with forces at the ends.
 
         Forces are of ground on the crank, the crank on the rod, and the guide on the
         slider.
         """
 
 
-def describe_bodies(
-    scene: dict[str, Any],
-) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
-    """Return the bodies, (crank, rod, offset) in m, gravity and the slider's force.
-
-    Gravity (2,) is in m/s^2 and the force (2,) in N.
-    """
+def describe(scene: dict[str, Any]) -> SliderCrank:
+    """Return what a scene of the protocol states."""
     lengths = scene["lengths"]
-    bodies = []
+    bars = []
     for name in ("crank", "rod", "slider"):
         bar = scene.get("bars", {}).get(name, {})
         length = lengths.get(name, 0.0)
         mass = bar.get("mass", 0.0)
-        r, phi = bar.get("centre", (0.5 * length, 0.0))
-        bodies.append(
-            SliderBar(
-                mass,
-                bar.get("inertia", mass * length**2 / 12.0),
-                (r * math.cos(phi), r * math.sin(phi)),
-            )
-        )
-    field = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
+        centre = _direct(*bar.get("centre", (0.5 * length, 0.0)))
+        inertia = bar.get("inertia", mass * length**2 / 12.0)
+        bars.append(SliderBar(mass, inertia, centre.tolist()))
     loads = scene.get("loads", ())
     if any(load["bar"] != 4 or "table" in load or load.get("moment") for load in loads):
         raise LimitError("a force on the slider is the only load here")
-    push = sum((_direct(*load["force"]) for load in loads), np.zeros(2))
-    return (
-        bodies,
-        (lengths["crank"], lengths["rod"], lengths.get("offset", 0.0)),
-        field,
-        push,
+    return SliderCrank(
+        lengths["crank"],
+        lengths["rod"],
+        lengths.get("offset", 0.0),
+        bars,
+        _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0))),
+        sum((_direct(*load["force"]) for load in loads), np.zeros(2)),
     )
 
 
@@ -112,71 +116,66 @@ def _direct(size: float, angle: float) -> Array:
 
 
 def answer_slider_positions(
-    make: Callable[..., _CutLoop],
+    make: Callable[[SliderCrank], CutLoop],
     question: dict[str, Any],
 ) -> dict[str, Any]:
     """Answer the positions of a question."""
-    scene = question["scene"]
+    linkage = describe(question["scene"])
+    tree = make(linkage)
     command = question["command"]
-    bodies, lengths, field, push = describe_bodies(scene)
-    tree = make(bodies, lengths, field, push)
-    crank, rod, _ = lengths
-    rows: dict[str, list[Any]] = {name: [] for name in ANSWERED_QUANTITIES}
-    n = len(command["theta_2"])
-    omegas = np.broadcast_to(command.get("omega_2", 0.0), n)
-    alphas = np.broadcast_to(command.get("alpha_2", 0.0), n)
-    branches = np.broadcast_to(command.get("branch", 1), n)
-    for theta, omega, alpha, branch in zip(
+    positions = np.broadcast_arrays(
         command["theta_2"],
-        omegas,
-        alphas,
-        branches,
-        strict=True,
-    ):
-        rod_angle = 0.0 if branch > 0 else math.pi
-        q = np.array(
-            [
-                theta,
-                rod_angle - theta,
-                crank * math.cos(theta) + branch * rod,
-            ]
-        )
-        _close_slider(tree, q, GAP_AT_THE_END * rod)
-        tree.set(q, np.zeros(3))
-        _, J, _ = tree.gap()
-        following = np.linalg.solve(J[:, 1:], -J[:, 0] * omega)
-        v = np.array([omega, *following])
-        tree.set(q, v)
-        _, J, drift = tree.gap()
-        following = np.linalg.solve(J[:, 1:], -J[:, 0] * alpha - drift)
-        a = np.array([alpha, *following])
-        matrix = np.column_stack([J.T, [1.0, 0.0, 0.0]])
-        *closing, torque = np.linalg.solve(matrix, tree.inverse(a))
-        F12, F23, guide = tree.borne(a, np.array(closing))
-        values = (
-            math.remainder(q[0] + q[1], math.tau),
-            q[2],
-            torque,
-            F12.tolist(),
-            (-F23).tolist(),
-            closing,
-            guide[1],
-        )
-        for name, value in zip(ANSWERED_QUANTITIES, values, strict=True):
-            rows[name].append(value)
-    answers = {name: np.array(values).tolist() for name, values in rows.items()}
-    return {"answers": answers}
+        command.get("omega_2", 0.0),
+        command.get("alpha_2", 0.0),
+        command.get("branch", 1),
+    )
+    rows = [
+        answer_position(tree, linkage, *row) for row in zip(*positions, strict=True)
+    ]
+    columns = zip(*rows, strict=True)
+    answers = zip(ANSWERED_QUANTITIES, map(np.array, columns), strict=True)
+    return {"answers": {name: values.tolist() for name, values in answers}}
 
 
-def _close_slider(tree: _CutLoop, q: Array, least: float) -> None:
-    """Close the gap by the rod and the slider, in place."""
+def answer_position(
+    tree: CutLoop,
+    linkage: SliderCrank,
+    theta: float,
+    omega: float,
+    alpha: float,
+    branch: int,
+) -> tuple[Any, ...]:
+    """Answer one position, in the order of `ANSWERED_QUANTITIES`."""
+    rod_angle = 0.0 if branch > 0 else math.pi
+    stroke = linkage.crank * math.cos(theta) + branch * linkage.rod
+    q = np.array([theta, rod_angle - theta, stroke])
     for _ in range(NEWTON_STEPS_OF_A_POSITION):
         tree.set(q, np.zeros(3))
-        apart, J, _ = tree.gap()
+        apart, J, _ = _measure_gap(tree)
         step = np.linalg.solve(J[:, 1:], -apart)
         q[1:] += step
-        if np.abs(step).max() <= least:
+        if np.abs(step).max() <= GAP_AT_THE_END * linkage.rod:
             break
+    tree.set(q, np.zeros(3))
+    _, J, _ = _measure_gap(tree)
+    v = np.array([omega, *np.linalg.solve(J[:, 1:], -J[:, 0] * omega)])
+    tree.set(q, v)
+    _, J, drift = _measure_gap(tree)
+    a = np.array([alpha, *np.linalg.solve(J[:, 1:], -J[:, 0] * alpha - drift)])
+    _, of_slider, _ = tree.follow(1)
+    needed = tree.inverse(a) - of_slider.T @ linkage.push
+    matrix = np.column_stack([J.T, [1.0, 0.0, 0.0]])
+    *closing, torque = np.linalg.solve(matrix, needed)
+    F43 = np.array(closing)
+    F12, F23, guide = tree.borne(a, (F43, linkage.push - F43))
+    theta_3 = math.remainder(q[0] + q[1], math.tau)
+    return theta_3, q[2], torque, F12, -F23, F43, guide[1]
+
+
+def _measure_gap(tree: CutLoop) -> list[Array]:
+    """Return the rod's end less the slider (2,), its Jacobian and its drift."""
+    ends = zip(tree.follow(0), tree.follow(1), strict=True)
+    return [of_rod - of_slider for of_rod, of_slider in ends]
 
 
 def serve_slider_crank(

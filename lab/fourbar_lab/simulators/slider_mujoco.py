@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from fourbar.quantities import Array
-from fourbar_lab.simulators.slider_engines import SliderBar
+from fourbar_lab.simulators.slider_engines import SliderBar, SliderCrank
 
 VERSION = mujoco.__version__
 _NO_INERTIA = 1e-12
@@ -18,17 +18,10 @@ _NO_INERTIA = 1e-12
 class MujocoSlider:
     """The tree, with sites at the rod's end and the slider."""
 
-    def __init__(
-        self,
-        bodies: list[SliderBar],
-        lengths: tuple[float, float, float],
-        field: Array,
-        push: Array,
-    ) -> None:
-        crank, rod, offset = lengths
-        of_crank, of_rod, of_slider = map(_write_inertial, bodies)
+    def __init__(self, linkage: SliderCrank) -> None:
+        of_crank, of_rod, of_slider = map(_write_inertial, linkage.bars)
         hinge = '<joint type="hinge" axis="0 0 1"/>'
-        gravity_x, gravity_y = field.tolist()
+        gravity_x, gravity_y = linkage.gravity.tolist()
         lines = [
             "<mujoco>",
             f'<option gravity="{gravity_x!r} {gravity_y!r} 0">',
@@ -36,11 +29,11 @@ class MujocoSlider:
             "</option>",
             "<worldbody>",
             f'<body name="crank">{hinge}{of_crank}',
-            f'<body name="rod" pos="{crank!r} 0 0">{hinge}{of_rod}',
-            f'<site name="end" pos="{rod!r} 0 0"/>',
+            f'<body name="rod" pos="{linkage.crank!r} 0 0">{hinge}{of_rod}',
+            f'<site name="end" pos="{linkage.rod!r} 0 0"/>',
             "</body>",
             "</body>",
-            f'<body name="slider" pos="0 {offset!r} 0">',
+            f'<body name="slider" pos="0 {linkage.offset!r} 0">',
             f'<joint type="slide" axis="1 0 0"/>{of_slider}',
             '<site name="slider"/>',
             "</body>",
@@ -49,7 +42,6 @@ class MujocoSlider:
         ]
         self.model = mujoco.MjModel.from_xml_string("\n".join(lines))
         self.data = mujoco.MjData(self.model)
-        self.push = push
         self.bodies = [self.model.body(name).id for name in ("crank", "rod", "slider")]
         self.sites = [self.model.site(name).id for name in ("end", "slider")]
 
@@ -59,51 +51,32 @@ class MujocoSlider:
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_fwdVelocity(self.model, self.data)
 
-    def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider (2,), its Jacobian and its drift."""
-        slopes = np.zeros((2, 3, 3))
-        rates = np.zeros((2, 3, 3))
-        for slope, rate, site in zip(slopes, rates, self.sites, strict=True):
-            mujoco.mj_jacSite(self.model, self.data, slope, None, site)
-            body = self.model.site_bodyid[site]
-            mujoco.mj_jacDot(
-                self.model,
-                self.data,
-                rate,
-                None,
-                self.data.site_xpos[site],
-                body,
-            )
-        end, slider = (self.data.site_xpos[site][:2] for site in self.sites)
-        return (
-            end - slider,
-            (slopes[0] - slopes[1])[:2],
-            (rates[0] - rates[1])[:2] @ self.data.qvel,
-        )
+    def follow(self, end: int) -> tuple[Array, Array, Array]:
+        """Return place, Jacobian and drift of an end of the cut."""
+        site = self.sites[end]
+        place = self.data.site_xpos[site]
+        slope = np.zeros((3, 3))
+        rate = np.zeros((3, 3))
+        mujoco.mj_jacSite(self.model, self.data, slope, None, site)
+        body = self.model.site_bodyid[site]
+        mujoco.mj_jacDot(self.model, self.data, rate, None, place, body)
+        return place[:2].copy(), slope[:2], rate[:2] @ self.data.qvel
 
     def inverse(self, a: Array) -> Array:
-        """Return the joint forces of accelerations a, without the closing force."""
+        """Return the joint forces of accelerations a, with no force at the cut."""
         self.data.xfrc_applied[:], self.data.qacc[:] = 0.0, a
         mujoco.mj_inverse(self.model, self.data)
-        slope = np.zeros((3, 3))
-        mujoco.mj_jacSite(self.model, self.data, slope, None, self.sites[1])
-        return np.array(self.data.qfrc_inverse) - slope[:2].T @ self.push
+        return np.array(self.data.qfrc_inverse)
 
-    def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
+    def borne(self, a: Array, on_ends: tuple[Array, Array]) -> list[Array]:
         """Return the force on crank, rod and slider by the body before, (2,), N."""
-        for body, force, site in zip(
-            self.bodies[1:],
-            (closing, self.push - closing),
-            self.sites,
-            strict=True,
-        ):
+        for body, force, site in zip(self.bodies[1:], on_ends, self.sites, strict=True):
             arm = self.data.site_xpos[site] - self.data.xipos[body]
             pull = np.array([*force, 0.0])
             self.data.xfrc_applied[body] = [*pull, *np.cross(arm, pull)]
         self.data.qacc[:] = a
         mujoco.mj_rnePostConstraint(self.model, self.data)
-        forces = [np.array(self.data.cfrc_int[body][3:5]) for body in self.bodies]
-        return forces[0], forces[1], forces[2]
+        return [np.array(self.data.cfrc_int[body][3:5]) for body in self.bodies]
 
 
 def _write_inertial(body: SliderBar) -> str:

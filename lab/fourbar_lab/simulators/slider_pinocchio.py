@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from fourbar.quantities import Array
-from fourbar_lab.simulators.slider_engines import SliderBar
+from fourbar_lab.simulators.slider_engines import SliderCrank
 
 VERSION = pin.__version__
 
@@ -12,24 +12,17 @@ VERSION = pin.__version__
 class PinocchioSlider:
     """The tree, with frames at the rod's end and the slider."""
 
-    def __init__(
-        self,
-        bodies: list[SliderBar],
-        lengths: tuple[float, float, float],
-        field: Array,
-        push: Array,
-    ) -> None:
-        crank, rod, offset = lengths
+    def __init__(self, linkage: SliderCrank) -> None:
         self.model = pin.Model()
-        self.push = push
-        self.model.gravity = pin.Motion(np.array([*field, 0.0, 0.0, 0.0, 0.0]))
+        gravity = np.array([*linkage.gravity, 0.0, 0.0, 0.0, 0.0])
+        self.model.gravity = pin.Motion(gravity)
         joints = (
             (pin.JointModelRZ(), 0, (0.0, 0.0)),
-            (pin.JointModelRZ(), 1, (crank, 0.0)),
-            (pin.JointModelPX(), 0, (0.0, offset)),
+            (pin.JointModelRZ(), 1, (linkage.crank, 0.0)),
+            (pin.JointModelPX(), 0, (0.0, linkage.offset)),
         )
-        for number, body in enumerate(bodies, 1):
-            joint, parent, place = joints[number - 1]
+        stated = zip(joints, linkage.bars, strict=True)
+        for number, ((joint, parent, place), body) in enumerate(stated, 1):
             placement = pin.SE3(np.eye(3), np.array([*place, 0.0]))
             self.model.addJoint(parent, joint, placement, f"joint {number}")
             inertia = pin.Inertia(
@@ -38,7 +31,7 @@ class PinocchioSlider:
                 np.diag([body.inertia] * 3),
             )
             self.model.appendBodyToJoint(number, inertia, pin.SE3.Identity())
-        end = pin.SE3(np.eye(3), np.array([rod, 0.0, 0.0]))
+        end = pin.SE3(np.eye(3), np.array([linkage.rod, 0.0, 0.0]))
         self.frames = []
         for joint, place in ((2, end), (3, pin.SE3.Identity())):
             frame = pin.Frame(f"B{joint}", joint, 0, place, pin.FrameType.OP_FRAME)
@@ -53,50 +46,28 @@ class PinocchioSlider:
         pin.computeJointJacobians(self.model, self.data, self.q)
         pin.updateFramePlacements(self.model, self.data)
 
-    def gap(self) -> tuple[Array, Array, Array]:
-        """Return the rod's end less the slider (2,), its Jacobian and its drift."""
-        end, end_slope, end_drift = self._follow(self.frames[0])
-        slider, slider_slope, slider_drift = self._follow(self.frames[1])
-        return end - slider, end_slope - slider_slope, end_drift - slider_drift
-
-    def _follow(self, frame: int) -> tuple[Array, Array, Array]:
-        """Return place, Jacobian and acceleration of a frame in the plane."""
+    def follow(self, end: int) -> tuple[Array, Array, Array]:
+        """Return place, Jacobian and drift of an end of the cut."""
+        at = (self.model, self.data, self.frames[end])
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        place = self.data.oMf[frame].translation
-        jacobian = pin.getFrameJacobian(self.model, self.data, frame, axes)
-        acceleration = pin.getFrameClassicalAcceleration(
-            self.model,
-            self.data,
-            frame,
-            axes,
-        )
-        return place[:2], jacobian[:2], acceleration.linear[:2]
+        place = self.data.oMf[self.frames[end]].translation
+        jacobian = pin.getFrameJacobian(*at, axes)
+        acceleration = pin.getFrameClassicalAcceleration(*at, axes)
+        return place[:2].copy(), jacobian[:2], acceleration.linear[:2]
 
     def inverse(self, a: Array) -> Array:
-        """Return the joint forces of accelerations a, without the closing force."""
-        return np.asarray(self._solve(a, np.zeros(2)))
+        """Return the joint forces of accelerations a, with no force at the cut."""
+        return np.array(pin.rnea(self.model, self.data, self.q, self.v, a))
 
-    def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
+    def borne(self, a: Array, on_ends: tuple[Array, Array]) -> list[Array]:
         """Return the force on crank, rod and slider by the body before, (2,), N."""
-        self._solve(a, closing)
-        forces = []
-        for joint in (1, 2, 3):
-            rotation = self.data.oMi[joint].rotation
-            forces.append((rotation @ self.data.f[joint].linear)[:2])
-        return forces[0], forces[1], forces[2]
-
-    def _solve(self, a: Array, closing: Array) -> Array:
-        """Return the generalized forces (3,) for the acceleration a, by RNEA.
-
-        The closing force acts on the rod's end, its opposite and the load on the
-        slider.
-        """
         outside = [pin.Force.Zero() for _ in range(4)]
-        for joint, force, frame in (
-            (2, closing, self.frames[0]),
-            (3, self.push - closing, self.frames[1]),
-        ):
+        for joint, force, frame in zip((2, 3), on_ends, self.frames, strict=True):
             turned = self.data.oMi[joint].rotation.T @ np.array([*force, 0.0])
             arm = self.model.frames[frame].placement.translation
             outside[joint] = pin.Force(turned, np.cross(arm, turned))
-        return np.array(pin.rnea(self.model, self.data, self.q, self.v, a, outside))
+        pin.rnea(self.model, self.data, self.q, self.v, a, outside)
+        return [
+            (self.data.oMi[joint].rotation @ self.data.f[joint].linear)[:2]
+            for joint in (1, 2, 3)
+        ]

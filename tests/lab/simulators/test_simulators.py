@@ -21,7 +21,7 @@ from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command
 from fourbar_lab import benchmark
-from fourbar_lab.simulators import gradients, motion, mujoco_c
+from fourbar_lab.simulators import gradients, motion, mujoco_c, pinocchio_simulated
 from fourbar_lab.simulators.motion import Instant, Simulator
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge_answers, read_problem
@@ -50,6 +50,7 @@ COARSE = 0.05
 """
 JUDGES = {"problems.py"}
 """Modules that state the formulas' answers; every other hands things to a simulator."""
+RIGID = f"{__name__}:Rigid"
 PROBLEM = read_problem(PROBLEMS / "crank_rocker.json")
 ENTRIES = {
     name: entry
@@ -58,13 +59,13 @@ ENTRIES = {
 }
 
 
-ALL = {"theta_3", "theta_4", "torque", *PIN_FORCES}
+READ = {"theta_3", "theta_4", "torque", *PIN_FORCES}
 
 
-def ask_position(problem=PROBLEM, **changes):
-    """Read scene and command of a problem, some entries of which are changed."""
-    scene = protocol.scene_from_json(problem["scene"])
-    return protocol.command_from_json(scene, problem["command"] | changes)
+def ask_position(problem="crank_rocker", **changes):
+    stated = read_problem(PROBLEMS / f"{problem}.json")
+    scene = protocol.scene_from_json(stated["scene"])
+    return protocol.command_from_json(scene, {**stated["command"], **changes})
 
 
 def find_errors(simulator, **setting):
@@ -91,27 +92,30 @@ def sealed(monkeypatch):
 
 @pytest.mark.usefixtures("sealed")
 def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
-    paths = {*(ROOT / "lab/fourbar_lab/simulators").glob("*.py")}
-    handing = [path for path in paths if path.name not in JUDGES]
-    assert len(handing) > 10
-    for path in handing:
-        formulas = ("fourbar.solving", "fourbar.formulas")
-        assert not [name for name in imported(path) if name.startswith(formulas)], path
+    paths = [
+        path
+        for path in (ROOT / "lab/fourbar_lab/simulators").glob("*.py")
+        if path.name not in JUDGES
+    ]
+    assert len(paths) > 10
+    for path in paths:
+        assert not {
+            name
+            for name in imported(path)
+            if name.startswith(("fourbar.solving", "fourbar.formulas"))
+        }, path
         assert "fourbar.solving" not in path.read_text(), path
-    for branch in (1, -1):
-        scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
-        scene = replace(
-            scene,
-            motion=scene.motion.replace(branch=branch, speed=-10.0 * branch),
-        )
-        begin = motion.start(scene)
-        assert write_mjcf(scene, start=begin).count("<key ") == 1
-        assert "coupler" in write_sdf(scene, "drake", begin)
-        theta = (begin.qpos[0], begin.qpos[0] + begin.qpos[1], begin.qpos[2])
-        assert motion.compute_gap_at_B(scene, theta) < 1e-15
+    scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
+    for branch, first in ((1, math.tau), (-1, 0.0)):
+        turned = scene.motion.replace(branch=branch, speed=-10.0 * branch)
+        moved = replace(scene, motion=turned)
+        begin = motion.start(moved)
+        assert write_mjcf(moved, start=begin).count("<key ") == 1
+        assert "coupler" in write_sdf(moved, "drake", begin)
+        theta = motion.bar_directions(begin.qpos)
+        assert motion.compute_gap_at_B(moved, theta) < 1e-15
         assert np.sin(theta[2] - theta[1]) * branch > 0.0
-        assert begin.qpos[0] == (math.tau if branch > 0 else 0.0)
-        assert begin.qvel[0] == -10.0 * branch
+        assert (begin.qpos[0], begin.qvel[0]) == (first, -10.0 * branch)
 
 
 def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated():
@@ -134,58 +138,60 @@ class Rigid(Simulator):
     A test changes it.
     """
 
-    name, version, device = "rigid", "1", "abacus"
-    made_for, changed = "tests", "nothing"
+    name, version, device, made_for = "rigid", "1", "abacus", "tests"
     settings: ClassVar[dict[str, Any]] = {"plain": 1.0, "wrong": 1.1}
     left_out = ""
     diverges_at = math.inf
 
     def through(self, scene, course):
-        begin, speed, done = motion.start(scene), scene.motion.omega_2 or 0.0, 0
+        speed, done = scene.motion.omega_2 or 0.0, 0
+        branch = np.array([scene.motion.branch], dtype=np.int8)
 
         def advance(steps):
             nonlocal done
             done += steps
-            return begin.qpos[0] + speed * done * course.timestep
+            return motion.start(scene).qpos[0] + speed * done * course.timestep
 
         def read(theta):
-            branch = np.array([scene.motion.branch], dtype=np.int8)
             command = Command(np.array([theta]), branch, speed, 0.0)
             exact = FreeBody().answer(scene, command).quantities
-            angles = [float(exact[name][0]) for name in ("theta_3", "theta_4")]
+            (theta_3,), (theta_4,) = exact["theta_3"], exact["theta_4"]
             if done > self.diverges_at:
-                angles[0] = math.nan
-            read = [name for name in PIN_FORCES if name != self.left_out]
-            forces = {name: exact[name][0] for name in read}
+                theta_3 = math.nan
+            forces = {pin: exact[pin][0] for pin in PIN_FORCES if pin != self.left_out}
             torque = self.settings[self.setting] * float(exact["torque"][0])
-            return Instant((theta, *angles), speed, 0.0, torque, forces)
+            return Instant((theta, theta_3, theta_4), speed, 0.0, torque, forces)
 
-        return motion.run_through(scene, course, advance, read)
+        return self.run(scene, course, advance, read)
 
 
 def test_a_run_is_judged_at_the_motion_that_it_made():
     errors = find_errors(Rigid, steps_per_turn=50)
-    assert max(errors.values()) < EXACT and {*errors} == ALL
+    assert max(errors.values()) < EXACT and set(errors) == READ
     assert find_errors(Rigid, name="wrong")["torque"] == pytest.approx(0.1, abs=1e-9)
 
 
-def test_a_run_begins_before_its_first_position_where_the_linkage_closes():
-    scene, command = ask_position()
-    for sense, begin, rows in ((1, -0.5, range(25)), (-1, 2.5, range(24, -1, -1))):
-        motion_back = scene.motion.replace(speed=10.0 * sense)
-        led, course = motion.lay_out(
-            replace(scene, motion=motion_back),
-            command._replace(speed=10.0 * sense),
-            100,
-        )
-        assert motion.start(led).qpos[0] == pytest.approx(begin * math.pi)
-        assert course.stops[-1] == 125 and course.rows.tolist() == [*rows]
-        assert course.timestep == pytest.approx(math.tau / 10.0 / 100)
-    # 30 degrees from a change point
-    scene, command = ask_position(read_problem(PROBLEMS / "pinocchio_2729.json"))
-    led, course = motion.lay_out(scene, command, 628)
-    assert 0.1 < motion.start(led).qpos[0] < command.theta_2[0] - 0.1
-    assert course.stops[0] > 1
+@pytest.mark.parametrize(
+    ("problem", "speed", "begins", "last_stop"),
+    [
+        ("crank_rocker", 10.0, (-0.5, -0.5), 125),
+        ("crank_rocker", -10.0, (2.5, 2.5), 125),
+        # 30 degrees from a change point
+        ("pinocchio_2729", 10.0, (0.03, 0.13), None),
+    ],
+)
+def test_a_run_begins_before_its_first_position_where_the_linkage_closes(
+    problem, speed, begins, last_stop
+):
+    scene, command = ask_position(problem)
+    scene = replace(scene, motion=scene.motion.replace(speed=speed))
+    led, course = motion.lay_out(scene, command._replace(speed=speed), 100)
+    low, high = (math.pi * part for part in begins)
+    assert low - 1e-12 < motion.start(led).qpos[0] < high + 1e-12
+    assert course.timestep == pytest.approx(math.tau / 10.0 / 100)
+    count = len(command.theta_2)
+    assert course.rows.tolist() == list(range(count))[:: 1 if speed > 0 else -1]
+    assert course.stops[0] > 1 and course.stops[-1] == (last_stop or course.stops[-1])
 
 
 @pytest.mark.parametrize(
@@ -219,63 +225,51 @@ def test_a_force_that_is_not_read_is_missing_and_the_others_count(monkeypatch):
 
 @pytest.mark.slow
 def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch):
-    told = {key: PROBLEM[key] for key in ("scene", "command")}
-
-    def tell(ask, **more):
+    def tell(ask="answer", **setting):
+        question = {"id": 1, "ask": ask, "setting": setting or None, **told}
         replies = BytesIO()
-        question = {"id": 1, "ask": ask, **told, **more}
-        serve(f"{__name__}:Rigid", BytesIO(json.dumps(question).encode()), replies)
-        return json.loads(replies.getvalue())
+        serve(RIGID, BytesIO(json.dumps(question).encode()), replies)
+        reply = json.loads(replies.getvalue())
+        return reply.get("setting") or reply
 
-    hello = open_engine(f"{__name__}:Rigid")[1]
+    told = {key: PROBLEM[key] for key in ("scene", "command")}
+    hello = open_engine(RIGID)[1]
     assert hello["settings"] == ["plain", "wrong"]
     assert (hello["device"], hello["made_for"]) == ("abacus", "tests")
-    for setting, key, made in (
-        (None, "setting", "plain, 628/rev"),
-        ({"name": "wrong"}, "setting", "wrong, 628/rev"),
-        ({"name": "wrong", "steps_per_turn": 50}, "setting", "wrong, 50/rev"),
-        ({"name": "no"}, "refusal", "it has no setting 'no'; it has"),
-        ({"error": 0.1}, "refusal", "it knows no law of its error"),
-        ({"steps": 3}, "error", "setting = {'steps': 3}"),
-    ):
-        assert made in tell("answer", setting=setting)[key]
-    assert tell("slopes") == {"id": 1, "refusal": "it has no derivatives"}
+    assert tell() == "plain, 628/rev"
+    assert tell(name="wrong") == "wrong, 628/rev"
+    assert tell(name="wrong", steps_per_turn=50) == "wrong, 50/rev"
+    assert "it has no setting 'no'; it has: plain" in tell(name="no")["refusal"]
+    assert "it knows no law of its error" in tell(error=0.1)["refusal"]
+    assert "setting = {'steps': 3}" in tell(steps=3)["error"]
+    assert tell("slopes")["refusal"] == "it has no derivatives"
     by_hand = [{"how": "by hand"}]
     monkeypatch.setattr(Rigid, "slopes", lambda *_: by_hand, raising=False)
-    assert tell("slopes") == {"id": 1, "slopes": by_hand}
-
-
-def load_adapter(name):
-    module, _, cls = name.partition(":")
-    assert find_spec(module) is not None
-    return getattr(pytest.importorskip(module, exc_type=ImportError), cls)
+    assert tell("slopes")["slopes"] == by_hand
 
 
 @pytest.mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn():
-    simulator = load_adapter("fourbar_lab.simulators.mujoco_c:MujocoFile")
-    at_states, through = (
-        find_errors(simulator, steps_per_turn=steps) for steps in (None, 157)
-    )
-    assert {*at_states} == {*through} == ALL
+    at_states = find_errors(mujoco_c.MujocoFile)
+    through = find_errors(mujoco_c.MujocoFile, steps_per_turn=157)
+    assert set(at_states) == READ == set(through)
     assert max(at_states.values()) < EXACT < max(through.values()) < THROUGH
-    assert find_errors(simulator, name="its defaults")["torque"] > THROUGH
+    assert find_errors(mujoco_c.MujocoFile, name="its defaults")["torque"] > THROUGH
 
 
 @pytest.mark.usefixtures("sealed")
-def test_each_solver_of_pinocchio_carries_the_loop():
-    name = "fourbar_lab.simulators.pinocchio_simulated:PinocchioSolvers"
-    simulator = load_adapter(name)
-    for setting in simulator.settings:
-        accurate = setting in ("constraintDynamics", "lcaba")
-        errors = find_errors(simulator, name=setting, steps_per_turn=314)
-        assert max(errors.values()) < IN_PINOCCHIO[accurate], setting
-        if accurate:
-            at_states = find_errors(simulator, name=setting)
-            assert max(at_states.values()) < IN_PINOCCHIO[True], setting
-        else:
-            answer = simulator().at_setting(name=setting).answer(*ask_position())
-            assert answer.refusal == "an impulse solver has no single states"
+@pytest.mark.parametrize("setting", ["constraintDynamics", "lcaba", "ADMM", "PGS"])
+def test_each_solver_of_pinocchio_carries_the_loop(setting):
+    solvers = pinocchio_simulated.PinocchioSolvers
+    accurate = setting in ("constraintDynamics", "lcaba")
+    errors = find_errors(solvers, name=setting, steps_per_turn=314)
+    assert max(errors.values()) < IN_PINOCCHIO[accurate]
+    if accurate:
+        at_states = find_errors(solvers, name=setting)
+        assert max(at_states.values()) < IN_PINOCCHIO[True]
+    else:
+        answer = solvers().at_setting(name=setting).answer(*ask_position())
+        assert answer.refusal == "an impulse solver has no single states"
 
 
 def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
@@ -288,45 +282,47 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
 
     def answered(state):
         state.data.qpos[:], state.data.qvel[:] = state.qpos, state.qvel
-        return mujoco_c._evaluate_mujoco(state.model, state.data)
+        return mujoco_c.reading(state.model, mujoco_c.evaluate(state.model, state.data))
 
-    now, by = answered(gradients.compile_and_assemble(scene, theta_2, "mujoco")), {}
+    now = answered(gradients.compile_and_assemble(scene, theta_2, "mujoco"))
+    by = {}
     for key in gradients.list_keys(scene):
-        more, less = (
-            answered(state).torque
-            for state in gradients.assemble_either_side(scene, theta_2, key, "mujoco")
-        )
-        by[key] = gradients.change(more, less)
+        sides = gradients.assemble_either_side(scene, theta_2, key, "mujoco")
+        by[key] = gradients.change(*(answered(state).torque for state in sides))
     state = (theta_2, now.omega_2, now.alpha_2, now.torque)
     right = gradients.collect_answer(scene, "differences", state, by)
     wrong = {**right, "by": {key: 1.1 * value for key, value in by.items()}}
     zero = {**right, "by": dict.fromkeys(by, 0.0)}
     slopes = json.loads(json.dumps([right, wrong, zero, {"how": "refused"}, {}]))
     compared = benchmark.compare_slopes(PROBLEM, slopes)
-    (_, found), (_, tenth), (_, zeros), refused, unread = compared
-    assert {*found} == {"torque", *by} and "motion.theta_2" in by
-    assert all(float(error) < DIFFERENCES for error in found.values())
-    assert all(float(tenth[key]) == pytest.approx(0.1, abs=1e-3) for key in by)
-    assert {zeros[key] for key in by} == {"zero"} and refused == ("refused", {})
+    (_, of_right), (_, of_wrong), (_, of_zero), refused, unread = compared
+    assert set(of_right) == {"torque", *by} and "motion.theta_2" in by
+    assert all(float(error) < DIFFERENCES for error in of_right.values())
+    assert all(float(of_wrong[key]) == pytest.approx(0.1, abs=1e-3) for key in by)
+    assert {of_zero[key] for key in by} == {"zero"}
+    assert refused == ("refused", {})
     assert unread == ("no derivatives that can be read: KeyError: 'how'", {})
 
 
 @pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for():
-    cls = load_adapter("fourbar_lab.simulators.exudyn_simulated:ExudynIntegrators")
+    module = pytest.importorskip(
+        "fourbar_lab.simulators.exudyn_simulated",
+        exc_type=ImportError,
+    )
+    integrators = module.ExudynIntegrators
+    setting = {"name": list(integrators.settings)[1], "steps_per_turn": 314}
+    assert max(find_errors(integrators, **setting).values()) < IN_EXUDYN
     scene, command = ask_position()
-    _, setting = cls.settings
-    steps = {"name": setting, "steps_per_turn": 314}
-    assert max(find_errors(cls, **steps).values()) < IN_EXUDYN
-    simulator = cls().at_setting(**steps)
+    simulator = integrators().at_setting(**setting)
     damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
     answer = simulator.answer(damped, command)
-    ours = fourbar.solve(damped, "force", at=answer.at).torque
-    apart = np.abs(answer.quantities["torque"] - ours).max()
-    assert apart < IN_EXUDYN * np.abs(ours).max()
-    dry = replace(scene, effects=(Friction.at(B=0.01),))
+    torque = fourbar.solve(damped, "force", at=answer.at).torque
+    apart = np.abs(answer.quantities["torque"] - torque).max()
+    assert apart < IN_EXUDYN * np.abs(torque).max()
+    rubbing = replace(scene, effects=(Friction.at(B=0.01),))
     with pytest.raises(LimitError, match="alone"):
-        simulator.through(*motion.lay_out(dry, command, 314))
+        simulator.through(*motion.lay_out(rubbing, command, 314))
 
 
 @pytest.mark.slow
@@ -337,10 +333,13 @@ def test_exudyn_refuses_what_it_has_no_element_for():
 )
 def test_each_simulator_that_is_installed_carries_the_loop(name):
     entry = ENTRIES[name]
-    simulator = load_adapter(entry.adapter)
-    setting = entry.setting or None
-    errors = find_errors(simulator, name=setting, steps_per_turn=entry.steps[1])
-    bound = simulator.tolerance[0] if "tolerance" in vars(simulator) else COARSE
-    assert errors["torque"] < bound
+    module, _, cls = entry.adapter.partition(":")
+    assert find_spec(module) is not None
+    simulator = getattr(pytest.importorskip(module, exc_type=ImportError), cls)
+    setting = {"name": entry.setting or None, "steps_per_turn": entry.steps[1]}
+    allowed = COARSE
+    if "tolerance" in vars(simulator):
+        allowed, _ = simulator.tolerance
+    errors = find_errors(simulator, **setting)
     not_read = np.nan
-    assert not errors.get("F43", not_read) > bound
+    assert errors["torque"] < allowed and not errors.get("F43", not_read) > allowed
