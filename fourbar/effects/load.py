@@ -75,7 +75,8 @@ class Table(Described):
             raise InputError(
                 f"{key}.factor",
                 factors,
-                "must end as it begins: its ends are one turn apart",
+                "must end as it begins, since its ends are one turn apart: a jump there"
+                " needs one more angle just inside",
             )
 
     @property

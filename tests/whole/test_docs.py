@@ -159,7 +159,7 @@ def test_the_readme_goes_on_from_its_first_scene(checkout, capsys):
     ("name", "count"),
     [
         ("docs/theory.md", 2),
-        ("docs/guide-designer.md", 5),
+        ("docs/guide-designer.md", 7),
         pytest.param("docs/guide-roboticist.md", 4, marks=pytest.mark.slow),
     ],
 )
