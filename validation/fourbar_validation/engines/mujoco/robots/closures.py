@@ -486,7 +486,13 @@ class _Finder:
         coupled = self._find_coupled(number, chain)
         holds = self._list_holds(chain, motors, coupled, freedoms - 1)
         if not holds:
-            return self._explain_coupling(number, chain, coupled)
+            text = self._explain_coupling(number, chain, coupled)
+            if freedoms == len(motors) == 2:
+                one, other = (name_joint(self.model, joint) for joint, _ in motors)
+                text += (
+                    f"; --hold {one} (or {other}) leaves a four-bar that the rest loads"
+                )
+            return text
         text = f"{count} and {_spell_count(freedoms, 3)} freedoms"
         if len(motors) > 1:
             motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
@@ -548,8 +554,9 @@ class _Finder:
         joints = {*chain.joints}.union(*(other.joints for other in coupled.values()))
         kinds = self.model.jnt_type[[*joints]]
         names = ", ".join(self._name(other) for other in coupled)
+        moves = "moves" if len(coupled) == 1 else "move"
         if not coupled or not np.all(kinds == HINGE_JOINT):
-            return f"{names} moves its bars too: no hold makes it a four-bar"
+            return f"{names} {moves} its bars too: no hold makes it a four-bar"
         taken = sum(2 if self._is_pin(n) else 3 for n in (number, *coupled))
         freedoms = len(joints) - taken
         bars = len(joints) + 1 - max(freedoms - 1, 0)
@@ -558,7 +565,7 @@ class _Finder:
             held = _spell_count(freedoms - 1, 3)
             which += f" once {held} of its freedoms is held"
         text = (
-            f"with {names}, which moves its bars too, {len(joints)} hinges,"
+            f"with {names}, which {moves} its bars too, {len(joints)} hinges,"
             f" {len(coupled) + 1} loops and {_spell_count(freedoms, 3)}"
             f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
             f" ({_SERVE_PLANAR})"
