@@ -55,6 +55,8 @@ from fourbar_validation.report.svg import (
 from fourbar_validation.report.templating import render
 
 BENCHMARKED_ENGINES = Path(__file__).parent / ENGINES_FILE
+JsonObject = dict[str, Any]
+"""A question, a reply, a result or a problem."""
 REFUSED = "R"
 DIFFERENTIATED = "crank_rocker"
 """Problem whose errors are drawn over time. An engine that has derivatives is asked for
@@ -120,7 +122,7 @@ class _MatrixRow:
     """One engine in one setting."""
 
     entry: Entry
-    hello: dict[str, Any] = field(default_factory=dict)
+    hello: JsonObject = field(default_factory=dict)
     cells: dict[str, _MatrixCell] = field(default_factory=dict)
     slopes: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     """Ways of differentiation with the relative errors of the torque and of each of its
@@ -144,10 +146,8 @@ def name_row(engine: str, version: str) -> str:
 
 def read_reasons(file: Path) -> dict[str, str]:
     """Read why letters are not A, by the name of a row, or by what it begins with."""
-    reasons: dict[str, str] = tomllib.loads(file.read_text(encoding="utf-8")).get(
-        "because", {}
-    )
-    return reasons
+    document = tomllib.loads(file.read_text(encoding="utf-8"))
+    return dict(document.get("because", {}))
 
 
 class Benchmark:
@@ -183,9 +183,8 @@ class Benchmark:
                 hello = running.ask_again(HELLO, 0)
                 if "error" in hello:
                     raise EngineError(str(hello["error"]))
-                for setting in (
-                    [entry.setting] if entry.setting else hello.get("settings") or [""]
-                ):
+                settings = hello.get("settings") or [""]
+                for setting in [entry.setting] if entry.setting else settings:
                     self._ask_engine(entry, hello, setting, running)
             except EngineError as error:
                 self._leave_out(entry, str(error))
@@ -194,15 +193,13 @@ class Benchmark:
 
     def _leave_out(self, entry: Entry, reason: str) -> None:
         row = self.rows.setdefault(KIND.sub("", entry.name), _MatrixRow(entry))
-        for problem in self.problems:
-            row.cells.setdefault(
-                problem, _MatrixCell(reason=f"not run: {write_one_line(reason)}")
-            )
+        cell = _MatrixCell(reason=f"not run: {write_one_line(reason)}")
+        row.cells = dict.fromkeys(self.problems, cell) | row.cells
 
     def _ask_engine(
         self,
         entry: Entry,
-        hello: dict[str, Any],
+        hello: JsonObject,
         setting: str,
         running: Running,
     ) -> None:
@@ -226,21 +223,15 @@ class Benchmark:
                     self._judge(problem, result, cell)
             if cell.letters not in ("AA", REFUSED):
                 cell.reason = cell.reason or self._explain(label)
-            if (
-                cell.letters != REFUSED or name not in row.cells
-            ):  # another kind of this row may have answered
+            # another kind of this row may have answered
+            if cell.letters != REFUSED or name not in row.cells:
                 row.cells[name] = cell
         if DIFFERENTIATED in self.problems and not row.slopes:
             problem = self.problems[DIFFERENTIATED]
             question = {key: problem[key] for key in ("scene", "command")}
-            result = self._take_or_ask(
-                row,
-                label,
-                "slopes",
-                {"problem": DIFFERENTIATED},
-                {"ask": "slopes", **question},
-                running,
-            )
+            stated = {"problem": DIFFERENTIATED}
+            question["ask"] = "slopes"
+            result = self._take_or_ask(row, label, "slopes", stated, question, running)
             row.slopes = compare_slopes(problem, result.get("slopes", []))
 
     def _ask_problem(
@@ -248,43 +239,34 @@ class Benchmark:
         row: _MatrixRow,
         setting: str,
         label: str,
-        problem: dict[str, Any],
+        problem: JsonObject,
         running: Running,
-    ) -> Iterator[dict[str, Any]]:
+    ) -> Iterator[JsonObject]:
         """Ask one problem, at each number of steps."""
-        question: dict[str, Any] = {
-            key: problem[key]
-            for key in ("ask", "scene", "command", "times")
-            if key in problem
-        }
-        entry = row.entry
+        keys = ("ask", "scene", "command", "times")
+        question = {key: problem[key] for key in keys if key in problem}
         name = problem["problem"]
-        several = entry.steps if problem["ask"] == "answer" else ()
+        stated = {"schema": RESULT, "problem": name}
+        several = row.entry.steps if problem["ask"] == "answer" else ()
         for steps in several or (None,):
-            asked: dict[str, Any] = {"name": setting} if setting else {}
+            asked: JsonObject = {"name": setting} if setting else {}
             stem = name
             if steps is not None:
                 asked["steps_per_turn"] = steps
                 stem = f"{name}-{steps}"
-            full = question | ({"setting": asked} if asked else {})
-            yield self._take_or_ask(
-                row,
-                label,
-                stem,
-                {"schema": RESULT, "problem": name},
-                full,
-                running,
-            )
+            if asked:
+                question["setting"] = asked
+            yield self._take_or_ask(row, label, stem, stated, question, running)
 
     def _take_or_ask(
         self,
         row: _MatrixRow,
         label: str,
         stem: str,
-        stated: dict[str, Any],
-        question: dict[str, Any],
+        stated: JsonObject,
+        question: JsonObject,
         running: Running,
-    ) -> dict[str, Any]:
+    ) -> JsonObject:
         """Take the result of an earlier run by the same version, or ask.
 
         The result is stored; one that broke down is asked for again.
@@ -302,8 +284,8 @@ class Benchmark:
 
     def _judge(
         self,
-        problem: dict[str, Any],
-        result: dict[str, Any],
+        problem: JsonObject,
+        result: JsonObject,
         cell: _MatrixCell,
     ) -> None:
         """Judge one result; of several timesteps the finest that is answered stands."""
@@ -321,17 +303,16 @@ class Benchmark:
             return
         levels = find_levels([row for row in judged if row.level != MISSING])
         second = "torque" if "torque" in find_levels(judged) else "motion"
-        cell.letters = "".join(
-            levels.get(group, MISSING) for group in ("reactions", second)
-        )
+        groups = "reactions", second
+        cell.letters = "".join(levels.get(group, MISSING) for group in groups)
         cell.reason, cell.file = "", str(result["file"])
         numbers = [(row.quantity, f"{row.error:.1e}", row.level) for row in judged]
-        gap = result.get("evidence", {}).get("gap")
-        numbers += [] if gap is None else [("gap at B", f"{gap:.1e}", "")]
-        seconds = float(result.get("seconds", result["asked_for"]))
-        cell.runs.append(
-            BenchmarkRun(str(result.get("setting", "exact")), seconds, numbers)
-        )
+        if (gap := result.get("evidence", {}).get("gap")) is not None:
+            numbers.append(("gap at B", f"{gap:.1e}", ""))
+        waited: float = result["asked_for"]
+        seconds = float(result.get("seconds", waited))
+        setting = str(result.get("setting", "exact"))
+        cell.runs.append(BenchmarkRun(setting, seconds, numbers))
         cell.order = _find_order(cell.runs)
 
     def _explain(self, label: str) -> str:
@@ -340,9 +321,7 @@ class Benchmark:
         Of several names with which the row's label begins, the longest counts.
         """
         names = [name for name in self.reasons if label.startswith(name)]
-        if names:
-            return self.reasons[max(names, key=len)]
-        return ""
+        return self.reasons.get(max(names, key=len, default=""), "")
 
     def list_rows(self) -> list[list[Any]]:
         """Return the rows of the table as lists of cells, problem by problem.
@@ -371,22 +350,21 @@ class Benchmark:
             name_row(label, row.text("version")): row
             for label, row in self.rows.items()
         }
-        lines = read_work(
-            dict(zip(BENCHMARK_COLUMNS, row, strict=True)) for row in table
-        )
-        page = {
-            "machine": name_machine(),
-            "problems": self.problems,
-            "rows": rows,
-            "chart": (write_svg(draw_panels(lines), "benchmark") if lines else ""),
-        }
-        if lines:
+        by_column = [dict(zip(BENCHMARK_COLUMNS, row, strict=True)) for row in table]
+        chart = ""
+        if lines := read_work(by_column):
+            chart = write_svg(draw_panels(lines), "benchmark")
             picture = write_alone(draw_panels(lines), "benchmark")
             write_text(self.out / "benchmark.svg", picture)
-        write_text(
-            self.out / "benchmark.html",
-            render("fourbar_lab", "benchmark.html.j2", **page),
+        page = render(
+            "fourbar_lab",
+            "benchmark.html.j2",
+            machine=name_machine(),
+            problems=self.problems,
+            rows=rows,
+            chart=chart,
         )
+        write_text(self.out / "benchmark.html", page)
 
 
 def _list_numbers(cell: _MatrixCell) -> Iterator[dict[str, str]]:
@@ -478,7 +456,7 @@ def draw_panels(lines: Mapping[str, list[TimedWork]]) -> Any:
         axes.tick_params(which="both", labelcolor=INK)
         markers = cycle(_MARKERS)
         for name, points in lines.items():
-            look: dict[str, Any] = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}
+            look: JsonObject = {"color": BAND, "linewidth": 0.8, "zorder": 1.5}
             if find_panel(name) == family:
                 look = {
                     "color": LIGHT_COLOURS[colours[family]],
@@ -500,7 +478,7 @@ def draw_panels(lines: Mapping[str, list[TimedWork]]) -> Any:
     return figure
 
 
-def _list_needs(problem: dict[str, Any]) -> set[str]:
+def _list_needs(problem: JsonObject) -> set[str]:
     """List what a problem asks of an engine, in the words of hello's `effects`."""
     scene = problem["scene"]
     needs = set(scene.get("effects", {}))
@@ -515,7 +493,7 @@ def _list_needs(problem: dict[str, Any]) -> set[str]:
     return needs
 
 
-def _ask_question(running: Running, question: dict[str, Any]) -> dict[str, Any]:
+def _ask_question(running: Running, question: JsonObject) -> JsonObject:
     """Ask one question; what came of it as entries of a result."""
     positions = len(question.get("times", question["command"].get("theta_2", [])))
     began = time.perf_counter()
@@ -527,16 +505,14 @@ def _ask_question(running: Running, question: dict[str, Any]) -> dict[str, Any]:
     if "answers" in reply or "slopes" in reply:
         kept = ("answers", "at", "setting", "evidence", "shared", "seconds", "slopes")
         return {key: reply[key] for key in kept if key in reply} | spent
-    word, text = (
-        ("refused", reply["refusal"])
-        if "refusal" in reply
-        else ("broke down", reply.get("error", ""))
-    )
+    word, text = "broke down", reply.get("error", "")
+    if "refusal" in reply:
+        word, text = "refused", reply["refusal"]
     return {"reason": f"{word}: {write_one_line(str(text))}", **spent}
 
 
 def compare_slopes(
-    problem: dict[str, Any],
+    problem: JsonObject,
     slopes: Iterable[Any],
 ) -> list[tuple[str, dict[str, str]]]:
     """Compare derivatives of the torque with those of the formulas.
@@ -551,32 +527,26 @@ def compare_slopes(
         for way in slopes:
             errors = {}
             if "by" in way:
-                angle, speed, acceleration = (
-                    float(way[key]) for key in scene.motion.names
+                moves = [float(way[str(key)]) for key in scene.motion.names]
+                motion: Any = zip(
+                    ("angle", "speed", "acceleration"), moves, strict=True
                 )
-                motion = scene.motion.replace(
-                    angle=angle,
-                    speed=speed,
-                    acceleration=acceleration,
-                )
-                ours = sensitivity(replace(scene, motion=motion))
-                pairs = {"torque": (way["torque"], ours.value("torque"))}
-                pairs |= {
-                    key: (theirs, ours.of("torque", key))
-                    for key, theirs in way["by"].items()
-                }
-                errors = {
-                    key: (
-                        "zero"
-                        if theirs == 0.0
-                        else f"{abs(theirs / float(np.ravel(value)[0]) - 1.0):.1e}"
-                    )
-                    for key, (theirs, value) in pairs.items()
-                }
+                moved = replace(scene, motion=scene.motion.replace(**dict(motion)))
+                ours = sensitivity(moved)
+                errors = {"torque": _tell_error(way["torque"], ours.value("torque"))}
+                for key, theirs in way["by"].items():
+                    errors[key] = _tell_error(theirs, ours.of("torque", key))
             compared.append((write_one_line(str(way["how"])), errors))
     except (AttributeError, KeyError, TypeError, ValueError, FourBarError) as error:
         compared.append((f"no derivatives that can be read: {say_error(error)}", {}))
     return compared
+
+
+def _tell_error(theirs: float, ours: Any) -> str:
+    """Write the relative error of a number."""
+    if theirs == 0.0:
+        return "zero"
+    return f"{abs(theirs / float(np.ravel(ours)[0]) - 1.0):.1e}"
 
 
 def _find_order(runs: list[BenchmarkRun]) -> float | None:
@@ -635,19 +605,17 @@ def benchmark_command(
     again. The results are written to benchmark.csv and one page.
     """
     find_checkout("benchmark")
+    known = list_problems()
     for name in problems:
-        if name not in list_problems():
-            raise InputError(
-                "--problem",
-                name,
-                f"must be one of {', '.join(list_problems())}",
-            )
+        if name not in known:
+            allowed = f"must be one of {', '.join(known)}"
+            raise InputError("--problem", name, allowed)
     entries = read_engines_of(engines or BENCHMARKED_ENGINES)
     out.mkdir(parents=True, exist_ok=True)
     benchmark = Benchmark(
         entries.values(),
         read_reasons(engines or BENCHMARKED_ENGINES),
-        problems or list_problems(),
+        problems or known,
         out,
     )
     benchmark.run(time_limit)

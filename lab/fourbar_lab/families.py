@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 
 from fourbar.effects import (
     LinearDrive,
@@ -63,18 +64,23 @@ _EVEN = _spread_masses(0.0)
 UNEVEN_DRAWERS = _spread_masses(3.0)
 
 
-def _draw_anywhere(rng: np.random.Generator) -> DrawnLinkage:
+def _draw_anywhere(rng: Generator) -> DrawnLinkage:
     """Draw lengths within a factor of ten, theta_2 anywhere it assembles."""
     while True:
         d, a = rng.uniform(0.1, 1.0, 2)
-        angle = float(rng.uniform(-7.0, 7.0))
+        angle = rng.uniform(-7.0, 7.0)
         diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
         b, c = rng.uniform(0.1, 1.0, 2)
         if abs(b - c) < diagonal < b + c:
             return (d, a, b, c), command_angle(angle)
 
 
-def _draw_near_limit(rng: np.random.Generator) -> DrawnLinkage:
+def _draw_signed(rng: Generator, low: float, high: float) -> float:
+    """Draw a number of either sign, whose size is uniform over decades."""
+    return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(low, high))
+
+
+def _draw_near_limit(rng: Generator) -> DrawnLinkage:
     """Draw a position within 1e-12..1e-2 rad of a limit of the input."""
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
@@ -92,7 +98,7 @@ within the rounding.
 """
 
 
-def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
+def _draw_near_change_point(rng: Generator) -> DrawnLinkage:
     """Draw a linkage 1e-8 to 1 rad from a change point, at that position.
 
     Parallelograms, kites and any s + l = p + q are drawn; some lengths miss the change
@@ -117,24 +123,22 @@ def _draw_near_change_point(rng: np.random.Generator) -> DrawnLinkage:
             for v in sorted(rng.uniform(0.1, 1.0, 3), reverse=True)
         )
         b = float(min(b, d + a - 0.01))
-        lengths, straight = (
-            ((d, a, b, d + a - b), math.pi)
-            if rng.random() < 0.5
-            else ((d, a, d - a + b, b), 0.0)
-        )
-    distance = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 0))
+        lengths, straight = (d, a, d - a + b, b), 0.0
+        if rng.random() < 0.5:
+            lengths, straight = (d, a, b, d + a - b), math.pi
+    distance = _draw_signed(rng, -8.0, 0.0)
     if rng.random() < 0.3:
         k = int(rng.integers(0, 4))
         missed = 0.1 * distance**2
         if missed < _BESIDE_ROUNDING:
             missed = 0.0
-        lengths = tuple(
-            v * (1.0 + missed) if i == k else v for i, v in enumerate(lengths)
-        )
+        changed = list(lengths)
+        changed[k] *= 1.0 + missed
+        return (*changed,), command_angle(straight + distance)
     return lengths, command_angle(straight + distance)
 
 
-def _draw_with_ratios(rng: np.random.Generator) -> DrawnLinkage:
+def _draw_with_ratios(rng: Generator) -> DrawnLinkage:
     """Draw lengths and masses in ratios from 1e-6 to 1e6.
 
     The ratios are crank to ground, coupler to diagonal, and those of masses.
@@ -150,7 +154,7 @@ def _draw_with_ratios(rng: np.random.Generator) -> DrawnLinkage:
 ANYWHERE = RandomFamily(_draw_anywhere, _EVEN)
 
 
-def scales(rng: np.random.Generator) -> Scene:
+def scales(rng: Generator) -> Scene:
     """Multiply all lengths by 1e-9..1e9."""
     scene = ANYWHERE.draw(rng)
     link = scene.linkage
@@ -158,20 +162,13 @@ def scales(rng: np.random.Generator) -> Scene:
     bars = []
     for number in MOVING_BARS:
         bar = link.bar(number)
-        bars.append(
-            Bar(
-                bar.length * k,
-                bar.mass,
-                bar.moment_of_inertia * k * k,
-                (bar.mass_centre[0] * k, bar.mass_centre[1]),
-            )
-        )
+        r, phi = bar.mass_centre
+        inertia = bar.moment_of_inertia * k * k
+        bars.append(Bar(bar.length * k, bar.mass, inertia, (r * k, phi)))
+    two, three, four = bars
+    linkage = FourBar(link.ground * k, two, three, four, link.ground_angle)
     loads = tuple(_scale_load_with_lengths(load, k) for load in scene.loads)
-    return replace(
-        scene,
-        linkage=FourBar(link.ground * k, bars[0], bars[1], bars[2], link.ground_angle),
-        loads=loads,
-    )
+    return replace(scene, linkage=linkage, loads=loads)
 
 
 def _scale_load_with_lengths(load: Load, k: float) -> Load:
@@ -184,24 +181,20 @@ def _scale_load_with_lengths(load: Load, k: float) -> Load:
     return replace(load, moment=load.moment * k, **scaled)
 
 
-def speeds(rng: np.random.Generator) -> Scene:
+def speeds(rng: Generator) -> Scene:
     """Draw omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
     scene = ANYWHERE.draw(rng)
-    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(
-        rng.random() < 0.9
-    )
-    alpha = float(
-        rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)])
-    )
+    omega = _draw_signed(rng, -3.0, 6.0) * bool(rng.random() < 0.9)
+    alpha = float(rng.choice([0.0, _draw_signed(rng, -3.0, 12.0)]))
     return replace(scene, motion=scene.motion.replace(speed=omega, acceleration=alpha))
 
 
-def _draw_deviation(rng: np.random.Generator) -> float:
+def _draw_deviation(rng: Generator) -> float:
     """Draw a relative deviation of 1e-5 to 3e-2, to either side."""
-    return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-5.0, math.log10(3e-2)))
+    return _draw_signed(rng, -5.0, math.log10(3e-2))
 
 
-def massless(rng: np.random.Generator) -> Scene:
+def massless(rng: Generator) -> Scene:
     """Draw a linkage of the random family without masses, loads and effects.
 
     Only what is added makes forces.
@@ -218,7 +211,7 @@ def massless(rng: np.random.Generator) -> Scene:
 
 def _draw_place(
     bar: int,
-    rng: np.random.Generator,
+    rng: Generator,
     nearest: float,
 ) -> Place:
     """Draw a place of a bar, from `nearest` to 1 m away from its first pin."""
@@ -226,40 +219,27 @@ def _draw_place(
     return Place(bar, (distance, angle))
 
 
-def springs(rng: np.random.Generator) -> Scene:
+def springs(rng: Generator) -> Scene:
     """Draw a spring near the length at which its force is zero.
 
     Every other spring on average has a preload.
     """
     scene = massless(rng)
-    first, second = (
-        int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False)
-    )
+    first, second = rng.choice((1, *MOVING_BARS), 2, replace=False).tolist()
     start, end = (_draw_place(bar, rng, 0.0) for bar in (first, second))
-    marked = replace(
-        scene,
-        points=(
-            Point("P", first, start.from_pin),
-            Point("Q", second, end.from_pin),
-        ),
-    )
-    places = solve(marked, "position").points
+    points = Point("P", first, start.from_pin), Point("Q", second, end.from_pin)
+    places = solve(replace(scene, points=points), "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
-    stiffness = float(rng.uniform(10.0, 1000.0))
+    stiffness = rng.uniform(10.0, 1000.0)
     preload = 0.0
     if rng.random() < 0.5:
-        preload = float(rng.uniform(-0.5, 2.0)) * stiffness * distance
-    spring = Spring(
-        start,
-        end,
-        stiffness,
-        max(distance * (1.0 + _draw_deviation(rng)) + preload / stiffness, 0.0),
-        preload,
-    )
+        preload = rng.uniform(-0.5, 2.0) * stiffness * distance
+    length = distance * (1.0 + _draw_deviation(rng)) + preload / stiffness
+    spring = Spring(start, end, stiffness, max(length, 0.0), preload)
     return replace(scene, effects=(Springs((spring,)),))
 
 
-def torsion(rng: np.random.Generator) -> Scene:
+def torsion(rng: Generator) -> Scene:
     """Draw a torsion spring near the angle at which its couple is zero.
 
     The rest angle is often whole turns away. No spring is at O2: the angle there is
@@ -269,17 +249,13 @@ def torsion(rng: np.random.Generator) -> Scene:
     scene = massless(rng)
     solution = solve(scene, "position")
     pin = str(rng.choice(["A", "B", "O4"]))
-    theta = (
-        scene.linkage.ground_angle,
-        solution.theta_2[0],
-        solution.theta_3[0],
-        solution.theta_4[0],
-    )
+    theta = [scene.linkage.ground_angle, solution.theta_2[0]]
+    theta += [solution.theta_3[0], solution.theta_4[0]]
     first, second = PINS[pin]
-    stiffness = float(rng.uniform(0.1, 10.0))
+    stiffness = rng.uniform(0.1, 10.0)
     preload = 0.0
     if rng.random() < 0.5:
-        preload = float(rng.uniform(-2.0, 2.0)) * stiffness
+        preload = rng.uniform(-2.0, 2.0) * stiffness
     turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
     rest = (
         float(theta[second - 1] - theta[first - 1]) * (1.0 + _draw_deviation(rng))
@@ -289,7 +265,7 @@ def torsion(rng: np.random.Generator) -> Scene:
     return replace(scene, effects=(Torsion.at(**{pin: (stiffness, rest, preload)}),))
 
 
-def tables(rng: np.random.Generator) -> Scene:
+def tables(rng: Generator) -> Scene:
     """Draw a load over a table, many turns from its angles or none.
 
     Every other one is near where its factor is zero. The ground is level: against
@@ -299,29 +275,21 @@ def tables(rng: np.random.Generator) -> Scene:
     linkage = scene.linkage
     angle = float(np.asarray(scene.motion.theta_2)) - linkage.ground_angle
     before, after = 10.0 ** rng.uniform(-3.0, 0.3, 2)
-    rise = float(rng.uniform(-2.0, 2.0))
-    first = (
-        -rise
-        * before
-        * (
-            (1.0 + _draw_deviation(rng))
-            if rng.random() < 0.5
-            else float(rng.uniform(-2.0, 2.0))
-        )
-    )
-    table = Table(
-        (angle - before, angle + after), (first, first + rise * (before + after))
-    )
+    rise = rng.uniform(-2.0, 2.0)
+    if rng.random() < 0.5:
+        factor = 1.0 + _draw_deviation(rng)
+    else:
+        factor = rng.uniform(-2.0, 2.0)
+    first = -rise * before * factor
+    last = first + rise * (before + after)
+    table = Table((angle - before, angle + after), (first, last))
     turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
-    size = float(rng.uniform(0.1, 10.0))
-    arm = float(rng.uniform(0.0, 1.0))
+    size = rng.uniform(0.1, 10.0)
+    arm = rng.uniform(0.0, 1.0)
     turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
     frame = str(rng.choice(["world", "bar"]))
     moment = float(rng.choice([0.0, size]))
-    if frame == "world":
-        form = "arm"
-    else:
-        form = "from_centre"
+    form = "arm" if frame == "world" else "from_centre"
     place: Any = {form: (arm, next(turned))}
     load = Load(
         int(rng.choice(MOVING_BARS)),
@@ -332,15 +300,11 @@ def tables(rng: np.random.Generator) -> Scene:
         **place,
     )
     motion = scene.motion.replace(angle=angle + math.tau * turns)
-    return replace(
-        scene,
-        linkage=replace(linkage, ground_angle=0.0),
-        loads=(load,),
-        motion=motion,
-    )
+    level = replace(linkage, ground_angle=0.0)
+    return replace(scene, linkage=level, loads=(load,), motion=motion)
 
 
-def drives(rng: np.random.Generator) -> Scene:
+def drives(rng: Generator) -> Scene:
     """Draw a cylinder between any two bars."""
     return _put_cylinder(
         ANYWHERE.draw(rng),
@@ -349,7 +313,7 @@ def drives(rng: np.random.Generator) -> Scene:
     )
 
 
-def strokes(rng: np.random.Generator) -> Scene:
+def strokes(rng: Generator) -> Scene:
     """Command the stroke of a cylinder from the ground to bar 2 or 4.
 
     The stroke (m) and its speed are those of a random scene at its input's position.
@@ -362,15 +326,14 @@ def strokes(rng: np.random.Generator) -> Scene:
         if bar == 2
         else (solution.theta_2, solution.theta_3)
     )
-    grows = (
-        solution.stroke_speed[0]
-        * (float(scene.motion.speed or 0.0) if bar == 2 else solution.omega_4[0])
-        > 0.0
-    )
+    turning = solution.omega_4[0]
+    if bar == 2:
+        turning = float(scene.motion.speed or 0.0)
+    grows = solution.stroke_speed[0] * turning > 0.0
     motion = Motion(
         stroke=float(solution.stroke[0]),
         stroke_speed=float(solution.stroke_speed[0]),
-        stroke_acceleration=float(rng.uniform(-2.0, 2.0)),
+        stroke_acceleration=rng.uniform(-2.0, 2.0),
         side="left" if grows else "right",
         branch=1 if math.sin(second[0] - first[0]) > 0.0 else -1,
     )
@@ -379,7 +342,7 @@ def strokes(rng: np.random.Generator) -> Scene:
 
 def _put_cylinder(
     scene: Scene,
-    rng: np.random.Generator,
+    rng: Generator,
     one: int,
     other: int,
 ) -> Scene:
@@ -387,17 +350,17 @@ def _put_cylinder(
     return replace(scene, drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
 
 
-def pushes(rng: np.random.Generator) -> Scene:
+def pushes(rng: Generator) -> Scene:
     """Draw a driving force at a point of a bar, along a fixed or turning line."""
     bar = int(rng.choice(MOVING_BARS))
     frame = str(rng.choice(FRAMES))
     place = _draw_place(bar, rng, 0.05)
-    direction = float(rng.uniform(-3.0, 3.0))
+    direction = rng.uniform(-3.0, 3.0)
     drive = PointDrive(place, direction, frame)
     return replace(ANYWHERE.draw(rng), drive_bar=None, drive=drive)  # type: ignore[arg-type]
 
 
-def _near_pins(rng: np.random.Generator) -> Scene:
+def _near_pins(rng: Generator) -> Scene:
     """Draw a spring or a cylinder with an end near a pin, or a load there.
 
     The end is at 1e-1 to 1e-11 m from the pin that joins its two bars. The line of the
@@ -408,7 +371,7 @@ def _near_pins(rng: np.random.Generator) -> Scene:
     near = {"O2": 1, "A": 3, "B": 3, "O4": 4}[pin]
     (far,) = {*PINS[pin]} - {near}
     distance = float(10.0 ** rng.uniform(-11.0, -1.0))
-    angle = float(rng.uniform(-3.0, 3.0))
+    angle = rng.uniform(-3.0, 3.0)
     if pin == SECOND_PIN[near]:
         distance, angle = cmath.polar(
             scene.linkage.lengths[near - 1] - cmath.rect(distance, angle)
@@ -419,36 +382,26 @@ def _near_pins(rng: np.random.Generator) -> Scene:
         start, end = end, start
     kind = rng.integers(0, 3)
     if kind == 0 and pin in ("A", "B", "O4"):
-        bars = {
-            bar: replace(scene.linkage.bar(bar), centre=(0.0, 0.0))
-            for bar in MOVING_BARS
-        }
-        force = (1.0, float(rng.uniform(-3.0, 3.0)))
+        two, three, four = (
+            replace(scene.linkage.bar(bar), centre=(0.0, 0.0)) for bar in MOVING_BARS
+        )
+        force = (1.0, rng.uniform(-3.0, 3.0))
         frame = str(rng.choice(["world", "bar"]))
-        linkage = FourBar(
-            scene.linkage.ground,
-            bars[2],
-            bars[3],
-            bars[4],
-            scene.linkage.ground_angle,
-        )
-        return replace(
-            scene,
-            linkage=linkage,
-            loads=(Load(near, force, from_pin=(distance, angle), frame=frame),),
-        )
+        linkage = replace(scene.linkage, input=two, coupler=three, output=four)
+        load = Load(near, force, from_pin=(distance, angle), frame=frame)
+        return replace(scene, linkage=linkage, loads=(load,))
     if kind == 1:
         return replace(
             ANYWHERE.draw(rng),
             drive_bar=None,  # type: ignore[arg-type]
             drive=LinearDrive(start, end),
         )
-    stiffness = float(rng.uniform(10.0, 1000.0))
-    length = float(rng.uniform(0.0, 2.0))
+    stiffness = rng.uniform(10.0, 1000.0)
+    length = rng.uniform(0.0, 2.0)
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
 
 
-FAMILY_DRAWERS: dict[str, Callable[[np.random.Generator], Scene]] = {
+FAMILY_DRAWERS: dict[str, Callable[[Generator], Scene]] = {
     "random": ANYWHERE.draw,
     "limit": RandomFamily(_draw_near_limit, _EVEN).draw,
     "change_point": RandomFamily(_draw_near_change_point, _EVEN).draw,

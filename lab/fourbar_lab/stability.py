@@ -5,8 +5,10 @@ The reference is ball arithmetic.
 
 import math
 import warnings
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import click
@@ -17,7 +19,6 @@ from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import OK, PIN_FORCES, UNITS
 from fourbar.scene import Scene, command, find_signs, with_signs
 from fourbar.scene.motion import Motion
-from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.slopes import judge_slopes
@@ -51,11 +52,8 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     commanded = np.full(times, angle)
     scene = replace(scene, motion=scene.motion.replace(angle=commanded))
     solution = solve(scene, "error")
-    return {
-        name: array[0]
-        for name in UNITS
-        if (array := getattr(solution, name)) is not None
-    }
+    arrays = {name: getattr(solution, name) for name in UNITS}
+    return {name: array[0] for name, array in arrays.items() if array is not None}
 
 
 def judge_sample(
@@ -67,7 +65,8 @@ def judge_sample(
     tally.samples += 1
     angle = float(np.asarray(scene.motion.angle))
     drive = name_driving(scene)
-    internal = (
+    # a component of a pin force that such a drive has no part in is left of larger ones
+    between_moving_bars = (
         scene.drive is not None
         and scene.drive.has_stroke
         and 1 not in [place.bar for _, place in scene.drive.ends]
@@ -85,25 +84,16 @@ def judge_sample(
         return
     values, sensitivity = exact
     errors: dict[str, float] = {}
-    for name in solution:
-        for component, index in list_components(name):
-            if (
-                component not in values
-                or name == scene.motion.commanded
-                or name.endswith("_error")
-            ):
-                continue
-            own = np.ravel(solution[name])[index]
-            rate = sensitivity[component]
-            if (
-                internal and name in PIN_FORCES
-            ):  # a component that the drive has no part in is left of larger ones
-                rate = max(sensitivity[other] for other, _ in list_components(name))
+    for name, found in solution.items():
+        if name == scene.motion.commanded or name.endswith("_error"):
+            continue
+        components = [item for item in list_components(name) if item[0] in values]
+        rates = [sensitivity[component] for component, _ in components]
+        if between_moving_bars and name in PIN_FORCES:
+            rates = [max(rates)] * len(rates)
+        for (component, index), rate in zip(components, rates, strict=True):
             part, errors[component] = error_over_allowed(
-                name,
-                own,
-                values[component],
-                rate,
+                name, np.ravel(found)[index], values[component], rate
             )
             tally.note(component, part, sample)
     if drive not in values:
@@ -118,12 +108,9 @@ def judge_sample(
         ("force_error", force, strongest),
     ):
         bar = float(solution[name])
-        tally.too_small[name] = max(
-            tally.too_small.get(name, 0.0), float(find_used(error, bar))
-        )
-        tally.too_large[name] = tally.too_large.get(name, 0) + (
-            bar > BAR_FACTORS * max(error, HALF_A_DIGIT * size)
-        )
+        ratio = float(find_used(error, bar))
+        tally.too_small[name] = max(tally.too_small.get(name, 0.0), ratio)
+        tally.too_large[name] += bar > BAR_FACTORS * max(error, HALF_A_DIGIT * size)
 
 
 def judge_samples(
@@ -144,15 +131,13 @@ def judge_samples(
     derivatives : judge those of `sensitivity` instead.
     """
     tally = Tally()
+    judge = judge_slopes if derivatives else judge_sample
+    which = list(FAMILY_DRAWERS).index(family)
     for number in samples:
-        rng = np.random.default_rng([seed, list(FAMILY_DRAWERS).index(family), number])
+        rng = np.random.default_rng([seed, which, number])
         scene = _feed_back(FAMILY_DRAWERS[family](rng), bar)
         if scene is not None:
-            (judge_slopes if derivatives else judge_sample)(
-                scene,
-                tally,
-                f"{family} {number}",
-            )
+            judge(scene, tally, f"{family} {number}")
     return tally
 
 
@@ -164,29 +149,16 @@ def _feed_back(scene: Scene, bar: int) -> Scene | None:
     if bar == 2:
         return scene
     solution = solve(scene, "acceleration")
-    theta, omega, alpha, sine = _read_bar_motion(solution, bar)
+    names = [f"{name}_{bar}" for name in ("theta", "omega", "alpha")]
+    theta, omega, alpha = (float(getattr(solution, name)[0]) for name in names)
+    other = solution.theta_4 if bar == 3 else solution.theta_3
+    sine = math.sin(other[0] - solution.theta_2[0])
     if solution.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
-    numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
     sign = 1 if sine > 0.0 else -1
     branch = int(find_signs(scene.linkage, np.array([theta]), sign, bar)[0])
-    return replace(scene, motion=Motion(branch=branch, **numbers))  # type: ignore[arg-type]
-
-
-def _read_bar_motion(solution: Solution, bar: int) -> tuple[float, float, float, float]:
-    """Return angle, speed and acceleration of a bar at the first position.
-
-    The sine whose sign its branch is follows.
-    """
-    theta, omega, alpha = (
-        float(getattr(solution, f"{name}_{bar}")[0])
-        for name in ("theta", "omega", "alpha")
-    )
-    first, second = {2: (3, 4), 3: (2, 4), 4: (2, 3)}[bar]
-    one, other = (
-        float(getattr(solution, f"theta_{each}")[0]) for each in (first, second)
-    )
-    return theta, omega, alpha, math.sin(other - one)
+    motion: Any = dict(zip(names, (theta, omega, alpha), strict=True))
+    return replace(scene, motion=Motion(branch=branch, **motion))
 
 
 def _judge_task(
@@ -196,6 +168,31 @@ def _judge_task(
     task: tuple[str, range],
 ) -> Tally:
     return judge_samples(*task, seed, bar, derivatives=derivatives)
+
+
+def list_rows(tallies: Collection[Tally], derivatives: bool) -> list[list[str]]:
+    """List the rows of the table: a name, and a cell of each tally."""
+    rows = []
+    for name in dict.fromkeys(chain.from_iterable(tally.worst for tally in tallies)):
+        row = [name]
+        for tally in tallies:
+            ratio, _ = tally.worst.get(name, (math.nan, ""))
+            cell = f"{ratio:.3f}" + " fails" * (ratio > 1.0)
+            row.append("-" if math.isnan(ratio) else cell)
+        rows.append(row)
+    for bar in ("torque_error", "drive_force_error", "force_error"):
+        if any(bar in tally.too_small for tally in tallies):
+            small = [tally.too_small.get(bar, math.nan) for tally in tallies]
+            large = [100.0 * tally.too_large[bar] / tally.samples for tally in tallies]
+            rows.append([f"error / {bar}", *(f"{x:.2f}" for x in small)])
+            title = f"% {bar} > {BAR_FACTORS:.0f} x error"
+            rows.append([title, *(f"{x:.2f}" for x in large)])
+    counts = {"not assembled": "not_assembled", "no torque": "no_torque"}
+    if derivatives:
+        counts["no digit tells"] = "untold"
+    for title, name in counts.items():
+        rows.append([title, *(str(getattr(tally, name)) for tally in tallies)])
+    return rows
 
 
 @click.command()
@@ -250,65 +247,13 @@ def stability(
     tasks = [(family, part) for family in chosen for part in parts]
     results = apply_each(partial(_judge_task, seed, bar, derivatives), tasks, jobs)
     tallies = {family: Tally() for family in chosen}
-    for (family, _), tally in track(
-        zip(tasks, results, strict=True),
-        "samples",
-        total=len(tasks),
-    ):
+    judged = zip(tasks, results, strict=True)
+    for (family, _), tally in track(judged, "samples", total=len(tasks)):
         tallies[family].add(tally)
-    rows = []
-    for name in dict.fromkeys(
-        name for tally in tallies.values() for name in tally.worst
-    ):
-        cells = [
-            tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen
-        ]
-        rows.append(
-            (
-                name,
-                *(
-                    "-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0)
-                    for cell in cells
-                ),
-            )
-        )
-    bars = ("torque_error", "drive_force_error", "force_error")
-    for name in (
-        name
-        for name in bars
-        if any(name in tally.too_small for tally in tallies.values())
-    ):
-        rows.append(
-            (
-                f"error / {name}",
-                *(
-                    f"{tallies[family].too_small.get(name, math.nan):.2f}"
-                    for family in chosen
-                ),
-            )
-        )
-        shares = (
-            100.0 * tallies[family].too_large.get(name, 0) / tallies[family].samples
-            for family in chosen
-        )
-        rows.append(
-            (
-                f"% {name} > {BAR_FACTORS:.0f} x error",
-                *(f"{share:.2f}" for share in shares),
-            )
-        )
-    rows.append(
-        ("not assembled", *(str(tallies[family].not_assembled) for family in chosen))
-    )
-    rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
-    if derivatives:
-        rows.append(
-            ("no digit tells", *(str(tallies[family].untold) for family in chosen))
-        )
+    rows = list_rows(tallies.values(), derivatives)
     console = Console()
-    if (
-        not console.is_terminal
-    ):  # in a file the columns of all families keep their width
+    if not console.is_terminal:
+        # in a file the columns of all families keep their width
         console.width = WIDE
     of = ", of derivatives by every number" if derivatives else ""
     title = (

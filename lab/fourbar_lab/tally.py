@@ -6,6 +6,7 @@ and nothing more.
 """
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -47,7 +48,7 @@ class Tally:
     """Output: largest error/allowed, and the sample it belongs to."""
     too_small: dict[str, float] = field(default_factory=dict)
     """Error bar: largest error/bar."""
-    too_large: dict[str, int] = field(default_factory=dict)
+    too_large: Counter[str] = field(default_factory=Counter)
     """Error bar: samples in which it is more than BAR_FACTORS times the error."""
     warned: list[str] = field(default_factory=list)
 
@@ -59,11 +60,10 @@ class Tally:
         self.untold += other.untold
         self.warned += other.warned
         for name, entry in other.worst.items():
-            self.worst[name] = max(self.worst.get(name, (0.0, "")), entry)
+            self.note(name, *entry)
         for name, ratio in other.too_small.items():
             self.too_small[name] = max(self.too_small.get(name, 0.0), ratio)
-        for name, count in other.too_large.items():
-            self.too_large[name] = self.too_large.get(name, 0) + count
+        self.too_large.update(other.too_large)
 
     def note(
         self,
@@ -72,22 +72,17 @@ class Tally:
         sample: str,
     ) -> None:
         """Keep the largest error over what is allowed."""
-        before = self.worst.get(output, (0.0, ""))
-        self.worst[output] = max(before, (ratio, sample))
+        self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
     def holds(self) -> bool:
         """Return whether error and error bars are as promised.
 
         Something must have been compared.
         """
+        within = all(ratio <= 1.0 for ratio, _ in self.worst.values())
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
-        useful = all(
-            is_by_chance(count, self.samples) for count in self.too_large.values()
-        )
-        errors = bool(self.worst) and all(
-            ratio <= 1.0 for ratio, _ in self.worst.values()
-        )
-        return errors and bars and useful and not self.warned
+        useful = all(is_by_chance(n, self.samples) for n in self.too_large.values())
+        return bool(self.worst) and within and bars and useful and not self.warned
 
 
 def is_by_chance(count: int, samples: int) -> bool:

@@ -86,7 +86,9 @@ theta_2 - theta_1 had lost nothing.
 def assert_bounds(tally):
     """Assert that outputs are within what the inputs' last digits do, bars too."""
     assert not tally.warned
-    assert not {name: entry for name, entry in tally.worst.items() if entry[0] > 1.0}
+    assert not {
+        name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0
+    }
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
