@@ -14,11 +14,13 @@ from fourbar.effects.effect import Actions, Effect
 from fourbar.effects.place import STATED_PAIR, Place, PointName
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.arithmetic import (
+    PI_LOW,
     Number,
     angle,
     is_any,
     make_like,
     polar,
+    split_sum,
 )
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.mobility import TURN
@@ -33,6 +35,8 @@ from fourbar.linkage import (
     Part,
 )
 
+_BEYOND_TURN = 2.0 * PI_LOW
+"""2 pi less TURN, rad: what counts after many turns."""
 FRAMES = ("world", "bar")
 """Axes in which the direction of a force is kept."""
 PLACES_OF_LOADS = ("from_pin", "from_centre", "point", "arm")
@@ -85,21 +89,28 @@ class Table(Described):
         return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:
-        """Interpolate the factor; InputError for a position outside the table."""
+        """Interpolate the factor; InputError for a position outside the table.
+
+        An angle beyond the table's last point before it is theta_2 less the point and
+        whole turns, of which nothing is rounded but the result.
+        """
         first = self.theta_2[0]
-        wrapped = angle(polar(1.0, theta_2))
-        doubles = shorten(wrapped)
-        place = self._require_covered(first + np.remainder(doubles - first, TURN))
+        wrapped = shorten(angle(polar(1.0, theta_2)))
+        place = first + np.remainder(wrapped - first, TURN)
+        place = self._require_covered(place)
         piece = np.searchsorted(np.array(self.theta_2), place, "right") - 1
         piece = np.clip(piece, 0, len(self.theta_2) - 2)
         points = make_like(self.theta_2, theta_2)
         factors = make_like(self.factor, theta_2)
         start = points[piece]
-        width = points[piece + 1] - start
+        width = points[piece + 1] - points[piece]
         before = factors[piece]
-        rise = factors[piece + 1] - before
-        turns = np.rint((place - doubles) / TURN)
-        past = wrapped - start + turns * TURN
+        rise = factors[piece + 1] - factors[piece]
+        away, lost = split_sum(theta_2, -start)
+        rest = np.fmod(away, TURN)
+        turns = np.rint((theta_2 - place) / TURN)
+        turns_left = np.rint((away - rest) / TURN) - turns
+        past = rest + turns_left * TURN + (lost - turns * _BEYOND_TURN)
         return before + rise * (past / width)
 
     def _require_covered(self, place: Any) -> Any:
