@@ -16,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ import numpy as np
 
 from fourbar.edit.dragging import list_handles
 from fourbar.edit.headline import list_peaks, write_headline
-from fourbar.errors import DependencyError, InputError, NotAssembledError, say_install
+from fourbar.errors import DependencyError, NotAssembledError, say_install
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
@@ -147,15 +148,13 @@ class Exports:
         self.stem = stem
 
     def write(self, scene: Scene, name: str, units: Conversion) -> Path:
-        """Write one export and return its path; InputError for an unknown format."""
+        """Write one export and return its path."""
         from fourbar.mjcf import write_mjcf_for
         from fourbar.show.animate import write_animation
         from fourbar.show.plot import draw
 
-        if name not in _ENDINGS:
-            raise InputError("format", name, "must be one of " + ", ".join(_ENDINGS))
-        self.folder.mkdir(exist_ok=True)
         path = self.folder / f"{self.stem}.{_ENDINGS[name]}"
+        self.folder.mkdir(exist_ok=True)
         if name == "csv":
             write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
         elif name == "mjcf":  # which has units of its own
@@ -243,9 +242,15 @@ class HarnessRun:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # so that it ends with all that it starts
             )
-            assert self.process.stdout is not None
-            reading = asyncio.create_task(self._read(self.process.stdout, lines))
-            while not (await asyncio.wait({reading}, timeout=TICK))[0]:
+            printed = self.process.stdout
+            assert printed is not None
+            while not printed.at_eof():
+                with suppress(TimeoutError):
+                    line = await asyncio.wait_for(printed.readline(), TICK)
+                    text = line.decode(errors="replace").rstrip()
+                    is_progress_bar = "\u2501" in text
+                    if line and not is_progress_bar:
+                        lines.append(text)
                 report(running=True)
             status = await self.process.wait()
             report(
@@ -257,11 +262,3 @@ class HarnessRun:
         except (DependencyError, OSError) as error:
             lines[:] = [str(error)]
             report(running=False, report=False)
-
-    @staticmethod
-    async def _read(stream: asyncio.StreamReader, lines: list[str]) -> None:
-        while line := await stream.readline():
-            text = line.decode(errors="replace").rstrip()
-            is_progress_bar = "\u2501" in text
-            if not is_progress_bar:
-                lines.append(text)

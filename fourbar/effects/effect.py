@@ -276,15 +276,15 @@ class Actions:
         R = {2: R2, 3: R3, 4: R4}
         M = {2: M2, 3: M3, 4: M4}
         for bar, force in self.forces.items():
-            R[bar] = R[bar] + force
+            _add_to(R, bar, force)
         for bar, moment in self.moments.items():
-            M[bar] = M[bar] + moment
+            _add_to(M, bar, moment)
         for pin, couple in self.couples.items():
             i, j = PINS[pin]
             if pin != "B":  # its couple is a field of the wrenches
-                M[j] = M[j] + couple
+                _add_to(M, j, couple)
                 if i != 1:
-                    M[i] = M[i] - couple
+                    _add_to(M, i, -couple)
         at_B = self.couples.get("B", 0.0)
         return Wrenches(R[2], R[3], R[4], M[2], M[3], M[4], at_B)
 

@@ -69,7 +69,7 @@ class LinearDrive(Line, ForceDrive):
 
         The vector is NaN where they coincide.
         """
-        across = self.end.locate(state) - self.start.locate(state)
+        across = self.across(state)
         stroke = np.abs(across)
         return stroke, across / stroke
 
@@ -87,8 +87,7 @@ class LinearDrive(Line, ForceDrive):
         """
         stroke, _ = self.line(state)
         lever, most = self.leverage(state, sines)
-        perimeter = sum(state.lengths[:4])
-        away = perimeter + abs(self.start.distance) + abs(self.end.distance)
+        away = self.reach(state)
         without_lever = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away
         coincide = stroke <= COINCIDENT_POINTS * away
         if not is_any(without_lever | coincide):

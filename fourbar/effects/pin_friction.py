@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, PinRows, SolvedFriction
-from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
@@ -71,11 +70,6 @@ class PinFriction(PinRows):
     }
     dry: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        PinRows.__post_init__(self)
-        if not self.pins:
-            raise InputError("effects.pin_friction", {}, "must name at least one pin")
-
     @property
     def loaded_pins(self) -> tuple[str, ...]:
         """Pins with friction, on whose forces the couples depend."""
@@ -85,22 +79,6 @@ class PinFriction(PinRows):
     def dry_pins(self) -> tuple[str, ...]:
         """Pins with friction."""
         return self.loaded_pins
-
-    def per_unit(
-        self,
-        actions: Actions,
-        solve_pin_forces: Callable[..., PinForces],
-    ) -> dict[str, PinForces]:
-        """Compute the pin forces that a couple of 1 N m at each pin causes.
-
-        The couple is against the pin's rotation.
-        """
-        forces = {}
-        for pin in self.loaded_pins:
-            single = Actions(actions.state, actions.bodies)
-            single.pin_couple(pin, -actions.sense(pin))
-            forces[pin] = solve_pin_forces(single, with_inertia=False)
-        return forces
 
     def solve_friction(
         self,
@@ -115,14 +93,16 @@ class PinFriction(PinRows):
         loaded_pins = self.loaded_pins
         arms = {pin: mu * r for pin, mu, r in self.pins if pin in loaded_pins}
         senses = {pin: actions.sense(pin) for pin in loaded_pins}
-        per_unit = self.per_unit(actions, solve_pin_forces)
+        per_unit = {}  # under a couple of 1 N m at a pin, against its rotation
+        for pin, sense in senses.items():
+            single = Actions(actions.state, actions.bodies)
+            single.pin_couple(pin, -sense)
+            per_unit[pin] = solve_pin_forces(single, with_inertia=False)
         shape = np.shape(pins.F12)
 
         F = _stack_forces(pins, arms, shape)
-        C = np.stack(
-            [_stack_forces(per_unit[pin], arms, shape) for pin in arms],
-            axis=2,
-        )
+        per_couple = [_stack_forces(per_unit[pin], arms, shape) for pin in arms]
+        C = np.stack(per_couple, axis=2)
         k = np.stack([_broadcast(arm, shape) for arm in arms.values()], axis=1)
         sliding = solve_sliding(F, C, k)
 
@@ -167,11 +147,8 @@ def _stack_forces(
     pins: Iterable[str],
     shape: tuple[int, ...],
 ) -> Array:
-    """Return the components of pin forces over all positions, (n, p, 2)."""
-    columns = []
-    for pin in pins:
-        flat = _broadcast(getattr(forces, PIN_FORCE[pin]), shape)
-        columns.append(np.stack([flat.real, flat.imag], axis=-1))
+    """Return pin forces over all positions, (n, p), complex, N."""
+    columns = [_broadcast(getattr(forces, PIN_FORCE[pin]), shape) for pin in pins]
     return np.stack(columns, axis=1)
 
 
@@ -223,9 +200,9 @@ class _Problems(NamedTuple):
     """
 
     F: Array
-    """(n, p, 2), N."""
+    """(n, p), complex, N."""
     C: Array
-    """(n, p, p, 2), 1/m."""
+    """(n, p, p), complex, 1/m."""
     k: Array
     """(n, p), m."""
 
@@ -235,17 +212,15 @@ class _Problems(NamedTuple):
 
     def right_side(self, x: Array) -> tuple[Array, Array]:
         """Compute k |F + C x| and its derivative, (n, p) and (n, p, p)."""
-        force = self.F + np.einsum("...pqi,...q->...pi", self.C, x)
-        size = np.hypot(force[..., 0], force[..., 1])
-        divisor = np.where(size == 0.0, 1.0, size)
-        direction = force / divisor[..., None]
-        slope = np.einsum("...pi,...pqi->...pq", direction, self.C)
+        force = self.F + np.einsum("...pq,...q->...p", self.C, x)
+        size = np.abs(force)
+        direction = force / np.where(size == 0.0, 1.0, size)
+        slope = (direction.conj()[..., None] * self.C).real
         return self.k * size, self.k[..., None] * slope
 
     def size(self) -> Array:
         """Return the largest couple k |F| of each, N m, (n,)."""
-        forces = np.hypot(self.F[..., 0], self.F[..., 1])
-        return np.asarray(np.max(self.k * forces, axis=-1))
+        return np.asarray(np.max(self.k * np.abs(self.F), axis=-1))
 
     def are_solved(self, x: Array) -> NDArray[np.bool_]:
         """Mark the problems whose equations couples fulfil, (n,)."""
@@ -269,11 +244,11 @@ class _Sliding(NamedTuple):
 def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
     """Solve n problems in p unknowns x_p = k_p |F_p + sum over q of C_pq x_q|.
 
-    F (n, p, 2) is in N, C (n, p, p, 2) in 1/m, k (n, p) in m.
+    F (n, p), complex, is in N, C (n, p, p), complex, in 1/m, k (n, p) in m.
     """
     finite: NDArray[np.bool_] = np.logical_and(
-        np.isfinite(F).all(axis=(1, 2)),
-        np.isfinite(C).all(axis=(1, 2, 3)),
+        np.isfinite(F).all(axis=1),
+        np.isfinite(C).all(axis=(1, 2)),
     )
     problems = _Problems(F, C, k)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -306,7 +281,7 @@ def _solve_coupled(
     k = problems.k
     x = np.full(k.shape, np.nan)
     number = np.full(len(k), ONE_SOLUTION, dtype=np.uint8)
-    K = k[:, :, None] * np.hypot(problems.C[..., 0], problems.C[..., 1])
+    K = k[:, :, None] * np.abs(problems.C)
     rows = np.flatnonzero(finite & np.isfinite(K).all(axis=(1, 2)))
     radius = np.abs(np.linalg.eigvals(K[rows])).max(axis=1)
 
@@ -325,9 +300,9 @@ def _solve_coupled(
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Solve (k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
-    Fx, Fy = F.T
-    Cx, Cy = C.T
-    kC = k * np.hypot(Cx, Cy)
+    Fx, Fy = F.real, F.imag
+    Cx, Cy = C.real, C.imag
+    kC = k * np.abs(C)
     k2 = k * k
     a = (kC - 1.0) * (kC + 1.0)
     b = k2 * (Fx * Cx + Fy * Cy)
@@ -382,7 +357,8 @@ def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
     x = _follow_newton(at_starts, at_starts.size()[..., None] * _list_starts(p))
     solves = at_starts.are_solved(x)
     sums = np.where(solves, x.sum(axis=2), np.inf)
-    least = x[np.arange(n), np.argmin(sums, axis=1)]
+    # some starts have not settled where solutions meet
+    least = _follow_newton(problems, x[np.arange(n), np.argmin(sums, axis=1)])
 
     distance = np.abs(x - least[:, None]).max(axis=2)
     larger = np.maximum(x.max(axis=2), least.max(axis=1)[:, None])

@@ -253,6 +253,15 @@ class Line(Placed):
                 "must be another bar than that of `from`",
             )
 
+    def across(self: Any, state: State) -> Any:
+        """Return the vector from `start` to `end`, complex, m."""
+        return self.end.locate(state) - self.start.locate(state)
+
+    def reach(self: Any, state: State) -> Any:
+        """Return the path from one end to the other, bar by bar, m."""
+        distances = abs(self.start.distance) + abs(self.end.distance)
+        return sum(state.lengths[:4]) + distances
+
 
 def change_each(terms: Any, change: Callable[[Place], Place]) -> Any:
     """Return terms with their places changed: the same tuple where no place is."""

@@ -156,15 +156,6 @@ class Spring(Line):
             return np.minimum(tension, 0.0)
         return np.maximum(tension, 0.0) if self.acts == "pull" else tension
 
-    def across(self, state: State) -> Any:
-        """Return the vector from `start` to `end`, complex, m."""
-        return self.end.locate(state) - self.start.locate(state)
-
-    def reach(self, state: State) -> Any:
-        """Return the path from one end to the other, bar by bar, m."""
-        distances = abs(self.start.distance) + abs(self.end.distance)
-        return sum(state.lengths[:4]) + distances
-
     def beyond_free_length(self, state: State) -> Any:
         """Return the distance of the ends less that at which the force is 0, m."""
         return np.abs(self.across(state)) + self.slack / self.stiffness

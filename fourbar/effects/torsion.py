@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Joints, PinRows
-from fourbar.errors import LimitError, expect
+from fourbar.errors import LimitError
 from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES_OF_BARS
@@ -47,15 +47,6 @@ class Torsion(PinRows):
         "rest": Declared("rad"),
         "preload": Declared("N m", left_out=0.0),
     }
-
-    def __post_init__(self) -> None:
-        expect("effects.torsion.turns", self.turns, type(None))
-        PinRows.__post_init__(self)
-
-    @property
-    def greatest_couple(self) -> float:
-        """Upper bound of the sum of the couples, N m."""
-        return sum(abs(preload) + k * math.pi for _, k, _, preload in self.springs)
 
     def act(self, actions: Actions, state: State) -> None:
         """Add M on bar j and its opposite on bar i.
@@ -109,7 +100,7 @@ class Torsion(PinRows):
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return an upper bound of the sum of the couples, N m."""
-        return self.greatest_couple
+        return sum(abs(preload) + k * math.pi for _, k, _, preload in self.springs)
 
     def unwind(self, linkage: FourBar, q: Joints) -> Joints:
         """Return each sprung pin within half a turn of its rest.

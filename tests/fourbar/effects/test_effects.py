@@ -75,7 +75,8 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     The distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along
     F + C x, at most 1.
     """
-    sliding = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
+    F, C = np.array([[complex(*F)]]), np.array([[[complex(*C)]]])
+    sliding = solve_sliding(F, C, np.array([[1.0]]))
     assert sliding.number[0] == number
     assert sliding.x[0, 0] == approx(x, rel=1e-15, nan_ok=True)
     if number != NO_SOLUTION:
@@ -92,8 +93,8 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     ],
 )
 def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(c1, c2, number):
-    F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
-    C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
+    F = np.array([[1.0 + 0j, 2.0]] * 2)
+    C = np.array([[[c1 + 0j, 0.0], [0.0, c2]]] * 2)
     sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
     assert [*sliding.number] == [number, ONE_SOLUTION]
     slight = 0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)
