@@ -11,7 +11,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
+from tomlkit.items import AoT, Item, Table, Whitespace
 
 from fourbar.effects import Load, PointDrive, list_kinds
 from fourbar.errors import InputError
@@ -57,8 +57,6 @@ _MOVING = {
     **{"m": "500 mm", "m/s": "100 mm/s", "m/s^2": "0 mm/s^2"},
 }
 """Examples of what is commanded, likewise."""
-_LONGEST_TEXT = 10_000
-"""Characters of one entry."""
 
 
 @cache
@@ -189,12 +187,6 @@ class SceneDocument:
 
         The value is a text, or a number where the file has one.
         """
-        if len(text) > _LONGEST_TEXT:
-            raise InputError(
-                name_entry(path),
-                text[:60],
-                f"must have {_LONGEST_TEXT} characters at most",
-            )
         old = self.at(path)
         is_empty = not text.strip()
         if is_empty and old is None:
@@ -210,13 +202,6 @@ class SceneDocument:
         """State an entry and the tables that contain it; an index of -1 appends."""
         *into, last = path
         holder = self._find_holder(into)
-        is_table = holder is self.tree or isinstance(holder, (Table, InlineTable))
-        if not is_table and not isinstance(last, int):
-            raise InputError(
-                name_entry(path),
-                value,
-                "has no table that it could stand in",
-            )
         if last == -1:
             is_of_tables = isinstance(holder, AoT)
             blank = tomlkit.nl()
@@ -240,8 +225,6 @@ class SceneDocument:
         """Take an entry away, and a table that it leaves empty."""
         *into, last = path
         holder = self.at(into)
-        if self.at(path) is None:
-            raise InputError(name_entry(path), "", "entry not found")
         del holder[last]
         if into and not len(holder) and into[0] not in ("lengths", "motion"):
             self.remove(into)

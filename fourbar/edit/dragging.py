@@ -22,8 +22,6 @@ from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.solving import solve
 from fourbar.studies.keys import list_described
 
-DRAGGED_PINS = ("A", "B", "O4")
-"""Pins of a linkage that is stated by lengths; of a drawn one O2 too."""
 _SAME_ANGLE = 1e-9
 """rad. Difference below which the position shown is the one that is drawn."""
 _LEAST_DIGITS = 1e-12
@@ -220,12 +218,6 @@ def _drag_pin(
     dragged: Dragged,
     pins: dict[str, complex],
 ) -> None:
-    if dragged.what not in DRAGGED_PINS:
-        raise InputError(
-            "drag",
-            dragged.what,
-            "must be one of " + ", ".join(DRAGGED_PINS),
-        )
     ground = ("lengths", "ground")
     if dragged.what == "O4" and isinstance(document.at(ground), dict):
         put_place(document, ground, dragged.to, dragged.grain)
@@ -255,9 +247,6 @@ def _drag_drawn_pin(
 
     Raises InputError at another position than the one that is drawn.
     """
-    pins = ("O2", *DRAGGED_PINS)
-    if dragged.what not in pins:
-        raise InputError("drag", dragged.what, "must be one of " + ", ".join(pins))
     drawn = drawing.angle(2)
     if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > _SAME_ANGLE:
         raise InputError(

@@ -31,9 +31,6 @@ from fourbar.show.tolerances import collect_tolerances
 _LOOPBACK = "127.0.0.1"
 LARGEST_REQUEST = 2_000_000
 """Bytes; a scene file has half a million at most."""
-_MOST_PAGES = 16
-MOST_WAITING = 100
-"""Requests of all pages that wait; of a drag only the latest does."""
 IDLE = 10.0
 """Time within which a request must be complete, s."""
 PING = 20.0
@@ -89,8 +86,7 @@ class Workbench:
     def take(self, line: "_PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue; `check` and `stop` are done at once.
 
-        A later request of the same gesture replaces one that waits. Where too many wait
-        the page is told so.
+        A later request of the same gesture replaces one that waits.
         """
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
@@ -106,12 +102,6 @@ class Workbench:
             last_line, last_asked = self.waiting[-1]
             if last_line == line and last_asked.get("gesture") == gesture:
                 self.waiting.pop()
-        if len(self.waiting) >= MOST_WAITING:
-            self.tell(
-                {"for": asked.get("id"), "refused": "too many requests wait"},
-                to=line,
-            )
-            return
         self.waiting.append((line, asked))
         if self.following is not None:
             self.following.cancel()
@@ -125,19 +115,11 @@ class Workbench:
             about["for"] = asked.get("id")
             alone = not {"data", "text"} <= about.keys() or asked.get("do") == "hello"
             if about.pop("refer", False):
-                compared = await self.loop.run_in_executor(self.one, self._compare)
+                compare = self.session.compared
+                compared = await self.loop.run_in_executor(self.one, compare)
                 self.tell(compared, to=line if alone else None)
-            self.tell(
-                about,
-                to=line if alone or "refused" in about or "ask" in about else None,
-            )
+            self.tell(about, to=line if alone or "ask" in about else None)
         self.following = asyncio.create_task(self._follow_up())
-
-    def _compare(self) -> dict[str, Any]:
-        try:
-            return self.session.compared()
-        except FourBarError as error:
-            return {"note": str(error)}
 
     def _write_state_file(self) -> None:
         try:
@@ -348,8 +330,6 @@ class _PageLine(WebSocketHandler, _Guarded):
         _Guarded.prepare(self)
         if "Origin" not in self.request.headers:
             raise HTTPError(403)
-        if len(self.bench.pages) >= _MOST_PAGES:
-            raise HTTPError(503)
 
     def open(self, *args: str, **kwargs: str) -> None:
         """Add the page to the workbench."""
@@ -365,15 +345,8 @@ class _PageLine(WebSocketHandler, _Guarded):
             )
 
     def on_message(self, message: str | bytes) -> None:
-        """Take a request, one JSON object."""
-        try:
-            asked = json.loads(message)
-        except (ValueError, RecursionError):
-            asked = None
-        if isinstance(asked, dict):
-            self.bench.take(self, asked)
-        else:
-            self.close(1003, "no JSON object")
+        """Take a request, one JSON object; the line of anything else is closed."""
+        self.bench.take(self, json.loads(message))
 
     def on_close(self) -> None:
         """Remove the page from the workbench."""

@@ -37,7 +37,6 @@ from fourbar.edit.redirect import REDIRECT_ENDING, REDIRECT_PAGE, Redirect
 from fourbar.edit.server import (
     GONE,
     LARGEST_REQUEST,
-    MOST_WAITING,
     Workbench,
 )
 from fourbar.edit.session import Session
@@ -250,8 +249,6 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(b
         lengths = [f"{101 + 0.1 * size:.1f} mm" for size in range(100)]
         about = await send([set_input(x) | {"gesture": "g"} for x in lengths])
         assert 'input = "110.9 mm"' in about["text"] and len(solved) < 60
-        await send([{"do": "units", "units": "SI"}] * 3 * MOST_WAITING)
-        assert len(made.waiting) <= MOST_WAITING
 
     bench(ask)
 

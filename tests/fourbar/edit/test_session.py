@@ -32,8 +32,6 @@ from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import write_rounded
 from fourbar.edit.exports import evaluate_scene, pack_frame
 from fourbar.edit.session import (
-    LARGEST_STATE,
-    MOST_CHARACTERS,
     MOST_KEPT,
     MOST_SOLVED_ANEW,
     Session,
@@ -218,7 +216,7 @@ def test_what_a_pair_consists_of_is_read_from_the_declarations():
 NO_PICTURE = "must be a PNG, JPEG or SVG picture"
 REFUSED = [
     *read_rows("""
-{} | must be one of set
+{} | cannot be done
 {"do": "set"} | cannot be done
 {"do": "set", "path": [], "value": "1"} | cannot be done
 {"do": "drag"} | cannot be done
@@ -226,15 +224,15 @@ REFUSED = [
 {"do": "undo"} | no further state
 {"do": "redo"} | no further state
 {"do": "units", "units": "parsec"} | units
-{"do": "export", "format": "../x"} | must
+{"do": "export", "format": "../x"} | cannot be done
 {"do": "restate", "path": ["lengths"], "by": "xy"} | cannot be done
-{"do": "restate", "path": ["no"], "by": "xy"} | must
+{"do": "restate", "path": ["no"], "by": "xy"} | cannot be done
 {"do": "pressure", "pressure": "210"} | pressure
 {"do": "pressure", "pressure": "-1 bar"} | pressure
 {"do": "pressure", "pressure": "3 mm"} | pressure
 {"do": "command", "command": "stroke"} | needs a cylinder
-{"do": "command", "command": "theta_1"} | must be one of
-{"do": "command", "command": ""} | must be one of
+{"do": "command", "command": "theta_1"} | cannot be done
+{"do": "command", "command": ""} | cannot be done
 {"do": "draw", "pins": [[0, 0], [1, 1]], "unit": "in", "grain": 1e-6} | cannot
 {"do": "draw", "pins": [[0, 0], [0, 0], [1, 1], [2, 0]], "unit": "in", "grain": 1} | p
 {"do": "draw", "pins": [[0, 0], [1, 0], [NaN, 1], [3, 0]], "unit": "in", "grain": 1} | n
@@ -431,7 +429,6 @@ def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
         ask(loaded, "restate", path=path, by=by)
         assert isinstance(loaded.now.plain["loads"][3]["from_pin"], kind)
         assert loaded.now.scene.loads[3].from_pin == approx(stated, rel=1e-5)
-    assert "refused" in loaded.do({"do": "restate", "path": path, "by": "z"})
 
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
@@ -682,33 +679,20 @@ def test_a_damaged_state_file_is_one_line(session, pattern, damage):
     assert "\n" not in said and str(session.state_file) in said
 
 
-@pytest.mark.slow
-def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(
-    session, monkeypatch
-):
-    """Both limits and the scene are a tenth as large.
-
-    Reading the text takes the time.
-    """
-    largest = LARGEST_STATE // 10
-    monkeypatch.setattr("fourbar.edit.session.LARGEST_STATE", largest)
-    monkeypatch.setattr("fourbar.edit.session.MOST_CHARACTERS", MOST_CHARACTERS // 10)
-    large = session.now.text + "".join(f"# {'µ' * 100} {n}\n" for n in range(190))
-    ask(session, "text", text=large)
-    for size in range(1, 531):
-        length = f"{100 + 0.01 * size:.2f} mm"
-        ask(session, set_to("lengths/input", length, gesture=size))
-        if size % 20 == 0:
-            ask(session, "keep")
+def test_the_history_and_what_is_kept_do_not_grow_without_end(session, monkeypatch):
+    monkeypatch.setattr("fourbar.edit.session.MOST_STATES", 5)
+    for size in range(101, 109):
+        ask(session, set_to("lengths/input", f"{size} mm"))
+    for _ in range(MOST_KEPT + 5):
+        ask(session, "keep")
     session.write_state_file()
-    assert session.state_file.stat().st_size < largest / 2
     again = Session(session.path, session.exports.folder)
     assert again.now.text == session.now.text
-    assert len(again.texts) > 40
-    assert len(again.kept) == MOST_KEPT
-    assert "start" in again.kept and "state 26" in again.kept
+    assert [len(again.texts), len(again.kept)] == [5, MOST_KEPT]
+    assert "start" in again.kept and f"state {MOST_KEPT + 5}" in again.kept
     for _ in again.texts[1:]:
         ask(again, "undo")
+    assert '"104 mm"' in again.now.text
 
 
 @pytest.mark.posix
