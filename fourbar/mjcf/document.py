@@ -240,18 +240,18 @@ def _write_comments(
     ]
     if reader == "genesis" and (names := _list_left_out_by_genesis(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
-    lines += (
-        numbers["instant"]
-        + (numbers["driven"] if drive == "flywheel" else [])
-        + numbers["pins"]
-    )
+    lines += numbers["instant"]
+    if drive == "flywheel":
+        lines += numbers["driven"]
+    lines += numbers["pins"]
     if reader == "mujoco" and drive != "flywheel" and scene.motion.free is None:
         lines += notes["without_flywheel"]
     if drive == "motor":
         lines.append(notes["control"])
     if passive:
         lines.append(notes["passive"])
-    lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
+    if reader == "mujoco" and scene.loads:
+        lines.append(notes["loads"])
     return [*lines, *numbers["after"]]
 
 
@@ -434,19 +434,11 @@ class WindowMotion:
     omega: float
     alpha: float
 
-    def __post_init__(self) -> None:
-        if (self.stop - self.start) * self.omega < 0.0:
-            raise ValueError("the input turns away from the end of its window")
-
     @property
     def fastest(self) -> float:
         """The greatest |omega_2| in the window, rad/s."""
-        return math.sqrt(
-            max(
-                self.omega**2,
-                self.omega**2 + 2.0 * self.alpha * (self.stop - self.start),
-            )
-        )
+        gained = 2.0 * self.alpha * (self.stop - self.start)
+        return math.sqrt(self.omega**2 + max(gained, 0.0))
 
     def time(self, theta_2: float) -> float:
         """Return the time at which the input passes an angle, s.
@@ -473,9 +465,8 @@ class WindowMotion:
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
         duration = self.time(self.stop)
-        per_revolution = (
-            duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
-        )
+        turns = duration * self.fastest / math.tau
+        per_revolution = turns * settings.steps_per_revolution
         # at the greatest speed throughout: an input that speeds up covers the end of
         # its window in few steps
         width = abs(self.stop - self.start)
@@ -526,16 +517,9 @@ def find_start(scene: Scene) -> Start:
         )
     theta_2 = at.theta_2[usable]
     first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
-    theta = (
-        float(at.theta_2[first]),
-        float(solution.theta_3[first]),
-        float(solution.theta_4[first]),
-    )
-    omega = (
-        speed,
-        float(solution.omega_3[first]),
-        float(solution.omega_4[first]),
-    )
+    columns = at.theta_2, solution.theta_3, solution.theta_4
+    theta = [float(column[first]) for column in columns]
+    omega = speed, float(solution.omega_3[first]), float(solution.omega_4[first])
     if np.ptp(theta_2) == 0.0:
         theta_2 = theta[0] + np.array([0.0, _compute_span(scene.linkage)])
         alpha = 0.0  # no window is requested: its length only sets the timestep

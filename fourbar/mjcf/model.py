@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from xml.etree import ElementTree as ET
@@ -175,6 +175,15 @@ _THICKNESS = 0.02
 def write_exactly(*numbers: float) -> str:
     """Write numbers so that they read back bit for bit."""
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
+
+
+def _write_attributes(
+    numbers: Mapping[str, float | tuple[float, ...]],
+) -> dict[str, str]:
+    """Write numbers as attributes of an element."""
+    return {
+        name: write_exactly(*np.atleast_1d(number)) for name, number in numbers.items()
+    }
 
 
 def _find_bar_element(root: ET.Element, bar: int) -> ET.Element:
@@ -404,10 +413,7 @@ class Model:
                 *[bar.moment_of_inertia + self.inertia[number]] * 3
             ),
         )
-        numbers = {**drive, **self.pin[pin]}
-        joint = {
-            key: write_exactly(*np.atleast_1d(value)) for key, value in numbers.items()
-        }
+        joint = _write_attributes({**drive, **self.pin[pin]})
         ET.SubElement(
             body,
             "joint",
@@ -485,9 +491,7 @@ class Model:
             return
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
-            attributes = {"name": "B"}
-            for key, value in self.pin["B"].items():
-                attributes[key] = write_exactly(*np.atleast_1d(value))
+            attributes = {"name": "B", **_write_attributes(self.pin["B"])}
             fixed = ET.SubElement(tendons, "fixed", attributes)
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))

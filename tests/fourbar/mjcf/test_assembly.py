@@ -20,6 +20,7 @@ from fourbar.mjcf import SIMULATORS, write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.quantities import Array
 from fourbar.scene import Command
+from fourbar_validation.engines.mujoco.closed_loop import open_model
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
 
@@ -49,9 +50,7 @@ def errors(scene, read):
 
 def read_mujoco(text):
     """As the comment of the file says."""
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
+    model, data = open_model(text)
     mujoco.mj_step(model, data, STEPS)
     mujoco.mj_forward(model, data)
     drive = data.actuator_force[model.actuator("drive").id]

@@ -19,6 +19,7 @@ from fourbar.effects import Torsion
 from fourbar.formulas.mobility import choose_range, turns_fully
 from fourbar.mjcf import RECIPE, Settings, list_defaults, make_scene, write_mjcf
 from fourbar.mjcf.document import SETTLING, choose_run
+from fourbar_validation.engines.mujoco.closed_loop import open_model
 from fourbar_validation.scenes.random import (
     MACHINES,
     DrawnType,
@@ -61,14 +62,6 @@ def random_scene(rng, kind):
         acceleration=0.0,
     )
     return replace(scene, motion=motion, drive=None, drive_bar=2, loads=())
-
-
-def at_keyframe(scene, text=""):
-    model = mujoco.MjModel.from_xml_string(text or write_mjcf(scene))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def gap(data):
@@ -218,7 +211,7 @@ def test_shapes_add_no_mass_and_change_no_bit():
             body.remove(geom)
     states = []
     for xml in (text, ET.tostring(bare, encoding="unicode")):
-        model, data = at_keyframe(crank_rocker(), xml)
+        model, data = open_model(xml)
         mujoco.mj_step(model, data, 200)
         states.append((*data.qpos, *data.qvel))
     assert states[0] == states[1]
@@ -245,7 +238,7 @@ def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line():
 @pytest.mark.parametrize("omega", [None, 0.0])
 def test_at_rest_a_file_is_written_that_stays_at_rest(omega):
     scene = crank_rocker(motion=Motion(1.0, omega), loads=(), effects=())
-    model, data = at_keyframe(scene)
+    model, data = open_model(write_mjcf(scene))
     mujoco.mj_step(model, data, 100)
     assert (
         np.abs(data.qvel).max() < 1e-9

@@ -6,6 +6,7 @@ The same motion and forces, turned, in each form of file.
 import re
 from xml.etree import ElementTree as ET
 
+import mujoco
 import numpy as np
 import pytest
 from pytest import approx
@@ -14,6 +15,7 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar_validation.engines.mujoco.closed_loop import open_model
 from tests.support.robots import rotation
 from tests.whole.test_imports import ROOT
 
@@ -56,14 +58,10 @@ def test_what_is_no_direction_is_refused(axis):
 
 @pytest.mark.parametrize("axis", AXES)
 def test_mujoco_moves_and_loads_a_tilted_linkage_alike(axis):
-    mujoco = pytest.importorskip("mujoco")
-
     plane = Plane(axis, ORIGIN)
     answers = []
     for place in (Plane(), plane):
-        model = mujoco.MjModel.from_xml_string(write_mjcf(scene(), plane=place))
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+        model, data = open_model(write_mjcf(scene(), plane=place))
         mujoco.mj_step(model, data, 50)
         mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)
