@@ -279,13 +279,13 @@ def _is_equal(one: Any, another: Any) -> bool:
 
 
 def split_parts(name: str, values: Array) -> dict[str, Array]:
-    """Split a quantity into scalars: components, and the magnitude of a pin force."""
-    if name in SCALARS:
+    """Split a quantity into scalars: components, and the magnitude of a force."""
+    if is_scalar(name):
         return {name: values}
     x = values[..., 0]
     y = values[..., 1]
     parts = {}
-    if name in PIN_FORCES:
+    if has_size(name):
         parts[f"|{name}|"] = np.hypot(x, y)
     parts[f"{name}_x"] = x
     parts[f"{name}_y"] = y
@@ -425,14 +425,10 @@ def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarCol
 
 
 def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
-    """Split a quantity into columns of one number a position."""
-    if is_scalar(name):
-        return {name: values}
-    x, y = (None, None) if values is None else (values[..., 0], values[..., 1])
-    parts = {f"{name}_x": x, f"{name}_y": y}
-    if has_size(name):
-        parts[f"|{name}|"] = None if x is None or y is None else np.hypot(x, y)
-    return parts
+    """Split a quantity into columns of one number a position, the magnitude last."""
+    parts = split_parts(name, np.empty((1, 2)) if values is None else values)
+    in_order = sorted(parts, key=lambda part: part[0] == "|")
+    return {part: None if values is None else parts[part] for part in in_order}
 
 
 def is_scalar(name: str) -> bool:

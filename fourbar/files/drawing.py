@@ -25,12 +25,10 @@ from fourbar.linkage import (
     FourBar,
 )
 from fourbar.quantities.units import half_unit_of_text
-from fourbar.scene import Scene, command_at
+from fourbar.scene import Command, Scene, find_signs
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins, PlanePoint
 from fourbar.scene.motion import (
     BAR_OF_ANGLE,
-    BRANCH_NAMES,
-    COMMAND_NAMES,
     STROKE_COMMAND,
     Motion,
 )
@@ -260,30 +258,25 @@ def find_side_of_cylinder(drawing: DrawnPins, drive: ForceDrive | None) -> str:
 
 
 def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
-    """Put a scene on the assembly whose pins lie where the drawing has them."""
+    """Put a scene on the assembly that is drawn.
+
+    The sine between the two bars that are not commanded has its sign in the drawing.
+    """
     bar = scene.motion.bar
-    O2 = complex(*drawing.place("O2"))
-    drawn_A = complex(*drawing.place("A")) - O2
-    drawn_B = complex(*drawing.place("B")) - O2
-    drawn_angle = drawing.angle(bar)
-    name_of_angle, *_ = COMMAND_NAMES[bar]
-    gaps = dict[float, Scene]()
-    for branch in BRANCH_NAMES:
-        stated: dict[str, Any] = {name_of_angle: drawn_angle, "branch": branch}
-        at_drawing = replace(scene, motion=Motion(**stated))
-        at = command_at(at_drawing, np.array([drawn_angle]))
-        here = solve(at_drawing, "position", at=at)
-        gap_of_A = abs(complex(*here.A[0]) - drawn_A)
-        gap_of_B = abs(complex(*here.B[0]) - drawn_B)
-        gap = float(gap_of_A + gap_of_B)
-        on_branch = replace(scene, motion=scene.motion.replace(branch=branch))
-        gaps.setdefault(gap if math.isfinite(gap) else math.inf, on_branch)
-    nearest = min(gaps)
-    if PINS_APART * max(scene.linkage.lengths) < nearest < math.inf:
+    first, second = (drawing.vector(other) for other in MOVING_BARS if other != bar)
+    sign = 1 if cross(first, second) >= 0.0 else -1
+    angle = np.array([drawing.angle(bar)])
+    branch = find_signs(scene.linkage, angle, sign, bar)
+    here = solve(scene, "position", at=Command(angle, branch, None, 0.0, bar))
+    gaps = []
+    for pin, found in (("A", here.A), ("B", here.B)):
+        drawn = np.subtract(drawing.place(pin), drawing.O2)
+        gaps.append(math.hypot(*(found[0] - drawn)))
+    if sum(gaps) > PINS_APART * max(scene.linkage.lengths):
         raise InputError(
             f"motion.theta_{bar}",
             DRAWN_WORD,
             f"in the assembly that is drawn the {BAR_NAMES[bar]} stands still: "
             "command another bar",
         )
-    return gaps[nearest]
+    return replace(scene, motion=scene.motion.replace(branch=int(branch[0])))
