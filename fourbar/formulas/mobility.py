@@ -23,8 +23,7 @@ from fourbar.errors import expect
 from fourbar.formulas.path import ROLES_OF_BARS, prepare_path
 from fourbar.formulas.position import TOUCHING, find_parallel_pairs
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, Lengths, require_bar
-
-Array = NDArray[np.float64]
+from fourbar.quantities import Array
 
 TURN = 2.0 * math.pi
 ANGLE_FROM_LIMITS = math.radians(1.0)

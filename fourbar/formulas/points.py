@@ -14,7 +14,6 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross, sine
 from fourbar.formulas.mobility import (
     TURN,
-    Array,
     change_points,
     circuits,
     turns_fully,
@@ -28,6 +27,7 @@ from fourbar.linkage import (
     require_bar,
     require_numbers,
 )
+from fourbar.quantities import Array
 
 
 class PointCoefficients(NamedTuple):
