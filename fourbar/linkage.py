@@ -8,7 +8,7 @@ import cmath
 import math
 from collections.abc import Container
 from contextlib import suppress
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from numbers import Integral
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
@@ -527,10 +527,6 @@ class Bar(Described):
         if self.density is None:
             return self.mass
         return self.density * self.area * self.length
-
-    def with_mass(self, mass: float) -> "Bar":
-        """Return the bar with a stated mass, kg, in place of what it follows from."""
-        return replace(self, mass=mass, density=None, mass_per_length=None)
 
     @property
     def moment_of_inertia(self) -> float:

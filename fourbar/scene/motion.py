@@ -226,11 +226,6 @@ class Law(Described, _OverTime):
                 raise InputError(of_bar, len(rates), f"needs {count}, one for a time")
 
     @property
-    def is_linear_in_acceleration(self) -> bool:
-        """True if the acceleration is continuous and linear from point to point."""
-        return self.omega is None
-
-    @property
     def angle(self) -> Any:
         """Angles of the law's bar at its times, rad."""
         return getattr(self, f"theta_{self.bar}")

@@ -134,9 +134,3 @@ def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass(stated):
     assert loads(fourbar.dump(scene)).linkage == scene.linkage
     bars = scene_to_json(scene)["bars"]
     assert bars["input"] == {"mass": scene.linkage.input.mass}
-
-
-def test_a_stated_mass_takes_the_place_of_what_it_followed_from():
-    heavier = make_scene().linkage.input.with_mass(3.0)
-    assert heavier == Bar(0.4, mass=3.0, diameter=0.02)
-    assert make_scene(PER_LENGTH).linkage.input.with_mass(3.0) == Bar(0.4, mass=3.0)

@@ -82,7 +82,7 @@ def test_runs_on_through_limits_and_names_its_change_points(coupler):
     linkage = FourBar(0.3, *bars)
     times = np.linspace(0.0, 1.0, 21)  # there, back and there again
     passed = integrate(linkage, (DOWN,), 1.0, 0.0, times)
-    assert len(passed.time) == len(times) and passed.energy_drift < 1e-11
+    assert len(passed.command.time) == len(times) and passed.energy_drift < 1e-11
     solution = solve(let_go(1.0, 0.0, 1.0, 20, DOWN, linkage=linkage))
     assert set(solution.branch) == {1, -1}
     # on an assembly with a change point theta_2 passes the ground's line, where its
@@ -90,7 +90,7 @@ def test_runs_on_through_limits_and_names_its_change_points(coupler):
     assert bool(passed.change_points) == (coupler == 0.12)
     for time in passed.change_points:
         at_it = integrate(linkage, (DOWN,), 1.0, 0.0, np.array([0.0, time]))
-        assert abs(math.sin(at_it.theta_2[-1])) < 1e-9
+        assert abs(math.sin(at_it.command.theta_2[-1])) < 1e-9
 
 
 @pytest.mark.parametrize("bar", [2, 4])
@@ -143,10 +143,10 @@ def test_a_release_is_computed_once_and_solved_as_any_command():
             getattr(solution, name),
             err_msg=name,
         )
-    assert_array_equal(released.time, solution.time)
-    assert_array_equal(released.theta_2, solution.theta_2)
-    assert_allclose(released.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
-    assert_allclose(released.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
+    assert_array_equal(released.command.time, solution.time)
+    assert_array_equal(released.command.theta_2, solution.theta_2)
+    assert_allclose(released.command.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
+    assert_allclose(released.command.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
     some = np.array(
         [3, 70, 4]
     )  # positions of both independent angles, in an order of their own
@@ -321,7 +321,7 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
     proportional = replace(on_B, length=0.0, preload=0.0)  # pulls with 0 there
     alone = let_go(0.5, 0.0, 1.0, 50, DOWN)
     with_it = replace(alone, effects=(DOWN, Springs((proportional,))))
-    one, other = (release(each).theta_2 for each in (with_it, alone))
+    one, other = (release(each).command.theta_2 for each in (with_it, alone))
     assert np.abs(one - other).max() < 1e-9
 
 
@@ -338,14 +338,14 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
         right = [(turned + k * pi) / 10.0 for k in range(5)]
         right = [t for t in right if t < 1.5]
         assert released.change_points == approx(right, abs=1e-9)
-        assert np.abs(released.omega_2 - speed).max() < 1e-9
+        assert np.abs(released.command.omega_2 - speed).max() < 1e-9
 
 
 @pytest.mark.slow
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     spring = fourbar.Torsion.at(O2=(0.01, 0.5, 0.0))
     still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)
-    assert len(release(still).time) == 5
+    assert len(release(still).command.time) == 5
     wound = r"effects\.torsion: at 0.*more than half a turn"
     with raises(LimitError, match=wound):
         release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))

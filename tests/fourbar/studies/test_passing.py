@@ -156,7 +156,7 @@ def test_a_law_passes_an_angle_up_and_down():
 def test_a_release_is_met_when_it_first_passes():
     """By a much finer release: the angle lies between two of its instants."""
     free = DROPPED.motion.replace(free=Free(1.0, 20000))
-    fine = fourbar.release(replace(DROPPED, motion=free))
+    fine = fourbar.release(replace(DROPPED, motion=free)).command
     value = float(fine.theta_2[3001])
     wanted = ("time", 0.0), ("time", 0.25), ("theta_2", value)
     found = join_commands([find_positions(DROPPED, *at) for at in wanted])

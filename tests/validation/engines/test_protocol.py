@@ -50,7 +50,7 @@ def stated(scene):
     scene = state_from_pins(scene)
     link = scene.linkage
     input_bar, coupler, output = (
-        replace(bar.with_mass(bar.mass), section=None, diameter=None)
+        replace(bar, density=None, mass_per_length=None, section=None, diameter=None)
         for bar in link.moving
     )
     return replace(

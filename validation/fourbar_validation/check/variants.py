@@ -86,7 +86,9 @@ def state_all(scene: Scene) -> Scene:
     """State every number that a variant may change: bars in full, and gravity."""
     bars = {
         name: replace(
-            bar.with_mass(bar.mass),
+            bar,
+            density=None,
+            mass_per_length=None,
             inertia=bar.moment_of_inertia,
             centre=bar.mass_centre,
         )

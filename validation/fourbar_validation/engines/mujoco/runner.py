@@ -162,7 +162,7 @@ class LawSegment:
         interpolated; another law is evaluated.
         """
         instant = self.began + seconds
-        if not (isinstance(self.law, Law) and self.law.is_linear_in_acceleration):
+        if not (isinstance(self.law, Law) and self.law.omega is None):
             return self.evaluate_alpha(instant)
         times = self.knots
         knots_before = bisect.bisect_right(times, instant)
