@@ -23,7 +23,8 @@ from fourbar.errors import expect
 from fourbar.formulas.path import ROLES_OF_BARS, prepare_path
 from fourbar.formulas.position import TOUCHING, find_parallel_pairs
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, Lengths, require_bar
-from fourbar.quantities import Array
+
+Array = NDArray[np.float64]
 
 TURN = 2.0 * math.pi
 ANGLE_FROM_LIMITS = math.radians(1.0)
