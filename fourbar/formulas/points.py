@@ -14,6 +14,7 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross, sine
 from fourbar.formulas.mobility import (
     TURN,
+    Array,
     change_points,
     circuits,
     turns_fully,
@@ -27,7 +28,6 @@ from fourbar.linkage import (
     require_bar,
     require_numbers,
 )
-from fourbar.quantities import Array
 
 
 class PointCoefficients(NamedTuple):

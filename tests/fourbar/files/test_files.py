@@ -6,7 +6,6 @@ The models say what their sources say.
 import math
 import re
 from dataclasses import replace
-from fractions import Fraction
 from math import pi, tau
 from pathlib import Path
 
@@ -35,7 +34,7 @@ from fourbar.effects import Place
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.files.scene_text import NEW_POSITIONS, write_new_scene
-from fourbar.quantities.units import UnitError, to_si
+from fourbar.quantities.units import to_si
 from tests.fourbar.test_solving import scenes
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -65,109 +64,6 @@ def test_models_read_back_and_assemble_everywhere(path):
     assert facts(loads(dump(scene))) == facts(scene)
     assert scene.title and scene.source
     assert set(fourbar.solve(scene).status) == {"ok"}
-
-
-@pytest.mark.parametrize(
-    "text, unit, value",
-    [
-        ("111192.75 kg cm^2", "kg m^2", Fraction("11.119275")),
-        ("0.2924725333 kg·cm²", "kg m^2", Fraction("0.2924725333") / 10000),
-        ("1 kg cm/s^2", "N", Fraction(1, 100)),
-        ("9.81 m s^-2", "m/s^2", Fraction("9.81")),
-        ("3 N m/(rad/s)", "N m s/rad", Fraction(3)),
-        ("2 kNm", "N m", Fraction(2000)),
-        ("5e-324 rad", "rad", Fraction(5e-324)),
-        *(
-            (text, "N m", Fraction(15))
-            for text in ("15 N⋅m", "15 N×m", "15 N•m", "15 kg·m²·s⁻²")
-        ),
-        *(
-            (text, "m", Fraction("0.3175"))
-            for text in ("12 1/2 in", '12-1/2"', "12.5 in.", "25/2 inches", "12.5″")
-        ),
-        ("2/3 yd", "m", Fraction("0.6096")),
-    ],
-)
-def test_units_are_converted_exactly_and_rounded_once(text, unit, value):
-    assert to_si(text, unit) == float(value)
-
-
-@pytest.mark.parametrize(
-    "degrees, turns", [("360", 1.0), ("45", 0.125), ("-90", -0.25), ("1080", 3.0)]
-)
-def test_degrees_are_the_nearest_doubles(degrees, turns):
-    # 2 pi times a power of two, or three, of the double nearest to pi: math.tau itself
-    # is correctly rounded
-    assert to_si(f"{degrees} deg", "rad") == turns * tau
-    assert to_si(f"{turns!r} rev", "rad") == turns * tau
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "1",
-        "",
-        "m",
-        "nan m",
-        "inf m",
-        "1e309 m",
-        "1e400 m",
-        "1_0 m",
-        "1 kg",
-        "1 s",
-        "20 degC",
-        "1 rad",
-        "1 m^99",
-        "1 m**2**9",
-        "1 ((cm^9)^9)^9",
-        "1 cm²²",
-        "1 m + 1 m",
-        "1 m; import os",
-        "1 __import__('os')",
-        "1 m" + " m" * 99,
-        "1 (((((((",
-        "0x10 m",
-        "1,5 m",
-        "1.2.3 m",
-        "9" * 200 + " m",
-        "1e9999999 m",
-    ],
-)
-def test_what_is_no_length_is_refused(text):
-    with raises(UnitError):
-        to_si(text, "m")
-
-
-@pytest.mark.parametrize("text", ["1 Hz", "1 1/s", "1 s^-1", "1 rad", "1 deg"])
-def test_an_angle_is_a_dimension(text):
-    with raises(UnitError):
-        to_si(text, "rad/s")
-
-
-@pytest.mark.parametrize(
-    "text, unit, meant",
-    [
-        ("5 lb", "N", "5 lbf"),
-        ("5 lbf", "kg", "5 lb"),
-        ("3 oz in", "N m", "3 ozf in"),
-        ("5 Hz", "rad/s", "5 rev/s"),
-        ("5 RPM", "rad/s", "5 rpm"),
-        ("5 Newton", "N", "5 newton"),
-        ("2 N m", "N m/rad", "2 N m/rad"),
-        ("5 1/s", "rad/s", "5 rad/s"),
-        ("5 1/min", "rad/s", "5 rev/min"),
-        ("5 kg cm2", "kg m^2", "5 kg cm^2"),
-        ("1 m/s2", "m/s^2", "1 m/s^2"),
-        ("30 cms", "m", "30 cm"),
-        ("300 MM", "m", "300 mm"),
-        ("5 pounds", "N", "5 lbf"),
-        ("0,3 m", "m", "0.3 m"),
-    ],
-)
-def test_what_may_have_been_meant_is_one(text, unit, meant):
-    with raises(UnitError, match=re.escape(f'did you mean "{meant}"?')):
-        to_si(text, unit)
-    assert to_si(meant, unit) > 0.0
 
 
 def test_defaults_are_those_of_the_contract():
