@@ -207,11 +207,7 @@ def _describe_pin(seen: SeenLoop, pin: str) -> Described:
         if name == "armature" and pin in _GROUND_PINS:
             continue  # it is inertia of the bar there
         size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
-        acts = not flag or is_enabled(
-            model,
-            flag,
-            *(("passive",) if flag in ("spring", "damper") else ()),
-        )
+        acts = not flag or is_enabled(model, flag)
         described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)
     if described[f"{key}.friction"].value:
         for field, attribute in FRICTION_COMPLIANCE.items():

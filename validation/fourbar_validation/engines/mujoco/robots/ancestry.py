@@ -1,6 +1,5 @@
 """Bodies of a model, the joints between them, and what acts on them."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -104,20 +103,25 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
         ends, leaders = (list_tendon_joints(model, one) for one in tied)
     else:
         return []
-    if tied[1] < 0 and len(ends) == 2 and all(ends.values()):
+    if not all(ends.values()):
+        return []
+    if tied[1] < 0 and len(ends) == 2:
         pairs = zip(ends.items(), reversed(ends.items()), strict=True)
         return [
             Follower(joint, leader, (powers[0] / factor, -other / factor, 0, 0, 0))
             for (joint, factor), (leader, other) in pairs
         ]
-    if len(ends) != 1 or len(leaders) != 1:
-        return []
-    ((joint, factor),) = ends.items()
-    ((leader, other),) = leaders.items()
-    if not factor or joint == leader:
-        return []
-    scaled = (power * other**k / factor for k, power in enumerate(powers))
-    return [Follower(joint, leader, tuple(scaled))]
+    followers = [
+        Follower(
+            joint,
+            leader,
+            tuple(power * other**k / factor for k, power in enumerate(powers)),
+        )
+        for joint, factor in ends.items()
+        for leader, other in leaders.items()
+        if joint != leader
+    ]
+    return followers if len(ends) == len(leaders) == 1 else []
 
 
 def list_tendon_joints(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
@@ -189,15 +193,9 @@ def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
-    """Tell whether no flag switches a feature off.
-
-    A flag that this MuJoCo does not have switches nothing.
-    """
-    bits = (
-        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0))
-        for flag in flags
-    )
-    return not any(model.opt.disableflags & bit for bit in bits)
+    """Tell whether no flag switches a feature off."""
+    bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{one.upper()}") for one in flags)
+    return not any(model.opt.disableflags & int(bit) for bit in bits)
 
 
 def list_lifted_masses(model: mujoco.MjModel) -> Array:
@@ -206,37 +204,20 @@ def list_lifted_masses(model: mujoco.MjModel) -> Array:
     Gravity compensation is a passive force: it is off with gravity, and where neither
     springs nor dampers act.
     """
-    factors = getattr(model, "body_gravcomp", np.zeros(model.nbody))
     passive = is_enabled(model, "spring") or is_enabled(model, "damper")
-    acts = passive and is_enabled(model, "gravity", "passive")
-    return np.asarray(model.body_mass * factors * acts)
+    acts = passive and is_enabled(model, "gravity")
+    return np.asarray(model.body_mass * model.body_gravcomp * acts)
 
 
-@dataclass(frozen=True, slots=True)
-class ClosureEnd:
-    """One end of a connect or a weld."""
-
-    body: int
-    place: Array
-    """Place in world axes, (3,), m."""
-
-
-def find_ends(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    equality: int,
-) -> tuple[ClosureEnd, ClosureEnd]:
-    """Locate both ends of a connect or a weld."""
-    bodies = find_tied_bodies(model, equality)
+def find_ends(model: mujoco.MjModel, data: mujoco.MjData, equality: int) -> list[Array]:
+    """Locate both ends of a connect or a weld in world axes, (3,) each, m."""
     if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE:
         sites = (model.eq_obj1id[equality], model.eq_obj2id[equality])
-        first, second = (data.site_xpos[site].copy() for site in sites)
-        return ClosureEnd(bodies[0], first), ClosureEnd(bodies[1], second)
+        return [data.site_xpos[site].copy() for site in sites]
     anchors = [model.eq_data[equality, 0:3], model.eq_data[equality, 3:6]]
     if model.eq_type[equality] == mujoco.mjtEq.mjEQ_WELD:
         anchors.reverse()  # it keeps the second body's anchor first
-    first, second = (
+    return [
         data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor
-        for body, anchor in zip(bodies, anchors, strict=True)
-    )
-    return ClosureEnd(bodies[0], first), ClosureEnd(bodies[1], second)
+        for body, anchor in zip(find_tied_bodies(model, equality), anchors, strict=True)
+    ]

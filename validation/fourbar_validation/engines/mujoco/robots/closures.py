@@ -5,7 +5,6 @@ the fourth pin; or four hinges and a weld, which joins two halves of a bar. Bodi
 no joint parts, or a held one, are one bar.
 """
 
-import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +17,6 @@ from fourbar.errors import InputError
 from fourbar.linkage import ENDS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
-    ClosureEnd,
     climb,
     find_common,
     find_ends,
@@ -191,16 +189,8 @@ def _spell_count(number: int, most: int = 7) -> str:
     return NUMBERS[number] if number <= most else str(number)
 
 
-def _measure_gap(
-    ends: tuple[ClosureEnd, ClosureEnd],
-    normal: Array | None = None,
-) -> float:
-    """Measure the distance of the two ends, in a plane if there is one, m."""
-    first, second = ends
-    apart = first.place - second.place
-    if normal is not None:
-        apart = apart - (apart @ normal) * normal
-    return float(np.linalg.norm(apart))
+class _NoFourBarError(Exception):
+    """A closure closes no planar four-bar; the message says why."""
 
 
 class _Chain:
@@ -209,13 +199,11 @@ class _Chain:
     The chain leads over the common ancestor of both ends.
     """
 
-    def __init__(
-        self,
-        finder: "_Finder",
-        first: int,
-        second: int,
-    ) -> None:
+    def __init__(self, finder: "_Finder", number: int) -> None:
         self.model = finder.model
+        self.number = number
+        self.is_pin = finder.is_pin(number)
+        first, second = find_tied_bodies(self.model, number)
         common = find_common(self.model, first, second)
         self.ground = finder.root[common]
         self.ground_name = name_body(self.model, common)
@@ -251,6 +239,11 @@ class _Chain:
         return side
 
     @property
+    def pins(self) -> int:
+        """Number of its joints, and of its closure if that is a pin."""
+        return len(self.joints) + self.is_pin
+
+    @property
     def hinges(self) -> list[int]:
         """Hinges among the joints."""
         types = self.model.jnt_type
@@ -281,29 +274,26 @@ class _Finder:
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""
         model = self.model
-        name = self._name(number)
         kind = EQUALITY_KINDS.get(int(model.eq_type[number]), "flex")
-        found = RobotClosure(
-            name,
+        closure = RobotClosure(
+            self._name(number),
             kind,
             None,
-            f"a {kind} equality is no pin",
+            self._describe_mimic(number, kind),
             solref=tuple(model.eq_solref[number].tolist()),
             solimp=tuple(model.eq_solimp[number].tolist()),
         )
-        if kind in ("joint", "tendon"):
-            return replace(found, reason=self._describe_mimic(number, kind))
         if kind not in ("connect", "weld"):
-            return found
-        ends = find_ends(self.model, self.data, number)
-        gap: float | None = None
-        if self._is_pin(number):
-            normal = self.normals.get(number)
-            gap = _measure_gap(find_ends(self.model, self.before, number), normal)
-        chain = _Chain(self, ends[0].body, ends[1].body)
-        loop, reason = self._recognise(number, name, chain)
+            return closure
+        chain = _Chain(self, number)
+        loop = None
+        reason = ""
+        try:
+            loop = self._recognise(chain)
+        except _NoFourBarError as error:
+            reason = str(error)
         return replace(
-            found,
+            closure,
             loop=loop,
             reason=reason,
             ground=chain.ground_name,
@@ -313,8 +303,15 @@ class _Finder:
                 for joint, kind in chain.others.items()
             ),
             misaligned=self._measure_axes(chain)[0],
-            gap=gap,
+            gap=self._measure_gap(number) if chain.is_pin else None,
         )
+
+    def _measure_gap(self, number: int) -> float:
+        """Measure the distance of the stated ends, in a plane if there is one, m."""
+        first, second = find_ends(self.model, self.before, number)
+        apart = first - second
+        normal = self.normals.get(number, np.zeros(3))
+        return float(np.linalg.norm(apart - (apart @ normal) * normal))
 
     def _name(self, number: int) -> str:
         """Name an equality so that no other has the same name."""
@@ -324,7 +321,7 @@ class _Finder:
             return name
         return f"{name}-{names[: number + 1].count(name)}"
 
-    def _is_pin(self, number: int) -> bool:
+    def is_pin(self, number: int) -> bool:
         """Return True for a connect, and for a weld that lets its bodies turn."""
         if self.model.eq_type[number] == mujoco.mjtEq.mjEQ_CONNECT:
             return True
@@ -344,51 +341,41 @@ class _Finder:
                 "by fourbar new SCENE --pins; then check-mjcf SCENE FILE --mimic "
                 f"{follower} says what it loses)"
             )
-        if kind == "tendon":
-            return "a tendon equality is no pin"
+        if kind != "joint":
+            return f"a {kind} equality is no pin"
         joint = int(model.eq_obj1id[number])
         rest = float(model.eq_data[number, 0])
         return f"{name_joint(model, joint)} is kept at {rest:.6g} of its rest"
 
-    def _recognise(
-        self,
-        number: int,
-        name: str,
-        chain: _Chain,
-    ) -> tuple[RobotLoop | None, str]:
-        """Return the four-bar of a closure, or the reason why it is none."""
-        model = self.model
-        if not model.eq_active0[number]:
-            return None, 'it is switched off in the file (active="false")'
+    def _recognise(self, chain: "_Chain") -> RobotLoop:
+        """Return the four-bar of a closure."""
+        if not self.model.eq_active0[chain.number]:
+            raise _NoFourBarError('it is switched off in the file (active="false")')
         if not chain.joints:
-            return None, "both ends are on one rigid body"
-        is_pin = self._is_pin(number)
+            raise _NoFourBarError("both ends are on one rigid body")
         reason = (
-            self._find_ball_in_a_plane(chain, is_pin=is_pin)
-            or self._find_other_joint(number, chain)
+            self._find_ball_in_a_plane(chain)
+            or self._find_other_joint(chain)
             or self._find_skew_axes(chain)
         )
+        if not reason and chain.pins != len(PINS):
+            reason = self._explain_count(chain)
+        elif not reason and None in chain.bars:
+            reason = "two of its hinges are on one body: a bar has no body"
         if reason:
-            return None, reason
-        hinges = len(chain.joints) + is_pin
-        if hinges != 4:
-            return None, self._explain_count(chain, hinges, number, is_pin=is_pin)
-        if None in chain.bars:
-            return None, "two of its hinges are on one body: a bar has no body"
-        return self._make_loop(number, name, chain, is_pin=is_pin)
+            raise _NoFourBarError(reason)
+        return self._make_loop(chain)
 
-    def _find_ball_in_a_plane(self, chain: _Chain, *, is_pin: bool) -> str:
+    def _find_ball_in_a_plane(self, chain: _Chain) -> str:
         """Say what to type for one ball among hinges with parallel axes.
 
         Both ends of the bar that the ball carries stay in their planes, so that a hinge
         moves as the ball does. Empty where the loop is another.
         """
-        others = chain.others
-        pins = len(chain.joints) + is_pin
-        is_one = [*others.values()] == [BALL] and pins == len(PINS)
+        is_one = [*chain.others.values()] == [BALL] and chain.pins == len(PINS)
         if not is_one or self._find_skew_axes(chain):
             return ""
-        (ball,) = others
+        (ball,) = chain.others
         rest = mujoco.MjData(self.model)
         rest.qpos[:] = self.data.qpos
         address = int(self.model.jnt_qposadr[ball])
@@ -407,9 +394,9 @@ class _Finder:
             " alike and makes it a four-bar"
         )
 
-    def _find_other_joint(self, number: int, chain: _Chain) -> str:
+    def _find_other_joint(self, chain: _Chain) -> str:
         words = {
-            FREE_JOINT: f"floats freely{self._suggest_hinge(number, chain)}",
+            FREE_JOINT: f"floats freely{self._suggest_hinge(chain)}",
             BALL: f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})",
             SLIDE: f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})",
         }
@@ -417,7 +404,7 @@ class _Finder:
             return f"{name_joint(self.model, joint)} {words[kind]}"
         return ""
 
-    def _suggest_hinge(self, number: int, chain: _Chain) -> str:
+    def _suggest_hinge(self, chain: _Chain) -> str:
         """Say what to type for a body that floats between two pins.
 
         One of the pins becomes a hinge, and the other closes the loop. Three or more
@@ -426,9 +413,9 @@ class _Finder:
         model = self.model
         floating = {int(model.jnt_bodyid[joint]) for joint in chain.others}
         pins = {}
-        for pin in sorted([number, *self._list_others(number)]):
-            ends = [int(body) for body in find_tied_bodies(model, pin)]
-            if self._is_pin(pin) and len(floating.intersection(ends)) == 1:
+        for pin in sorted([chain.number, *self._list_others(chain.number)]):
+            ends = find_tied_bodies(model, pin)
+            if self.is_pin(pin) and len(floating.intersection(ends)) == 1:
                 pins[pin] = ends
         if len(floating) != 1 or len(pins) < 2:
             return ""
@@ -464,29 +451,22 @@ class _Finder:
             f"the loop is spatial ({_SERVE_SPATIAL})"
         )
 
-    def _explain_count(
-        self,
-        chain: _Chain,
-        hinges: int,
-        number: int,
-        *,
-        is_pin: bool,
-    ) -> str:
+    def _explain_count(self, chain: _Chain) -> str:
         """Say what another number of hinges makes, and what makes it a four-bar."""
-        freedoms = hinges - 3
-        count = f"{_spell_count(hinges)} hinge{'s' if hinges > 1 else ''}"
+        freedoms = chain.pins - 3
+        count = f"{_spell_count(chain.pins)} hinge{'s' if chain.pins > 1 else ''}"
+        if freedoms <= 0 and chain.is_pin:
+            return f"{count} in a plane cannot move"
         if freedoms <= 0:
-            if is_pin:
-                return f"{count} in a plane cannot move"
             return (
                 f"a weld that leaves no freedom: {count} in a plane cannot move; a"
                 ' <connect> or torquescale="0" makes a pin of it'
             )
         motors = self._list_motors(chain.joints)
-        coupled = self._find_coupled(number, chain)
+        coupled = self._find_coupled(chain)
         holds = self._list_holds(chain, motors, coupled, freedoms - 1)
         if not holds:
-            text = self._explain_coupling(number, chain, coupled)
+            text = self._explain_coupling(chain, coupled)
             if freedoms == len(motors) == 2:
                 one, other = (name_joint(self.model, joint) for joint, _ in motors)
                 text += (
@@ -510,27 +490,25 @@ class _Finder:
         of_kinds = np.isin(self.model.eq_type, [*types]) & (self.model.eq_active0 != 0)
         return [other for other in np.flatnonzero(of_kinds).tolist() if other != number]
 
-    def _find_coupled(self, number: int, chain: _Chain) -> dict[int, _Chain]:
-        """Return the other closures whose loops move the same bars, with their chains.
+    def _find_coupled(self, chain: _Chain) -> list[_Chain]:
+        """List the chains of other closures whose loops move the same bars.
 
         Loops that share bars with such a loop are among them.
         """
-        others = {
-            other: _Chain(self, *find_tied_bodies(self.model, other))
-            for other in self._list_others(number)
-        }
+        others = [_Chain(self, other) for other in self._list_others(chain.number)]
         joints = {*chain.joints}
-        coupled = dict[int, _Chain]()
-        while more := {n for n in others if joints & {*others[n].joints}}:
-            coupled |= {n: others.pop(n) for n in more}
-            joints.update(*(coupled[n].joints for n in more))
-        return dict(sorted(coupled.items()))
+        coupled: list[_Chain] = []
+        while more := [other for other in others if joints & {*other.joints}]:
+            coupled += more
+            others = [other for other in others if other not in more]
+            joints.update(*(other.joints for other in more))
+        return sorted(coupled, key=lambda other: other.number)
 
     def _list_holds(
         self,
         chain: _Chain,
         motors: list[tuple[int, int]],
-        coupled: dict[int, _Chain],
+        coupled: list[_Chain],
         count: int,
     ) -> list[tuple[str, ...]]:
         """List the joints to hold that leave a four-bar apart from other loops."""
@@ -540,24 +518,19 @@ class _Finder:
         holds = []
         for held in combinations(holdable, count):
             moving = {*chain.joints} - {*held}
-            if not any(moving & {*other.joints} for other in coupled.values()):
+            if not any(moving & {*other.joints} for other in coupled):
                 holds.append(tuple(name_joint(self.model, joint) for joint in held))
         return holds
 
-    def _explain_coupling(
-        self,
-        number: int,
-        chain: _Chain,
-        coupled: dict[int, _Chain],
-    ) -> str:
+    def _explain_coupling(self, chain: _Chain, coupled: list[_Chain]) -> str:
         """Say which linkage loops with common bars make."""
-        joints = {*chain.joints}.union(*(other.joints for other in coupled.values()))
+        joints = {*chain.joints}.union(*(other.joints for other in coupled))
         kinds = self.model.jnt_type[[*joints]]
-        names = ", ".join(self._name(other) for other in coupled)
+        names = ", ".join(self._name(other.number) for other in coupled)
         moves = "moves" if len(coupled) == 1 else "move"
         if not coupled or not np.all(kinds == HINGE_JOINT):
             return f"{names} {moves} its bars too: no hold makes it a four-bar"
-        taken = sum(2 if self._is_pin(n) else 3 for n in (number, *coupled))
+        taken = sum(2 if one.is_pin else 3 for one in (chain, *coupled))
         freedoms = len(joints) - taken
         bars = len(joints) + 1 - max(freedoms - 1, 0)
         which = NAMES_OF_LINKAGES.get(bars, f"a linkage of {bars} bars")
@@ -570,13 +543,10 @@ class _Finder:
             f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
             f" ({_SERVE_PLANAR})"
         )
-        return text + self._describe_inner_four_bar(number, coupled, joints)
+        return text + self._describe_inner_four_bar(chain, coupled, joints)
 
     def _describe_inner_four_bar(
-        self,
-        number: int,
-        coupled: dict[int, _Chain],
-        joints: set[int],
+        self, chain: _Chain, coupled: list[_Chain], joints: set[int]
     ) -> str:
         """Describe the four bars that a closure and three pins of others join, if any.
 
@@ -587,14 +557,13 @@ class _Finder:
         for joint in joints:
             parent = self.root[find_parent(model, int(model.jnt_bodyid[joint]))]
             pins[frozenset((self._find_root(joint), parent))] = self.data.xanchor[joint]
-        for equality in (*coupled, number):
-            ends = find_ends(model, self.data, equality)
-            first, last = (self.root[end.body] for end in ends)
-            pins[frozenset((first, last))] = ends[0].place
+        for one in (*coupled, chain):
+            ends = find_tied_bodies(model, one.number)
+            first, last = (self.root[end] for end in ends)
+            place, _ = find_ends(model, self.data, one.number)
+            pins[frozenset((first, last))] = place
         of_others = {
-            self._find_root(joint)
-            for chain in coupled.values()
-            for joint in chain.joints
+            self._find_root(joint) for other in coupled for joint in other.joints
         }
         bars = {bar for pair in pins for bar in pair}
         for inner in permutations(bars - {first, last}, 2):
@@ -611,13 +580,13 @@ class _Finder:
             cycle = cycle[ground:] + cycle[:ground]
             if cycle[1] > cycle[3]:
                 cycle[1:] = reversed(cycle[1:])
+            names = [name_body(model, bar) for bar in cycle]
             shared = [name_body(model, bar) for bar in cycle[1:] if bar in of_others]
             if len(shared) == len(cycle) - 1:  # it is the four-bar of another closure
                 continue
-            moving = ", ".join(name_body(model, bar) for bar in cycle[1:])
             lengths = ", ".join(write_length(sizes[bar]) for bar in cycle)
             return (
-                f"; {moving} on {name_body(model, cycle[0])} ({lengths} mm) are a"
+                f"; {', '.join(names[1:])} on {names[0]} ({lengths} mm) are a"
                 f" four-bar, but {', '.join(shared)} belongs to another loop too"
             )
         return ""
@@ -658,40 +627,34 @@ class _Finder:
         """List (joint, actuator) of what takes a control and acts on these joints."""
         return [motor for motor in list_motors(self.model) if motor[0] in joints]
 
-    def _make_loop(
-        self,
-        number: int,
-        name: str,
-        chain: _Chain,
-        *,
-        is_pin: bool,
-    ) -> tuple[RobotLoop | None, str]:
+    def _make_loop(self, chain: _Chain) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output."""
-        pins: list[int | None] = [*chain.joints]
+        number = chain.number
+        joints: list[int | None] = [*chain.joints]
         groups: list[tuple[int, ...]]
         groups = [(bar,) for bar in chain.bars if bar is not None]
-        if is_pin:
-            pins.append(None)
+        if chain.is_pin:
+            joints.append(None)
         else:  # its halves are one bar
             halves = {*groups[0], *groups.pop()}
             groups[0] = tuple(sorted(halves, key=lambda body: body != chain.ground))
-        # bar i lies between pin i - 1 and pin i
-        at_ground = next(i for i, bars in enumerate(groups) if chain.ground in bars)
+        # group i lies between joint i - 1 and joint i
+        at_ground = next(i for i, group in enumerate(groups) if chain.ground in group)
         groups = groups[at_ground:] + groups[:at_ground]
-        pins = pins[at_ground:] + pins[:at_ground]
-        motors = self._list_motors(chain.joints)
-        remarks: list[str] = []
-        # the ground lies between the pins at the end and at the beginning
-        driven, text = self._choose_driven(pins[0], pins[-1], motors, number)
-        remarks += text
-        if driven != pins[0]:
-            groups = [groups[0], *reversed(groups[1:])]
-            pins = list(reversed(pins))
-        by_pin = dict(zip(PINS, pins, strict=True))
-        hinges = {pin: joint for pin, joint in by_pin.items() if joint is not None}
-        bodies = dict(zip((1, 2, 3, 4), groups, strict=True))
-        cut = next((pin for pin, joint in by_pin.items() if joint is None), None)
-        moving = set(hinges.values())
+        joints = joints[at_ground:] + joints[:at_ground]
+        # the ground lies between the joints at the end and at the beginning
+        driven, remarks = self._choose_driven([joints[0], joints[-1]], chain)
+        if driven != joints[0]:
+            groups[1:] = reversed(groups[1:])
+            joints.reverse()
+        hinges: dict[str, int] = {}
+        cut = None
+        for pin, joint in zip(PINS, joints, strict=True):
+            if joint is None:
+                cut = pin
+            else:
+                hinges[pin] = joint
+        bodies = dict(zip(ENDS, groups, strict=True))
         sides = {
             pin: 1.0 if self._find_root(joint) in bodies[PINS[pin][1]] else -1.0
             for pin, joint in hinges.items()
@@ -706,8 +669,9 @@ class _Finder:
             rotation = self.data.xmat[bodies[bar][0]].reshape(3, 3)
             return np.asarray(rotation.T @ vector)
 
+        moving = set(hinges.values())
         loop = RobotLoop(
-            name=name,
+            name=self._name(number),
             equality=number,
             closures=(number,),
             cut=cut,
@@ -725,36 +689,30 @@ class _Finder:
             axis=to_body(1, normal),
             along=to_body(1, along),
             misaligned=self._measure_axes(chain)[0] or 0.0,
-            lengths=(),
-            angles=(),
-            stated_angles=(),
+            lines=(),
+            stated_lines=(),
             qpos=self.data.qpos.copy(),
             held=tuple(j for j in range(self.model.njnt) if j not in moving),
             other_equalities=(),
         )
-        frame = LoopFrame(loop, self.data)
-        lines = [complex(*frame.line(bar)) for bar in ENDS]
         loop = replace(
             loop,
-            lengths=tuple(map(abs, lines)),
-            angles=tuple(map(cmath.phase, lines)),
-            stated_angles=tuple(map(LoopFrame(loop, self.before).angle, ENDS)),
+            lines=tuple(map(LoopFrame(loop, self.data).line, ENDS)),
+            stated_lines=tuple(map(LoopFrame(loop, self.before).line, ENDS)),
         )
         for length, (one, other) in zip(loop.lengths, ENDS.values(), strict=True):
             if length <= COINCIDENT_PINS * max(loop.lengths):
-                reason = f"pins {one} and {other} are in one place: a bar has no length"
-                return None, reason
-        closures, others, reason = self._sort_equalities(loop)
-        if reason:
-            return None, reason
+                raise _NoFourBarError(
+                    f"pins {one} and {other} are in one place: a bar has no length"
+                )
+        closures, others = self._sort_equalities(loop)
         remarks += _describe_offset(self.posed, closures, loop, normal)
-        loop = replace(
+        return replace(
             loop,
             closures=closures,
             other_equalities=others,
             remarks=tuple(remarks),
         )
-        return loop, ""
 
     def _find_root(self, joint: int) -> int:
         """Return the bar that a joint turns."""
@@ -774,10 +732,11 @@ class _Finder:
             for bar in PINS[pin]
         }
         if cut is not None:
-            for end in find_ends(self.model, self.data, number):
-                root = self.root[end.body]
-                bar = next(bar for bar in PINS[cut] if root in bodies[bar])
-                places[bar, cut] = end.place
+            tied = find_tied_bodies(self.model, number)
+            ends = find_ends(self.model, self.data, number)
+            for body, place in zip(tied, ends, strict=True):
+                bar = next(b for b in PINS[cut] if self.root[body] in bodies[b])
+                places[bar, cut] = place
         return places
 
     def _choose_along(self, normal: Array, line: Array) -> Array:
@@ -798,105 +757,95 @@ class _Finder:
         return np.asarray(np.linalg.svd(normal[None])[2][1])
 
     def _choose_driven(
-        self,
-        first: int | None,
-        last: int | None,
-        motors: list[tuple[int, int]],
-        number: int,
+        self, ends: list[int | None], chain: _Chain
     ) -> tuple[int, list[str]]:
         """Return the driven hinge among those of the ground, and remarks.
 
         A remark says so if no motor decides.
         """
         model = self.model
-        at_ground = [joint for joint in (first, last) if joint is not None]
+        at_ground = [joint for joint in ends if joint is not None]
         if self.options.drive is not None:
             stated = find_joint(model, self.options.drive, "--drive")
             if stated in at_ground:
                 return stated, []
-        driven = [joint for joint, _ in motors]
+        driven = [joint for joint, _ in self._list_motors(chain.joints)]
         if not driven:  # one that takes no control drives by a speed that it keeps
             driven = [joint for joint in at_ground if list_actuators(model, joint)]
         names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
-        for joint in driven:
-            if joint in at_ground:
-                if len(set(driven)) == 1:
-                    return joint, []
-                taken = f"{name_joint(model, joint)} is taken as driven"
-                text = f"motors act on {names}: {taken} (--drive states another)"
-                return joint, [text]
-        pushed, by = self._find_pushed(at_ground, number)
-        chosen = min(at_ground) if pushed is None else pushed  # the first of the file
-        if driven:
-            reason = f"the motor on {names} acts between two moving bars"
-        elif by:
-            reason = f"{by} acts on it"
+        chosen = next((joint for joint in driven if joint in at_ground), None)
+        if chosen is not None:
+            if len(set(driven)) == 1:
+                return chosen, []
+            reason = f"motors act on {names}"
         else:
+            pushed, by = self._find_pushed(at_ground, chain.number)
+            # of the hinges without a sign the first of the file
+            chosen = min(at_ground) if pushed is None else pushed
             reason = "no motor acts on it"
-        taken = (
-            f"{name_joint(model, chosen)} is taken as driven (--drive states another)"
-        )
-        return chosen, [f"{reason}: {taken}"]
+            if driven:
+                reason = f"the motor on {names} acts between two moving bars"
+            elif by:
+                reason = f"{by} acts on it"
+        taken = f"{name_joint(model, chosen)} is taken as driven"
+        return chosen, [f"{reason}: {taken} (--drive states another)"]
 
     def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
         """Return the one hinge of the ground whose bar another closure moves.
 
         The closure's name follows; (None, "") if there is not exactly one such hinge.
         """
-        pushed: dict[int, str] = {}
-        hinge_of = {self.root[int(self.model.jnt_bodyid[j])]: j for j in at_ground}
-        for other in self._list_others(number):
-            for end in find_ends(self.model, self.data, other):
-                root = self.root[end.body]
-                if root in hinge_of:
-                    pushed[hinge_of[root]] = self._name(other)
-        if len(pushed) != 1:
-            return None, ""
-        ((joint, name),) = pushed.items()
-        return joint, name
+        hinge_of = {self._find_root(joint): joint for joint in at_ground}
+        pushed = {
+            hinge_of[self.root[body]]: self._name(other)
+            for other in self._list_others(number)
+            for body in find_tied_bodies(self.model, other)
+            if self.root[body] in hinge_of
+        }
+        return next(iter(pushed.items())) if len(pushed) == 1 else (None, "")
 
     def _sort_equalities(
         self, loop: RobotLoop
-    ) -> tuple[tuple[int, ...], tuple[int, ...], str]:
-        """Return the equalities that hold the closing pin, and others on moving bars.
-
-        A text says that one leaves the loop no freedom.
-        """
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Return the equalities of the closing pin, and others on moving bars."""
         bars = {root: bar for bar, roots in loop.bodies.items() for root in roots}
         moving = {root for root, bar in bars.items() if bar != 1}
         frame = LoopFrame(loop, self.data)
         closures = [loop.equality]
         others: list[int] = []
-        pins = set(loop.hinges.values())
         for other in self._list_others(loop.equality, "joint"):
             equality = self.model.equality(other)
             if EQUALITY_KINDS[int(equality.type[0])] == "joint":
-                if pins & {int(equality.obj1id[0]), int(equality.obj2id[0])}:
+                tied = {int(equality.obj1id[0]), int(equality.obj2id[0])}
+                if tied & {*loop.hinges.values()}:
                     others.append(other)
                 continue
-            ends = find_ends(self.model, self.data, other)
-            carried = [self._find_bar(end.body, moving) for end in ends]
+            ends = find_tied_bodies(self.model, other)
+            carried = [self._find_bar(end, moving) for end in ends]
             numbers = [1 if root is None else bars[root] for root in carried]
             if numbers[0] == numbers[1]:
                 continue
-            if not all(self.root[end.body] in bars for end in ends):
+            if not all(self.root[end] in bars for end in ends):
                 others.append(other)
                 continue
             pin = _PIN_BETWEEN.get(frozenset(numbers))
-            if pin is None or not self._is_pin(other) or not _is_at(frame, pin, ends):
-                reason = f"{self._name(other)} holds two of its bars as well"
-                return (), (), f"{reason}: no freedom is left"
+            places = find_ends(self.model, self.data, other)
+            if not (pin and self.is_pin(other) and _is_at(frame, pin, places)):
+                raise _NoFourBarError(
+                    f"{self._name(other)} holds two of its bars as well: no freedom is"
+                    " left"
+                )
             # beside a hinge a connect holds the same pin
             (closures if pin == loop.cut else others).append(other)
-        return tuple(closures), tuple(others), ""
+        return tuple(closures), tuple(others)
 
 
-def _is_at(frame: LoopFrame, pin: str, ends: tuple[ClosureEnd, ClosureEnd]) -> bool:
+def _is_at(frame: LoopFrame, pin: str, ends: list[Array]) -> bool:
     """Tell whether both ends of another equality lie on the axis of a pin."""
     near = max(COINCIDENT_PINS * max(frame.loop.lengths), LARGEST_RESIDUAL)
     place = frame.locate(PINS[pin][0], pin)
     return all(
-        float(np.linalg.norm(frame.in_plane(end.place - place))) <= near for end in ends
+        float(np.linalg.norm(frame.in_plane(end - place))) <= near for end in ends
     )
 
 

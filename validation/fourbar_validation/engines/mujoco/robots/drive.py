@@ -108,7 +108,7 @@ class LoopDrive:
 
         def locate(place: Place) -> tuple[Array, complex]:
             """Return a place in world axes, (3,), m, and its bar's direction."""
-            line = complex(*frame.line(place.bar))
+            line = frame.line(place.bar)
             unit = line / abs(line)
             arm: Any = unit * complex(place.in_bar)
             pin = frame.locate(place.bar, FIRST_PIN[place.bar])

@@ -1,5 +1,6 @@
 """A loop in a state of its model: axes of its plane, pins and lines of its bars."""
 
+import cmath
 import math
 
 import mujoco
@@ -7,7 +8,18 @@ import numpy as np
 
 from fourbar.linkage import ENDS, FIRST_PIN
 from fourbar.quantities import Array
+from fourbar_validation.engines.mujoco.robots.ancestry import find_roots
 from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+
+
+def list_bars(model: mujoco.MjModel, loop: RobotLoop) -> list[int | None]:
+    """List the bar, 1 to 4, that each body belongs to; None: it belongs to none.
+
+    What hangs on a bar by joints that are held belongs to it.
+    """
+    roots = find_roots(model, {*loop.held})
+    bars = {roots[body]: bar for bar, bodies in loop.bodies.items() for body in bodies}
+    return [bars.get(root) for root in roots]
 
 
 class LoopFrame:
@@ -38,24 +50,23 @@ class LoopFrame:
         turn = self.data.xmat[body].reshape(3, 3)
         return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
 
-    def line(self, bar: int) -> Array:
-        """Return a bar's line in the plane, first pin to second, (2,), m."""
+    def line(self, bar: int) -> complex:
+        """Return a bar's line in the plane, from its first pin to the second, m."""
         first, second = (self.locate(bar, pin) for pin in ENDS[bar])
-        return self.in_plane(second - first)
+        return complex(*self.in_plane(second - first))
 
     def angle(self, bar: int) -> float:
         """Return the angle of a bar's line, rad."""
-        x, y = self.line(bar)
-        return math.atan2(y, x)
+        return cmath.phase(self.line(bar))
 
     def resolve(self, bar: int, vector: Array) -> tuple[float, float]:
         """Resolve a vector of the world along a bar's line and to its left."""
         x, y = self.in_plane(vector)
-        along, left = self.line(bar)
-        size = math.hypot(along, left)
+        line = self.line(bar)
+        size = abs(line)
         return (
-            float(along * x + left * y) / size,
-            float(along * y - left * x) / size,
+            float(line.real * x + line.imag * y) / size,
+            float(line.real * y - line.imag * x) / size,
         )
 
     def along_bar(self, bar: int, place: Array) -> tuple[float, float]:

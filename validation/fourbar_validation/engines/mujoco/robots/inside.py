@@ -22,25 +22,24 @@ and dry friction in full: that couple and these pin forces are what MuJoCo's are
 compared with, in the same model.
 """
 
-import cmath
 import math
 import time
 from collections.abc import Iterable
 from copy import copy
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.linkage import ENDS, MOVING_BARS, PINS
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.quantities import Array
 from fourbar.scene.motion import OPEN
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
+from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
-    climb,
     find_tied_bodies,
     is_enabled,
     list_actuators,
@@ -61,7 +60,7 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
 )
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.robots.loop import (
     DRIVEN_PINS,
     FOLLOWING,
@@ -103,8 +102,6 @@ _BALANCED = 1e-14
 """Relative step of the hinges' accelerations at which nothing is left that acts on
 them.
 """
-_DIRECTIONS = {1: -1.0, 2: 1.0, 3: 1.0, 4: -1.0}
-"""Signs with which the bars add up to zero around the loop."""
 HEAVY = 1e4
 """Armature that holds a joint while the model is stepped, over the largest inertia of
 the robot. It lets the joints move by about its inverse; beyond 1e5 MuJoCo's solver
@@ -136,8 +133,7 @@ a humanoid these are 13 seconds.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class _RobotState:
+class _RobotState(NamedTuple):
     """Closed state of a robot."""
 
     qpos: Array
@@ -216,6 +212,7 @@ class LoopInside:
         rubs = not self.model.opt.disableflags & without_friction
         self._friction = self.model.dof_frictionloss * rubs
         self.bearers = BearerForces(self.model)
+        self._bars = list_bars(model, loop)
         self.flywheel = 0.0
         """Part of the armature of the driven hinge that keeps its speed, kg m^2. Its
         torque is none of the drive's.
@@ -224,8 +221,6 @@ class LoopInside:
         """Joints that were at a limit of their range in some state."""
         self.contacts = 0
         """Most contacts in a state."""
-        self._doubtful: list[InsideRow] = []
-        """Last rows of a simulation that may be in the other assembly."""
 
     def _switch_off(self) -> None:
         """Switch off what acts on the loop beside its drive."""
@@ -422,8 +417,9 @@ class LoopInside:
         """Return the sine of the angle between the bars that follow in a pose."""
         self._evaluate_closure(qpos)
         frame = LoopFrame(self.loop, self.closing)
-        (x, y), (u, v) = map(frame.line, FOLLOWING[self.bar])
-        return float(x * v - y * u) / (math.hypot(x, y) * math.hypot(u, v))
+        first, second = map(frame.line, FOLLOWING[self.bar])
+        product = first.conjugate() * second
+        return product.imag / abs(product)
 
     def _is_in_line(self, qpos: Array) -> bool:
         """Tell whether the bars that follow are in line: at a change point or a limit.
@@ -663,38 +659,24 @@ class LoopInside:
         for pin, name in FORCE_AT.items():
             joint = self.loop.hinges.get(pin)
             if joint is None:
-                force, bar = self._read_closure(data, pin)
+                body = find_tied_bodies(self.model, self.loop.equality)[0]
+                force = self._sum_closures(data, self._bars[body])
             else:
                 body = int(self.model.jnt_bodyid[joint])
                 force = self.bearers.read(data, body)
-                bar = self._find_bar(body, pin)
             _, acted_on = FORCE_BETWEEN[name]
-            sign = 1.0 if bar == acted_on else -1.0
+            sign = 1.0 if self._bars[body] == acted_on else -1.0
             forces[name] = sign * frame.in_plane(force)
         return forces
 
-    def _read_closure(self, data: mujoco.MjData, pin: str) -> tuple[Array, int]:
-        """Sum the forces of the equalities at the cut pin.
-
-        Return the sum and the bar that it acts on.
-        """
+    def _sum_closures(self, data: mujoco.MjData, bar: int | None) -> Array:
+        """Sum the forces of the equalities at the cut pin on one of its bars."""
         total = np.zeros(3)
-        bars = []
         for equality in self.loop.closures:
-            first_body = find_tied_bodies(self.model, equality)[0]
-            bar = self._find_bar(first_body, pin)
-            bars.append(bar)
-            sign = 1.0 if bar == bars[0] else -1.0
+            first = find_tied_bodies(self.model, equality)[0]
+            sign = 1.0 if self._bars[first] == bar else -1.0
             total += sign * read_equality_force(data, equality)
-        return total, bars[0]
-
-    def _find_bar(self, body: int, pin: str) -> int:
-        """Return which of the two bars of a pin a body belongs to."""
-        for above in climb(self.model, body):
-            for bar in PINS[pin]:
-                if above in self.loop.bodies[bar] and bar != 1:
-                    return bar
-        return 1
+        return total
 
     def answer_states(self, motion: LoopMotion) -> InsideAnswer:
         """Answer at closed states, each by itself.
@@ -759,7 +741,7 @@ class LoopInside:
                 " another speed"
             )
         answer.seconds_per_step = math.inf
-        self._doubtful.clear()
+        doubtful: list[InsideRow] = []  # they may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
         settled = SETTLING_TIME * self.find_constant()
@@ -781,7 +763,7 @@ class LoopInside:
             row = self.ask(data.qpos, data.qvel, float(self.turn @ data.qacc))
             answer.rows.append(row)
             drive(row)
-            if self._left_assembly(answer, data.qpos):
+            if self._left_assembly(answer, doubtful, data.qpos):
                 break
         if answer.other_assembly is not None and not answer.rows:
             raise LimitError(OTHER_ASSEMBLY)
@@ -801,7 +783,9 @@ class LoopInside:
             model.dof_armature[self.lead] += armature
         return model, armature
 
-    def _left_assembly(self, answer: InsideAnswer, qpos: Array) -> bool:
+    def _left_assembly(
+        self, answer: InsideAnswer, doubtful: list[InsideRow], qpos: Array
+    ) -> bool:
         """Tell whether the last row is in the other assembly, and drop such rows.
 
         Beside a change point, where a loop that has yielded is in neither, the rows
@@ -812,13 +796,13 @@ class LoopInside:
         assert closed is not None  # the row was evaluated there
         now, due = (self._measure_sine(pose) for pose in (qpos, closed))
         if now * due > 0.0:
-            self._doubtful.clear()
+            doubtful.clear()
             return False
-        self._doubtful.append(row)
+        doubtful.append(row)
         if min(abs(now), abs(due)) <= _SINE_OF_AN_ASSEMBLY:
             return False
-        answer.other_assembly = self._doubtful[0].joint
-        del answer.rows[-len(self._doubtful) :]
+        answer.other_assembly = doubtful[0].joint
+        del answer.rows[-len(doubtful) :]
         return True
 
     def find_constant(self) -> float:
@@ -894,32 +878,6 @@ def _has_warned(data: mujoco.MjData) -> bool:
     return any(data.warning[kind].number for kind in WARNINGS)
 
 
-def turn_hinges(
-    model: mujoco.MjModel,
-    loop: RobotLoop,
-    theta_2: float,
-    theta_3: float,
-    theta_4: float,
-) -> Array:
-    """Return the pose in which the bars of a loop have these angles, (nq,).
-
-    Each hinge but the driven one turns by less than half a turn.
-    """
-    turned_2 = theta_2 - loop.angles[1]
-    turned_3 = theta_3 - loop.angles[2]
-    turned_4 = theta_4 - loop.angles[3]
-    turns = {
-        "O2": turned_2,
-        "A": math.remainder(turned_3 - turned_2, math.tau),
-        "B": math.remainder(turned_4 - turned_3, math.tau),
-        "O4": math.remainder(turned_4, math.tau),
-    }
-    qpos = loop.qpos.copy()
-    for pin, joint in loop.hinges.items():
-        qpos[model.jnt_qposadr[joint]] += loop.senses[pin] * turns[pin]
-    return qpos
-
-
 def assemble(
     model: mujoco.MjModel,
     loop: RobotLoop,
@@ -930,8 +888,8 @@ def assemble(
 ) -> Array | None:
     """Return the pose at an angle of a bar in an assembly of a loop, (nq,).
 
-    The bars are vectors of a closed polygon, of which the two that follow make up for
-    the rest, a triangle. None if the loop is open.
+    Each hinge but the driven one turns by less than half a turn. None if the loop is
+    open.
 
     Parameters
     ----------
@@ -939,27 +897,26 @@ def assemble(
     sign : of the sine of the angle from the first bar that follows to the second; None:
         that of the loop's pose.
     """
-    angles = dict(zip(ENDS, loop.angles, strict=True))
-    vectors = {
-        bar: _DIRECTIONS[bar] * cmath.rect(length, angles[bar])
-        for bar, length in zip(ENDS, loop.lengths, strict=True)
-    }
-    first, second = FOLLOWING[bar]
     if sign is None:
         sign = _measure_pose_sine(loop, bar)
-    side = math.copysign(1.0, sign) * _DIRECTIONS[first] * _DIRECTIONS[second]
-    angles[bar] = angle
-    line = -vectors[1] - _DIRECTIONS[bar] * cmath.rect(loop.lengths[bar - 1], angle)
-    size = abs(line)
-    near, far = abs(vectors[first]), abs(vectors[second])
-    if not abs(near - far) < size < near + far:
+    ground, crank, coupler, output = loop.lengths
+    moving = (Bar(crank), Bar(coupler), Bar(output))
+    linkage = FourBar(ground, *moving, loop.angles[0])
+    branch = np.array([math.copysign(1.0, sign)]).astype(np.int8)
+    closed = close(linkage, np.array([angle]), branch, bar)
+    if not closed.assembled[0]:
         return None
-    apart = math.acos((size**2 + near**2 - far**2) / (2.0 * size * near))
-    vector = cmath.rect(near, cmath.phase(line) - side * apart)
-    for one, along in (first, vector), (second, line - vector):
-        turned = cmath.phase(_DIRECTIONS[one] * along) - angles[one]
-        angles[one] += math.remainder(turned, math.tau)
-    return turn_hinges(model, loop, angles[2], angles[3], angles[4])
+    turned = {1: 0.0, bar: angle - loop.angles[bar - 1]}
+    for one, theta in zip(FOLLOWING[bar], closed.theta[:, 0].tolist(), strict=True):
+        turned[one] = math.remainder(theta - loop.angles[one - 1], math.tau)
+    qpos = loop.qpos.copy()
+    for pin, joint in loop.hinges.items():
+        first, second = PINS[pin]
+        turn = turned[second] - turned[first]
+        if pin != "O2":
+            turn = math.remainder(turn, math.tau)
+        qpos[model.jnt_qposadr[joint]] += loop.senses[pin] * turn
+    return qpos
 
 
 def _measure_pose_sine(loop: RobotLoop, bar: int) -> float:

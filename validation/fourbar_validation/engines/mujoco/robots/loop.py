@@ -3,12 +3,13 @@
 Everything here is plain data, without MuJoCo.
 """
 
+import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 
@@ -90,12 +91,10 @@ class RobotLoop:
     """Unit vector of the plane that angles are counted from, same frame, (3,)."""
     misaligned: float
     """Largest angle between two axes, rad."""
-    lengths: tuple[float, ...]
-    """Lengths of ground, input, coupler and output, m."""
-    angles: tuple[float, ...]
-    """theta_1 to theta_4 in the pose, rad."""
-    stated_angles: tuple[float, ...]
-    """The same before the loops were closed, rad."""
+    lines: tuple[complex, ...]
+    """Lines of bars 1 to 4 in the plane, from their first pin to the second, m."""
+    stated_lines: tuple[complex, ...]
+    """The same before the loops were closed, m."""
     qpos: Array
     """Joint positions of the whole model in the pose, (nq,)."""
     held: tuple[int, ...]
@@ -114,6 +113,16 @@ class RobotLoop:
         return self.hinges["O2"]
 
     @property
+    def lengths(self) -> tuple[float, ...]:
+        """Lengths of ground, input, coupler and output, m."""
+        return tuple(map(abs, self.lines))
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """theta_1 to theta_4 in the pose, rad."""
+        return tuple(map(cmath.phase, self.lines))
+
+    @property
     def longest(self) -> float:
         """Longest moving bar, m."""
         return max(self.lengths[1:])
@@ -123,7 +132,7 @@ class RobotLoop:
 
         The pose then does not tell the assembly.
         """
-        return is_in_line(self.stated_angles, bar)
+        return is_in_line(tuple(map(cmath.phase, self.stated_lines)), bar)
 
     def seen_from_behind(self) -> "RobotLoop":
         """Return the loop with the other normal of its plane.
@@ -133,43 +142,34 @@ class RobotLoop:
         return replace(
             self,
             axis=-self.axis,
-            angles=tuple(-angle for angle in self.angles),
-            stated_angles=tuple(-angle for angle in self.stated_angles),
+            lines=tuple(line.conjugate() for line in self.lines),
+            stated_lines=tuple(line.conjugate() for line in self.stated_lines),
             senses={pin: -sense for pin, sense in self.senses.items()},
         )
 
     def seen_from_other_end(self) -> "RobotLoop":
         """Return the loop with its output for its input."""
-        pins = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
+        pins = dict(zip(PINS, reversed(PINS), strict=True))
         bars = {1: 1, 2: 4, 3: 3, 4: 2}
-        reversed_senses = {
-            pins[pin]: sense if pin in ENDS[1] else -sense
-            for pin, sense in self.senses.items()
-        }
 
-        def exchange(angles: tuple[float, ...]) -> tuple[float, ...]:
-            ground, crank, coupler, output = angles
-            turned = (
-                math.remainder(one + math.pi, math.tau) for one in (ground, coupler)
-            )
-            ground, coupler = turned
-            return ground, output, coupler, crank
+        def exchange(lines: tuple[complex, ...]) -> tuple[complex, ...]:
+            ground, crank, coupler, output = lines
+            return -ground, output, -coupler, crank
 
-        ground, crank, coupler, output = self.lengths
         return replace(
             self,
             cut=None if self.cut is None else pins[self.cut],
-            bodies={bar: self.bodies[bars[bar]] for bar in bars},
-            hinges={
-                pin: self.hinges[old] for pin, old in pins.items() if old in self.hinges
+            bodies={bar: self.bodies[other] for bar, other in bars.items()},
+            hinges={pins[pin]: joint for pin, joint in self.hinges.items()},
+            senses={
+                pins[pin]: sense if pin in ENDS[1] else -sense
+                for pin, sense in self.senses.items()
             },
-            senses=reversed_senses,
             points={
                 (bars[bar], pins[pin]): at for (bar, pin), at in self.points.items()
             },
-            lengths=(ground, output, coupler, crank),
-            angles=exchange(self.angles),
-            stated_angles=exchange(self.stated_angles),
+            lines=exchange(self.lines),
+            stated_lines=exchange(self.stated_lines),
         )
 
     def describe_lengths(self) -> str:

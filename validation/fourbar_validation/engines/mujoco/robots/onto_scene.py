@@ -7,8 +7,7 @@ closure is then closed onto the assembly of the scene.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from copy import deepcopy
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from xml.etree import ElementTree as ET
@@ -34,7 +33,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
     compile_robot,
 )
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop import (
     BAR_ROLES,
@@ -57,7 +56,6 @@ from fourbar_validation.engines.mujoco.robots.scene import (
     miss_output,
     write_pose,
 )
-from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 _NOTHING_CLOSES = {
     "MJCF": (
@@ -145,30 +143,23 @@ def _list_variants(
         return
     sites = [model.site(number).name for number in range(model.nsite)]
     stated = [names.get(role, role) for role in SITE_ROLES]
-    pairs: Iterable[Sequence[str]] = [stated]
+    pairs: list[Sequence[str]] = [stated]
     if not {*stated} <= {*sites}:
-        missing = [
-            f"{role}={names[role]}"
-            for role in SITE_ROLES
-            if role in names and names[role] not in sites
-        ]
-        if missing:
-            listed = ", ".join(filter(None, sites)) or "none"
-            raise InputError(
-                "--name", missing[0], f"no such site; the file has: {listed}"
-            )
-        named = [name for name in sites if name][:_MOST_SITES]
-        pairs = combinations(named, 2)
-    root = ET.fromstring(file.text)
-    tried = False
+        for role, name in names.items():
+            if role in SITE_ROLES and name not in sites:
+                listed = ", ".join(filter(None, sites)) or "none"
+                raise InputError(
+                    "--name", f"{role}={name}", f"no such site; the file has: {listed}"
+                )
+        named = [name for name in sites if name]
+        pairs = [*combinations(named[:_MOST_SITES], 2)]
+    if not pairs:
+        raise InputError("MJCF", None, _NOTHING_CLOSES[file.kind])
     for first, second in pairs:
-        tried = True
-        closed = deepcopy(root)
+        closed = ET.fromstring(file.text)
         equality = ET.SubElement(closed, "equality")
         ET.SubElement(equality, "connect", name="B", site1=first, site2=second)
         yield replace(file, text=ET.tostring(closed, encoding="unicode"))
-    if not tried:
-        raise InputError("MJCF", None, _NOTHING_CLOSES[file.kind])
 
 
 def _fit(
@@ -188,20 +179,17 @@ def _fit(
     model = posed.model
     wanted = {role: name for role, name in options.names.items() if role in BAR_ROLES}
     bodies = {role: _find_body(model, name) for role, name in wanted.items()}
-    fitting = [way for way in ways if not _list_misnamed(model, way, bodies)]
+    fitting = [way for way in ways if not _count_misnamed(model, way, bodies)]
     if not fitting:
         stated = ", ".join(f"{role}={name}" for role, name in wanted.items())
         bars = "; ".join(_write_bars(model, way) for way in ways)
         raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
-    usual = {
-        role: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, role)
-        for role in BAR_ROLES
-    }
-    usual = {role: body for role, body in usual.items() if body >= 0}
+    names = [model.body(body).name for body in range(model.nbody)]
+    usual = {role: names.index(role) for role in BAR_ROLES if role in names}
 
     def rank(way: RobotLoop) -> tuple[float, int]:
         missed = ALIKE * round(miss_lengths(scene, way) / ALIKE)
-        return missed, len(_list_misnamed(model, way, usual))
+        return missed, _count_misnamed(model, way, usual)
 
     loop = min(fitting, key=rank)
     # one of its pins on the ground is a hinge, by which it is found again
@@ -210,14 +198,9 @@ def _fit(
     loop, robot = close_onto(scene, posed, loop, pose)
     described = SceneOfLoop(compiled, robot, loop)
     described.meet_lengths()
-    found = LoopOfScene(
-        file,
-        compiled,
-        robot,
-        described.loop,
-        find_turn(scene, described.loop),
-        described.write_parts(),
-    )
+    turned = find_turn(scene, described.loop)
+    parts = described.write_parts()
+    found = LoopOfScene(file, compiled, robot, described.loop, turned, parts)
     return miss_lengths(scene, loop), found
 
 
@@ -234,21 +217,19 @@ def _list_ways(
 
 def _find_body(model: mujoco.MjModel, name: str) -> int:
     """Find a body by its name; an InputError lists what the file has."""
-    number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name))
-    if number < 0:
-        names = [name_body(model, body) for body in range(1, model.nbody)]
-        raise InputError(
-            "--name", name, f"no such body; the file has: {', '.join(names)}"
-        )
-    return number
+    names = [name_body(model, body) for body in range(model.nbody)]
+    if name not in names:
+        listed = ", ".join(names[1:])
+        raise InputError("--name", name, f"no such body; the file has: {listed}")
+    return names.index(name)
 
 
-def _list_misnamed(
+def _count_misnamed(
     model: mujoco.MjModel, loop: RobotLoop, bodies: Mapping[str, int]
-) -> list[str]:
-    """List the roles whose body is no part of the bar of that role."""
-    seen = SeenLoop(model, loop, 0.0)
-    return [role for role, body in bodies.items() if seen.bar(body) != BAR_ROLES[role]]
+) -> int:
+    """Count the roles whose body is no part of the bar of that role."""
+    bars = list_bars(model, loop)
+    return sum(bars[body] != BAR_ROLES[role] for role, body in bodies.items())
 
 
 def _write_bars(model: mujoco.MjModel, loop: RobotLoop) -> str:
@@ -356,16 +337,13 @@ def _close_flat(
     if is_in_line(loop.angles, command(scene).bar):
         posed = move_to(posed, _leave_flat(scene, posed, loop))
         loop = _sample_loop(posed, loop, pose, behind)
-    missed = miss_output(scene, loop.angles)
+    ways = [(miss_output(scene, loop.angles), loop, posed)]
     reflected = reflect(posed.model, loop, command(scene).bar)
     if reflected is not None:
         other_pose = move_to(posed, reflected)
         other = _sample_loop(other_pose, loop, pose, behind)
-        missed_by_other = miss_output(scene, other.angles)
-        if missed_by_other < missed:
-            posed = other_pose
-            loop = other
-            missed = missed_by_other
+        ways.append((miss_output(scene, other.angles), other, other_pose))
+    missed, loop, posed = min(ways, key=lambda way: way[0])
     text = (
         f"{name_following(command(scene).bar)} are in line in the pose before closing,"
         " which does not tell the assembly: "
@@ -387,17 +365,10 @@ def _leave_flat(
     commanded = command(scene)
     inside = LoopInside(posed.model, loop, bar=commanded.bar)
     turned = find_turn(scene, loop)
-    best = loop.qpos
-    largest = 0.0
-    for angle in np.unique(commanded.angle) + turned:
-        qpos = inside.close(float(angle))
-        if qpos is None:
-            continue
-        size = inside.measure_transmission(qpos)
-        if size > largest:
-            best = qpos
-            largest = size
-    return best
+    angles = np.unique(commanded.angle) + turned
+    poses = [inside.close(float(angle)) for angle in angles]
+    closed = [loop.qpos, *(qpos for qpos in poses if qpos is not None)]
+    return max(closed, key=inside.measure_transmission)
 
 
 def _fits_gravity(
@@ -417,11 +388,10 @@ def _fits_gravity(
     turned = loop.angles[0] - scene.linkage.ground_angle
     gravity = model.opt.gravity * is_enabled(model, "gravity")
     of_robot = LoopFrame(loop, posed.data, turned).in_plane(gravity)
-    size = float(np.linalg.norm(of_robot))
-    wanted_size = float(np.linalg.norm(wanted))
-    if size == 0.0 or wanted_size == 0.0:
+    sizes = np.linalg.norm([of_robot, wanted], axis=1)
+    if not sizes.all():
         return False
-    difference = of_robot / size - np.asarray(wanted) / wanted_size
+    difference = of_robot / sizes[0] - wanted / sizes[1]
     return bool(np.linalg.norm(difference) <= _SAME_DIRECTION)
 
 

@@ -133,7 +133,7 @@ def find_offset(
     total = np.zeros(3)
     for number in closures:
         first, second = find_ends(alone, data, number)
-        offset = max(offset, abs(float((first.place - second.place) @ normal)))
+        offset = max(offset, abs(float((first - second) @ normal)))
         total += read_equality_force(data, number)
     across = float(total @ normal)
     return offset, abs(across), float(np.linalg.norm(total - across * normal))

@@ -113,9 +113,7 @@ def read_loop_scene(
         raise InputError("--loop", None, f"states one of the four-bars: {names}")
     (loop,) = loops
     title = f"{loop.name} of {file.path.name}"
-    made = make_loop_scene(compiled, posed, loop, speed, title, str(file.path.name))
-    notes = (*compiled.notes, *posed.notes)
-    return replace(made, notes=notes)
+    return make_loop_scene(compiled, posed, loop, speed, title, file.path.name)
 
 
 def make_loop_scene(
@@ -134,13 +132,8 @@ def make_loop_scene(
         remarks.append(
             f"a speed of {DEFAULT_SPEED:g} rad/s is taken; --speed states another"
         )
-    return LoopScene(
-        scene,
-        made.loop,
-        made.write_parts(),
-        tuple(remarks),
-        (),
-    )
+    notes = (*compiled.notes, *posed.notes)
+    return LoopScene(scene, made.loop, made.write_parts(), tuple(remarks), notes)
 
 
 def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
@@ -150,7 +143,7 @@ def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
     """
     own = getattr(model, f"dof_{name}")[model.jnt_dofadr[joint]]
     if name == "damping":
-        own = own * is_enabled(model, "damper", "passive")
+        own = own * is_enabled(model, "damper")
     # since MuJoCo 4.0
     of_motors = getattr(model, f"actuator_{name}", np.zeros(model.nu))
     motors = list_actuators(model, joint)
@@ -232,8 +225,8 @@ class SceneOfLoop:
         self.seen = SeenLoop(posed.model, loop, 0.0)
         self.remarks: list[str] = []
         self.carried = {bar: self.seen.list_parts(bar) for bar in MOVING_BARS}
-        bodies = {body for carried in self.carried.values() for body in carried}
-        parts = list_unknown_parts(compiled, bodies)
+        self.bodies = {body for bodies in self.carried.values() for body in bodies}
+        parts = list_unknown_parts(compiled, self.bodies)
         if parts:
             self._leave_out(f"the mass of {', '.join(parts)}, whose mesh is missing")
         gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")
@@ -258,12 +251,7 @@ class SceneOfLoop:
             lines.append(f"Held as they stand: {', '.join(held)}.")
         return tuple(lines)
 
-    def describe(
-        self,
-        speed: float,
-        title: str,
-        source: str,
-    ) -> Scene:
+    def describe(self, speed: float, title: str, source: str) -> Scene:
         """Describe the scene."""
         lumps = {bar: self.seen.lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
@@ -271,23 +259,12 @@ class SceneOfLoop:
         bars = {}
         for bar, lump in lumps.items():
             inertia = lump.inertia + (armature.get("O4", 0.0) if bar == 4 else 0.0)
-            length = lengths[bar - 1]
-            bars[bar] = Bar(length)
-            if lump.mass or inertia:
-                bars[bar] = Bar(
-                    length,
-                    round_off(lump.mass),
-                    round_off(inertia),
-                    (round_off(lump.centre[0]), _round_angle(lump.centre[1])),
-                )
+            distance, angle = lump.centre
+            centre = (round_off(distance), _round_angle(angle))
+            mass = round_off(lump.mass)
+            bars[bar] = Bar(lengths[bar - 1], mass, round_off(inertia), centre)
         theta_1 = _round_angle(self.loop.angles[0])
-        linkage = FourBar(
-            lengths[0],
-            bars[2],
-            bars[3],
-            bars[4],
-            theta_1,
-        )
+        linkage = FourBar(lengths[0], bars[2], bars[3], bars[4], theta_1)
         *ends, at_start = self._find_sweep(linkage)
         whole = math.tau * math.ceil((-math.pi - ends[0]) / math.tau)
         start, stop = (_round_angle(end + whole) for end in ends)
@@ -296,13 +273,9 @@ class SceneOfLoop:
         motion = Motion(theta_2, speed, branch=branch)
         effects = tuple(self._list_effects(armature, at_start))
         self._remark_what_is_left_out(lumps)
+        loads = tuple(self._list_loads())
         return Scene(
-            linkage,
-            motion,
-            loads=tuple(self._list_loads()),
-            effects=effects,
-            title=title,
-            source=source,
+            linkage, motion, loads=loads, effects=effects, title=title, source=source
         )
 
     def meet_lengths(self) -> tuple[float, ...]:
@@ -328,54 +301,46 @@ class SceneOfLoop:
 
     def _list_armature(self) -> dict[str, float]:
         """Return the armature of each hinge that has any, by its pin, kg m^2."""
-        model = self.model
-        armature = dict[str, float]()
-        for pin, joint in self.loop.hinges.items():
-            size = _reflect(model, joint, "armature")
-            if size:
-                armature[pin] = size
-                name = name_joint(model, joint)
-                if pin == "O4":
-                    self.remarks.append(
-                        f"the armature {size:.6g} kg m^2 of {name} is in the inertia of"
-                        " the output, which turns as it does"
-                    )
-                elif pin != "O2":
-                    self.remarks.append(
-                        f"not in the scene: the armature {size:.6g} kg m^2 of {name}, "
-                        "between two moving bars"
-                    )
+        armature = {
+            pin: _reflect(self.model, joint, "armature")
+            for pin, joint in self.loop.hinges.items()
+        }
+        for pin, size in armature.items():
+            text = f"the armature {size:.6g} kg m^2 of {self._name_hinge(pin)}"
+            if size and pin == "O4":
+                self.remarks.append(
+                    f"{text} is in the inertia of the output, which turns as it does"
+                )
+            elif size and pin != "O2":
+                self._leave_out(f"{text}, between two moving bars")
         return armature
 
+    def _name_hinge(self, pin: str) -> str:
+        return name_joint(self.model, self.loop.hinges[pin])
+
     def _list_effects(
-        self,
-        armature: dict[str, float],
-        at_start: dict[str, float],
+        self, armature: dict[str, float], at_start: dict[str, float]
     ) -> Iterator[Effect]:
         """List the effects, the pins in their order."""
         model = self.model
         pull = self._in_plane(self.gravity)
         if abs(pull) > ROUND_OFF_OF_LOADS * float(np.linalg.norm(self.gravity)):
-            angle = math.atan2(pull.imag, pull.real)
-            yield Gravity(round_off(abs(pull)), _round_angle(angle))
+            yield Gravity(round_off(abs(pull)), _round_angle(cmath.phase(pull)))
         hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
-        rubbing = is_enabled(model, "frictionloss", "constraint")
-        damping = {pin: _reflect(model, hinges[pin], "damping") for pin in hinges}
-        couples = model.dof_frictionloss[model.jnt_dofadr[[*hinges.values()]]] * rubbing
-        friction = dict(zip(hinges, couples.tolist(), strict=True))
-        for make, at_pins in ((Viscous, damping), (Friction, friction)):
-            if any(at_pins.values()):
-                yield make(tuple((p, round_off(x)) for p, x in at_pins.items() if x))
-        springs = tuple(self._list_springs(hinges, at_start))
-        if springs:
+        damping = [_reflect(model, joint, "damping") for joint in hinges.values()]
+        couples = model.dof_frictionloss[model.jnt_dofadr[[*hinges.values()]]]
+        couples = couples * is_enabled(model, "frictionloss", "constraint")
+        for make, sizes in ((Viscous, damping), (Friction, couples.tolist())):
+            at_pins = zip(hinges, map(round_off, sizes), strict=True)
+            if any(sizes):
+                yield make(tuple((pin, size) for pin, size in at_pins if size))
+        if springs := tuple(self._list_springs(hinges, at_start)):
             yield Torsion(springs)
         if armature.get("O2"):
             yield Flywheel(round_off(armature["O2"]), 2)
 
     def _list_springs(
-        self,
-        hinges: dict[str, int],
-        at_start: dict[str, float],
+        self, hinges: dict[str, int], at_start: dict[str, float]
     ) -> Iterator[tuple[str, float, float, float]]:
         """List pin, stiffness, rest angle and preload of the hinges' springs.
 
@@ -383,7 +348,7 @@ class SceneOfLoop:
         couple of whole turns beyond is a preload.
         """
         model = self.model
-        if not is_enabled(model, "spring", "passive"):
+        if not is_enabled(model, "spring"):
             return
         for pin, joint in hinges.items():
             stiffness = float(model.jnt_stiffness[joint])
@@ -437,17 +402,17 @@ class SceneOfLoop:
         betas = self._follow(linkage, angles, in_pose)
         free = (angles >= low) & (angles <= high)
         stopping = []
-        for pin in betas.keys() - {"O2"}:
+        for pin, beta in betas.items():
             least, most = self.seen.stops(pin) or (-math.inf, math.inf)
-            above = betas[pin] >= least - OUTSIDE_A_RANGE
-            inside = above & (betas[pin] <= most + OUTSIDE_A_RANGE)
-            if not inside[free].all():
-                stopping.append(name_joint(self.model, self.loop.hinges[pin]))
+            above = beta >= least - OUTSIDE_A_RANGE
+            inside = above & (beta <= most + OUTSIDE_A_RANGE)
+            if pin != "O2" and not inside[free].all():
+                stopping.append(self._name_hinge(pin))
             free &= inside
         if stopping:
             self.remarks.append(
                 f"the range of {', '.join(sorted(stopping))} ends the motion before"
-                f" that of {name_joint(self.model, self.loop.joint)}"
+                f" that of {self._name_hinge('O2')}"
             )
         if not free.any():
             raise InputError(
@@ -531,27 +496,21 @@ class SceneOfLoop:
         for number in loop.other_equalities:
             name = describe_equality(model, number)
             self._leave_out(f"the equality {name}, which acts on its bars too")
-        dofs = [int(model.jnt_dofadr[joint]) for joint in loop.hinges.values()]
-        joints = list(loop.hinges.values())
-        for field, rows, what in (
-            ("dof_dampingpoly", dofs, "damping that is a polynomial of the speed"),
-            (
-                "jnt_stiffnesspoly",
-                joints,
-                "stiffness that is a polynomial of the angle",
-            ),
+        joints = [*loop.hinges.values()]
+        for field, rows, what, of in (
+            ("dof_dampingpoly", model.jnt_dofadr[joints], "damping", "speed"),
+            ("jnt_stiffnesspoly", joints, "stiffness", "angle"),
         ):
             if np.any(getattr(model, field, np.zeros(model.nv))[rows]):
-                self._leave_out(what)
+                self._leave_out(f"{what} that is a polynomial of the {of}")
         self._remark_tendons_and_motors()
         if np.any(model.opt.density) or np.any(model.opt.viscosity):
             self._leave_out(
                 f"a fluid of density {model.opt.density:g} kg/m^3 and viscosity "
                 f"{model.opt.viscosity:g} Pa s"
             )
-        bodies = [body for carried in self.carried.values() for body in carried]
         collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-        if np.any(collides & np.isin(model.geom_bodyid, bodies)):
+        if np.any(collides & np.isin(model.geom_bodyid, [*self.bodies])):
             self._leave_out("contacts, and what its bars touch")
 
     def _leave_out(self, what: str) -> None:
@@ -563,26 +522,22 @@ class SceneOfLoop:
         The motor of the driven hinge is left out.
         """
         model = self.model
-        bodies = {b for c in self.carried.values() for b in c}
-        joints = {*self.loop.hinges.values()}
         for number in filter(self.seen.touches_tendon, range(model.ntendon)):
-            acts = []
-            for name in ("stiffness", "damping", "frictionloss"):
-                values = getattr(model, f"tendon_{name}")[number]
-                if np.any(values):
-                    acts.append(f"{name} {float(np.max(values)):.6g}")
+            sizes = {
+                name: float(np.max(getattr(model, f"tendon_{name}")[number]))
+                for name in ("stiffness", "damping", "frictionloss")
+            }
+            acts = [f"{name} {size:.6g}" for name, size in sizes.items() if size]
             if acts:
                 name = model.tendon(number).name or str(number)
                 self._leave_out(f"the tendon {name} ({', '.join(acts)})")
+        joints = {*self.loop.hinges.values()} - {self.loop.joint}
         for number in range(model.nu):
             kind = mujoco.mjtTrn(int(model.actuator_trntype[number]))
             target = int(model.actuator_trnid[number, 0])
             on_joint = kind == mujoco.mjtTrn.mjTRN_JOINT and target in joints
-            on_site = (
-                kind == mujoco.mjtTrn.mjTRN_SITE
-                and int(model.site_bodyid[target]) in bodies
-            )
-            if on_site or (on_joint and target != self.loop.joint):
+            on_site = kind == mujoco.mjtTrn.mjTRN_SITE
+            if on_joint or (on_site and int(model.site_bodyid[target]) in self.bodies):
                 self._leave_out(describe_actuator(model, number))
 
 

@@ -10,12 +10,11 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
-    find_roots,
     is_enabled,
     list_actuators,
 )
 from fourbar_validation.engines.mujoco.robots.closures import EQUALITY_KINDS
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
+from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.robots.loop import DRIVEN_PINS, RobotLoop
 
 _PLANES = {2: "x-y", 1: "x-z", 0: "y-z"}
@@ -62,13 +61,7 @@ class SeenLoop(LoopFrame):
         self.hinge = loop.hinges
         self.sense = loop.senses
         self.closure = loop.equality
-        held = set(range(model.njnt)) - {*loop.hinges.values()}
-        self._roots = find_roots(model, held)
-        self._bars = {
-            self._roots[body]: bar
-            for bar, bodies in loop.bodies.items()
-            for body in bodies
-        }
+        self._bars = list_bars(model, loop)
 
     def with_model(self) -> "SeenLoop":
         """Return the same loop in a model of its own, which may be changed."""
@@ -120,7 +113,7 @@ class SeenLoop(LoopFrame):
 
     def bar(self, body: int) -> int | None:
         """Return the bar that a body belongs to, None if it belongs to none."""
-        return self._bars.get(self._roots[body])
+        return self._bars[body]
 
     def list_parts(self, bar: int) -> list[int]:
         """List the bodies of a bar."""
