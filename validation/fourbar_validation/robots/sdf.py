@@ -5,13 +5,13 @@ loop, and Drake's constraints, become a connect or a weld. The text keeps every 
 of the file; MuJoCo's own writer keeps six.
 """
 
-import heapq
 import math
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
+from itertools import permutations
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -402,33 +402,26 @@ class _Conversion:
             self.names[name] = short if counts[short] == 1 else name
 
     def _grow_tree(self, links: list[str]) -> None:
-        """Hang each link on another by a joint, from the world outwards."""
-        joints = defaultdict(list)
-        for number, edge in enumerate(self.edges):
-            for end in (edge.parent, edge.child):
-                joints[end].append((edge.rank(), number))
-        reached = set[str]()
+        """Hang each link on another by a joint, from the world outwards.
+
+        Of the joints that reach a further link the first is that of the lowest rank, of
+        equals the nearest to the world.
+        """
+        ranks = {edge: edge.rank() for edge in self.edges}
+        depths = {"": 0}
         for root in ("", *links):
-            if root in reached:
-                continue
-            reached.add(root)
-            if root:
+            if root not in depths:
+                depths[root] = 0
                 self.tree[root] = (None, "")
-            heap = [(rank, 0, number) for rank, number in joints[root]]
-            heapq.heapify(heap)
-            while heap:
-                _, depth, number = heapq.heappop(heap)
-                edge = self.edges[number]
-                for link, bearer in (
-                    (edge.child, edge.parent),
-                    (edge.parent, edge.child),
-                ):
-                    if link in reached:
-                        continue
-                    self.tree[link] = (edge, bearer)
-                    reached.add(link)
-                    for rank, other in joints[link]:
-                        heapq.heappush(heap, (rank, depth + 1, other))
+            while leading := [
+                (ranks[edge], depths[bearer], number, link, bearer)
+                for number, edge in enumerate(self.edges)
+                for link, bearer in permutations((edge.child, edge.parent))
+                if bearer in depths and link not in depths
+            ]:
+                _, depth, number, link, bearer = min(leading)
+                self.tree[link] = (self.edges[number], bearer)
+                depths[link] = depth + 1
         hanging = [edge for edge, _ in self.tree.values()]
         self.closing = [
             edge for edge in self.edges if edge.name and edge not in hanging

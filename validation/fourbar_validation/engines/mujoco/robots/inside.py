@@ -24,7 +24,7 @@ compared with, in the same model.
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from copy import copy
 from typing import NamedTuple
 
@@ -824,36 +824,36 @@ class LoopInside:
         The other joints are held. A state is the one of the largest gap on the way from
         each angle; of a motion that MuJoCo loses there is none.
         """
-        states = []
         model = copy(self.model)
-        data = mujoco.MjData(self.model)
         model.dof_armature[self.held] += self._size_armature(HEAVY)
         # the motor may meet the stops of the file
         model.opt.disableflags &= ~(LIMITS_OFF & ~self.flags)
         steps = max(round(seconds / model.opt.timestep), 1)
-        for angle in angles:
-            state = self.state(angle, 0.0)
-            if state is None:
-                continue
-            mujoco.mj_resetData(model, data)
-            data.qpos[:] = state.qpos
-            worst: TornState | None = None
-            for _ in range(steps):
-                data.qfrc_applied[:] = self.turn * torque
-                mujoco.mj_step(model, data)
-                mujoco.mj_forward(model, data)
-                mujoco.mj_rnePostConstraint(model, data)
-                if _has_warned(data):
-                    start = self._read_position(state.qpos)
-                    worst = TornState(start, math.inf, {})
-                    break
-                gap = self._measure_gap(data.qpos)
-                if worst is None or gap > worst.gap:
-                    joint = self._read_position(data.qpos)
-                    worst = TornState(joint, gap, self._read_forces(data))
-            assert worst is not None
-            states.append(worst)
-        return states
+        starts = (self.state(angle, 0.0) for angle in angles)
+        return [
+            max(self._let_go(model, start.qpos, torque, steps), key=lambda one: one.gap)
+            for start in starts
+            if start is not None
+        ]
+
+    def _let_go(
+        self, model: mujoco.MjModel, qpos: Array, torque: float, steps: int
+    ) -> Iterator[TornState]:
+        """Yield the states of a pose that is let go under a torque, N m."""
+        data = mujoco.MjData(model)
+        data.qpos[:] = qpos
+        for _ in range(steps):
+            data.qfrc_applied[:] = self.turn * torque
+            mujoco.mj_step(model, data)
+            mujoco.mj_forward(model, data)
+            mujoco.mj_rnePostConstraint(model, data)
+            if _has_warned(data):
+                yield TornState(self._read_position(qpos), math.inf, {})
+                return
+            joint = self._read_position(data.qpos)
+            yield TornState(
+                joint, self._measure_gap(data.qpos), self._read_forces(data)
+            )
 
 
 def _solve_least_squares(matrix: Array, right: Array) -> Array:

@@ -43,6 +43,8 @@ LARGEST_RESIDUAL = 1e-5
 MOST_NEWTON_STEPS = 100
 LONGEST_NEWTON_STEP = 0.3
 """rad or m; longer steps leave the region where the loops are nearly linear."""
+_NO_STEP = 1e-12
+"""rad or m; a shorter step moves nothing: the residuals are at their least."""
 _DAMPING = 1e-4
 """Weight of a step against the residuals. It keeps what no equality decides where it
 is.
@@ -340,6 +342,8 @@ class _Closing:
             step = np.zeros(self.model.nv)
             step[self.dofs] = lsq_linear(matrix, wanted, room).x
             mujoco.mj_integratePos(self.model, qpos, step, 1.0)
+            if np.abs(step).max() <= _NO_STEP:
+                break
         return qpos
 
 
