@@ -1,32 +1,17 @@
 """check-mjcf and advise on a robot's file: what is printed, and the exit status."""
 
-import cmath
 import math
-from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import fourbar
 from fourbar.mjcf import write_mjcf
-from fourbar.quantities import PIN_FORCES
 from fourbar_validation.advise.advise import advise_command as advise
-from fourbar_validation.engines.mujoco.robots.answers import (
-    BarMotion,
-    InsideAnswer,
-    InsideRow,
-    LoopMeasurement,
-    PinsAndTorque,
-)
 from fourbar_validation.robots.check import check_mjcf_command as check_mjcf
 from fourbar_validation.robots.command import robot_command as loops
-from fourbar_validation.robots.judge import _make_answer
-from fourbar_validation.robots.measure import _subtract_formulas
 from tests.support.robots import FOOT_PARALLELOGRAM, make_parallelogram
-from tests.support.scenes import crank_rocker
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
@@ -78,39 +63,6 @@ def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(
     assert "not simulated: its timestep of" in held
     assert "by generalized forces; contacts, joint limits and motors are off" in held
     assert "nan" not in checked.output
-
-
-def test_forces_in_a_plane_that_is_turned_are_those_of_the_scene():
-    """The scene's own answer, turned by 40 deg as complex numbers."""
-    turned = math.radians(40.0)
-    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 5.0, 6), 10.0, 5.0))
-    solution = fourbar.solve(scene)
-
-    def turn(vector):
-        turned_vector = complex(*vector) * cmath.exp(1j * turned)
-        return np.array([turned_vector.real, turned_vector.imag])
-
-    rows = []
-    for i, theta_2 in enumerate(solution.theta_2):
-        thetas = (theta_2, solution.theta_3[i], solution.theta_4[i])
-        angles = [theta + turned for theta in thetas]
-        speeds = (10.0, solution.omega_3[i], solution.omega_4[i])
-        forces = {name: turn(getattr(solution, name)[i]) for name in PIN_FORCES}
-        right = PinsAndTorque(solution.torque[i], forces)
-        bars = BarMotion(*angles, *speeds)
-        row = InsideRow(theta_2 + turned, 10.0, 5.0, 0.0, right, right, 0.0, bars, 1.0)
-        rows.append(row)
-    measured = SimpleNamespace(scene=scene, turned=turned)
-    for method in (LoopMeasurement.command, LoopMeasurement.collect):
-        setattr(measured, method.__name__, partial(method, measured))
-    inside = InsideAnswer(rows)
-    answer = _make_answer(measured, inside, "engine", "setting")
-    assert answer.at.angle == pytest.approx(solution.theta_2, abs=1e-12)
-    for name, values in answer.quantities.items():
-        np.testing.assert_allclose(values, solution[name], atol=1e-10, err_msg=name)
-    differences = _subtract_formulas(inside, solution, measured)
-    assert {*differences} == {"torque", *PIN_FORCES}
-    assert max(values.max() for values in differences.values()) < 1e-10
 
 
 def test_options_that_do_not_go_together_are_refused():

@@ -396,15 +396,6 @@ def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed():
     )
 
 
-def test_a_loop_seen_from_behind_turns_the_other_way():
-    loop = loop_of(Planar().text())
-    behind = loop.seen_from_behind()
-    assert np.allclose(behind.angles, np.negative(loop.angles))
-    assert np.allclose(behind.axis, -loop.axis)
-    assert behind.senses == {pin: -sense for pin, sense in loop.senses.items()}
-    assert behind.lengths == loop.lengths
-
-
 def test_a_loop_is_chosen_by_its_name():
     closures = report_of(Planar().text()).closures
     assert choose_loop(closures, "coupler-output") is closures[0].loop
