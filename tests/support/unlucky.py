@@ -12,13 +12,14 @@ from pathlib import Path
 
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines import workers
+from fourbar_validation.scenes.suites import Suite
 from tests.support.scenes import crank_rocker
 
 PREPARE = workers.prepare_worker
 
 
 @dataclass(frozen=True)
-class Few:
+class Few(Suite):
     """Scenes made in code; the names say which engine misbehaves where."""
 
     names: tuple[str, ...] = ("a", "b", "c", "d")

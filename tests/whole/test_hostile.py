@@ -32,7 +32,7 @@ from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
 from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.run import run
-from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
+from fourbar_validation.scenes.suites import LARGEST_LIST, Suite, read_suite
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 
@@ -60,7 +60,7 @@ def scene_text(title):
 
 
 @dataclass(frozen=True)
-class Named:
+class Named(Suite):
     """Scenes whose name, title and source are hostile.
 
     Where the beginning or the whole matters each by itself.

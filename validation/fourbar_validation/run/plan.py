@@ -4,7 +4,7 @@ Every machine cuts a run alike.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.summary import PICTURED, SKETCHED, Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.store import Store
-from fourbar_validation.scenes.suites import Files, Suite
+from fourbar_validation.scenes.suites import Suite
 
 WORKERS = 2
 SCENES_OF_A_SLOW_TASK = 1
@@ -121,12 +121,8 @@ class Plan:
     @property
     def draw_at_once(self) -> bool:
         """Return whether scenes are drawn as they are judged, because there are few."""
-        suite = self.suite
-        if isinstance(suite, Files):
-            without_pictures = len(suite.not_drawn)
-        else:
-            without_pictures = 0
-        return self.options.drawn and len(suite) - without_pictures <= PICTURED
+        pictures = len(self.suite) - len(self.suite.not_drawn)
+        return self.options.drawn and pictures <= PICTURED
 
     @property
     def sketch(self) -> bool:
@@ -137,11 +133,8 @@ class Plan:
     def tasks(self) -> list[range]:
         """Return the scenes of each task."""
         count = len(self.suite)
-        simulated = any(engine.through_time for engine in self.engines)
-        if self.draw_at_once or simulated:
-            least = SCENES_OF_A_SLOW_TASK
-        else:
-            least = SCENES_OF_A_QUICK_TASK
+        slow = self.draw_at_once or any(one.through_time for one in self.engines)
+        least = SCENES_OF_A_SLOW_TASK if slow else SCENES_OF_A_QUICK_TASK
         size = max(least, math.ceil(count / _MOST_TASKS))
         return [
             range(start, min(start + size, count)) for start in range(0, count, size)
@@ -184,7 +177,12 @@ class Plan:
         if kept:
             progress.note(self._tell_kept(kept))
         progress.advance(JUDGING, len(kept))
-        jobs = self._make_jobs(task for task in wanted if task not in done)
+        how = self.engines, self.draw_at_once, self.sketch
+        jobs = (
+            (task, pool.make_jobs(self.suite, self.tasks[task], *how))
+            for task in wanted
+            if task not in done
+        )
         workers = self.options.workers
         limit = pool.find_time_limit(self.suite, self.engines)
         for task, records in pool.judge_tasks(jobs, limit, workers):
@@ -200,19 +198,6 @@ class Plan:
             f"kept from an interrupted run: the answers of all engines on"
             f" {len(scenes)} of {len(self.suite)} scenes, {', '.join(names)}{further}"
         )
-
-    def _make_jobs(self, tasks: Iterable[int]) -> Iterator[tuple[int, list[pool.Job]]]:
-        for task in tasks:
-            yield (
-                task,
-                pool.make_jobs(
-                    self.suite,
-                    self.tasks[task],
-                    self.engines,
-                    self.draw_at_once,
-                    self.sketch,
-                ),
-            )
 
     def summarise(self) -> Summary:
         """Return a summary that knows the engines, and no scene yet."""

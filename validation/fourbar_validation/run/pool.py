@@ -13,7 +13,7 @@ from fourbar_validation.engines.processes import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge_for_report
-from fourbar_validation.scenes.suites import Files, Suite
+from fourbar_validation.scenes.suites import Suite
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,22 +44,15 @@ def make_jobs(
     sketch: bool = False,
 ) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone."""
-    jobs = []
-    for i in scenes:
-        if isinstance(suite, Files):
-            drawn = draw and suite.name(i) not in suite.not_drawn
-            jobs.append(
-                Job(
-                    replace(suite, texts=(suite.texts[i],)),
-                    0,
-                    engines,
-                    drawn,
-                    sketch,
-                )
-            )
-        else:
-            jobs.append(Job(suite, i, engines, draw, sketch))
-    return jobs
+    return [
+        Job(
+            *suite.alone(i),
+            engines,
+            draw and suite.name(i) not in suite.not_drawn,
+            sketch,
+        )
+        for i in scenes
+    ]
 
 
 def judge_job(job: Job) -> Record:
@@ -102,9 +95,7 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
 
     Guests have limits of their own besides.
     """
-    limit = worker_processes.SCENE_SECONDS + SECONDS_PER_POSITION * (
-        suite.positions if isinstance(suite, Files) else 0
-    )
+    limit = worker_processes.SCENE_SECONDS + SECONDS_PER_POSITION * suite.positions
     return limit + QUESTIONS * sum(
         guest.seconds or limit for guest in engines if isinstance(guest, Guest)
     )

@@ -25,6 +25,7 @@ from fourbar_validation.scenes.random import (
     draw_lengths,
     draw_uniform,
 )
+from fourbar_validation.scenes.suites import Suite
 
 HEAVY_BARS = Ranges(
     mass=draw_uniform(0.2, 2.0),
@@ -435,7 +436,7 @@ HARD_FAMILIES = tuple(
 )
 
 
-class Hard:
+class Hard(Suite):
     """Every scene of every family, by name.
 
     A worker makes them again from the parameters alone.

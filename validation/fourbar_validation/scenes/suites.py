@@ -41,6 +41,11 @@ class Suite(Protocol):
     A scene is made where it is judged, so a long suite takes no memory.
     """
 
+    positions: int = 0
+    """The most that a scene of files asks for, or what takes as long."""
+    not_drawn: frozenset[str] = frozenset()
+    """Names of the scenes of which no pictures are made."""
+
     def __len__(self) -> int: ...
 
     def name(self, index: int) -> str:
@@ -52,20 +57,26 @@ class Suite(Protocol):
     def fingerprint(self) -> str:
         """Name the suite; changes when any scene does."""
 
+    def alone(self, index: int) -> "tuple[Suite, int]":
+        """Return what a worker needs of a scene: a suite, and its number there."""
+        return self, index
+
 
 @dataclass(frozen=True, slots=True)
-class Files:
+class Files(Suite):
     """Scene files, read once so that a run judges what it began with."""
 
     texts: tuple[tuple[str, str], ...]
     """(name, text of the file), sorted by name."""
     positions: int = 0
-    """The most that any of them asks for, or what takes as long."""
     not_drawn: frozenset[str] = frozenset()
-    """Names of the scenes of which no pictures are made."""
 
     def __len__(self) -> int:
         return len(self.texts)
+
+    def alone(self, index: int) -> "tuple[Files, int]":
+        """Return the text of the scene alone."""
+        return replace(self, texts=(self.texts[index],)), 0
 
     def name(self, index: int) -> str:
         """Name a scene."""
@@ -82,7 +93,7 @@ class Files:
 
 
 @dataclass(frozen=True, slots=True)
-class Random:
+class Random(Suite):
     """`count` random linkages of the given types, or uneven ones.
 
     Scene i depends on (seed, i) alone.
@@ -177,21 +188,14 @@ def _count_positions(scene: Scene, file: Path) -> int:
     require_steps(scene.motion, MOST_POSITIONS_OF_A_SCENE, "in a run", str(file))
     for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
         if isinstance(stated, (Sweep, Law, Rise, Sine, Free)):
-            if isinstance(stated, Free):
-                seconds = stated.duration
-            else:
-                seconds = 0.0
+            seconds = stated.duration if isinstance(stated, Free) else 0.0
             if seconds > _MOST_SECONDS:
                 allowed = (
                     f"must not exceed {_MOST_SECONDS:g} s in a run: engines go through"
                     " it in steps of 1 ms"
                 )
-                raise InputError(
-                    "motion.free.duration",
-                    seconds,
-                    allowed,
-                    str(file),
-                )
+                key = "motion.free.duration"
+                raise InputError(key, seconds, allowed, str(file))
             return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return len(default_places(scene))
 
