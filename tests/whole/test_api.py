@@ -371,37 +371,6 @@ def test_a_figure_is_refused_arguments_of_another_type(tmp_path):
         assert "\n" not in str(caught.value)
 
 
-def test_the_public_formulas_agree_with_a_solution():
-    """A point's velocity is its coefficient times omega_2.
-
-    The coupler curve passes through the point at each angle.
-    """
-    scene = crank_rocker()
-    solution, linkage = fourbar.solve(scene), scene.linkage
-    at, z = (linkage, solution.theta_2, solution.branch), linkage.coupler.to_centre
-    by_angle = fourbar.point_coefficients(*at, 3, z)
-    a = by_angle.first * solution.alpha_2 + by_angle.second * solution.omega_2**2
-    np.testing.assert_allclose(
-        np.column_stack([np.real(a), np.imag(a)]),
-        solution.a_G3,
-        rtol=1e-12,
-        atol=1e-12,
-    )
-    curve = fourbar.coupler_curve(linkage, z.real, z.imag)
-    gaps = np.hypot(
-        curve.x[:, None] - solution.G3[:, 0],
-        curve.y[:, None] - solution.G3[:, 1],
-    )
-    assert gaps.min(axis=0).max() < 0.01 * linkage.coupler.length
-    pin = fourbar.instant_centres(*at)[2, 3].point
-    np.testing.assert_allclose(
-        np.column_stack(pin),
-        solution.A,
-        rtol=0.0,
-        atol=1e-15,
-    )
-
-
 def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert status(["classify", "0.3", "0.1", "0.25", "0.22", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

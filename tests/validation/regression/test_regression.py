@@ -128,9 +128,9 @@ def read_files(folder):
 def test_other_versions_are_reported():
     """Kernels that a processor is given are among them."""
     others = {"mujoco": "3.3.7", "cpu_features": "none", "blas_kernel": "Prescott"}
-    older = replace(HERE, versions=HERE.versions | others)
+    older = replace(HERE, versions=HERE.versions | others, machine="another")
     found = compare_rows((older, [ROW]), (HERE, [ROW]))
-    assert {what for what, _, _ in found.surroundings} == {*others}
+    assert {what for what, _, _ in found.surroundings} == {*others, "machine"}
     assert "\nmujoco: 3.3.7 -> " in "\n" + render.write_differences(found)
 
 
