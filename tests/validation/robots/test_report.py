@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.columns import read_columns
@@ -151,6 +151,15 @@ def test_how_near_a_state_is_to_a_change_point_is_told_within_ten_degrees(
         f"{abs(degrees):.2g} deg from a change point" if near else ""
     )
     assert bool(told) == near
+
+
+def test_a_small_transmission_angle_is_told_as_well():
+    """At theta_2 = 0 the bars b = 10, c = 9 and e = d - a = 1.5 are nearly in line."""
+    scene = Scene(uniform(4.5, 3.0, 10.0, 9.0))
+    mu = math.degrees(math.acos((100.0 + 81.0 - 2.25) / 180.0))
+    told = _describe_limit(SimpleNamespace(scene=scene), math.radians(3.0))
+    small = f"a transmission angle of {mu:.2g} deg, whose sine divides the forces"
+    assert told == f"3 deg from {small}"
 
 
 @pytest.mark.parametrize(

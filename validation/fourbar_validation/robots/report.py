@@ -15,6 +15,7 @@ from fourbar.formulas.mobility import (
     find_intervals,
     turns_fully,
 )
+from fourbar.formulas.transmission import transmission_extremes
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import command
 from fourbar.writing import write_text
@@ -287,24 +288,38 @@ def _describe_worst_near_limits(
 
 
 def _describe_limit(loop: LoopMeasurement, theta_2: float) -> str:
-    """Say how near an angle of the scene's bar 2 is to a limit or a change point.
+    """Say how near an angle of the scene's bar 2 is to a place where forces are large.
 
-    The text is empty beyond NEAR_A_LIMIT. `theta_2`: rad.
+    Such a place is a limit, a change point or a small transmission angle. The text is
+    empty beyond NEAR_A_LIMIT. `theta_2`: rad.
     """
     linkage = loop.scene.linkage
-    places = [(angle, "a change point") for angle in change_points(linkage, 2)]
+    unbounded = ", where forces grow without bound"
+    places = [(at, f"a change point{unbounded}") for at in change_points(linkage, 2)]
     if not turns_fully(linkage):
         limits = [end for ends in find_intervals(linkage) for end in ends]
-        places += [(limit, "a limit position") for limit in limits]
+        places += [(limit, f"a limit position{unbounded}") for limit in limits]
+    mu = transmission_extremes(linkage)
+    smallest = (
+        (mu.theta_2_least, mu.least),
+        (mu.theta_2_greatest, math.pi - mu.greatest),
+    )
+    places += [
+        (
+            at,
+            f"a transmission angle of {math.degrees(angle):.2g} deg, whose sine"
+            " divides the forces",
+        )
+        for at, angle in smallest
+        if 0.0 < angle < NEAR_A_LIMIT
+    ]
     near = [
         (abs(math.remainder(theta_2 - angle, math.tau)), kind) for angle, kind in places
     ]
     distance, kind = min(near, default=(math.inf, ""))
     if distance > NEAR_A_LIMIT:
         return ""
-    return (
-        f"{math.degrees(distance):.2g} deg from {kind}, where forces grow without bound"
-    )
+    return f"{round(math.degrees(distance), 6):.2g} deg from {kind}"
 
 
 def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
