@@ -15,11 +15,12 @@ from fourbar.edit.document import KeyPath, SceneDocument
 from fourbar.effects import Load, Place
 from fourbar.effects.place import states_place
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
+from fourbar.evaluation.case import compute_shown_state
+from fourbar.formulas.motion import State
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, SECOND_PIN
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
-from fourbar.solving import solve
 from fourbar.studies.keys import list_described
 
 _SAME_ANGLE = 1e-9
@@ -157,25 +158,17 @@ def drag(
     position = Command(
         np.array([dragged.theta_2]),
         np.array([dragged.branch], dtype=np.int8),
-        None,
+        0.0,
         0.0,
     )
-    shown = solve(scene, "position", at=position)
-    pins = {"O2": 0j, "A": complex(*shown.A[0]), "B": complex(*shown.B[0])}
-    pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)
+    state = compute_shown_state(scene, position)
     if isinstance(dragged.what, str):
         if scene.drawing is None:
-            _drag_pin(document, dragged, pins)
+            _drag_pin(document, dragged, state)
         else:
             _drag_drawn_pin(document, dragged, scene.drawing)
         return
-    turned = {
-        1: scene.linkage.ground_angle,
-        2: dragged.theta_2,
-        3: float(shown.theta_3[0]),
-        4: float(shown.theta_4[0]),
-    }
-    if not all(map(cmath.isfinite, (*pins.values(), *turned.values()))):
+    if not np.isfinite(state.position.u3).all():
         raise InputError(
             "theta_2",
             dragged.theta_2,
@@ -183,8 +176,8 @@ def drag(
         )
     in_world = 1.0 + 0.0j
     for handle in list_handles(scene):
-        bar_frame = cmath.rect(1.0, turned[handle.bar])
-        foot = pins[FIRST_PIN[handle.bar]] + bar_frame * handle.at
+        bar_frame = _take_one(state.direction(handle.bar))
+        foot = _take_one(state.foot(handle.bar)) + bar_frame * handle.at
         frame = bar_frame if handle.turns else in_world
         if list(handle.path) == dragged.what:
             pair = (dragged.to - foot) / frame
@@ -193,18 +186,7 @@ def drag(
         if handle.force is not None and list(handle.force) == dragged.what:
             force_frame = bar_frame if handle.force_turns else in_world
             arrow = (dragged.to - foot - frame * handle.beyond) / force_frame
-            stated = str(plain["loads"][handle.force[1]]["force"][0])
-            unit = find_unit(stated, "N")
-            force = to_si(stated, unit) * dragged.stretch
-            half_turn = 0.0 if force >= 0.0 else math.pi
-            angle = cmath.phase(arrow) + half_turn
-            path_of_size = (*handle.force, 0)
-            path_of_angle = (*handle.force, 1)
-            old_angle = document.at(path_of_angle)
-            new_size = write_rounded(force, abs(force) / 50.0, unit)
-            new_angle = _write_like(old_angle, angle, 0.02, "rad")
-            document.put(path_of_size, new_size)
-            document.put(path_of_angle, new_angle)
+            _put_force(document, handle.force, plain, arrow, dragged.stretch)
             return
     raise InputError(
         "drag",
@@ -213,24 +195,41 @@ def drag(
     )
 
 
-def _drag_pin(
+def _take_one(value: Any) -> complex:
+    """Return a place or direction at the one position of a state."""
+    return complex(np.ravel(value)[0])
+
+
+def _put_force(
     document: SceneDocument,
-    dragged: Dragged,
-    pins: dict[str, complex],
+    path: KeyPath,
+    plain: dict[str, Any],
+    arrow: complex,
+    stretch: float,
 ) -> None:
+    """Turn a force into the direction of its arrow; a negative one stays so."""
+    stated = str(plain["loads"][path[1]]["force"][0])
+    unit = find_unit(stated, "N")
+    force = to_si(stated, unit) * stretch
+    half_turn = 0.0 if force >= 0.0 else math.pi
+    angle = cmath.phase(arrow) + half_turn
+    of_angle = (*path, 1)
+    written = _write_like(document.at(of_angle), angle, 0.02, "rad")
+    document.put((*path, 0), write_rounded(force, abs(force) / 50.0, unit))
+    document.put(of_angle, written)
+
+
+def _drag_pin(document: SceneDocument, dragged: Dragged, state: State) -> None:
+    """Change the lengths of the bars that end in a pin."""
     ground = ("lengths", "ground")
     if dragged.what == "O4" and isinstance(document.at(ground), dict):
         put_place(document, ground, dragged.to, dragged.grain)
         return
-    lengths = {
-        "A": {"input": "O2"},
-        "B": {"coupler": "A", "output": "O4"},
-        "O4": {"ground": "O2"},
-    }[str(dragged.what)]
-    for bar, pin in lengths.items():
-        key = ("lengths", bar)
-        length = abs(dragged.to - pins[pin])
-        document.put(key, _write_like(document.at(key), length, dragged.grain))
+    for bar, pin in SECOND_PIN.items():
+        if pin == dragged.what:
+            key = ("lengths", BAR_NAMES[bar])
+            length = abs(dragged.to - _take_one(state.foot(bar)))
+            document.put(key, _write_like(document.at(key), length, dragged.grain))
     if dragged.what == "O4":
         angle = cmath.phase(dragged.to)
         grain = dragged.grain / max(abs(dragged.to), dragged.grain)
