@@ -400,10 +400,8 @@ def _add_element(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _drag_point(session: Session, asked: dict[str, Any]) -> None:
-    numbers = {}
-    for name in ("grain", "theta_2", "stretch"):
-        if name in asked:
-            numbers[name] = float(asked[name])
+    names = {"grain", "theta_2", "stretch"} & asked.keys()
+    numbers = {name: float(asked[name]) for name in names}
     x, y = map(float, asked["to"])
     dragged = Dragged(
         asked["what"],
