@@ -18,6 +18,7 @@ METHODS = {
     "Bar": ("moment_of_inertia",),
     "Motion": ("replace",),
     "Scene": ("plot",),
+    "Released": ("time", "theta_2", "omega_2", "alpha_2"),
     "Sensitivity": ("of", "value", "to_pandas"),
 }
 """Methods and properties that are shown with their class."""

@@ -89,6 +89,26 @@ class Released:
         """Return the command at other times, (n,) rising from 0, s, of the same run."""
         return self._run.report(times).command
 
+    @property
+    def time(self) -> Array:
+        """Times of the instants, (n,), s."""
+        return np.asarray(self.command.time)
+
+    @property
+    def theta_2(self) -> Array:
+        """Angle of the input, continuous, (n,), rad."""
+        return self.command.angle
+
+    @property
+    def omega_2(self) -> Array:
+        """Speed of the input, (n,), rad/s."""
+        return np.asarray(self.command.speed)
+
+    @property
+    def alpha_2(self) -> Array:
+        """Acceleration of the input, (n,), rad/s^2."""
+        return np.asarray(self.command.acceleration)
+
 
 def release(scene: Scene) -> Released:
     """Compute the motion of a linkage that is released, as its scene says (`free`).
