@@ -185,19 +185,13 @@ def measure_influences(
     influences = []
     for name, changed, varied, why in _describe_setting(scene, settings):
         worst, at_steps = _measure_errors(scene, setup, varied)
-        if before > 0.0 and math.isfinite(before):
-            times = worst / before
-        else:
-            times = math.nan
-        if before_at_steps > 0.0:
-            growth = at_steps / before_at_steps
-        else:
-            growth = math.nan
+        times = worst / before if 0.0 < before < math.inf else math.nan
+        growth = at_steps / before_at_steps if before_at_steps > 0.0 else math.nan
         reason = why(setup, times, growth)
         influences.append(SettingInfluence(name, changed, worst, times, reason))
     return sorted(
         influences,
-        key=lambda one: -one.times if one.times == one.times else math.inf,
+        key=lambda one: math.inf if math.isnan(one.times) else -one.times,
     )
 
 
@@ -208,9 +202,9 @@ def _measure_errors(
 ) -> tuple[float, float]:
     """Return the worst error at the steps and between them, and at the steps alone."""
     trial = setup.try_out(settings)
-    if trial.broken:
-        return math.inf, math.inf
-    at_steps = compute_errors(scene, trial.at, trial.quantities)
+    at_steps = INFINITE_ERRORS
+    if not trial.broken:
+        at_steps = compute_errors(scene, trial.at, trial.quantities)
     return judge_trial(scene, trial).worst, at_steps.worst
 
 

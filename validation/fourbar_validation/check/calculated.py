@@ -5,7 +5,6 @@ drive follow from this change by the equations of the free bodies, which are sol
 all changes at once.
 """
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -648,54 +647,31 @@ def find_single_precision(judge: Judge) -> Iterator[Mistake]:
 def _state(
     text: str,
     values: MistakenNumbers,
-    *,
-    whole: bool = True,
-    left: float = 0.0,
+    **more: Any,
 ) -> Mistake:
-    def predict(quantity: str, right: Solution) -> Array | None:
-        return values.get(quantity)
-
-    return Mistake(text, predict, whole=whole, left=left)
+    """Return the mistake that leads to these numbers; `more`: fields of `Mistake`."""
+    return Mistake(text, lambda quantity, right: values.get(quantity), **more)
 
 
 def _find_impulses(judge: Judge) -> Iterator[Mistake]:
     """Fit one time by which all forces and the torque are multiplied."""
-    ours = []
-    theirs = []
-    for key in judge.table.values:
-        if name_quantity(key) in FORCE_NAMES:
-            mask = judge.where(key)
-            ours.append(judge.ours(key)[mask].ravel())
-            theirs.append(judge.table.values[key][mask].ravel())
-    if len(ours) < ENOUGH_POSITIONS:
+    keys = [key for key in judge.table.values if name_quantity(key) in FORCE_NAMES]
+    if len(keys) < ENOUGH_POSITIONS:
         return
-    x = np.concatenate(ours)
-    y = np.concatenate(theirs)
-    stated = np.isfinite(y)
-    x = x[stated]
-    y = y[stated]
-    with np.errstate(all="ignore"):
-        squares = float(x @ x)
-        if squares:
-            time = float(x @ y) / squares
-        else:
-            time = math.nan
-    if len(x) < ENOUGH_POSITIONS:
+    ours, theirs = (
+        np.concatenate([numbers(key)[judge.where(key)].ravel() for key in keys])
+        for numbers in (judge.ours, judge.table.values.__getitem__)
+    )
+    stated = np.isfinite(theirs)
+    squares = float(ours[stated] @ ours[stated])
+    if np.count_nonzero(stated) < ENOUGH_POSITIONS or not squares:
         return
-    if not 0.0 < time < 1.0:
-        return
-
-    def predict(quantity: str, right: Solution) -> Array | None:
-        if quantity in FORCE_NAMES:
-            values = getattr(right, quantity, None)
-        else:
-            values = None
-        if values is None:
-            return None
-        return np.asarray(time * values)
-
-    text = f"impulses in place of forces: every force and the torque times {time:.4g} s"
-    yield Mistake(text, predict, times=2.0)
+    time = float(ours[stated] @ theirs[stated]) / squares
+    if 0.0 < time < 1.0:
+        forces = ((name, getattr(judge.right, name)) for name in FORCE_NAMES)
+        impulses = {name: time * force for name, force in forces if force is not None}
+        how = f"every force and the torque times {time:.4g} s"
+        yield _state(f"impulses in place of forces: {how}", impulses, times=2.0)
 
 
 def _find_late(judge: Judge) -> Iterator[Mistake]:
@@ -757,16 +733,8 @@ def _find_stale(judge: Judge) -> Iterator[Mistake]:
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
     """Yield the mistake of the other branch from where the numbers change."""
-    key = next(
-        (
-            key
-            for key in ("theta_3", "theta_4", *judge.table.values)
-            if key in judge.table.values
-        ),
-        None,
-    )
-    if key is None:
-        return
+    keys = ("theta_3", "theta_4", *judge.table.values)
+    key = next(filter(judge.table.values.__contains__, keys))
     error, allowed, _ = judge.judged_right(key)
     if not (error > allowed).any():
         return
@@ -791,10 +759,7 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
         ours, theirs = (getattr(one, quantity, None) for one in (right, other))
         if ours is None or theirs is None:
             return None
-        if quantity in VECTORS:
-            mask = later[:, None]
-        else:
-            mask = later
+        mask = later[:, None] if quantity in VECTORS else later
         return np.asarray(np.where(mask, theirs, ours))
 
     place = f"{judge.at.commanded} = {here:.4g} deg"

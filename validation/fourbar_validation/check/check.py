@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import click
@@ -277,50 +277,33 @@ def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
 
 
 def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]:
-    by_quantity = {
-        quantity: [f for f in judgement.findings if f.quantity == quantity]
-        for quantity in dict.fromkeys(f.quantity for f in judgement.findings)
-    }
-    for quantity, findings in by_quantity.items():
-        judged = [finding for finding in findings if finding.judged]
+    case = partial(JunitCase, name, name)
+    for quantity in dict.fromkeys(each.quantity for each in judgement.findings):
+        judged = [
+            each
+            for each in judgement.findings
+            if each.quantity == quantity and each.judged
+        ]
         differing = [finding for finding in judged if not finding.agrees]
         if differing:
             worst = max(differing, key=lambda finding: finding.error)
             text = (
                 f"{len(differing)} of {len(judged)} differ; line {worst.line}: theirs"
-                f" {worst.theirs}, ours "
+                f" {worst.theirs}, ours {worst.ours} in SI, error {worst.error:.2e},"
+                f" allowed {worst.allowed:.2e}"
             )
-            text += (
-                f"{worst.ours} in SI, error {worst.error:.2e}, allowed"
-                f" {worst.allowed:.2e}"
-            )
-            yield JunitCase(name, name, quantity, "failure", "differs", text)
+            yield case(quantity, "failure", "differs", text)
+        elif judged:
+            yield case(quantity, "passed")
         else:
-            skipped = "no digit is left to judge by"
-            yield JunitCase(
-                name,
-                name,
-                quantity,
-                *(("passed",) if judged else ("skipped", "not judged", skipped)),
-            )
+            text = "no digit is left to judge by"
+            yield case(quantity, "skipped", "not judged", text)
     for line in judgement.not_assembled:
-        yield JunitCase(
-            name,
-            name,
-            f"line {line}",
-            "failure",
-            "no motion",
-            "the linkage has no motion there",
-        )
+        text = "the linkage has no motion there"
+        yield case(f"line {line}", "failure", "no motion", text)
     if not judgement.compared:
-        yield JunitCase(
-            name,
-            name,
-            "anything is compared",
-            "failure",
-            "nothing compared",
-            judgement.sentence(),
-        )
+        text = judgement.sentence()
+        yield case("anything is compared", "failure", "nothing compared", text)
 
 
 MOST_SHOWN_OF_EACH = 3

@@ -71,16 +71,11 @@ def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
     Raises InputError for what is no entry.
     """
     entries: dict[str, Entry] = {}
-    for file in dict.fromkeys(
-        folder / ENGINES_FILE
-        for folder in (*folders, Path(__file__).parent, *LAB_FOLDERS)
-    ):
+    for folder in dict.fromkeys((*folders, Path(__file__).parent, *LAB_FOLDERS)):
+        file = folder / ENGINES_FILE
         if file.is_file():
-            entries = entries | {
-                name: entry
-                for name, entry in read_engines_of(file).items()
-                if name not in entries
-            }
+            of_file = read_engines_of(file)
+            entries |= {name: of_file[name] for name in of_file if name not in entries}
     return entries
 
 
@@ -153,17 +148,13 @@ def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
     """
     if not entry.requires and not entry.python:
         return sys.executable
+    python: str | None = sys.executable
+    wanted = list(entry.requires)
     if entry.python:
         python = shutil.which(entry.python)
-    else:
-        python = sys.executable
+        wanted += [text for text in requires("fourbar") or [] if "extra ==" not in text]
     if python is None:
         raise DependencyError(f"{entry.name}: no {entry.python} is found")
-    if entry.python:
-        needed = [text for text in requires("fourbar") or [] if "extra ==" not in text]
-    else:
-        needed = []
-    wanted = [*entry.requires, *needed]
     key = hashlib.sha256(
         repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()
     ).hexdigest()[:12]
@@ -230,11 +221,7 @@ def start_engine(
     (guest,) = name_guests([(entry.adapter or entry.name, entry.name, program)], taken)
     if like is not None:
         guest = replace(guest, **{name: getattr(like, name) for name in _KEPT_FIELDS})
-    setting: dict[str, Any] = {}
-    if entry.setting:
-        setting["name"] = entry.setting
+    setting: dict[str, Any] = {"name": entry.setting} if entry.setting else {}
     if entry.steps:
         setting["steps_per_turn"] = entry.steps[-1]
-    if setting:
-        return guest.at_setting(**setting)
-    return guest
+    return guest.at_setting(**setting) if setting else guest

@@ -322,10 +322,7 @@ def _read_hello(data: dict[str, Any]) -> Hello:
         return tuple(map(write_one_line, values))
 
     def text(name: str) -> str:
-        value = data.get(name, "")
-        if not isinstance(value, str):
-            raise InputError(name, value, "must be a text")
-        return write_one_line(value)
+        return protocol.require_text(name, data.get(name, ""))
 
     if "error" in data:
         raise EngineError(text("error") or "the engine reported an error without text")
@@ -413,14 +410,8 @@ class GuestClient:
         self._program = program
         self._hello = hello
         self._trouble = trouble
-        if setting:
-            self._setting = {"setting": setting}
-        else:
-            self._setting = {}
-        if trouble:
-            self.commands = COMMANDED_NAMES
-        else:
-            self.commands = hello.commands
+        self._setting = {"setting": setting} if setting else {}
+        self.commands = COMMANDED_NAMES if trouble else hello.commands
         self.step: float | None = None
         """Step of a released motion, s."""
 

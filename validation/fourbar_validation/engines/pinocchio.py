@@ -282,21 +282,16 @@ class PinocchioReleased:
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         setting = f"RK4 {self.step:g} s"
+        refuse = partial(ReleasedAnswer.refused, RELEASED_NAME, setting)
         if scene.loads or any(
             not isinstance(effect, Gravity) for effect in scene.effects
         ):
-            return ReleasedAnswer.refused(
-                RELEASED_NAME,
-                setting,
-                "in forward dynamics only gravity has a model here",
-            )
+            return refuse("in forward dynamics only gravity has a model here")
         for bar in (3, 4):  # the ends of the open tree
             inertia = scene.linkage.bar(bar)
             if inertia.mass == 0.0 and inertia.moment_of_inertia == 0.0:
-                return ReleasedAnswer.refused(
-                    RELEASED_NAME,
-                    setting,
-                    f"bar {bar} has no inertia: the open tree has no mass matrix",
+                return refuse(
+                    f"bar {bar} has no inertia: the open tree has no mass matrix"
                 )
         tree = PinocchioTree(scene)
         none = np.zeros(3)
@@ -306,9 +301,7 @@ class PinocchioReleased:
             float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0
         )
         if state is None:
-            return ReleasedAnswer.refused(
-                RELEASED_NAME, setting, "the loop does not close at the start"
-            )
+            return refuse("the loop does not close at the start")
         q, v = state
         rows = []
         now = 0.0

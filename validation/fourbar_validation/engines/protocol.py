@@ -387,7 +387,7 @@ def answer_from_json(
     where it broke down.
     """
     data = _read_reply(data)
-    setting = _require_text("setting", data.get("setting", "exact"))
+    setting = require_text("setting", data.get("setting", "exact"))
     if "refusal" in data:
         return Answer(engine, setting, refusal=_read_reason(data["refusal"]))
     n = len(command.angle)
@@ -411,13 +411,13 @@ def answer_from_json(
             name: _read_values("predicted", name, values, n, ())
             for name, values in predicted
         },
-        alarms=[_require_text("alarms", alarm) for alarm in alarms],
+        alarms=[require_text("alarms", alarm) for alarm in alarms],
         evidence={
             name: float(_read_values("evidence", name, [value], 1, ())[0])
             for name, value in evidence
         },
-        shared=_require_text("shared", data.get("shared", "")) or "not stated",
-        own=_require_text("own", data.get("own", "")) or "not stated",
+        shared=require_text("shared", data.get("shared", "")) or "not stated",
+        own=require_text("own", data.get("own", "")) or "not stated",
         seconds=_read_seconds("seconds", data.get("seconds", 0.0)),
     )
 
@@ -431,19 +431,20 @@ def _read_reply(data: Any) -> dict[str, Any]:
         raise InputError("answer", data, "must be an object")
     if "error" in data:
         raise EngineError(
-            _require_text("error", data["error"])
+            require_text("error", data["error"])
             or "the engine reported an error without text"
         )
     return data
 
 
 def _read_reason(value: Any) -> str:
-    if not (reason := _require_text("refusal", value)):
+    if not (reason := require_text("refusal", value)):
         raise InputError("refusal", value, "must say why")
     return reason
 
 
-def _require_text(name: str, value: Any) -> str:
+def require_text(name: str, value: Any) -> str:
+    """Return a text in one line; InputError for what is none."""
     if not isinstance(value, str):
         raise InputError(name, value, "must be a text")
     return write_one_line(value)
@@ -689,7 +690,7 @@ def released_from_json(
 ) -> ReleasedAnswer:
     """Read and check a released motion at n times, as `answer_from_json` does."""
     data = _read_reply(data)
-    setting = _require_text("setting", data.get("setting", "exact"))
+    setting = require_text("setting", data.get("setting", "exact"))
     if "refusal" in data:
         return ReleasedAnswer.refused(engine, setting, _read_reason(data["refusal"]))
     answers = dict(_read_object("answers", data))

@@ -11,6 +11,7 @@ free of it.
 import math
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -58,6 +59,7 @@ class MujocoForward:
         """Integrate the motion at the given times, rising from 0 (s)."""
         scene = state_from_pins(scene)
         setting = f"RK4 {self.step:g} s"
+        refuse = partial(ReleasedAnswer.refused, RELEASED, setting)
         start = with_signs(scene.linkage, command_of(scene))
         interval = float(
             times[1] - times[0]
@@ -74,15 +76,11 @@ class MujocoForward:
         try:
             loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
         except InputError as error:
-            return ReleasedAnswer.refused(RELEASED, setting, str(error))
+            return refuse(str(error))
         theta_2 = float(start.theta_2[0])
         q_0 = Assembler(loop).find(theta_2, int(start.branch[0]))
         if q_0 is None:
-            return ReleasedAnswer.refused(
-                RELEASED,
-                setting,
-                "the loop does not close at the start",
-            )
+            return refuse("the loop does not close at the start")
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows = []
@@ -165,10 +163,8 @@ class MujocoOneState:
         if isinstance(scene.drive, PointDrive):
             return Answer(self.name, "", refusal=NO_PUSH)
         began = time.perf_counter()
-        if len(self.impedances) > 1:
-            setting = "extrapolated"
-        else:
-            setting = f"d = {self.impedances[0]:g}"
+        several = len(self.impedances) > 1
+        setting = "extrapolated" if several else f"d = {self.impedances[0]:g}"
         try:
             rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:

@@ -136,11 +136,8 @@ class MujocoSimulated:
 
 def _require_run(scene: Scene, command: Command) -> None:
     """Raise LimitError where this motion of the input is not simulated."""
-    if command.time is not None:
-        law = scene.motion.law
-    else:
-        law = None
-    if law is None and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
+    by_law = command.time is not None and scene.motion.law is not None
+    if not by_law and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
         raise LimitError(
             "omega_2 or alpha_2 differs from position to position: that is no one"
             " motion through time"
@@ -482,28 +479,14 @@ def observe_order(
     The closure's time constant is held in seconds. At the recipe's own h the softness
     is already of the size of the truncation; the order shows above it.
     """
-    errors = [
-        error(
-            ask_at(
-                MujocoSimulated(
-                    replace(
-                        RECIPE,
-                        timestep_scale=scale,
-                        time_constant_steps=80.0 / scale,
-                    )
-                ),
-                scene,
-                command,
-            )
+
+    def measure(scale: float) -> float:
+        settings = replace(
+            RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale
         )
-        for scale in (4.0, 2.0)
-    ]
-    if errors[1]:
-        ratio = errors[0] / errors[1]
-    else:
-        ratio = math.inf
-    return (
-        errors[0],
-        errors[1],
-        math.log2(ratio) if 0.0 < ratio < math.inf else math.nan,
-    )
+        return error(ask_at(MujocoSimulated(settings), scene, command))
+
+    coarse, fine = map(measure, (4.0, 2.0))
+    ratio = coarse / fine if fine else math.inf
+    order = math.log2(ratio) if 0.0 < ratio < math.inf else math.nan
+    return coarse, fine, order

@@ -23,6 +23,7 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, write_mjcf
+from fourbar.mjcf.document import WindowMotion
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
@@ -235,14 +236,13 @@ class TrialSetup:
         """Choose how the input moves through a segment."""
         return SteadySegment(self.command.theta_2, segment, self.omega, self.alpha)
 
+    def _list_runs(self) -> list[WindowMotion]:
+        return [self.motion_segment(segment).run for segment in self.segments]
+
     @property
     def simulated_seconds(self) -> float:
         """Time in which the linkage passes all segments."""
-        total = 0.0
-        for segment in self.segments:
-            run = self.motion_segment(segment).run
-            total += run.time(run.stop)
-        return total
+        return sum(run.time(run.stop) for run in self._list_runs())
 
     @property
     def revolutions(self) -> float:
@@ -254,13 +254,11 @@ class TrialSetup:
 
     def steps(self, settings: Settings) -> int:
         """Count the steps of one run, without making it."""
-        total = 0
-        for segment in self.segments:
-            run = self.motion_segment(
-                segment
-            ).run  # a whole number of steps over the segment
-            total += round(run.time(run.stop) / run.timestep(settings))
-        return total
+        # a whole number of steps over each segment
+        return sum(
+            round(run.time(run.stop) / run.timestep(settings))
+            for run in self._list_runs()
+        )
 
     def try_out(self, settings: Settings, edit: Edit | None = None) -> Trial:
         """Run through every segment that assembles.
@@ -279,13 +277,8 @@ class TrialSetup:
         for segment in self.segments:
             before = trial.steps
             rows = slice(first, first + len(segment))
-            self._run(
-                segment,
-                settings,
-                edit,
-                {name: x[rows] for name, x in out.items()},
-                trial,
-            )
+            of_segment = {name: x[rows] for name, x in out.items()}
+            self._run(segment, settings, edit, of_segment, trial)
             trial.segments += ((rows, trial.steps - before),)
             first = rows.stop
             if trial.broken:
@@ -301,17 +294,8 @@ class TrialSetup:
         out: dict[str, Array],
         trial: Trial,
     ) -> None:
-        motion_segment = self.motion_segment(segment)
-        timestep = motion_segment.run.timestep(settings)
-        loop, light = self.build_loops(settings, timestep, edit)
-        run = SimulatedRun(
-            self.scene,
-            loop,
-            light,
-            motion_segment,
-            self.start[segment[0]],
-            timestep,
-        )
+        run = self._start(segment, settings, edit)
+        loop = run.loop
         driving = name_driving(self.scene)
         for row, index in enumerate(segment):
             run.to(index)
@@ -333,9 +317,18 @@ class TrialSetup:
             ).items():
                 out[name][row] = value
         trial.steps += run.stepper.done
-        trial.steps_per_revolution = max(
-            trial.steps_per_revolution, 2.0 * np.pi / motion_segment.fastest / timestep
-        )
+        made = 2.0 * np.pi / run.motion_segment.fastest / run.stepper.timestep
+        trial.steps_per_revolution = max(trial.steps_per_revolution, made)
+
+    def _start(
+        self, segment: list[int], settings: Settings, edit: Edit | None
+    ) -> SimulatedRun:
+        """Return a run that stands at the first position of a segment."""
+        motion_segment = self.motion_segment(segment)
+        timestep = motion_segment.run.timestep(settings)
+        loop, light = self.build_loops(settings, timestep, edit)
+        start = self.start[segment[0]]
+        return SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
 
     def make_clocks(
         self,
@@ -347,12 +340,10 @@ class TrialSetup:
         Each call of the first starts again at the start of the longest segment.
         """
         segment = max(self.segments, key=len)
-        motion_segment = self.motion_segment(segment)
-        timestep = motion_segment.run.timestep(settings)
-        loop, light = self.build_loops(settings, timestep, edit)
-        start = self.start[segment[0]]
-        run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
+        run = self._start(segment, settings, edit)
+        loop = run.loop
         data = loop.data
+        start = self.start[segment[0]]
         forces = np.empty((_MOST_READINGS, *data.cfrc_int.shape))
         closing = np.empty((_MOST_READINGS, 2))
         accelerations = np.empty(_MOST_READINGS)
@@ -369,7 +360,7 @@ class TrialSetup:
             began = time.process_time()
             for row in range(count):
                 loop.forward()
-                if light is not None:
+                if run.light is not None:
                     run.read()
                     continue
                 # kept as they are: arithmetic on whole arrays later takes no time
