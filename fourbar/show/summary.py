@@ -12,9 +12,9 @@ import numpy as np
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import OK, STATUS_NAMES, Array
+from fourbar.quantities import OK, STATUS_NAMES
 from fourbar.scene import Scene
-from fourbar.scene.motion import Motion
+from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import find_stroke_ranges
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
 from fourbar.show.duty import MotorDuty, motor_duty
@@ -24,14 +24,7 @@ from fourbar.show.motion_curves import (
     compute_pin_loads,
     describe_motion,
 )
-from fourbar.show.panels import (
-    EXTREME_ERROR,
-    TIED,
-    PanelCurve,
-    Peak,
-    Wanted,
-    fit_panels,
-)
+from fourbar.show.panels import EXTREME_ERROR, TIED, PanelCurve, Peak
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
@@ -40,7 +33,7 @@ _INSET = 1e-9
 """Part of a range that is left out at its limit positions. These may not assemble as
 doubles.
 """
-_PANELS_OF_RANGE = 48
+_STEPS_OF_RANGE = 48
 ZERO_TRANSMISSION_ANGLE = 1e-6
 """Transmission angle that counts as zero, rad. At a limit, a place in its last digits
 leaves some 1e-8.
@@ -312,16 +305,10 @@ def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]
     low = here - (here - low) % TURN if width < TURN else here - 0.5 * TURN
     high = low + (1.0 - _INSET) * width
     low += _INSET * width
-    branch = int(at.branch[first])
-
-    def compute(angles: Array) -> dict[str, Array]:
-        motion = Motion(**{f"theta_{at.bar}": angles}, branch=branch)  # type: ignore[arg-type]
-        stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
-        assert stroke is not None
-        return {"stroke": stroke}
-
-    edges = np.linspace(low, high, _PANELS_OF_RANGE + 1)
-    panels = fit_panels(compute, edges, {"stroke": Wanted(ranged=True)})
+    sweep = {f"theta_{at.bar}": Sweep(low, high, _STEPS_OF_RANGE)}
+    motion = Motion(**sweep, branch=int(at.branch[first]))  # type: ignore[arg-type]
+    whole = solve(replace(scene, motion=motion, tolerances=()), "position")
+    panels = describe_motion(whole).positions
     least, most = (panels.find_peak("stroke", sense).value for sense in (-1, 1))
     # a cylinder whose ends meet has a corner there
     return 0.0 if least <= EXTREME_ERROR * most else least, most
