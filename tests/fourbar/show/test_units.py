@@ -14,6 +14,7 @@ import fourbar
 from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
+from fourbar.show.plot.figures import draw_figure
 from fourbar.show.units import units, units_of_scene, write_digits
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
@@ -109,6 +110,13 @@ def test_what_is_no_list_of_units_is_refused(text, words, capsys):
         units(text)
     assert status(["analyze", str(MODEL), "--units", text]) == 2
     assert "units" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_plots_say_theirs():
+    for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
+        figure = draw_figure(crank_rocker(), name, units=units("imperial")).figure
+        assert figure.subfigs[0].axes[0].get_ylabel() == label
 
 
 def test_units_are_read_as_people_write_them():
