@@ -409,6 +409,16 @@ def test_the_block_has_the_numbers_of_the_facts():
         assert [*filter(None, map(str.strip, rows[label]))] == numbers
 
 
+def test_the_rates_are_the_largest_of_the_bars_that_follow():
+    text = block(Scene(MASSLESS, turn()))
+    dense = solve(Scene(MASSLESS, turn(20_000)))
+    for name, factor, unit in (("omega", 30.0 / pi, "rpm"), ("alpha", 1.0, "rad/s²")):
+        rates = [dense[f"{name}_{bar}"] for bar in (3, 4)]
+        peaks = [factor * rate[np.abs(rate).argmax()] for rate in rates]
+        words = " ".join(f"{peak:.4g} {unit}" for peak in peaks)
+        assert f"{name} {words} at" in text
+
+
 @pytest.mark.parametrize("steps", [1, 6])
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(steps):
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""

@@ -15,6 +15,7 @@ import fourbar
 from fourbar import Bar, Free, Gravity, Motion, Scene, solve
 from fourbar.effects import Place
 from fourbar.files import loads
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command_at
 from fourbar.show.located import locate
 from fourbar.show.position import PositionSheet
@@ -39,24 +40,18 @@ def numbers(line):
 
 def test_bars_points_and_forces_are_those_of_the_solution():
     s = solve(ONE)
-    shown = {**COMMON, **units("m N N.m rad/s")}
-    sheet = PositionSheet(ONE, s, shown)
-    bars = [numbers(line)[1:] for line in sheet.write_bars()[1:]]
-    for bar, row in zip((2, 3, 4), bars, strict=True):
-        rates = [getattr(s, f"{letter}_{bar}")[0] for letter in ("omega", "alpha")]
-        assert row[1:] == approx(rates, rel=SIX_DIGITS)
-        angle = np.degrees(getattr(s, f"theta_{bar}")[0])
-        assert row[0] == approx(angle, abs=6e-5)
-    points = sheet.write_points()
-    at = next(i for i, line in enumerate(points) if line.startswith("P "))
-    place, speed, growth = (numbers(line) for line in points[at : at + 3])
-    assert place == approx(s.points["P"][0], rel=SIX_DIGITS)
-    for row, vector in ((speed, s.velocity["P"][0]), (growth, s.acceleration["P"][0])):
-        assert row == approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
-    forces = sheet.write_pin_forces()[1:5]
-    for line, name in zip(forces, ("F12", "F32", "F43", "F14"), strict=True):
-        vector = getattr(s, name)[0]
-        assert line.startswith(name)
+    sheet = PositionSheet(ONE, s, {**COMMON, **units("m N N.mm rad/s")})
+    for bar, line in zip((2, 3, 4), sheet.write_bars()[1:], strict=True):
+        angle, *rates = numbers(line)[1:]
+        assert angle == approx(np.degrees(s[f"theta_{bar}"][0]), abs=6e-5)
+        expected = [s[f"{letter}_{bar}"][0] for letter in ("omega", "alpha")]
+        assert rates == approx(expected, rel=SIX_DIGITS)
+    rows = sheet.write_points()
+    first = next(i for i, line in enumerate(rows) if line.startswith("P "))
+    assert numbers(rows[first]) == approx(s.points["P"][0], rel=SIX_DIGITS)
+    vectors = [s.velocity["P"], s.acceleration["P"], *(s[name] for name in PIN_FORCES)]
+    rows = [*rows[first + 1 : first + 3], *sheet.write_pin_forces()[1:5]]
+    for line, (vector,) in zip(rows, vectors, strict=True):
         assert numbers(line) == approx([*vector, np.hypot(*vector)], rel=SIX_DIGITS)
 
 

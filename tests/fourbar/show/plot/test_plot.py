@@ -54,7 +54,6 @@ from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_mechanism
 from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
-from fourbar.show.units import choose_unit
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
@@ -502,10 +501,6 @@ def test_what_cannot_be_drawn_is_named_and_leaves_no_file(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_scene_without_velocity_draws_positions_only():
-    assert len(composed(WITHOUT_SPEED, "kinematics").axes) == 1
-
-
 @pytest.mark.slow
 def test_the_position_of_a_motion_through_time_is_one_that_it_passes():
     shown = make_view(released(), position=0.3)
@@ -565,12 +560,6 @@ except fourbar.errors.DependencyError as error:
 )
 def test_numbers_have_three_digits(value, shown):
     assert write_number(value) == shown
-
-
-def test_units_get_the_prefix_that_suits():
-    assert choose_unit(0.94, "N m") == (1e3, "mN m")
-    assert choose_unit(15218.0, "N m") == (1e-3, "kN m")
-    assert choose_unit(0.0, "N") == (1.0, "N")
 
 
 def longest_line(axes):
