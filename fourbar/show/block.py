@@ -329,7 +329,8 @@ class _SceneBlock:
 
         If there is none, write how nearly there would be one.
         """
-        linkage, bar = self.linkage, self.motion.bar
+        linkage = self.linkage
+        bar = self.motion.bar
         points = change_points(linkage, bar)
         yield from self._write_met_equalities()
         if (miss := find_miss(linkage)) is not None:
@@ -368,7 +369,8 @@ class _SceneBlock:
 
         If the output is commanded, it is the input.
         """
-        kind, bar = self.facts.kind, self.solution.at.bar
+        kind = self.facts.kind
+        bar = self.solution.at.bar
         first, last = self.facts.ends
         name = BAR_NAMES[bar]
         following = [4 if bar != 4 else 2]
@@ -412,7 +414,8 @@ class _SceneBlock:
         width = high.value - low.value
         if self.facts.kind == "turn" and width > 2.0 * math.pi - 1e-9:
             return "turns fully"
-        start, stop = self._angle(low.value), self._angle(high.value)
+        start = self._angle(low.value)
+        stop = self._angle(high.value)
         if self.facts.kind == "law" and bar == self.solution.at.bar:
             return f"from {start} to {stop}"
         places = [self._place(end.place, named=False) for end in (low, high)]
@@ -470,7 +473,8 @@ class _SceneBlock:
 
     def _write_peak(self) -> str:
         """Write the largest and the RMS value of the drive's torque or force."""
-        facts, drive = self.facts, self.drive
+        facts = self.facts
+        drive = self.drive
         assert drive is not None
         if facts.peak is None:
             return self._write_growth(drive.keys.value)
@@ -531,14 +535,17 @@ class _SceneBlock:
 
     def _is_balanced(self) -> bool:
         """Tell whether the drive has nothing to do: its peak is rounding alone."""
-        peak, drive = self.facts.peak, self.drive
+        peak = self.facts.peak
+        drive = self.drive
         if peak is None or drive is None or not np.nan_to_num(drive.sizes).any():
             return False
         return not self._without_rounding(peak.value)
 
     def _write_power(self) -> Iterator[str]:
         """Write power and energy of the drive, and what a motor must have."""
-        facts, duty, power = self.facts, self.facts.duty, self.solution.power
+        facts = self.facts
+        duty = self.facts.duty
+        power = self.solution.power
         if duty is None:
             idle = facts.peak is not None and self._is_rounding(facts.peak.value)
             if power is not None and power[0] and not idle:
@@ -589,7 +596,8 @@ class _SceneBlock:
         yield _row("cycle", f"{mean}energy swings by {energy} about the mean")
 
     def _write_drive_head(self) -> str:
-        scene, motion = self.scene, self.motion
+        scene = self.scene
+        motion = self.motion
         where = describe_drive(scene)
         if scene.drive is None:
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
@@ -737,7 +745,9 @@ class _SceneBlock:
 
     def _write_remarks(self) -> Iterator[str]:
         """Write where pin forces jump, and what rounding does."""
-        facts, scene, solution = self.facts, self.scene, self.solution
+        facts = self.facts
+        scene = self.scene
+        solution = self.solution
         passes = facts.pins and solution.change_points
         if passes and has_growing_forces(scene, solution):
             yield (
@@ -781,7 +791,8 @@ class _SceneBlock:
 
         The warning names the collinear bars that cost the digits.
         """
-        solution, drive = self.solution, self.drive
+        solution = self.solution
+        drive = self.drive
         if drive is None or drive.error is None or solution.drive_condition is None:
             return
         # of those that matter: one that passes through zero has no digits, and needs

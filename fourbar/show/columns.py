@@ -122,7 +122,8 @@ def _split_difference(solution: Solution, name: str) -> Iterator[tuple[str, str]
         return
     words = name.split("-")
     for count in range(1, len(words)):
-        first, second = "-".join(words[:count]), "-".join(words[count:])
+        first = "-".join(words[:count])
+        second = "-".join(words[count:])
         if all(
             _is_number(solution, number) or _is_force_along_path(solution, number)
             for part in (first, second)
@@ -159,49 +160,48 @@ def _find_number(
     """Return the SI unit of a number of each position and its values."""
     values: Array | None
     if name == "time":
-        if solution.time is None:
-            values = compute_times(solution.scene, solution.at)
-        else:
-            values = solution.time
+        values = solution.time
         if values is None:
-            raise InputError(
-                "--columns",
-                name,
-                "the positions are passed at no one speed: no time",
-            )
+            values = compute_times(solution.scene, solution.at)
+        if values is None:
+            none = "the positions are passed at no one speed: no time"
+            raise InputError("--columns", name, none)
         return "s", values
     stem, axis = _split_axis(name)
-    quantities = _list_column_quantities(solution)
     if not _is_number(solution, name):
-        with_speed = _solve_at_rest(scene, solution)
-        known = ["time", *_list_column_quantities(with_speed)]
-        close = get_close_matches(name, known, 1)
-        if names_other_mechanism(stem):
-            raise InputError("--columns", name, f"unknown; {ELSEWHERE}")
-        if _is_number(with_speed, name):
-            raise _ask_for_speed(scene, name)
-        hint = f'did you mean "{close[0]}"? ' if close else ""
-        raise InputError(
-            "--columns",
-            name,
-            f"unknown; {hint}quantities are {', '.join(['time', *quantities])}; "
-            "F12_x is a component, omega_4/omega_2 a ratio, theta_3-theta_2 a"
-            " difference, F_P/F_Q the ratio of the forces along the paths of two"
-            " points",
-        )
-    if find_derived(stem) is not None:
-        values = derive(solution, stem)
-    else:
-        values = find_values(solution, stem)
+        raise _refuse_name(scene, solution, name)
+    find = find_values if find_derived(stem) is None else derive
+    values = find(solution, stem)
     if values is None:
         raise _ask_for_speed(scene, name)
+    unit = find_unit_of_quantity(stem)
     if axis is not None:
-        return find_unit_of_quantity(stem), values[..., axis]
+        return unit, values[..., axis]
     if is_scalar(stem):
-        return find_unit_of_quantity(stem), values
+        return unit, values
     if _is_place(solution, stem):
         raise InputError("--columns", name, f"is a place: {name}_x or {name}_y")
-    return find_unit_of_quantity(stem), np.hypot(values[..., 0], values[..., 1])
+    return unit, np.hypot(values[..., 0], values[..., 1])
+
+
+def _refuse_name(scene: Scene, solution: Solution, name: str) -> InputError:
+    """Make the error of a name that no column has, or none without a speed."""
+    with_speed = _solve_at_rest(scene, solution)
+    if names_other_mechanism(_split_axis(name)[0]):
+        return InputError("--columns", name, f"unknown; {ELSEWHERE}")
+    if _is_number(with_speed, name):
+        return _ask_for_speed(scene, name)
+    known = ["time", *_list_column_quantities(with_speed)]
+    close = get_close_matches(name, known, 1)
+    hint = f'did you mean "{close[0]}"? ' if close else ""
+    there = ", ".join(["time", *_list_column_quantities(solution)])
+    return InputError(
+        "--columns",
+        name,
+        f"unknown; {hint}quantities are {there}; F12_x is a component, omega_4/omega_2"
+        " a ratio, theta_3-theta_2 a difference, F_P/F_Q the ratio of the forces along"
+        " the paths of two points",
+    )
 
 
 def _split_axis(name: str) -> tuple[str, int | None]:

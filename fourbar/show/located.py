@@ -187,7 +187,8 @@ class _LocatedSearch:
         """
         from scipy.optimize.elementwise import find_root
 
-        before, after = gaps[:-1], gaps[1:]
+        before = gaps[:-1]
+        after = gaps[1:]
         crosses = before * after < 0.0
         if self.unit == "rad":  # half a turn away it changes its side, too
             crosses &= np.abs(after - before) < np.pi
@@ -237,11 +238,13 @@ class _LocatedSearch:
         `side`: one of `EXTREMES`.
         """
         row = int(np.nanargmin(side * self.values))
-        place, value = self.places[row], self.values[row]
+        place = self.places[row]
+        value = self.values[row]
         around = self.values[row - 1 : row + 2]
         if 0 < row < len(self.values) - 1 and np.isfinite(around).all():
             least = self._minimize(lambda places: side * self._read(places), row)
-            place, value = least.x, side * least.f_x
+            place = least.x
+            value = side * least.f_x
         return float(place), float(value)
 
 

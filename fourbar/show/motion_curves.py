@@ -475,12 +475,15 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     away = np.abs(panels.list_nodes().ravel()[rows] - solution.at.places[first])
     nearest = angles[rows[np.argmin(away)]]
     angles += TURN * np.round((coarse[first] - nearest) / TURN)
-    low, high = np.inf, -np.inf
+    low = np.inf
+    high = -np.inf
     for stretch in stretches:
-        start, stop = angles[stretch].min(), angles[stretch].max()
+        start = angles[stretch].min()
+        stop = angles[stretch].max()
         turned = TURN * _find_turns(start, stop, low, high) if low < high else 0.0
         angles[stretch] += turned
-        low, high = min(low, start + turned), max(high, stop + turned)
+        low = min(low, start + turned)
+        high = max(high, stop + turned)
     curve.values = angles.reshape(curve.values.shape)
 
 

@@ -278,7 +278,8 @@ class Panels:
 
     def _place(self, panel: int, x: Array) -> Array:
         """Convert places within a panel, from -1 to 1, to those of the motion."""
-        start, stop = self.start[panel], self.stop[panel]
+        start = self.start[panel]
+        stop = self.stop[panel]
         return np.asarray(0.5 * (start + stop) + 0.5 * (stop - start) * x)
 
     def find_peak(self, name: str, sense: int = 0) -> Peak:
@@ -388,7 +389,8 @@ def fit_panels(
     wanted : by name of a curve, what is asked of it.
     most_halvings : number of rounds after which a curve is taken as it is.
     """
-    start, stop = edges[:-1], edges[1:]
+    start = edges[:-1]
+    stop = edges[1:]
     length = edges[-1] - edges[0]
     fits = _fit_panels(compute, start, stop)
     usual = {name: _find_usual_size(fit.values) for name, fit in fits.items()}
@@ -416,10 +418,8 @@ def fit_panels(
         if is_last:
             break
         middle = 0.5 * (start[is_open] + stop[is_open])
-        start, stop = (
-            np.concatenate((start[is_open], middle)),
-            np.concatenate((middle, stop[is_open])),
-        )
+        start = np.concatenate((start[is_open], middle))
+        stop = np.concatenate((middle, stop[is_open]))
         fits = _fit_panels(compute, start, stop)
     start, stop = map(np.concatenate, zip(*ends, strict=True))
     order = np.argsort(start if stop[0] > start[0] else -start)

@@ -126,7 +126,8 @@ class PositionSheet:
         for name in names:
             for start, unit in scales.items():
                 label = f"  {start[0]}" if start else name
-                vector, most = self._read(start + name), largest[start]
+                vector = self._read(start + name)
+                most = largest[start]
                 sized = bool(start)
                 rows.append(self._write_vector(label, vector, unit, most, sized=sized))
         return rows

@@ -72,7 +72,8 @@ def write_type(
     mobility = classify(linkage)
     relation = {1.0: "<", -1.0: ">", 0.0: "="}[float(np.sign(mobility.surplus))]
     outer = min(linkage.lengths) + max(linkage.lengths)
-    factor, unit = 1.0, ""
+    factor = 1.0
+    unit = ""
     if units is not None:
         factor, unit = choose_unit(max(linkage.lengths), "m", units)
 
@@ -523,7 +524,8 @@ def _write_degrees(angle: float) -> str:
 
 def write_equilibria_json(title: str, rest: Equilibria) -> str:
     """Write equilibria as one JSON object, SI and rad."""
-    positions, keys = rest.positions, read_drive_demand(rest.positions).keys
+    positions = rest.positions
+    keys = read_drive_demand(rest.positions).keys
     return write_object(
         _EQUILIBRIUM_SCHEMA,
         title=title,

@@ -131,18 +131,18 @@ def print_positions(
     cells = dict[str, list[str]]()
     for column in columns:
         cells |= _write_column(column, column.name, units)
-    shown, left_out = make_table(
-        solution, width, units, every=step, cells=cells or None
-    )
+    cells = cells or list_columns(solution, units)
+    kept = _fit_columns(cells, width)
+    rows = [*zip(*(cells[name] for name in kept), strict=True)]
+    last = rows[-1:] if (len(rows) - 1) % step else []
+    shown = make_plain_table(kept, rows[::step] + last, gap=GAP - 1)
     told = [] if solution.scene is None else list_arm_notes(solution.scene)
     notes = [line for note in told for line in wrap_line(note)]
     if step > 1:
         more = "; --all shows each" if every is None else ""
-        notes.append(
-            f"shown: every {step}{_write_ordinal(step)} of the {len(solution)}"
-            f" positions{more}"
-        )
-    if left_out:
+        which = f"every {step}{_write_ordinal(step)} of the {len(rows)} positions"
+        notes.append(f"shown: {which}{more}")
+    if left_out := [name.split("\n")[0] for name in cells if name not in kept]:
         notes.append(
             f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has"
             " them)"
@@ -150,13 +150,23 @@ def print_positions(
     return write_table(solution.title, [], shown, notes, width)
 
 
+def _fit_columns(cells: dict[str, list[str]], width: int | None) -> list[str]:
+    """List the first columns that a terminal of a width holds; None: all."""
+    needed = -GAP
+    kept: list[str] = []
+    for name, column in cells.items():
+        needed += GAP + max(len(cell) for cell in (*name.split("\n"), *column))
+        if width is not None and needed > width:
+            break
+        kept.append(name)
+    return kept
+
+
 def _choose_step(count: int) -> int:
     """Show every so many positions, so that no more than MOST_ROWS_PRINTED are."""
     wanted = math.ceil((count - 1) / (MOST_ROWS_PRINTED - 1))
-    return next(
-        (step for step in ROW_STEPS if step >= wanted),
-        ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1]),
-    )
+    multiple = ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1])
+    return next((step for step in ROW_STEPS if step >= wanted), multiple)
 
 
 def _write_ordinal(number: int) -> str:
@@ -251,36 +261,6 @@ def _list_derived_columns(solution: Solution, has_forces: bool) -> Iterator[str]
 def _choose_form(unit: str) -> str:
     """Choose the form of numbers of an SI unit: angles line up at the point."""
     return ".4f" if unit == "rad" else ".6g"
-
-
-def make_table(
-    solution: Solution,
-    width: int | None,
-    units: Conversion = DEGREES,
-    *,
-    every: int = 1,
-    cells: dict[str, list[str]] | None = None,
-) -> "tuple[Table, list[str]]":
-    """Make the table for a terminal of a width, and name the columns left out.
-
-    A width of None is as wide as the table needs. Every so many positions are shown,
-    the last one always. `cells`: by heading; left out: all columns.
-    """
-    if cells is None:
-        cells = list_columns(solution, units)
-    needed = -GAP
-    kept: list[str] = []
-    for name, column in cells.items():
-        needed += GAP + max(len(cell) for cell in (*name.split("\n"), *column))
-        if width is not None and needed > width:
-            break
-        kept.append(name)
-    rows = list(zip(*(cells[name] for name in kept), strict=True))
-    shown = rows[::every]
-    if (len(rows) - 1) % every:
-        shown += rows[-1:]
-    left_out = [name.split("\n")[0] for name in cells if name not in kept]
-    return make_plain_table(kept, shown, gap=GAP - 1), left_out
 
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:

@@ -138,7 +138,8 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
 
     The last lines say where first order and samples part.
     """
-    samples, count = spreads.samples, len(spreads.scene.tolerances)
+    samples = spreads.samples
+    count = len(spreads.scene.tolerances)
     tolerance = f"{count} tolerance{'s' if count > 1 else ''}"
     drawn = f"{samples} samples ({spreads.describe_seed()})"
     lines = [f"{tolerance}, {drawn}, {len(spreads.theta_2)} positions"]

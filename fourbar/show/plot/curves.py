@@ -69,9 +69,11 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     over = axis.values
     here = axis.factor * float(view.here.at.places[0])
     axes.set_xlabel(f"{axis.label} ({axis.unit.strip()})")
-    low, high = float(over[0]), float(over[-1])
+    low = float(over[0])
+    high = float(over[-1])
     if high == low:
-        low, high = low - 1.0, high + 1.0
+        low = low - 1.0
+        high = high + 1.0
     axes.set_xlim(low, high)
     if axis.unit == "°":
         set_degree_ticks(axes.xaxis, high - low)
@@ -197,7 +199,8 @@ def draw_angles(axes: "Axes", view: View) -> None:
         axes.plot(over, values, label=rf"$\theta_{bar}$", **choose_bar_line(bar))
     span = float(np.nanmax(shown) - np.nanmin(shown))
     set_degree_ticks(axes.yaxis, 1.3 * span + 1e-9)
-    symbol, named = r"\theta", "the bars"
+    symbol = r"\theta"
+    named = "the bars"
     if len(bars) < 3:
         symbol = ",\\ ".join(rf"\theta_{bar}" for bar in bars)
         named = " and ".join(BAR_NAMES[bar] for bar in bars)
@@ -306,10 +309,13 @@ def _draw_drive(
     poles = find_poles(view)
     values = getattr(view.sweep, name)
     limit, factor, shown_unit = choose_scale([values], unit, view)
-    symbol, curve_name, on_bar = f"${letter}$", letter, ""
+    symbol = f"${letter}$"
+    curve_name = letter
+    on_bar = ""
     poles_of = "drive's force (its line has no lever)"
     if bar:
-        symbol, curve_name = f"${letter}_{bar}$", f"{letter}{_SUBSCRIPTS[bar]}"
+        symbol = f"${letter}_{bar}$"
+        curve_name = f"{letter}{_SUBSCRIPTS[bar]}"
         on_bar = f" on bar {bar}"
         poles_of = f"torque{on_bar} ({_POLE_REASON[bar]})"
     plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
@@ -331,7 +337,8 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
     if not np.isfinite(values).any():
         return
     index = find_peak_index(values)
-    place, peak = float(over[index]), float(values[index])
+    place = float(over[index])
+    peak = float(values[index])
     axes.plot(place, peak, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **RING_MARK)
     low, high = axes.get_xlim()
     quarter = (place - low) / (high - low) * 4.0
@@ -470,7 +477,8 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     """
     if view.time is not None:
         return []
-    positions, linkage = view.sweep.at, view.scene.linkage
+    positions = view.sweep.at
+    linkage = view.scene.linkage
     degrees = np.degrees(positions.angle)
     order = np.argsort(degrees)
     margin = 0.0

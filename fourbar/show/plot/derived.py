@@ -99,7 +99,8 @@ def _draw_ratios(axes: "Axes", view: View, names: dict[int, str]) -> None:
     curves = {_SYMBOLS[name]: derive(view.sweep, name) for name in names.values()}
     limit = choose_limit([*curves.values()])
     for bar, (symbol, values) in zip(names, curves.items(), strict=True):
-        before, after = values[:-1], values[1:]
+        before = values[:-1]
+        after = values[1:]
         # a ratio changes its sign at a pole, where it is large, or at zero
         is_large = np.minimum(np.abs(before), np.abs(after)) > 1.0
         poles = np.flatnonzero((before * after < 0.0) & is_large)

@@ -144,7 +144,8 @@ def _choose_figure(scene: Scene, figure: str) -> FigureKind:
     """Choose a figure that the scene can show."""
     if not isinstance(figure, str) or figure not in FIGURES:
         raise InputError("figure", figure, "must be one of " + ", ".join(FIGURES))
-    motion, drive = scene.motion, scene.drive
+    motion = scene.motion
+    drive = scene.drive
     if FIGURES[figure].needs_speed and motion.speed is None and not is_over_time(scene):
         raise InputError(
             f"motion.{motion.names[1]}",

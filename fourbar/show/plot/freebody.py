@@ -365,7 +365,8 @@ def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) ->
     step = 10.0 ** math.floor(math.log10(factor * biggest))
     fitting = (m * step for m in (5.0, 2.0) if 2.0 * m * step <= factor * biggest)
     round_force = next(fitting, step) / factor
-    x, y = axes.get_xlim()[0], axes.get_ylim()[0]
+    x = axes.get_xlim()[0]
+    y = axes.get_ylim()[0]
     look: dict[str, Any] = {"lw": 2.0, "solid_capstyle": "butt", "clip_on": False}
     axes.plot([x, x + scale * round_force], [y, y], color=INK, **look)
     axes.annotate(

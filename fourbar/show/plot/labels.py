@@ -152,7 +152,8 @@ class _Room:
         point, shun, beside = _transform(self.axes.transData, ends).tolist()
         away = math.pi / 2 if point == shun else cmath.phase(point - shun)
         ring = (beside - point).real
-        dots, widths = np.concatenate(self.dots), np.concatenate(self.widths)
+        dots = np.concatenate(self.dots)
+        widths = np.concatenate(self.widths)
         edge = 0.5 * self.per_point * widths
         best = (math.inf, point, point)
         for reach, k in product(_REACH, range(LABEL_DIRECTIONS)):
@@ -188,7 +189,8 @@ class _Room:
 
     def _leaves(self, box: Box) -> bool:
         """Return True if a label does not lie inside the axes."""
-        below, above = box[0] - self.inside[0], self.inside[1] - box[1]
+        below = box[0] - self.inside[0]
+        above = self.inside[1] - box[1]
         return min(below.real, below.imag, above.real, above.imag) < 0.0
 
     def _count_crossed(self, start: complex, end: complex) -> int:
@@ -247,5 +249,6 @@ def _sample_line(points: Points, per_point: float) -> Points:
 
 def _overlaps(box: Box, other: Box) -> bool:
     """Return True if two boxes overlap."""
-    right, left = other[1] - box[0], box[1] - other[0]
+    right = other[1] - box[0]
+    left = box[1] - other[0]
     return min(right.real, right.imag, left.real, left.imag) > 0.0

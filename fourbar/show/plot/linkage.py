@@ -220,7 +220,8 @@ def draw_support(axes: "Axes", pin: complex, size: float, labels: Labels) -> Non
     """Draw the hatched support under a fixed pin."""
     from matplotlib.patches import Polygon, Rectangle
 
-    x, y = pin.real, pin.imag
+    x = pin.real
+    y = pin.imag
     wide = 1.7 * size
     foot = y - wide
     corners = [(x, y), (x - size, foot), (x + size, foot)]
@@ -350,9 +351,11 @@ def _list_paths(view: View) -> Iterator[tuple[Points, str, tuple[float, ...], st
     bars = view.scene.linkage
     yield traced.path(sweep.A), BAR_COLOURS[2], (1, 2), "path of $A$"
     yield traced.path(sweep.B), BAR_COLOURS[4], (3, 2), "path of $B$"
-    centre, name = 0.5 * (sweep.A + sweep.B), "its mid-point"
+    centre = 0.5 * (sweep.A + sweep.B)
+    name = "its mid-point"
     if bars.coupler.mass > 0.0:
-        centre, name = sweep.G3, "$G_3$"
+        centre = sweep.G3
+        name = "$G_3$"
     yield traced.path(centre), BAR_COLOURS[3], (4, 1.5), f"coupler curve of {name}"
     for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
         if bars.bar(bar).mass > 0.0:
@@ -386,7 +389,8 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     }
     for number in MOVING_BARS:
         plot_points(axes, [pins[pin] for pin in ENDS[number]], lw=2.5, **faint)
-    A, B = pins["A"], pins["B"]
+    A = pins["A"]
+    B = pins["B"]
     for name in names:
         here = factor * complex(*view.here.points[name][0])
         plot_points(axes, [A, here, B], lw=0.8, ls=":", **faint)

@@ -70,7 +70,8 @@ def trace(view: View) -> Trace:
 
 
 def _list_circuit_commands(view: View, steps: int) -> Command:
-    linkage, here = view.scene.linkage, view.here
+    linkage = view.scene.linkage
+    here = view.here
     number = int(find_circuit(linkage, here.theta_2, here.branch)[0])
     branch = view.scene.motion.branch
     theta_2, assembly, _ = list_circuit(linkage, number, branch, steps)

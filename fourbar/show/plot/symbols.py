@@ -185,7 +185,8 @@ def _list_symbols(kind: str, one: Any) -> list[Symbol]:
 
 def _make_drive(scene: Scene) -> Symbol:
     """Make the symbol of the drive, which exerts a torque or a force."""
-    drive, bar = scene.drive, scene.drive_bar
+    drive = scene.drive
+    bar = scene.drive_bar
     if isinstance(drive, LinearDrive):
         return _join_ends("cylinder", "F", drive)
     if drive is None:
@@ -199,7 +200,8 @@ def _make_drive(scene: Scene) -> Symbol:
 
 def _join_ends(kind: str, name: str, line: Any) -> Symbol:
     """Make the symbol of a line between two points."""
-    start, end = line.start, line.end
+    start = line.start
+    end = line.end
     end_of_line = (end.bar, end.vector())
     return Symbol(kind, name, start.bar, start.vector(), end=end_of_line)
 
@@ -274,7 +276,8 @@ class _Pen:
         """Draw an arrow over the bars."""
         from matplotlib.patches import FancyArrowPatch
 
-        start, end = split_complex(tail), split_complex(tip)
+        start = split_complex(tail)
+        end = split_complex(tip)
         look = {**HEADED, "color": self.colour, "mutation_scale": 10.0}
         arrow = FancyArrowPatch(start, end, zorder=8, **look)
         self.drawn.append(self.axes.add_patch(arrow))
@@ -334,7 +337,8 @@ def draw_symbol(
 
 def _draw_between_ends(pen: _Pen, other_end: tuple[int, complex]) -> None:
     """Draw a spring as a zigzag, a cylinder as its rod and barrel, and both ends."""
-    symbol, place = pen.symbol, pen.place
+    symbol = pen.symbol
+    place = pen.place
     start = place.point(symbol.bar, symbol.at)
     end = place.point(*other_end)
     if symbol.kind == "spring":
@@ -351,7 +355,8 @@ def _draw_between_ends(pen: _Pen, other_end: tuple[int, complex]) -> None:
 
 def _draw_couple(pen: _Pen) -> None:
     """Draw a moment, or the torque of the drive, as an arrow that turns."""
-    symbol, place = pen.symbol, pen.place
+    symbol = pen.symbol
+    place = pen.place
     text = symbol.name
     if symbol.kind == "moment":
         centre = place.point(symbol.bar, symbol.at) + symbol.beyond
@@ -375,7 +380,9 @@ def _draw_couple(pen: _Pen) -> None:
 
 def _draw_ring(pen: _Pen) -> None:
     """Draw what acts at a pin or a place as a ring; a torsion spring is a spiral."""
-    symbol, place, kind = pen.symbol, pen.place, pen.symbol.kind
+    symbol = pen.symbol
+    place = pen.place
+    kind = pen.symbol.kind
     centre = place.point(symbol.bar, symbol.at)
     if symbol.pin:
         centre = place.pins[symbol.pin]
@@ -395,7 +402,8 @@ def _draw_ring(pen: _Pen) -> None:
 
 def _draw_force(pen: _Pen) -> None:
     """Draw an arrow of one length at the place where a force acts."""
-    symbol, place = pen.symbol, pen.place
+    symbol = pen.symbol
+    place = pen.place
     tail = place.tail(symbol)
     sign = symbol.sign(place.theta_2)
     if sign == 0.0:

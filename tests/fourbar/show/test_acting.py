@@ -73,7 +73,8 @@ def load(stated):
     return f"{HATCH.partition('[effects]')[0]}[[loads]]\n{stated}\n"
 
 
-COUPLE, FORCE = 'moment = "1 N m"', 'force = ["1 N", "0 deg"]'
+COUPLE = 'moment = "1 N m"'
+FORCE = 'force = ["1 N", "0 deg"]'
 ARM = 'arm = ["1 mm", "0 deg"]'
 LONGEST = f"{1000.0 * sqrt(0.13 + 0.12 * math.sin(math.radians(80.0)))!r} mm"
 AT_80 = 'theta_2 = "80 deg"\nomega_2 = "0 rad/s"\n'
@@ -90,7 +91,8 @@ steps = 20
 BY_STROKE = """stroke = { from = "390 mm", to = "497 mm", steps = 7 }
 side = "left"
 """
-TOO_LONG, PULLS = "extended length of 400 mm", "spring 1 pulls"
+TOO_LONG = "extended length of 400 mm"
+PULLS = "spring 1 pulls"
 TOLD = [
     (hatch(), f"{TOO_LONG} from theta_2 = {reach(0.4)} on"),
     (hatch("600 mm"), f"compressed length of 450 mm up to theta_2 = {reach(0.45)}"),

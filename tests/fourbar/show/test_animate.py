@@ -112,7 +112,8 @@ def test_what_is_solved_already_changes_no_number(angles):
 
 @pytest.mark.slow
 def test_a_free_motion_is_embedded_instant_by_instant():
-    data, solution = embedded(animate.write_page(RELEASED)), solve(RELEASED)
+    data = embedded(animate.write_page(RELEASED))
+    solution = solve(RELEASED)
     (columns,) = data["branches"].values()
     assert_array_equal(data["time"], solution.time)
     for name in (*QUANTITIES, "theta_2", "omega_2"):  # to the last bit

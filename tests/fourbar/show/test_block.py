@@ -72,7 +72,8 @@ def opposite(side, first, second):
     return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
-PARALLELOGRAM, CRANK_ROCKER = (0.3, 0.1, 0.3, 0.1), (0.3, 0.1, 0.25, 0.22)
+PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
+CRANK_ROCKER = (0.3, 0.1, 0.25, 0.22)
 ONE_CHANGE_POINT = (4.0, 1.0, 2.0, 3.0)
 STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
 LIMITED = (0.3, 0.4, 0.2, 0.25)
@@ -361,7 +362,8 @@ def test_the_block_says(name):
         scene, said, unsaid = SAID[name]
     else:
         document = dict(FILES[name])
-        said, unsaid = document.pop("says"), document.pop("never")
+        said = document.pop("says")
+        unsaid = document.pop("never")
         if not {"lengths", "pins"} & document.keys():
             document = CRANK_ROCKER_FILE | document
         scene = read_tables(document)
@@ -375,7 +377,8 @@ def test_the_block_has_the_numbers_of_the_facts():
     scene = crank_rocker(motion=turn(360))
     facts = summarize(scene, solve(scene, "error"))
     text = "\n".join(write_facts(facts))
-    duty, peak = facts.duty, facts.peak
+    duty = facts.duty
+    peak = facts.peak
     torque, rms, most = (
         f"{1e3 * number:.4g} mN m"
         for number in (peak.value, duty.rms_torque, duty.peak_torque)
@@ -425,13 +428,13 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     sweep = Motion(Sweep(0.2, 1.4, steps) if steps > 1 else 0.2, 0.0)
     static = solve(crank_rocker(motion=sweep, effects=WEIGHT)).torque
     held = crank_rocker(motion=sweep, effects=(*WEIGHT, Friction.at(O2=0.5)))
-    low, high = static.min() - 0.5, static.max() + 0.5
-    digits, where = 6, ": dry friction holds it between them"
+    low = static.min() - 0.5
+    high = static.max() + 0.5
+    digits = 6
+    where = ": dry friction holds it between them"
     if steps > 1:
-        digits, where = (
-            4,
-            " over theta_2 = 11.46 deg to 80.21 deg, a part of it at each",
-        )
+        digits = 4
+        where = " over theta_2 = 11.46 deg to 80.21 deg, a part of it at each"
         assert np.ptp(static) > 0.1
     low, high = (f"{1e3 * end:.{digits}g} mN m" for end in (low, high))
     assert f"at rest {low} to {high}{where}" in block(held)

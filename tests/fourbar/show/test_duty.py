@@ -31,9 +31,11 @@ LISTED = Motion(np.linspace(0.1, 0.1 + tau, 61), 10.0)
 @pytest.mark.parametrize("drive", [None, CYLINDER], ids=("couple", "cylinder"))
 def test_shaking_is_the_momentum_that_the_bars_lose(drive):
     s = solve(crank_rocker(loads=(), effects=(), drive=drive))
-    force, moment = 0.0, 0.0
+    force = 0.0
+    moment = 0.0
     for number, bar in zip(MOVING_BARS, s.scene.linkage.moving, strict=True):
-        G, a = s[f"G{number}"], s[f"a_G{number}"]
+        G = s[f"G{number}"]
+        a = s[f"a_G{number}"]
         force -= bar.mass * a
         moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0])
         moment -= bar.moment_of_inertia * getattr(s, f"alpha_{number}")
@@ -108,8 +110,10 @@ def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
 
 def test_the_json_holds_the_duty():
     s = solve(crank_rocker(motion=LISTED))
-    duty, entry = motor_duty(s), write_motor(s.scene, s, units("imperial"))
-    inch, pound = 0.0254, 0.45359237 * 9.80665
+    duty = motor_duty(s)
+    entry = write_motor(s.scene, s, units("imperial"))
+    inch = 0.0254
+    pound = 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp"
     assert entry["units"]["energy_out"] == "lbf in"
     for printed, unit, number in (
@@ -130,7 +134,8 @@ def test_a_study_has_what_each_of_its_members_has():
         "motion.theta_2": np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn]),
     }
     s = solve(vary(scene, values))
-    duty, load = motor_duty(s), bearing_load(s, "A")
+    duty = motor_duty(s)
+    load = bearing_load(s, "A")
     arrays = shaking_force(s), shaking_moment(s), *duty, *load
     for member, ground in enumerate(values["lengths.ground"][:3]):
         angle = values["lengths.ground_angle"][member]

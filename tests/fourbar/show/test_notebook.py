@@ -139,7 +139,8 @@ def test_a_solution_says_its_range_and_how_many_positions_it_has():
 
 def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
     """By 1 % of a length, and by 1 deg."""
-    slopes, spread = sensitivity(LOOSE), tolerances(LOOSE, 64)
+    slopes = sensitivity(LOOSE)
+    spread = tolerances(LOOSE, 64)
     steps = {
         f"lengths.{name}": 0.01 * length
         for name, length in zip(LENGTH_NAMES, LOOSE.linkage.lengths, strict=True)
@@ -160,7 +161,8 @@ def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
 
 def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
-    slopes, spread = sensitivity(LOOSE), tolerances(LOOSE, 64)
+    slopes = sensitivity(LOOSE)
+    spread = tolerances(LOOSE, 64)
     table = slopes.to_pandas()
     assert len(table) == len(slopes.keys) * 61
     rows = table[table["key"] == "lengths.input"]
@@ -169,7 +171,8 @@ def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
     assert set(spread.spreads) <= set(table.columns)
     assert all(np.isfinite(slopes.value(name)).all() for name in spread.spreads)
     wide = spread.to_pandas()
-    of_F43, size = wide[wide["quantity"] == "|F43|"], spread.spreads["|F43|"]
+    of_F43 = wide[wide["quantity"] == "|F43|"]
+    size = spread.spreads["|F43|"]
     assert len(wide) == 61 * len(spread.spreads)
     assert_array_equal(of_F43["deviation"], size.deviation)
     assert_array_equal(of_F43["share of lengths.input"], size.shares[0])

@@ -212,7 +212,8 @@ def test_an_input_that_does_not_turn_fully_swings(show):
 
 @pytest.mark.slow
 def test_a_free_motion_plays_once_in_its_own_time(show):
-    page, s = show(RELEASED), solve(RELEASED)
+    page = show(RELEASED)
+    s = solve(RELEASED)
     # it has one branch: no key promises another, and none takes the linkage away
     for name in ("branch", "torque", "branch-key"):
         assert not page[name].is_displayed(), name
@@ -250,7 +251,8 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     show, motion, place, over, pace
 ):
     scene = crank_rocker(motion=motion, drive=CYLINDER)
-    page, s = show(scene), solve(scene)
+    page = show(scene)
+    s = solve(scene)
     page.run("go(20)")
     assert page["theta-text"].text == place
     assert page["over"].text == over
@@ -263,7 +265,8 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     assert page.state("plotted.over") == approx(s.at.places)
     page["chart"].click()  # its middle
     assert abs(page.state("row") - 20) <= 2
-    closed, rows = np.flatnonzero(s.assembled), page.play(400)
+    closed = np.flatnonzero(s.assembled)
+    rows = page.play(400)
     assert (min(rows), max(rows)) == (closed[0], closed[-1])
     assert np.abs(np.diff(rows)).max() <= 1
     page.run("play(false); go(0)")
@@ -301,7 +304,8 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     page = show(scene)
     page.run("go(20); toggle('show-v'); toggle('show-a')")
     s = solve(scene)
-    theta_3, theta_4 = s.theta_3[20], s.theta_4[20]
+    theta_3 = s.theta_3[20]
+    theta_4 = s.theta_4[20]
     script = f"""{POINTS}
         return [...document.querySelectorAll("path.act")].map(e => [
           e.getAttribute("class"),

@@ -140,7 +140,8 @@ def test_the_centre_of_a_bar_that_turns_back_is_at_infinity(name):
 
 PARALLELOGRAM = fourbar.FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1))
 """Uniform bars of 1 kg/m, all in one line at theta_2 = 0 and 180 deg."""
-ALONG, ACROSS = Gravity(9.81, 0.0), Gravity(9.81, -0.5 * np.pi)
+ALONG = Gravity(9.81, 0.0)
+ACROSS = Gravity(9.81, -0.5 * np.pi)
 LIMITS = "on the change point: the limits from both sides"
 
 

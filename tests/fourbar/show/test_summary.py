@@ -121,9 +121,11 @@ def take_scene(name):
 
 def list_sizes(scene, s):
     """List the sizes of what a summary has the peaks of, by name."""
-    drive, speed = "drive_force", s.stroke_speed
+    drive = "drive_force"
+    speed = s.stroke_speed
     if s.drive is None:
-        drive, speed = "torque", getattr(s, f"omega_{s.drive_bar}")
+        drive = "torque"
+        speed = getattr(s, f"omega_{s.drive_bar}")
     curves = {drive: getattr(s, drive), "power": s.power, "speed": speed}
     for name in PIN_FORCE.values():
         curves[name] = np.hypot(*getattr(s, name).T)
@@ -155,10 +157,12 @@ def scan(scene, ends, *corners):
     "name", slow_but({"turn backwards", "load with corners", "stroke"}, SCENES)
 )
 def test_facts_are_those_of_a_dense_scan(name):
-    scene, pin = take_scene(name), REVERSES.get(name, "")
+    scene = take_scene(name)
+    pin = REVERSES.get(name, "")
     solution = solve(scene)
     facts = summarize(scene, solution)
-    motion, panels = facts.motion, facts.motion.panels
+    motion = facts.motion
+    panels = facts.motion.panels
     assert not panels.growing
     ends = solution.at.places[[0, -1]]
     corners = [*getattr(scene.motion.law, "time", ())]
@@ -203,7 +207,8 @@ def test_facts_are_those_of_a_dense_scan(name):
 
 def check_loads(facts, sizes, weights):
     """Check the loads of pins and drive, and that the JSON has the same numbers."""
-    motion, panels = facts.motion, facts.motion.panels
+    motion = facts.motion
+    panels = facts.motion.panels
     entry = write_motor(facts.scene, facts.solution, {})
     for pin, force in PIN_FORCE.items():
         peak = panels.find_peak(force)
@@ -295,7 +300,10 @@ EXTREME = 1e-9
 """rad and relative: the dense output of the integrator, and equal extremes."""
 
 
-ARM, AWAY, CRANK, COUPLER = 0.5, math.radians(25.0), 2.0, 5.0
+ARM = 0.5
+AWAY = math.radians(25.0)
+CRANK = 2.0
+COUPLER = 5.0
 
 
 INERTIA = 2.0 * CRANK * ARM**2 / 3.0 + COUPLER * ARM**2

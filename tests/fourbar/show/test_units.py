@@ -33,7 +33,8 @@ PURE = (
 MODEL = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 
 
-INCH, POUND = 0.0254, 0.45359237 * 9.80665
+INCH = 0.0254
+POUND = 0.45359237 * 9.80665
 
 SIZES = {
     **dict.fromkeys(("in", "in/s", "in/s^2"), INCH),
@@ -140,7 +141,8 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
 
 
 def test_a_ground_by_coordinates_has_their_unit():
-    one, other = {"x": "3 in", "y": "1 in"}, "3 in"
+    one = {"x": "3 in", "y": "1 in"}
+    other = "3 in"
     shown = [units_of_scene({"lengths": {"ground": ground}}) for ground in (one, other)]
     assert shown[0] == shown[1]
 

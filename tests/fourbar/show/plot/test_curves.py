@@ -69,7 +69,8 @@ def test_instant_centres_lie_on_the_lines_of_the_bars():
     assert np.isfinite(across).sum() > 30
     assert across[np.isfinite(across)] == approx(0.0, abs=1e-9)
     here = make_view(SCENE).here
-    bar, away = here.B[0] - here.A[0], derive(here, "I24")[0] - here.A[0]
+    bar = here.B[0] - here.A[0]
+    away = derive(here, "I24")[0] - here.A[0]
     assert bar[0] * away[1] == approx(bar[1] * away[0], rel=1e-9)
 
 

@@ -82,7 +82,8 @@ CYLINDER = LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
 
 BETWEEN_NEIGHBOURS = LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09, 0.7)))
 
-BOTTOM, SIDE = Place(1, (0.25, radians(-160.0))), Place(2, (0.09, 0.17))
+BOTTOM = Place(1, (0.25, radians(-160.0)))
+SIDE = Place(2, (0.09, 0.17))
 
 COMMANDS = {
     r"$\theta_3$ (°)": Motion(theta_3=Sweep(1.25, 0.67, 40), omega_3=-2.0),
@@ -163,7 +164,8 @@ def clashes(figure):
 
 def require_clear_texts(figure):
     """No text covers another one or leaves the page."""
-    texts, page = texts_shown(figure), figure.bbox
+    texts = texts_shown(figure)
+    page = figure.bbox
     assert len(texts) > 5
     for text, box in texts:
         assert page.x0 <= box.x0 and box.x1 <= page.x1, text

@@ -73,7 +73,8 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
         _, line, _ = labels.lines[0]
         return line[0], line[-1 if name == "spring" else 1]
 
-    theta_3, theta_4 = solution.theta_3[index], solution.theta_4[index]
+    theta_3 = solution.theta_3[index]
+    theta_4 = solution.theta_4[index]
     G3, G4 = (complex(*solution[name][index]) for name in ("G3", "G4"))
     sign = math.copysign(1.0, TABLED.table.at(solution.theta_2[index]))
     for name, tail, direction in (
