@@ -7,6 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -46,14 +47,8 @@ def try_faults(numbers: Sequence[int]) -> list[_Failing] | str:
 
 def _inject(*arguments: str) -> Ended:
     """Run the module that injects, in a process of its own."""
-    packages = dict.fromkeys(
-        str(folder)
-        for folder in (
-            FORMULAS_FOLDER.parent,
-            PACKAGE.parent,
-            Path(__file__).parents[1],
-        )
-    )
+    folders = FORMULAS_FOLDER.parent, PACKAGE.parent, Path(__file__).parents[1]
+    packages = dict.fromkeys(map(str, folders))
     line = [sys.executable, "-P", injection.__file__, *arguments]
     variables = {"PYTHONPATH": os.pathsep.join(packages)}
     return run_to_end(line, seconds=FAULT_SECONDS, folder=CHECKOUT, variables=variables)
@@ -111,29 +106,23 @@ def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
 
     Return the reason why it survives, or None.
     """
-    entries, rows = read_faults(), try_faults(())
-    failing = (
-        rows
-        if isinstance(rows, str)
-        else [row for outcome in rows[0].values() for row in outcome]
-    )
+    entries = read_faults()
+    rows = try_faults(())
+    failing = rows
+    if not isinstance(rows, str):
+        failing = [row for outcome in rows[0].values() for row in outcome]  # type: ignore[misc]
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
     judged = [i for i, entry in enumerate(entries) if "scenes" in entry]
     batches = [
         judged[start : start + FAULTS_OF_A_PROCESS]
         for start in range(0, len(judged), FAULTS_OF_A_PROCESS)
     ]
-    outcomes = apply_each(try_in_turn, batches, workers)
-    for batch, of_batch in zip(batches, outcomes, strict=True):
-        for number, outcome in zip(batch, of_batch, strict=True):
-            why = explain_survival(entries[number], outcome)
-            yield (
-                entries[number]["fault"],
-                None if why and "harmless" in entries[number] else why,
-            )
-    tested = [i for i, entry in enumerate(entries) if "tests" in entry]
-    if CHECKOUT is None:
-        tested = []
+    outcomes = chain.from_iterable(apply_each(try_in_turn, batches, workers))
+    for number, outcome in zip(judged, outcomes, strict=True):
+        entry = entries[number]
+        why = explain_survival(entry, outcome)
+        yield entry["fault"], None if "harmless" in entry else why
+    tested = [i for i, entry in enumerate(entries) if "tests" in entry and CHECKOUT]
     reasons = apply_each(try_tests, tested, workers)
     for number, reason in zip(tested, reasons, strict=True):
         yield entries[number]["fault"], reason

@@ -77,18 +77,17 @@ def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
     lines = dump(scene).splitlines()
     for _ in range(SHRINKING_ROUNDS):
         before = lines
-        for number in reversed(
-            range(len(lines))
-        ):  # lines that a change removes lie behind
+        # lines that a change removes lie behind
+        for number in reversed(range(len(lines))):
             for simpler in _list_simpler(lines, number):
                 try:
-                    simpler_scene = loads("\n".join(simpler))
-                    if fails(simpler_scene):
-                        scene = simpler_scene
-                        lines = simpler
-                        break
+                    candidate = loads("\n".join(simpler))
                 except FourBarError:  # no scene any more
                     continue
+                if fails(candidate):
+                    scene = candidate
+                    lines = simpler
+                    break
         if lines == before:
             break
     return scene
@@ -102,27 +101,24 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
     line = lines[number]
     until = number + 1
     if line.startswith("["):
-        until = next(
-            (i for i in range(until, len(lines)) if lines[i].startswith("[")),
-            len(lines),
-        )
+        while until < len(lines) and not lines[until].startswith("["):
+            until += 1
     if not line.startswith(_NEEDED):
         yield [*lines[:number], *lines[until:]]
     key, _, value = line.partition(" = ")
+    entries = []
     if value.startswith('["'):
         entries = [f"{key} = {json.dumps(each)}" for each in json.loads(value)]
-    else:
-        entries = []
     for digits in DIGITS_OF_A_LENGTH:
-        entries.append(
-            NUMBER_BEFORE_A_UNIT.sub(
-                lambda match, digits=digits: f"{float(match[0]):.{digits}g}",  # type: ignore[misc]
-                line,
-            )
-        )
+        shorten = partial(_round_match, digits)
+        entries.append(NUMBER_BEFORE_A_UNIT.sub(shorten, line))
     for entry in entries:
         if entry != line:
             yield [*lines[:number], entry, *lines[number + 1 :]]
+
+
+def _round_match(digits: int, match: re.Match[str]) -> str:
+    return f"{float(match[0]):.{digits}g}"
 
 
 def keep_counterexample(
@@ -178,18 +174,16 @@ def _check_assembly(
     problems = []
     margin = np.abs(compute_closing_margin(scene.linkage, commanded.theta_2))
     signs = with_signs(scene.linkage, commanded).branch
-    for i, theta_2 in enumerate(commanded.theta_2):
-        closes = (
-            compute_directions(make_balls(scene, float(theta_2)), int(signs[i]))
-            is not None
-        )
-        if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
+    angles = np.stack([solution.theta_3, solution.theta_4])
+    for i, theta_2 in enumerate(commanded.theta_2.tolist()):
+        balls = make_balls(scene, theta_2)
+        closes = compute_directions(balls, int(signs[i])) is not None
+        said = bool(solution.assembled[i])
+        if closes != said and margin[i] > TOUCHING_MARGIN:
             problems.append(
-                f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2"
-                f" = {theta_2!r}"
+                f"assembled: the formulas say {said} at theta_2 = {theta_2!r}"
             )
-        angles = (solution.theta_3[i], solution.theta_4[i])
-        if np.isfinite(angles).any() and not solution.assembled[i]:
+        if np.isfinite(angles[:, i]).any() and not said:
             problems.append(
                 "assembled: angles where the loop does not close, theta_2 ="
                 f" {theta_2!r}"
@@ -199,19 +193,18 @@ def _check_assembly(
 
 def _check_engines(question: Question) -> list[str]:
     scene = question.scene
-    commanded = question.at
-    solution = question.solution
     rows = list(check_identities(question))
     for engine in EXACT_ENGINES:
-        answer = ask_at(engine.start(), scene, commanded)
-        held = make_demands(engine, scene, commanded, answer)
-        rows += Comparison("", scene, answer, solution, held).rows()
+        answer = ask_at(engine.start(), scene, question.at)
+        held = make_demands(engine, scene, question.at, answer)
+        rows += Comparison("", scene, answer, question.solution, held).rows()
     # half of the scenes are drawn where doubles have few digits: that they are
     # undecided is no fault
-    failed = [
-        row for row in rows if row.verdict == FAILS and row.quantity != "undecided"
+    return [
+        f"{row.engine} {row.quantity}: {row.reason}"
+        for row in rows
+        if row.verdict == FAILS and row.quantity != "undecided"
     ]
-    return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
 
 
 def examine_scene(seed: int, index: int) -> list[str]:
@@ -238,15 +231,14 @@ def examine_scenes(
     Tasks of an interrupted run are read.
     """
     with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
-        tasks = {
-            min(start + SCENES_OF_A_TASK, count): range(
-                start, min(start + SCENES_OF_A_TASK, count)
-            )
-            for start in range(0, count, SCENES_OF_A_TASK)
-        }
-        done = store.done() & tasks.keys()
-        yield from (store.read(stop)[0] for stop in sorted(done))
-        todo = [task for task in tasks.items() if task[0] not in done]
+        done = store.done()
+        todo = []
+        for start in range(0, count, SCENES_OF_A_TASK):
+            stop = min(start + SCENES_OF_A_TASK, count)
+            if stop in done:
+                yield store.read(stop)[0]
+            else:
+                todo.append((stop, range(start, stop)))
         for stop, outcomes in worker_processes.apply_over_processes(
             partial(examine_scene, seed),
             todo,
@@ -254,11 +246,9 @@ def examine_scenes(
             seconds=worker_processes.SCENE_SECONDS,
             instead=_find_lost,
         ):
-            wrong = {
-                str(number): outcome
-                for number, outcome in zip(tasks[stop], outcomes, strict=True)
-                if outcome
-            }
+            first = stop - len(outcomes)
+            numbered = enumerate(outcomes, first)
+            wrong = {str(number): found for number, found in numbered if found}
             store.put(stop, [wrong])
             yield wrong
 
@@ -309,9 +299,7 @@ def fuzz(
         source = wrong[number][0]
         scene = draw_fuzz_scene(seed, int(number))
         if not source.startswith(WORKER_LOST):  # shrinking would end this process too
-            scene = shrink_scene(
-                scene, lambda candidate: bool(list_findings(candidate))
-            )
+            scene = shrink_scene(scene, lambda smaller: bool(list_findings(smaller)))
             source = list_findings(scene)[0]
         title = f"found by fuzzing, seed {seed}, scene {number}"
         path = keep_counterexample(

@@ -5,6 +5,7 @@ Each must end in a scene or in one clear line.
 
 import time
 from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import click
 import numpy as np
@@ -15,6 +16,7 @@ from fourbar.scene import command
 from fourbar.solving import find_last_stage, solve
 from fourbar_validation.scenes.suites import list_model_files
 
+_Choice = TypeVar("_Choice")
 _HANG = 5.0
 """Seconds; a scene file takes milliseconds."""
 MOST_POSITIONS_OF_A_FILE = 10_000
@@ -22,59 +24,51 @@ MOST_POSITIONS_OF_A_FILE = 10_000
 the reading of it is tried.
 """
 _PIECES = (
-    *(
-        '"',
-        "'",
-        "[",
-        "]",
-        "{",
-        "}",
-        "=",
-        "\n",
-        "#",
-        ",",
-        ".",
-        "\\",
-        "\x00",
-        "\ud7ff",
-        "é",
-        "∞",
-        "--",
-        "1e999",
-        "nan",
-    ),
-    *(
-        "-0.0",
-        "1e308 m",
-        "1e-320 m",
-        "0 m",
-        "inf m",
-        "48 kg",
-        "deg",
-        "m^99",
-        "m/s/s/s",
-        "9**9**9",
-        "(((((",
-        "0x10 m",
-    ),
-    *(
-        "true",
-        "[[loads]]",
-        "[effects]",
-        '"""',
-        "'''",
-        "1979-05-27",
-        "__import__('os')",
-        "../../etc/passwd",
-    ),
-    *(
-        "<script>alert(1)</script>",
-        "</mujoco>",
-        "${x}",
-        "{{x}}",
-        "%s%n",
-        "steps = 99999999999999999999",
-    ),
+    '"',
+    "'",
+    "[",
+    "]",
+    "{",
+    "}",
+    "=",
+    "\n",
+    "#",
+    ",",
+    ".",
+    "\\",
+    "\x00",
+    "\ud7ff",
+    "é",
+    "∞",
+    "--",
+    "1e999",
+    "nan",
+    "-0.0",
+    "1e308 m",
+    "1e-320 m",
+    "0 m",
+    "inf m",
+    "48 kg",
+    "deg",
+    "m^99",
+    "m/s/s/s",
+    "9**9**9",
+    "(((((",
+    "0x10 m",
+    "true",
+    "[[loads]]",
+    "[effects]",
+    '"""',
+    "'''",
+    "1979-05-27",
+    "__import__('os')",
+    "../../etc/passwd",
+    "<script>alert(1)</script>",
+    "</mujoco>",
+    "${x}",
+    "{{x}}",
+    "%s%n",
+    "steps = 99999999999999999999",
 )
 """Text that is put into files: the syntax itself, numbers at the edge, and text that
 other formats would run.
@@ -89,7 +83,7 @@ def _mutate_files(
     """Mutate scene files; each depends on (seed, index) alone."""
     for index in indices:
         rng = np.random.default_rng([seed, index])
-        text = originals[int(rng.integers(len(originals)))]
+        text = _pick(rng, originals)
         for _ in range(int(rng.integers(1, 6))):
             text = _mutate(text, rng, originals)
         yield index, text
@@ -101,41 +95,36 @@ def _mutate(
     originals: Sequence[str],
 ) -> str:
     if not text:
-        return _PIECES[int(rng.integers(len(_PIECES)))]
+        return _pick(rng, _PIECES)
     start = int(rng.integers(len(text)))
     length = int(rng.geometric(0.1))
     lines = text.splitlines(keepends=True)
     line = int(rng.integers(len(lines)))
     match int(rng.integers(7)):
         case 0:  # a piece put in
-            return (
-                text[:start] + _PIECES[int(rng.integers(len(_PIECES)))] + text[start:]
-            )
+            return text[:start] + _pick(rng, _PIECES) + text[start:]
         case 1:  # a piece in place of a value
             head, _, _ = lines[line].partition("=")
-            return "".join(
-                [
-                    *lines[:line],
-                    f"{head}= {_PIECES[int(rng.integers(len(_PIECES)))]}\n",
-                    *lines[line + 1 :],
-                ]
-            )
+            lines[line] = f"{head}= {_pick(rng, _PIECES)}\n"
+            return "".join(lines)
         case 2:  # something cut out
             return text[:start] + text[start + length :]
         case 3:  # one character changed
             return text[:start] + chr(int(rng.integers(1, 0xD7FF))) + text[start + 1 :]
         case 4:  # a line twice
-            return "".join([*lines[:line], lines[line], *lines[line:]])
+            lines.insert(line, lines[line])
+            return "".join(lines)
         case 5:  # two files in one
-            donor = originals[int(rng.integers(len(originals)))]
+            donor = _pick(rng, originals)
             return text[:start] + donor[int(rng.integers(len(donor))) :]
         case _:  # a digit changed
             digits = [i for i, character in enumerate(text) if character.isdigit()]
-            if digits:
-                start = digits[int(rng.integers(len(digits)))]
-            else:
-                start = 0
+            start = _pick(rng, digits or [0])
             return text[:start] + str(int(rng.integers(10))) + text[start + 1 :]
+
+
+def _pick(rng: np.random.Generator, choices: Sequence[_Choice]) -> _Choice:
+    return choices[int(rng.integers(len(choices)))]
 
 
 def try_out(text: str) -> str:

@@ -40,21 +40,15 @@ def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
     Raises ValueError if the entry no longer fits one.
     """
     texts = {}
-    for change in (entry, *([entry["also"]] if "also" in entry else [])):
-        text = _find_module_file(change["file"]).read_text(encoding="utf-8")
-        if text.count(change["old"]) != 1:
-            count = text.count(change["old"])
-            raise ValueError(
-                f"{entry['fault']}: {count} places in {change['file']} read"
-                f" {change['old']!r}"
-            )
-        name = (
-            change["file"]
-            .removesuffix(".py")
-            .removesuffix("/__init__")
-            .replace("/", ".")
-        )
-        texts[name] = text.replace(change["old"], change["new"])
+    for change in (entry, entry.get("also")):
+        if change is None:
+            continue
+        file, old = change["file"], change["old"]
+        text = _find_module_file(file).read_text(encoding="utf-8")
+        if (count := text.count(old)) != 1:
+            raise ValueError(f"{entry['fault']}: {count} places in {file} read {old!r}")
+        name = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        texts[name] = text.replace(old, change["new"])
     return texts
 
 
@@ -122,10 +116,7 @@ def _list_failing(names: list[str]) -> dict[str, list[str]]:
     failing = {}
     for name in names or FAULT_SCENES:
         simulated = name.startswith("simulated")
-        if name.startswith("to full accuracy"):
-            offered = HARD_ENGINES
-        else:
-            offered = ENGINES
+        offered = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
         engines = [engine for engine in offered if simulated or not engine.through_time]
         rows = judge(name, FAULT_SCENES[name], engines).rows
         failing[name] = [
@@ -159,14 +150,10 @@ def inject_and_judge() -> None:
         print(json.dumps(_run_tests(entry)))
         return
     for number in numbers:
-        for name in [
-            name
-            for name in sys.modules
-            if name.partition(".")[0] in (*CHANGEABLE_PACKAGES, "fourbar_lab")
-        ]:
-            del sys.modules[
-                name
-            ]  # modules of the previous fault; the engines' libraries stay
+        # modules of the previous fault; the engines' libraries stay
+        for name in list(sys.modules):
+            if name.partition(".")[0] in (*CHANGEABLE_PACKAGES, "fourbar_lab"):
+                del sys.modules[name]
         entry = read_faults()[number]
         finder = _FaultFinder(entry)
         sys.meta_path.insert(0, finder)

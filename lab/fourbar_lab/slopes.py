@@ -146,11 +146,8 @@ def judge_slopes(
             for (key, number), row in zip(numbers.items(), rows, strict=True):
                 value, rate = exact[component][key]
                 rate += together / (abs(number) or 1.0)
-                tally.note(
-                    component,
-                    error_over_allowed("", np.ravel(row)[index], value, rate)[0],
-                    f"{sample} by {key}",
-                )
+                part, _ = error_over_allowed("", np.ravel(row)[index], value, rate)
+                tally.note(component, part, f"{sample} by {key}")
 
 
 def _is_held(scene: Scene, values: BallValues) -> bool:
@@ -158,14 +155,10 @@ def _is_held(scene: Scene, values: BallValues) -> bool:
 
     Torque and pin forces then have no derivative.
     """
-    dry = [
-        PINS[pin]
-        for term in scene.effects
-        if isinstance(term, Friction)
-        for pin, f in term.torques
-        if f
-    ]
-    return any(
-        not abs(values.get(f"omega_{j}", 0) - values.get(f"omega_{i}", 0)) > 0
-        for i, j in dry
-    )
+    for term in scene.effects:
+        if isinstance(term, Friction):
+            for pin, f in term.torques:
+                i, j = (values.get(f"omega_{bar}", 0) for bar in PINS[pin])
+                if f and not abs(j - i) > 0:
+                    return True
+    return False

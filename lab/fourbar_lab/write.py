@@ -6,6 +6,7 @@ Each MJCF file lies next to its scene.
 import math
 import re
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 import click
@@ -31,9 +32,8 @@ def find_stale(files: Iterable[Path]) -> list[Path]:
     stale = []
     for file in files:
         xml = file.with_suffix(".xml")
-        if not xml.is_file() or not _is_same_model(
-            xml.read_text(encoding="utf-8"), write_mjcf(load(file))
-        ):
+        text = xml.read_text(encoding="utf-8") if xml.is_file() else ""
+        if not _is_same_model(text, write_mjcf(load(file))):
             stale.append(file)
     return stale
 
@@ -42,20 +42,12 @@ def _is_same_model(one: str, other: str) -> bool:
     if NUMBER_IN_AN_MJCF.split(one) != NUMBER_IN_AN_MJCF.split(other):
         return False
     numbers = zip(
-        NUMBER_IN_AN_MJCF.findall(one),
-        NUMBER_IN_AN_MJCF.findall(other),
+        map(float, NUMBER_IN_AN_MJCF.findall(one)),
+        map(float, NUMBER_IN_AN_MJCF.findall(other)),
         strict=True,
     )
-    return all(
-        a == b
-        or math.isclose(
-            float(a),
-            float(b),
-            rel_tol=STATE_ROUND_OFF,
-            abs_tol=STATE_ROUND_OFF,
-        )
-        for a, b in numbers
-    )
+    close = partial(math.isclose, rel_tol=STATE_ROUND_OFF, abs_tol=STATE_ROUND_OFF)
+    return all(close(a, b) for a, b in numbers)
 
 
 def write_models(files: Iterable[Path]) -> list[Path]:

@@ -101,11 +101,10 @@ class _DrakeTree(Tree):
 
     def point(self, name: str) -> Array:
         """Return a point fixed in a body."""
-        return np.array(
-            self.plant.CalcPointsPositions(self.context, *self.local[name], self.world)[
-                :2, 0
-            ]
+        found = self.plant.CalcPointsPositions(
+            self.context, *self.local[name], self.world
         )
+        return np.array(found[:2, 0])
 
     def rotation(self, bar: int) -> Array:
         """Return the body's rotation matrix."""
@@ -184,10 +183,8 @@ class _DrakeTree(Tree):
         applied = []
         for bar, wrench in self.wrenches.items():
             force = ExternallyAppliedSpatialForce()
-            force.body_index, force.F_Bq_W = (
-                self.body[bar].index(),
-                _make_spatial(wrench),
-            )
+            force.body_index = self.body[bar].index()
+            force.F_Bq_W = _make_spatial(wrench)
             applied.append(force)
         port = self.plant.get_applied_spatial_force_input_port()
         port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))

@@ -154,12 +154,8 @@ class ExudynBars(Loaded):
         of_3_to_2, theta_4 = q[1:]
         theta_2 = reduce_angle(q[0])
         coordinates = np.zeros(EXUDYN_SIZE)
-        for bar, angle in zip(
-            MOVING_BARS,
-            (theta_2, theta_2 + of_3_to_2, theta_4),
-            strict=True,
-        ):
-            coordinates[self.turn[bar]] = angle
+        directions = theta_2, theta_2 + of_3_to_2, theta_4
+        coordinates[[*self.turn.values()]] = directions
         self.state.SetODE2Coordinates(coordinates)
         jacobian = self._read_constraint_jacobian()
         gap = self._read_constraint_gap()
@@ -224,11 +220,8 @@ class ExudynBars(Loaded):
 
     def rotation(self, bar: int) -> Array:
         """Return the body's rotation matrix, (2, 2)."""
-        matrix = self.mbs.GetObjectOutputBody(
-            self.body[bar],
-            exu.OutputVariableType.RotationMatrix,
-            [0.0, 0.0, 0.0],
-        )
+        kind = exu.OutputVariableType.RotationMatrix
+        matrix = self.mbs.GetObjectOutputBody(self.body[bar], kind, [0.0, 0.0, 0.0])
         return np.reshape(matrix, (3, 3))[:2, :2]
 
     def velocity(self, bar: int) -> float:
@@ -273,10 +266,8 @@ class ExudynBars(Loaded):
             f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()
         }
         for moving in MOVING_BARS:
-            values[f"omega_{moving}"], values[f"alpha_{moving}"] = (
-                self.velocity(moving),
-                self.alpha(moving),
-            )
+            values[f"omega_{moving}"] = self.velocity(moving)
+            values[f"alpha_{moving}"] = self.alpha(moving)
         self.solver.ComputeMassMatrix(self.mbs)
         inertial = np.array(self.solver.GetSystemMassMatrix()) @ a
 

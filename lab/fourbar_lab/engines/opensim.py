@@ -216,11 +216,9 @@ class _OpenSimBars(Loaded):
     def point(self, name: str) -> Array:
         """Return a station of a body."""
         bar, place = self.local[name]
-        return np.array(
-            self.body[bar]
-            .findStationLocationInGround(self.state, _make_vec(*place))
-            .to_numpy()[:2]
-        )
+        station = _make_vec(*place)
+        found = self.body[bar].findStationLocationInGround(self.state, station)
+        return np.array(found.to_numpy()[:2])
 
     def gap(self) -> tuple[float, float]:
         """Return A on bar 2 minus A on bar 3, which opens as B would."""
@@ -267,11 +265,11 @@ class _OpenSimBars(Loaded):
     ) -> BarValues:
         """Return speeds, accelerations and forces by name; {} at a toggle's 0/0."""
         if bar != self.commanded:
-            self.commanded, q = bar, self.state.getQ().to_numpy()
+            self.commanded = bar
+            q = self.state.getQ().to_numpy()
             for moving, pin in DIRECTION_JOINTS.items():
-                self.joint[pin].updCoordinate().setIsPrescribed(
-                    self.state, moving == bar
-                )
+                coordinate = self.joint[pin].updCoordinate()
+                coordinate.setIsPrescribed(self.state, moving == bar)
             self.state.setQ(make_simbody_vector(q))
             self.model.realizePosition(self.state)
         try:
@@ -289,19 +287,12 @@ class _OpenSimBars(Loaded):
         """Return the generalized forces of the drive per N m or N, (3,)."""
         if self.force_drive is None:
             return _PER_COORDINATE[self.drive_bar]
-        rate = sum(
-            sense
-            * (
-                np.zeros((2, 3))
-                if place.bar == 1
-                else self._compute_station_jacobian(name)
-            )
-            for name, (sense, place) in zip(
-                CYLINDER_ENDS,
-                self.force_drive.ends,
-                strict=False,
-            )
-        )
+        rate = np.zeros((2, 3))
+        for name, (sense, place) in zip(
+            CYLINDER_ENDS, self.force_drive.ends, strict=False
+        ):
+            if place.bar != 1:
+                rate += sense * self._compute_station_jacobian(name)
         return np.asarray(self.line()[1] @ rate)
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
@@ -327,10 +318,8 @@ class _OpenSimBars(Loaded):
     def _motion(self) -> BarValues:
         values: BarValues = {}
         for bar in MOVING_BARS:
-            values[f"omega_{bar}"], values[f"alpha_{bar}"] = (
-                self.velocity(bar),
-                self.alpha(bar),
-            )
+            values[f"omega_{bar}"] = self.velocity(bar)
+            values[f"alpha_{bar}"] = self.alpha(bar)
         for name, point in ON_BARS.items():
             bar, place = self.local[point]
             drift = self.matter.calcBiasForStationJacobian(
@@ -360,16 +349,12 @@ class _OpenSimBars(Loaded):
             for bar, wrench in self.wrenches.items():
                 for function, value in zip(self.applied[bar], wrench, strict=True):
                     function.setValue(value)
-            self.state.setTime(
-                self.state.getTime()
-            )  # Simbody computes again what depends on it
+            # Simbody computes again what depends on it
+            self.state.setTime(self.state.getTime())
             self.model.realizeAcceleration(self.state)
-            couple = float(
-                self.joint[DIRECTION_JOINTS[self.commanded]]
-                .calcReactionOnChildExpressedInGround(self.state)
-                .get(0)
-                .get(2)
-            )
+            held = self.joint[DIRECTION_JOINTS[self.commanded]]
+            reaction = held.calcReactionOnChildExpressedInGround(self.state)
+            couple = float(reaction.get(0).get(2))
             force = self._compute_closing_force()
             drive = drive + couple / leverage
             closing = closing + force
@@ -377,12 +362,10 @@ class _OpenSimBars(Loaded):
             self.push(2, force, pin_a)
             self.push(3, -force, pin_a)
             size = abs(couple), math.hypot(*force)
-            falls = (
-                size[0] < before[0] or size[1] < before[1]
-            )  # torque, then force, come first
-            if size in seen or (
-                number > 1 and not falls
-            ):  # rounding may go round in a circle
+            # torque, then force, come first
+            falls = size[0] < before[0] or size[1] < before[1]
+            # rounding may go round in a circle
+            if size in seen or (number > 1 and not falls):
                 break
             before = size
             seen.add(size)
@@ -409,12 +392,8 @@ class _OpenSimBars(Loaded):
         return float(_PER_COORDINATE[bar] @ self.a)
 
     def _read_reaction(self, pin: str) -> Array:
-        return np.array(
-            self.joint[pin]
-            .calcReactionOnChildExpressedInGround(self.state)
-            .get(1)
-            .to_numpy()[:2]
-        )
+        reaction = self.joint[pin].calcReactionOnChildExpressedInGround(self.state)
+        return np.array(reaction.get(1).to_numpy()[:2])
 
     def _compute_closing_force(self) -> Array:
         """Return the force of bar 3 on bar 2 in N, from the constraint's multipliers.
@@ -422,13 +401,8 @@ class _OpenSimBars(Loaded):
         Simbody's constraint acts on the bodies with -G^T lambda.
         """
         on_bodies = osim.VectorOfSpatialVec()
-        on_mobilities = osim.Vector()
-        multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(
-            self.state,
-            multipliers,
-            on_bodies,
-            on_mobilities,
+            self.state, self.state.getMultipliers(), on_bodies, osim.Vector()
         )
         force = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
         return np.array([-force.get(0), -force.get(1)])
@@ -453,11 +427,7 @@ def _make_vec(
 
 def make_simbody_vector(values: Iterable[float]) -> Any:
     """Make a vector of Simbody."""
-    numbers = [float(value) for value in values]
-    made = osim.Vector(len(numbers), 0.0)
-    for index, value in enumerate(numbers):
-        made.set(index, value)
-    return made
+    return osim.Vector.createFromMat(np.array([*values], dtype=float))
 
 
 def _make_constants() -> list[Any]:

@@ -73,17 +73,19 @@ def read_docstring(script: Path) -> Reproduction:
     )
     return Reproduction(
         script,
-        " ".join(sentence.split()),
-        {name: " ".join(text.split()) for name, text in stated},
+        _fold(sentence),
+        {name: _fold(text) for name, text in stated},
     )
+
+
+def _fold(text: str) -> str:
+    return " ".join(text.split())
 
 
 def read_findings() -> list[Reproduction]:
     """Read the scripts of a checkout."""
-    return [
-        read_docstring(path)
-        for path in sorted(FINDINGS.glob("*.py") if FINDINGS else ())
-    ]
+    scripts = FINDINGS.glob("*.py") if FINDINGS else ()
+    return [read_docstring(path) for path in sorted(scripts)]
 
 
 def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
@@ -108,39 +110,22 @@ def _list_interpreters(name: str) -> Iterator[str]:
     """
     yield sys.executable
     for entry in read_engines([]).values():
-        if any(
-            re.match(r"[\w.-]+", requirement)[0] == name  # type: ignore[index]
-            for requirement in entry.requires
-        ):
+        named = [re.split(r"[^\w.-]", text)[0] for text in entry.requires]
+        if name in named:
             try:
                 yield make_environment(entry)
             except DependencyError as error:
                 click.echo(str(error), err=True)
 
 
-def _run_findings(
-    findings: list[Reproduction],
-    seconds: float,
-) -> list[tuple[Reproduction, str]]:
-    """Run each finding where its engine is: what came of it, in words."""
-    outcomes = []
-    for finding in findings:
-        place = find_interpreter(finding)
-        if place is None:
-            outcomes.append(
-                (
-                    finding,
-                    (
-                        f"not run: {finding.engine[0]} is not installed, and no engine"
-                        " requires it"
-                    ),
-                )
-            )
-        else:
-            outcomes.append(
-                (finding, f"{finding.run(place[0], seconds)} in {place[1]}")
-            )
-    return outcomes
+def _run_finding(finding: Reproduction, seconds: float) -> str:
+    """Run a finding where its engine is: what came of it, in words."""
+    place = find_interpreter(finding)
+    if place is None:
+        name, _ = finding.engine
+        return f"not run: {name} is not installed, and no engine requires it"
+    python, versions = place
+    return f"{finding.run(python, seconds)} in {versions}"
 
 
 @click.command()
@@ -163,15 +148,12 @@ def findings_command(scripts: tuple[Path, ...], time_limit: float) -> None:
     chosen = [read_docstring(script) for script in scripts] or read_findings()
     for finding in chosen:
         if "Engine" not in finding.fields:
-            raise InputError(
-                "SCRIPT",
-                str(finding.script),
-                "has no line 'Engine: NAME (MODULE)' in its docstring",
-            )
-    outcomes = _run_findings(chosen, time_limit)
-    for finding, state in outcomes:
+            why = "has no line 'Engine: NAME (MODULE)' in its docstring"
+            raise InputError("SCRIPT", str(finding.script), why)
+    states = [_run_finding(finding, time_limit) for finding in chosen]
+    for finding, state in zip(chosen, states, strict=True):
         click.echo(f"{finding.script.name}: {state}")
-    if all(state.startswith("not run") for _, state in outcomes):
+    if all(state.startswith("not run") for state in states):
         raise DependencyError(
             "no finding's simulator is installed here or required by an engine of"
             " engines.toml"

@@ -49,35 +49,31 @@ def collect_problem(name: str) -> dict[str, Any]:
     scene = fourbar.load(PROBLEMS / f"{name}.toml")
     solution = fourbar.solve(scene, "error")
     if scene.motion.free is None:
-        asked: dict[str, Any] = {
-            "command": protocol.command_to_json(
-                scene, with_signs(scene.linkage, list_positions(scene))
-            )
-        }
+        ask = "answer"
+        commanded = with_signs(scene.linkage, list_positions(scene))
+        asked = {"command": protocol.command_to_json(scene, commanded)}
         answers, errors = collect_answers(solution)
     else:
+        ask = "release"
         asked = protocol.release_to_json(scene)
         answers, errors = _answer_released(solution)
     return {
-        **{
-            "schema": PROBLEM_SCHEMA,
-            "title": scene.title,
-            "source": scene.source,
-            "conventions": FOUR_BAR_CONVENTIONS,
-        },
+        "schema": PROBLEM_SCHEMA,
+        "title": scene.title,
+        "source": scene.source,
+        "conventions": FOUR_BAR_CONVENTIONS,
         "mechanism": "four-bar",
-        "ask": "answer" if scene.motion.free is None else "release",
+        "ask": ask,
         "scene": protocol.scene_to_json(scene),
         **asked,
-        "answers": {
-            quantity: np.asarray(values).tolist()
-            for quantity, values in answers.items()
-        },
-        "errors": {
-            quantity: np.asarray(values).tolist() for quantity, values in errors.items()
-        },
+        "answers": _list_values(answers),
+        "errors": _list_values(errors),
         "units": {quantity: UNITS.get(quantity, "Hz") for quantity in answers},
     }
+
+
+def _list_values(answers: dict[str, Any]) -> dict[str, Any]:
+    return {name: np.asarray(values).tolist() for name, values in answers.items()}
 
 
 def list_problems() -> list[str]:
@@ -116,8 +112,10 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
     for name in PIN_FORCES:
         rate = float(np.hypot(*np.gradient(answers[name], time, axis=0).T).max())
         errors[name] = SAFE * solution.force_error + rate * late
-    if (period := _measure_period(time, solution.theta_2, omega, alpha)) is not None:
-        answers["frequency"], errors["frequency"] = 1.0 / period, 2.0 * late / period**2
+    period = _measure_period(time, solution.theta_2, omega, alpha)
+    if period is not None:
+        answers["frequency"] = 1.0 / period
+        errors["frequency"] = 2.0 * late / period**2
     return answers, errors
 
 
@@ -161,9 +159,8 @@ def problems_command(archive: Path | None) -> None:
         click.echo(f"wrote {archive}")
         return
     for name in list_problems():
-        write_text(
-            (PROBLEMS / name).with_suffix(".json"), write_problem(collect_problem(name))
-        )
+        file = PROBLEMS / f"{name}.json"
+        write_text(file, write_problem(collect_problem(name)))
         click.echo(f"wrote {name}.json")
 
 
@@ -172,23 +169,19 @@ def _write_archive(checkout: Path, archive: Path) -> None:
 
     The bytes are the same each time.
     """
-    files = sorted(PROBLEMS.iterdir())
-    files += [
-        checkout / name
-        for name in (
-            "docs/benchmark.md",
-            "docs/protocol.md",
-            "docs/protocol.schema.json",
-        )
-    ]
-    files += [checkout / name for name in ("LICENSE", "CITATION.cff")]
+    others = (
+        "docs/benchmark.md",
+        "docs/protocol.md",
+        "docs/protocol.schema.json",
+        "LICENSE",
+        "CITATION.cff",
+    )
+    files = sorted(PROBLEMS.iterdir()) + [checkout / name for name in others]
     files += sorted((checkout / "docs" / "benchmark").glob("*.svg"))
     with ZipFile(archive, "w", ZIP_DEFLATED) as packed:
         for file in files:
-            entry = ZipInfo(
-                f"{_ARCHIVE}/{file.relative_to(checkout)}",
-                date_time=(1980, 1, 1, 0, 0, 0),
-            )
+            name = f"{_ARCHIVE}/{file.relative_to(checkout)}"
+            entry = ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
             entry.compress_type = ZIP_DEFLATED
             packed.writestr(entry, file.read_bytes())
 

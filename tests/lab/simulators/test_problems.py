@@ -127,10 +127,9 @@ def read_question(name):
     return protocol.command_from_json(scene, problem["command"])
 
 
-@pytest.mark.parametrize("name", PRESCRIBED)
+@pytest.mark.parametrize("name", ["cylinder", "pin_friction"])
 def test_the_free_bodies_answer_the_same(name):
-    scene, command = read_question(name)
-    answers = FreeBody().answer(scene, command).quantities
+    answers = FreeBody().answer(*read_question(name)).quantities
     least = float(np.abs(answers["sin_mu"]).min())
     assert_agreement(name, answers, K * EPS / least**2)
 
@@ -293,11 +292,11 @@ def solve_pin_forces(problem, theta, omega):
 
 
 def test_the_page_s_example_reads_an_answer_without_this_project():
-    page = (ROOT / "docs/benchmark.md").read_text()
-    code = page[page.index("```python") + 9 :].partition("```")[0]
+    page = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8")
+    code = page.partition("```python")[2].partition("```")[0]
+    assert "fourbar" not in code.replace("fourbar-problem/4", "")
     names = {}
     exec(code, names)
-    assert "fourbar" not in code.replace("fourbar-problem/4", "")
     file = PROBLEMS / "newton_128.json"
     right = read_stored("newton_128")["answers"]["F43"]
     assert names["find_error"](file, "F43", right) <= 0.0

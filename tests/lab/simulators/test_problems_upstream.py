@@ -4,6 +4,7 @@ module of this project.
 
 import ast
 import json
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -18,41 +19,29 @@ DIGITS = 1e-8
 """Of the ten digits that the files state."""
 
 
-def literals(path):
-    """What the file states as plain values."""
-    outcomes = {}
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-            try:
-                outcomes[node.targets[0].id] = ast.literal_eval(node.value)
-            except ValueError:
-                continue
-    return outcomes
+def read_problem_file(name):
+    return json.loads((PROBLEMS / f"{name}.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("quantity", ["torque", "F14"])
-def test_newton_s_free_bodies_find_our_answers(quantity):
-    numbers = [
-        node
-        for node in ast.parse(NEWTON.read_text()).body
-        if isinstance(node, ast.Assign)
-        or (isinstance(node, ast.FunctionDef) and node.name.startswith("solve"))
-    ]
-    names = {"np": np}
-    exec(compile(ast.Module(numbers, []), str(NEWTON), "exec"), names)
-    problem = json.loads((PROBLEMS / "newton_128.json").read_text())
-    command, answers = problem["command"], np.array(problem["answers"][quantity])
-    solved = [
-        names["solve_free_bodies"](theta, command["omega_2"], 0.0)
-        for theta in command["theta_2"]
-    ]
-    theirs = np.array(
-        [torque if quantity == "torque" else force for torque, force in solved]
-    )
-    assert (
-        len(theirs) == 37
-        and np.abs(theirs - answers).max() <= DIGITS * np.abs(answers).max()
-    )
+def run_statements(path, *kinds):
+    """Run the statements of these kinds at the top of a file, and return its names."""
+    body = ast.parse(path.read_text()).body
+    found = {"np": np}
+    for node in (node for node in body if isinstance(node, kinds)):
+        with suppress(NameError):
+            exec(compile(ast.Module([node], []), str(path), "exec"), found)
+    return found
+
+
+def test_newton_s_free_bodies_find_our_answers():
+    problem = read_problem_file("newton_128")
+    command = problem["command"]
+    solve = run_statements(NEWTON, ast.Assign, ast.FunctionDef)["solve_free_bodies"]
+    solved = [solve(theta, command["omega_2"], 0.0) for theta in command["theta_2"]]
+    assert len(solved) == 37
+    for name, theirs in zip(("torque", "F14"), zip(*solved, strict=True), strict=True):
+        ours = np.array(problem["answers"][name])
+        assert np.abs(np.array(theirs) - ours).max() <= DIGITS * np.abs(ours).max()
 
 
 @pytest.mark.parametrize(
@@ -62,42 +51,32 @@ def test_newton_s_free_bodies_find_our_answers(quantity):
 )
 def test_every_test_for_another_project_says_what_it_compares(path):
     tree = ast.parse(path.read_text())
-    tests = [
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
-    ]
-    assert (
-        tests
-        and all(ast.get_docstring(node) for node in tests)
-        and ast.get_docstring(tree)
-    )
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    tests = [node for node in functions if node.name.startswith("test_")]
+    assert tests and all(ast.get_docstring(node) for node in (tree, *tests))
     assert "expectedFailure" not in path.read_text()
     assert not any(name.startswith("fourbar") for name in imported(path))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
 def test_a_file_for_another_project_states_our_answers(path):
-    text, stated = path.read_text(), literals(path)
+    text, stated = path.read_text(), run_statements(path, ast.Assign)
     problems = [file.stem for file in PROBLEMS.glob("*.json") if file.stem in text]
-    tables = (
-        stated["EXPECTED"]
-        if isinstance(next(iter(stated["EXPECTED"])), str)
-        else {problems[0]: stated["EXPECTED"]}
-    )
-    assert set(tables) <= set(problems)
+    tables = stated["EXPECTED"]
+    if not isinstance(next(iter(tables)), str):
+        tables = {problems[0]: tables}
+    assert tables.keys() <= set(problems)
     compared = 0
     for name, table in tables.items():
-        problem = json.loads((PROBLEMS / f"{name}.json").read_text())
+        problem = read_problem_file(name)
         angles = np.rad2deg(problem["command"]["theta_2"])
         for degrees, row in table.items():
             index = int(np.argmin(np.abs(angles - degrees)))
             assert abs(angles[index] - degrees) < 1e-9
             for column, value in zip(stated["COLUMNS"], row, strict=True):
                 ours = np.asarray(problem["answers"][column])
-                assert (
-                    np.abs(ours[index] - value).max() <= DIGITS * np.abs(ours).max()
-                ), (name, degrees, column)
+                apart = np.abs(ours[index] - value).max()
+                assert apart <= DIGITS * np.abs(ours).max(), (name, degrees, column)
                 compared += 1
     assert compared >= 16
 
