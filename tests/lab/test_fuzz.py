@@ -7,6 +7,7 @@ import os
 import signal
 from dataclasses import replace
 from importlib import import_module
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -92,11 +93,12 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
     assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
 
 
-def test_a_traceback_is_a_finding(monkeypatch):
-    def broken(*_):
-        raise ZeroDivisionError("oops")
-
-    monkeypatch.setattr(examine, "_check_file", broken)
+def test_a_traceback_is_a_finding_and_so_is_a_file_of_another_scene(monkeypatch):
+    another = replace(crank_rocker(), title="another")
+    monkeypatch.setattr(examine, "loads", lambda _: another)
+    (finding,) = examine.list_findings(crank_rocker())
+    assert finding.startswith("file: ")
+    monkeypatch.setattr(examine, "judge", Mock(side_effect=ZeroDivisionError("oops")))
     assert examine.list_findings(crank_rocker()) == ["ZeroDivisionError: oops"]
 
 
@@ -113,7 +115,7 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch):
 
     assert examine.list_findings(scene) == []
     monkeypatch.setattr("fourbar_validation.run.question.solve", pretend)
-    assert any(line.startswith("assembled") for line in examine.list_findings(scene))
+    assert any(" assembled: " in line for line in examine.list_findings(scene))
 
 
 @pytest.mark.slow
