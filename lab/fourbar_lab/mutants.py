@@ -21,18 +21,10 @@ import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, FourBarError
 from fourbar.quantities import UNITS
-from fourbar.scene import Command, Scene
-from fourbar.scene import command as command_of
+from fourbar.scene import Scene
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import Comparison
-from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.free_body import NAME as FREE_BODY
-from fourbar_validation.engines.registry import ENGINES, Engine, make_demands
-from fourbar_validation.run.identities import check_identities, compare_status
-from fourbar_validation.run.question import Question
+from fourbar_validation.engines.registry import ENGINES
+from fourbar_validation.run.judge import judge
 
 EXCHANGED_OPERATORS = (
     (ast.Add, ast.Sub),
@@ -64,7 +56,7 @@ MODULES = (
     "path",
 )
 SCENES_OF_A_MUTANT = 10
-EXACT_ENGINE_NAMES = ("pinocchio-inverse", "mujoco-inverse", FREE_BODY)
+EXACT_ENGINE_NAMES = ("pinocchio-inverse", "mujoco-inverse", "free-body")
 
 
 class Mutant(NamedTuple):
@@ -184,9 +176,9 @@ def choose_scenes() -> list[Scene]:
     return chosen
 
 
-def compute_numbers(scene: Scene, command: Command) -> dict[str, Any]:
+def compute_numbers(scene: Scene) -> dict[str, Any]:
     """Compute every number that `solve` returns for a scene."""
-    solution = solve(scene, "force", at=command)
+    solution = solve(scene, "force")
     numbers = {name: getattr(solution, name) for name in UNITS}
     numbers["status"] = solution.status_code.astype(float)
     return {name: value for name, value in numbers.items() if value is not None}
@@ -205,41 +197,23 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
 
 
 class Baseline(NamedTuple):
-    """A scene, and what engines and formulas say of it without a mutant."""
+    """A scene, and the numbers of the formulas without a mutant."""
 
     scene: Scene
-    command: Command
-    answers: list[tuple[Engine, Answer]]
     before: dict[str, Any]
 
 
-def is_caught(baseline: Baseline) -> bool:
-    """Check a scene: whether any comparison or identity fails."""
-    scene, command, answers, _ = baseline
-    question = Question("", scene, command)
-    rows = list(check_identities(question))
-    for engine, answer in answers:
-        held = make_demands(engine, scene, command, answer)
-        rows += Comparison("", scene, answer, question.solution, held).rows()
-        if engine.name == FREE_BODY:
-            reference = make_reference(scene, answer)
-            if reference is not None:
-                rows.append(compare_status(question, reference))
-    return any(row.verdict == FAILS for row in rows)
+def is_caught(scene: Scene) -> bool:
+    """Judge a scene by the exact engines: whether any row fails."""
+    engines = [engine for engine in ENGINES if engine.name in EXACT_ENGINE_NAMES]
+    return any(row.failed for row in judge("", scene, engines).rows)
 
 
 def make_baseline(scene: Scene) -> Baseline:
     """Solve a scene; RuntimeError where the harness fails on it."""
-    command = command_of(scene)
-    answers = [
-        (engine, ask_at(engine.start(), scene, command))
-        for engine in ENGINES
-        if engine.name in EXACT_ENGINE_NAMES
-    ]
-    baseline = Baseline(scene, command, answers, compute_numbers(scene, command))
-    if is_caught(baseline):
+    if is_caught(scene):
         raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
-    return baseline
+    return Baseline(scene, compute_numbers(scene))
 
 
 def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
@@ -248,11 +222,10 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     signal.alarm(MUTANT_SECONDS)
     try:
         with np.errstate(all="ignore"), mutant.active():
-            for baseline in tried:
-                scene, command, _, before = baseline
-                if is_changed(before, compute_numbers(scene, command)):
+            for scene, before in tried:
+                if is_changed(before, compute_numbers(scene)):
                     differs = True
-                    if is_caught(baseline):
+                    if is_caught(scene):
                         return True
     except Exception:  # a mutant that raises or hangs ends the run: that is noticed
         return True
