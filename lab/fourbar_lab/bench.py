@@ -18,8 +18,6 @@ import numpy as np
 
 from fourbar.errors import BROKEN, FAILED, HOLDS
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
-from fourbar.formulas.mobility import choose_range
-from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS, Array
 from fourbar.show.plot.style import format_of
 from fourbar.solving import solve
@@ -48,10 +46,6 @@ from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
-"""Linkage whose input swings between limit positions. Each of its positions has to be
-examined.
-"""
 _THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system. Larger batches are slower per position
 (27 MB of matrices each).
@@ -324,8 +318,6 @@ def measure_speed(
     """Measure the ratios of SPEED_LIMITS, ns per position, and times by how many."""
     scene = make_example()
     command = command_positions(positions)
-    limits = make_example(_WITH_LIMITS)
-    swing = command_positions(positions, *choose_range(_WITH_LIMITS))
     everything = allocate(UNKNOWNS, command)
     angles = allocate(ANGLES, command)
     batch = min(positions, _THIRTEEN_BATCH)
@@ -345,14 +337,6 @@ def measure_speed(
         _ANGLES_ALONE: (positions, partial(solve, scene, at=command, out=angles)),
         _SYSTEM: (batch, partial(solve_thirteen, bodies, 2)),
         FLOOR_OF_TIMES: (positions, _make_floor(command.theta_2, angles)),
-        "input between limits: all": (
-            positions,
-            partial(solve, limits, at=swing, out=everything),
-        ),
-        "input between limits: positions only": (
-            positions,
-            partial(solve, limits, at=swing, out=angles),
-        ),
         TO_FORCES: (many, partial(solve, scene, "force", at=solved)),
         WITH_ERROR_BARS: (many, partial(solve, scene, "error", at=solved)),
         "13x13 of one position": (SINGLE_CALLS, repeated(solve_thirteen, lone, 2)),

@@ -72,18 +72,10 @@ def make_example(
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
 
-def command_positions(
-    n: int,
-    start: float = 0.0,
-    stop: float = 2.0 * np.pi,
-) -> Command:
-    """Command n positions, over a revolution unless specified otherwise."""
-    return Command(
-        np.linspace(start, stop, n),
-        np.broadcast_to(np.int8(1), (n,)),
-        10.0,
-        0.0,
-    )
+def command_positions(n: int) -> Command:
+    """Command n positions over a revolution."""
+    angles = np.linspace(0.0, 2.0 * np.pi, n)
+    return Command(angles, np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 
 def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:

@@ -162,46 +162,54 @@ def solve_eight_equations(
             arms.append(arm)
         for load in scene.get("loads", ()):  # at the mass centre
             forces[load["bar"] - 2] -= _resolve_force(*load["force"])
-        A = mp.zeros(8, 8)
-        y = mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
-        newton = (
-            {0: 1, 2: 1},
-            {1: 1, 3: 1},
-            {2: -1, 4: 1},
-            {3: -1, 5: 1},
-            {4: -1},
-            {5: -1, 6: 1},
-        )
-        for row, factors in enumerate(newton):
-            force = forces[row // 2]
-            y[row] = force.imag if row % 2 else force.real
-            for column, factor in factors.items():
-                A[row, column] = factor
-        # moments about each mass centre: the forces at A on the crank and at O2, those
-        # at A and B on the rod
-        for row, force_x, arm, factor in (
-            (6, 0, -arms[0], 1),
-            (6, 2, crank - arms[0], 1),
-            (7, 2, -arms[1], -1),
-            (7, 4, rod - arms[1], 1),
-        ):
-            A[row, force_x] = -factor * arm.imag
-            A[row, force_x + 1] = factor * arm.real
-        A[6, 7] = 1
-        y[6] = moments[0]
-        y[7] = moments[1]
-        x = [float(value) for value in mp.lu_solve(A, y)]
+        x = _solve_free_bodies(forces, moments, arms, crank, rod)
         angle = float(mp.atan2(sine, cosine))
         stroke = float((crank + rod).real)
-    return {
-        "theta_3": angle,
-        "stroke": stroke,
-        "torque": x[7],
-        "F12": x[0:2],
-        "F32": x[2:4],
-        "F43": x[4:6],
-        "guide_force": x[6],
-    }
+    values = angle, stroke, x[7], x[0:2], x[2:4], x[4:6], x[6]
+    return dict(zip(SLIDER_CRANK_UNITS, values, strict=True))
+
+
+def _solve_free_bodies(
+    forces: list[Any],
+    moments: list[Any],
+    arms: list[Any],
+    crank: Any,
+    rod: Any,
+) -> list[float]:
+    """Solve for F12, F32, F43 (x, y of each), the guide's force and the torque.
+
+    Parameters
+    ----------
+    forces : what the motion of crank, rod and slider asks for beyond loads, N.
+    moments : of crank and rod about their mass centres, N m.
+    arms : from the first pin of each to its mass centre, m.
+    """
+    from mpmath import mp
+
+    A = mp.zeros(8, 8)
+    y = mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
+    on_bars = ({0: 1, 2: 1}, {2: -1, 4: 1}, {4: -1})
+    for bar, factors in enumerate(on_bars):
+        y[2 * bar] = forces[bar].real
+        y[2 * bar + 1] = forces[bar].imag
+        for force_x, factor in factors.items():
+            A[2 * bar, force_x] = factor
+            A[2 * bar + 1, force_x + 1] = factor
+    A[5, 6] = 1
+    # moments about each mass centre: the forces at A on the crank and at O2, those
+    # at A and B on the rod
+    for row, force_x, arm, factor in (
+        (6, 0, -arms[0], 1),
+        (6, 2, crank - arms[0], 1),
+        (7, 2, -arms[1], -1),
+        (7, 4, rod - arms[1], 1),
+    ):
+        A[row, force_x] = -factor * arm.imag
+        A[row, force_x + 1] = factor * arm.real
+    A[6, 7] = 1
+    y[6] = moments[0]
+    y[7] = moments[1]
+    return [float(value) for value in mp.lu_solve(A, y)]
 
 
 def _resolve_force(size: float, direction: float) -> Any:

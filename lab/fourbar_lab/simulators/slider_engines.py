@@ -19,20 +19,13 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.quantities import Array
+from fourbar_lab.simulators.slider_crank import SLIDER_CRANK_UNITS
 from fourbar_validation.compare.rows import say_error
 
 GAP_AT_THE_END = 1e-15
 """Gap at which Newton's method ends, in parts of the rod's length."""
 NEWTON_STEPS_OF_A_POSITION = 50
-ANSWERED_QUANTITIES = (
-    "theta_3",
-    "stroke",
-    "torque",
-    "F12",
-    "F32",
-    "F43",
-    "guide_force",
-)
+ANSWERED_QUANTITIES = tuple(SLIDER_CRANK_UNITS)
 
 
 class SliderBar(NamedTuple):
