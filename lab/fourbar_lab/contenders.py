@@ -61,15 +61,10 @@ CONTENDED_LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
 
 
-def make_example(
-    linkage: FourBar = CONTENDED_LINKAGE,
-    theta_2: float | None = 0.0,
-) -> Scene:
-    """Return the scene that is timed: a crank at 10 rad/s, driven, with gravity.
-
-    With theta_2 None the scene covers its full range.
-    """
-    return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
+def make_example(theta_2: float = 0.0) -> Scene:
+    """Return the scene that is timed: a crank at 10 rad/s, driven, with gravity."""
+    motion = Motion(theta_2, 10.0)
+    return Scene(CONTENDED_LINKAGE, motion, effects=(Gravity(),))
 
 
 def command_positions(n: int) -> Command:
