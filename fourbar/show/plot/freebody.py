@@ -201,7 +201,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         )
         raise InputError("figure", "freebody", reason)
     freed = [(bar, *list_actions(view, bar)) for bar in MOVING_BARS]
-    lines = max(len(couples) for *_, couples in freed)
+    lines = max(1, *(len(couples) for *_, couples in freed))  # or "no couples"
     panels, below = figure.subplots(2, 3, height_ratios=[_PANEL, LINE_HEIGHT * lines])
     sizes = [abs(arrow.force) for _, arrows, _ in freed for arrow in arrows]
     biggest = max(sizes, default=0.0)

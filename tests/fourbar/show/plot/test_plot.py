@@ -218,7 +218,10 @@ def test_every_figure_shows_what_it_takes_and_no_texts_overlap(name):
 
 CLEAR_FIGURES = [
     *((thesis(), name) for name in ("overview", "coupler", "freebody")),
-    *((crank_rocker(drive=CYLINDER), name) for name in ("torque", "freebody")),
+    *(
+        (crank_rocker(drive=CYLINDER, loads=()), name)
+        for name in ("torque", "freebody")
+    ),
     *((released(20, 1.2), name) for name in ("overview", "energy")),
     (by_law(), "torque"),
     *zip(
