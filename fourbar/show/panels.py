@@ -428,8 +428,10 @@ def fit_panels(
         whole = _Fit(*(np.concatenate(c)[order] for c in zip(*parts, strict=True)))
         curves[name] = PanelCurve(whole.values, whole.error, [])
         curves[name].poles = _find_panels_at_poles(curves[name], whole.unsettled)
+    start = start[order]
+    stop = stop[order]
     share = (stop - start) / (stop - start).sum()
-    return Panels(start[order], stop[order], share[order], curves)
+    return Panels(start, stop, share, curves)
 
 
 def _find_usual_size(values: Array) -> float:
