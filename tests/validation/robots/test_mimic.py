@@ -185,11 +185,8 @@ def test_each_error_stands_with_its_name(
 
 
 @pytest.mark.slow
-def test_the_printed_polynomial_does_in_mujoco_what_was_said(tmp_path):
+def test_an_axis_the_other_way_takes_the_opposite_polynomial(tmp_path):
     best = measure_mimic(write(tmp_path), "s", KNEE).fitted[2]
-    polycoef = " ".join(f"{number!r}" for number in best.coefficients)
-    again = measure_mimic(write(tmp_path, polycoef), "s", KNEE)
-    assert again.file.angle == pytest.approx(best.angle, rel=1e-9)
     opposite = " ".join(f"{-number!r}" for number in best.coefficients)
     turned = measure_mimic(write(tmp_path, opposite, axis=-1), "s", KNEE)
     assert turned.file.angle == pytest.approx(best.angle, rel=1e-9)

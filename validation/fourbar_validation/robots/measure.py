@@ -156,7 +156,6 @@ def _compare(
         errors = _subtract_formulas(answer, formulas, loop)
     else:
         errors = answer.errors()
-    largest = loop.states.sizes()
     for name in FORCE_QUANTITIES:
         quantity = name_driving(loop.scene) if name == COUPLE.value else name
         sizes = np.where(np.isfinite(errors[name]), errors[name], math.inf)
@@ -173,7 +172,7 @@ def _compare(
             quantity,
             error,
             scale,
-            scale != float(largest[name].max()),
+            loop.find_vanishing(name) is not None,
             rows[worst].joint,
             float(np.asarray(formulas.theta_2)[worst]),
             median,

@@ -321,27 +321,32 @@ def test_two_connects_along_one_axis_are_one_pin():
     assert loop.remarks == (said,)
 
 
-def test_a_joint_equality_is_a_mimic():
-    mimic = '<joint joint1="O4" joint2="O2" polycoef="0.1 0.5 0 0 0"/>'
-    text = Planar().text().replace("</equality>", f"{mimic}</equality>")
+@pytest.mark.parametrize(
+    ("tendon", "mimic", "words"),
+    [
+        (
+            "",
+            '<joint joint1="O4" joint2="O2" polycoef="0.1 0.5 0 0 0"/>',
+            "O4 follows O2, polycoef 0.1 0.5 0 0 0",
+        ),
+        (
+            '<tendon><fixed name="T"><joint joint="O4" coef="2"/>'
+            '<joint joint="O2" coef="-1"/></fixed></tendon>',
+            '<tendon tendon1="T"/>',
+            "O4 follows O2, polycoef 0 0.5 0 0 0",
+        ),
+    ],
+)
+def test_an_equality_of_joints_or_of_a_fixed_tendon_is_a_mimic(tendon, mimic, words):
+    text = Planar().text().replace("</equality>", f"{mimic}</equality>{tendon}")
     one, other = report_of(text).closures
-    assert other.kind == "joint"
-    assert other.loop is None
-    assert "O4 follows O2, polycoef 0.1 0.5 0 0 0" in other.reason
-    assert one.loop is not None
-    assert one.loop.other_equalities == (1,)
-
-
-def test_a_fixed_tendon_over_two_joints_is_a_mimic():
-    tendon = (
-        '<tendon><fixed name="T"><joint joint="O4" coef="2"/>'
-        '<joint joint="O2" coef="-1"/></fixed></tendon><equality>'
+    assert (other.name, other.kind) == (
+        ("T", "tendon") if tendon else ("O4-O2", "joint")
     )
-    text = Planar().text().replace("<equality>", f'{tendon}<tendon tendon1="T"/>')
-    other, one = report_of(text).closures
-    assert (other.name, other.kind) == ("T", "tendon")
-    assert "O4 follows O2, polycoef 0 0.5 0 0 0" in other.reason
+    assert other.loop is None
+    assert words in other.reason
     assert one.loop is not None
+    assert one.loop.other_equalities == ((1,) if not tendon else ())
 
 
 def test_another_hinge_of_the_ground_can_be_the_driven_one():
