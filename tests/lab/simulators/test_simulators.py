@@ -142,8 +142,10 @@ class Rigid(Simulator):
     settings: ClassVar[dict[str, Any]] = {"plain": 1.0, "wrong": 1.1}
     left_out = ""
     diverges_at = math.inf
+    timesteps: ClassVar[list[float]] = []
 
     def through(self, scene, course):
+        Rigid.timesteps.append(course.timestep)
         speed, done = scene.motion.omega_2 or 0.0, 0
         branch = np.array([scene.motion.branch], dtype=np.int8)
 
@@ -168,6 +170,7 @@ class Rigid(Simulator):
 def test_a_run_is_judged_at_the_motion_that_it_made():
     errors = find_errors(Rigid, steps_per_turn=50)
     assert max(errors.values()) < EXACT and set(errors) == READ
+    assert Rigid.timesteps[-1] == pytest.approx(math.tau / 10.0 / 50)
     assert find_errors(Rigid, name="wrong")["torque"] == pytest.approx(0.1, abs=1e-9)
 
 
