@@ -323,36 +323,34 @@ class Benchmark:
         names = [name for name in self.reasons if label.startswith(name)]
         return self.reasons.get(max(names, key=len, default=""), "")
 
-    def list_rows(self) -> list[list[Any]]:
-        """Return the rows of the table as lists of cells, problem by problem.
+    def list_rows(self) -> list[JsonObject]:
+        """Return the rows of the table by column, problem by problem.
 
         A run at a coarser timestep than the finest has no level.
         """
         table = []
+        blank = dict.fromkeys(BENCHMARK_COLUMNS, "")
         for problem in self.problems:
             for label, row in self.rows.items():
-                stated = {"problem": problem, "engine": label}
-                stated["version"] = row.text("version")
                 lines = [*_list_numbers(row.cells[problem])]
                 if problem == DIFFERENTIATED:
                     lines += _list_slopes(row)
-                table += [
-                    [(stated | line).get(column, "") for column in BENCHMARK_COLUMNS]
-                    for line in lines
-                ]
+                stated = blank | {"problem": problem, "engine": label}
+                stated["version"] = row.text("version")
+                table += [stated | line for line in lines]
         return table
 
     def write(self) -> None:
         """Write the table and the page."""
         table = self.list_rows()
-        write_text(self.out / "benchmark.csv", write_csv_rows(BENCHMARK_COLUMNS, table))
+        lists = [[*line.values()] for line in table]
+        write_text(self.out / "benchmark.csv", write_csv_rows(BENCHMARK_COLUMNS, lists))
         rows = {
             name_row(label, row.text("version")): row
             for label, row in self.rows.items()
         }
-        by_column = [dict(zip(BENCHMARK_COLUMNS, row, strict=True)) for row in table]
         chart = ""
-        if lines := read_work(by_column):
+        if lines := read_work(table):
             chart = write_svg(draw_panels(lines), "benchmark")
             picture = write_alone(draw_panels(lines), "benchmark")
             write_text(self.out / "benchmark.svg", picture)
