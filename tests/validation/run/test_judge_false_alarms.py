@@ -13,7 +13,7 @@ import fourbar
 from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import Free, Law, Motion
+from fourbar.scene.motion import Free, Law, Motion, Rise
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
@@ -171,6 +171,18 @@ def test_a_table_of_uneven_steps_that_overshoots_its_points_is_a_right_law(ends)
         angles[-1] = angles[0]
         time = (0.0, *np.cumsum(steps).tolist())
         law = Law(time=time, theta_2=tuple(angles.tolist()), ends=ends)
+        scene = replace(crank_rocker(), motion=Motion(law=law))
+        (row,) = check_law(make_question("law", scene, ()))
+        assert not row.failed, row
+
+
+@pytest.mark.parametrize("kind", ["345", "cycloidal"])
+def test_a_right_rise_is_right_at_every_step(kind):
+    """The acceleration of a 3-4-5 law was once told by a sum of far larger terms."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        rise, duration = rng.uniform(0.1, 3.0, 2)
+        law = Rise(kind, (rise, duration), 0.0, steps=100)
         scene = replace(crank_rocker(), motion=Motion(law=law))
         (row,) = check_law(make_question("law", scene, ()))
         assert not row.failed, row

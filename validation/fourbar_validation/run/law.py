@@ -111,7 +111,10 @@ def _restate_rise(law: Rise, time: Array) -> _Restated:
     Other forms of the standard laws serve:
 
         cycloidal, with x = pi u:  u - sin x cos x/pi,  2 sin^2 x,  4 pi sin x cos x;
-        345: the polynomial of Bernstein with the coefficients 0, 0, 0, 1, 1, 1.
+        345, with w = 2 u - 1:  (8 + 15 w - 10 w^3 + 3 w^5)/16 and its derivatives.
+
+    Both sum terms of the size of their result: in powers of u the acceleration of the
+    345 law is a difference of terms as large as 120.
     """
     rise, duration = law.rise
     start = getattr(law, f"theta_{law.bar}")
@@ -132,7 +135,6 @@ def _restate_rise(law: Rise, time: Array) -> _Restated:
 
 def _restate_standard_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
     """Compute a standard law from 0 to 1 and its two derivatives in other forms."""
-    v = 1.0 - u
     if kind == "cycloidal":
         sine = np.sin(np.pi * u)
         cosine = np.cos(np.pi * u)
@@ -141,9 +143,12 @@ def _restate_standard_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
             2.0 * sine * sine,
             4.0 * np.pi * sine * cosine,
         )
-    place = u**3 * (10.0 * v * v + 5.0 * u * v + u * u)
-    speed = 30.0 * (u**4 - 2.0 * u**3 + u * u)
-    return place, speed, 60.0 * (2.0 * u**3 - 3.0 * u * u + u)
+    w = 2.0 * u - 1.0
+    return (
+        (8.0 + 15.0 * w - 10.0 * w**3 + 3.0 * w**5) / 16.0,
+        1.875 * (1.0 - 2.0 * w**2 + w**4),
+        15.0 * (w**3 - w),
+    )
 
 
 def _restate_sine(law: Sine, time: Array) -> _Restated:
