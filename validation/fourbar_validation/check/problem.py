@@ -17,7 +17,12 @@ from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.writing import read_text
 from fourbar_validation.compare.rows import escape_controls, write_one_line
-from fourbar_validation.compare.tolerance import EPS, K, magnitude
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    K,
+    compute_difference,
+    magnitude,
+)
 from fourbar_validation.engines import protocol
 
 PROBLEM_SCHEMA = "fourbar-problem/4"
@@ -60,12 +65,7 @@ def read_problem(path: str | Path) -> dict[str, Any]:
     problem = _read_document(path, PROBLEM_SCHEMA)
     for name in ("answers", "errors", "scene", "command"):
         if not isinstance(problem.get(name), dict):
-            raise InputError(
-                name,
-                problem.get(name),
-                "must be an object",
-                str(path),
-            )
+            raise InputError(name, problem.get(name), "must be an object", str(path))
     return {**problem, "problem": Path(path).stem}
 
 
@@ -158,10 +158,7 @@ def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Arr
 
     Both are arrays by the quantity's name.
     """
-    if solution.drive_force is None:
-        drive = "torque"
-    else:
-        drive = "drive_force"
+    drive = "torque" if solution.drive_force is None else "drive_force"
     angle = K * EPS / solution.condition
     bars = {
         "theta_3": angle,
@@ -193,13 +190,11 @@ def _judge_quantity(
         or theirs is None
     ):
         return JudgedQuantity(name, group, MISSING, math.nan, 0)
-    difference = np.atleast_1d(answered - ours)
     size = 1.0
-    if name.startswith("theta"):
-        difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
-    else:
+    if not name.startswith("theta"):
         size = float(magnitude(np.atleast_1d(ours)).max()) or 1.0
-    off = magnitude(difference) / size
+    pair = np.atleast_1d(ours), np.atleast_1d(answered)
+    off = compute_difference(name, *pair) / size
     bars = np.atleast_1d(np.array(errors, dtype=float)) / size
     level = next(
         (
@@ -210,13 +205,7 @@ def _judge_quantity(
         WORSE,
     )
     worst = int(np.argmax(off))
-    return JudgedQuantity(
-        name,
-        group,
-        level,
-        float(off[worst]),
-        worst,
-    )
+    return JudgedQuantity(name, group, level, float(off[worst]), worst)
 
 
 def find_levels(rows: list[JudgedQuantity]) -> dict[str, str]:

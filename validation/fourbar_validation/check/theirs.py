@@ -231,17 +231,14 @@ def read_table(
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
-    (_, headings), *rows = _read_lines(path)
-    unit_line = [""] * len(headings)
-    if rows and _is_unit_line(rows[0][1]):
-        unit_line = rows.pop(0)[1]
-    if not rows:
-        raise InputError(
-            "table",
-            path.name,
-            "needs a header and at least one row",
-            str(path),
-        )
+    lines_of_file = _read_lines(path)
+    unit_line: list[str] = []
+    if len(lines_of_file) > 1 and _is_unit_line(lines_of_file[1][1]):
+        unit_line = lines_of_file.pop(1)[1]
+    if len(lines_of_file) < 2:
+        allowed = "needs a header and at least one row"
+        raise InputError("table", path.name, allowed, str(path))
+    (_, headings), *rows = lines_of_file
     columns, left_out, renamings = _read_headings(
         path, headings, unit_line, commanded, points
     )
@@ -329,16 +326,10 @@ def _require_cells(
     if len(cells) < len(headings) or any(
         cell.strip() for cell in cells[len(headings) :]
     ):
+        allowed = f"needs {len(headings)} cells"
         if len(cells) > len(headings):
-            beside = "; with decimal commas, semicolons between them"
-        else:
-            beside = ""
-        raise InputError(
-            f"line {line}",
-            cells,
-            f"needs {len(headings)} cells{beside}",
-            str(path),
-        )
+            allowed += "; with decimal commas, semicolons between them"
+        raise InputError(f"line {line}", cells, allowed, str(path))
 
 
 def _list_renamings(renamings: dict[str, str]) -> str:
@@ -451,7 +442,7 @@ def _find_rounding(halves: Array, unit: Unit) -> Array:
 
 
 def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Read the lines that hold anything, with their numbers; at least a header."""
+    """Read the lines that hold anything, with their numbers."""
     text = read_text(path, "table", LARGEST_TABLE_FILE)
     text = _remove_comments(text)
     header = next((line for line in text.splitlines() if line.strip()), "")
@@ -470,13 +461,6 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
             "must be a CSV file",
             str(path),
         ) from None
-    if len(numbered) < 2:
-        raise InputError(
-            "table",
-            path.name,
-            "needs a header and at least one row",
-            str(path),
-        )
     if delimiter != ",":  # there a comma is a decimal comma
         numbered[1:] = [
             (line, [_read_comma(cell) for cell in cells])
@@ -495,10 +479,7 @@ def _remove_comments(text: str) -> str:
     first = next(
         (i for i, line in enumerate(lines) if line.strip() and not of_comment[i]), 0
     )
-    if lines:
-        words = re.sub(r"\d[eE][-+]?\d", "", lines[first])
-    else:
-        words = ""
+    words = re.sub(r"\d[eE][-+]?\d", "", lines[first]) if lines else ""
     has_header = re.search(r"[^\W\d_]", words)
     for i, line in enumerate(lines):
         if not of_comment[i]:
@@ -606,10 +587,7 @@ def _read_headings(
                 left_out[column] += f": {renaming}"
                 renamings[column] = renaming
             continue
-        if index < len(unit_line):
-            below = unit_line[index].strip(" []()")
-        else:
-            below = ""
+        below = "".join(unit_line[index : index + 1]).strip(" []()")
         text = (match["square"] or match["round"] or below).strip()
         columns[index] = (
             f"|{name}|" if of_vector and name == vector else name,

@@ -7,7 +7,9 @@ generated file.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import count
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -228,10 +230,7 @@ def _describe_pin(seen: SeenLoop, pin: str) -> Described:
         element,
         "range",
     )
-    if seen.sense[pin] > 0:
-        sense = "counter-clockwise"
-    else:
-        sense = "clockwise"
+    sense = "counter-clockwise" if seen.sense[pin] > 0 else "clockwise"
     return described | {f"{key}.positive": ModelEntry(sense, element, "axis")}
 
 
@@ -396,22 +395,27 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
 
 def _name_tendon(seen: SeenLoop, number: int) -> str:
     """Return a tendon's name: its pins, or else the bars that it runs between."""
-    model = seen.model
     joints = {joint: pin for pin, joint in seen.hinge.items()}
     parts = []
-    for wrap in range(
-        model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]
-    ):
-        kind = mujoco.mjtWrap(model.wrap_type[wrap])
-        index = int(model.wrap_objid[wrap])
+    for kind, index, _ in _list_wraps(seen.model, number):
         if kind == mujoco.mjtWrap.mjWRAP_JOINT:
             parts.append(joints.get(index, "another joint"))
         elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-            bar = seen.bar(model.site_bodyid[index])
+            bar = seen.bar(seen.model.site_bodyid[index])
             parts.append("no bar" if bar is None else BAR_NAMES[bar])
         else:
             parts.append(kind.name.removeprefix("mjWRAP_").lower())
     return f"tendons.{' '.join(sorted(parts))}"
+
+
+def _list_wraps(
+    model: mujoco.MjModel, tendon: int
+) -> Iterator[tuple[mujoco.mjtWrap, int, float]]:
+    """List kind, index and coefficient of each thing that a tendon runs over."""
+    first = model.tendon_adr[tendon]
+    for wrap in range(first, first + model.tendon_num[tendon]):
+        kind = mujoco.mjtWrap(model.wrap_type[wrap])
+        yield kind, int(model.wrap_objid[wrap]), float(model.wrap_prm[wrap])
 
 
 def _describe_tendons(seen: SeenLoop) -> Described:
@@ -425,41 +429,27 @@ def _describe_tendons(seen: SeenLoop) -> Described:
     tendons = list[tuple[str, tuple[float, ...], int]]()
     rest: dict[int, float] = {}
     for i in filter(seen.touches_tendon, range(model.ntendon)):
-        path = []
-        for wrap in range(
-            model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]
-        ):
-            index = int(model.wrap_objid[wrap])
-            if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
-                if index not in pins:
-                    continue
+        path: list[tuple[Any, ...]] = []
+        for kind, index, by_turn in _list_wraps(model, i):
+            if kind == mujoco.mjtWrap.mjWRAP_JOINT and index in pins:
                 pin = pins[index]
-                coefficient = seen.sense[pin] * float(model.wrap_prm[wrap])
+                coefficient = seen.sense[pin] * by_turn
                 path.append((pin, coefficient))
-                rest[i] = rest.get(
-                    i, -float(model.tendon_length0[i])
-                ) + coefficient * seen.rest_angle(pin)
-            elif model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_SITE:
+                before = rest.get(i, -float(model.tendon_length0[i]))
+                rest[i] = before + coefficient * seen.rest_angle(pin)
+            elif kind == mujoco.mjtWrap.mjWRAP_SITE:
                 bar = seen.bar(model.site_bodyid[index])
-                path.append(
-                    (
-                        str(bar),
-                        *(
-                            ()
-                            if bar is None
-                            else seen.along_bar(bar, data.site_xpos[index])
-                        ),
-                    )
-                )
+                place = bar and seen.along_bar(bar, data.site_xpos[index])
+                path.append((str(bar), *(place or ())))
         numbers = tuple(number for _, *place in sorted(path) for number in place)
         tendons.append((_name_tendon(seen, i), numbers, i))
     described: Described = {}
     for name, numbers, i in sorted(tendons):
-        key = next(
-            key
-            for key in (name, *(f"{name} ({n})" for n in range(2, 99)))
-            if key not in described
-        )
+        key = name
+        for number in count(2):
+            if key not in described:
+                break
+            key = f"{name} ({number})"
         element = _name_element("tendon", model.tendon(i).name, i)
         described[key] = ModelEntry("present", element)
         described[f"{key}.path"] = ModelEntry(numbers, element)
@@ -470,15 +460,11 @@ def _describe_tendons(seen: SeenLoop) -> Described:
                 written,
             )
         if model.tendon_stiffness[i]:
-            if i in rest:
-                end = ".springlength angle"
-            else:
-                end = ".springlength"
-            lengths = tuple(
-                float(length) + rest.get(i, 0.0)
-                for length in model.tendon_lengthspring[i]
+            end = "springlength angle" if i in rest else "springlength"
+            lengths = model.tendon_lengthspring[i] + rest.get(i, 0.0)
+            described[f"{key}.{end}"] = ModelEntry(
+                _read_field(lengths), element, "springlength"
             )
-            described[key + end] = ModelEntry(lengths, element, "springlength")
         if not model.tendon_frictionloss[i]:
             del described[f"{key}.solreffriction"], described[f"{key}.solimpfriction"]
     return described
@@ -577,10 +563,7 @@ def _set_attribute(
 def _write_setting(value: Value) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, tuple):
-        numbers = value
-    else:
-        numbers = (value,)
+    numbers = value if isinstance(value, tuple) else (value,)
     return " ".join(
         repr(int(number)) if number == int(number) else repr(number)
         for number in numbers
@@ -672,10 +655,7 @@ def _set_load(
             pos=_write_setting((float(x), float(y), 0.0)),
         )
         gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
-        if axes == "world axes":
-            frame = {"refsite": "O2"}
-        else:
-            frame = {}
+        frame = {"refsite": "O2"} if axes == "world axes" else {}
         ET.SubElement(
             actuators,
             "general",
@@ -738,8 +718,6 @@ def mend_entry(
 
 def _number_of_word(name: str, word: str) -> int:
     """Find the number of an integrator or a solver that MJCF calls by a word."""
-    return next(
-        int(kind)
-        for member, kind in ENUMERATIONS[name].__members__.items()
-        if member.partition("_")[2] == word.upper()
-    )
+    members = ENUMERATIONS[name].__members__
+    prefix = next(iter(members)).partition("_")[0]
+    return int(members[f"{prefix}_{word.upper()}"])
