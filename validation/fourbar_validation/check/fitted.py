@@ -99,27 +99,16 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
-        mask = judge.where(key)
-        ours = judge.ours(key)[mask]
-        theirs = judge.table.values[key][mask]
-        stated = np.isfinite(theirs)
-        ours = ours[stated]
-        theirs = theirs[stated]
-        if not mask.any() or not (squares := float(ours @ ours)):
+        theirs = judge.table.values[key]
+        stated = judge.where(key).reshape(-1, *[1] * (theirs.ndim - 1))
+        stated = stated & np.isfinite(theirs)
+        ours = judge.ours(key)[stated]
+        if not (squares := float(ours @ ours)):
             continue
-        announced = judge.table.units[key]
-        unit = UNITS[name_quantity(key)]
-        near = float(ours @ theirs) / squares
+        near = float(ours @ theirs[stated]) / squares
         if not judge.explained(key, near * judge.ours(key), NEAR_ENOUGH):
             continue
-        ratio_found = _name_ratio(
-            judge,
-            key,
-            announced.text,
-            announced.factor,
-            unit,
-            near,
-        )
+        ratio_found = _name_ratio(judge, key, near)
         if ratio_found is None and np.count_nonzero(ours) >= ENOUGH_NUMBERS and near:
             ratio_found = _round_ratio(judge, key, near)
         if ratio_found is not None:
@@ -136,32 +125,21 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         )
 
 
-def _name_ratio(
-    judge: Judge,
-    key: str,
-    announced: str,
-    factor: float,
-    unit: str,
-    near: float,
-) -> tuple[str, float] | None:
+def _name_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
+    announced = judge.table.units[key]
+    unit = UNITS[name_quantity(key)]
     for unit_tried in OTHER_UNITS.get(unit, ()):
-        ratio = math.copysign(factor / find_factor(unit, unit_tried), near)
+        ratio = math.copysign(announced.factor / find_factor(unit, unit_tried), near)
         if (
             abs(near / ratio - 1.0) < NEAR_A_PLAIN_NUMBER
             and abs(ratio) != 1.0
             and judge.explained(key, ratio * judge.ours(key))
         ):
-            if near < 0.0:
-                reversed_too = ", and reversed"
-            else:
-                reversed_too = ""
-            return (
-                (
-                    f"units: numbers in {unit_tried} where {announced} was announced"
-                    f" ({ratio:.6g} times){reversed_too}"
-                ),
-                ratio,
+            text = (
+                f"units: numbers in {unit_tried} where {announced.text} was announced"
+                f" ({ratio:.6g} times)"
             )
+            return text + ", and reversed" * (near < 0.0), ratio
     return None
 
 
@@ -180,9 +158,8 @@ def _round_ratio(
     ten = math.copysign(10.0**power, near)
     if power and judge.explained(key, ten * judge.ours(key)):
         return f"every number is {'-' if near < 0.0 else ''}10^{power} times ours", ten
-    fits = judge.explained(key, near * judge.ours(key), CARRIED)
-    if fits:
-        return (f"every number is {near:.5g} times ours", near)
+    if judge.explained(key, near * judge.ours(key), CARRIED):
+        return f"every number is {near:.5g} times ours", near
     return None
 
 
@@ -317,10 +294,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     name = judge.at.commanded
 
     def take(quantity: str, right: Solution) -> Array | None:
-        if quantity == name:
-            return None
-        values: Array | None = getattr(wrong, quantity, None)
-        return values
+        return None if quantity == name else getattr(wrong, quantity, None)
 
     yield Mistake(
         f"the angle of the {BAR_NAMES[judge.at.bar]} is measured from another zero:"
@@ -454,18 +428,11 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
         )
     else:
         text = f"the rows are in another order than their {table.found_by}"
-    yield Mistake(text, lambda quantity, right: _take_rows(quantity, right, nearest))
 
-
-def _take_rows(
-    quantity: str,
-    right: Solution,
-    rows: Array,
-) -> Array | None:
-    if quantity == right.commanded:
-        values = None
-    else:
+    def take(quantity: str, right: Solution) -> Array | None:
         values = getattr(right, quantity, None)
-    if values is None:
-        return None
-    return np.asarray(values[rows])
+        if values is None or quantity == right.commanded:
+            return None
+        return np.asarray(values[nearest])
+
+    yield Mistake(text, take)

@@ -46,7 +46,7 @@ def choose_few(command: Command) -> Command:
         .round()
         .astype(int)
     )
-    return command._replace(angle=command.theta_2[rows], branch=command.branch[rows])
+    return command.part(rows)
 
 
 def evaluate_double(scene: Scene, command: Command) -> QuantityValues:
@@ -189,33 +189,20 @@ def compare_with_reference(
             sizes.tolist(),
             strict=True,
         ):
-            pairs = (
-                ((ours, exact),)
-                if name == "torque"
-                else tuple(zip(ours, exact, strict=True))
-            )
+            pairs = [(ours, exact)]
+            if name != "torque":
+                pairs = list(zip(ours, exact, strict=True))
             if all(y is not None for _, y in pairs):
-                errors.append(
-                    float(
-                        divide(
-                            math.hypot(
-                                *(_compute_relative_error(x, y) for x, y in pairs)
-                            ),
-                            size,
-                        )
-                    )
-                )
+                apart = [_compute_difference(x, y) for x, y in pairs]
+                errors.append(float(divide(math.hypot(*apart), size)))
         worst[name] = find_greatest(errors)
     return WorstErrors(**worst)
 
 
-def _compute_relative_error(ours: Any, exact: Any) -> float:
+def _compute_difference(ours: Any, exact: Any) -> float:
     from flint import arb
 
-    if isinstance(ours, arb):
-        ball = ours
-    else:
-        ball = arb(float(ours))
+    ball = ours if isinstance(ours, arb) else arb(float(ours))
     return abs(float((ball - exact).mid()))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
-from fourbar.scene import Command, Scene
+from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.judged_setup import JudgedSetup
@@ -362,10 +362,7 @@ class CostStudy:
         points = []
         setup = self.setup()
         rows = sorted(row for segment in setup.segments for row in segment)
-        command = setup.command._replace(
-            angle=setup.command.theta_2[rows],
-            branch=setup.command.branch[rows],
-        )
+        command = setup.command.part(np.array(rows))
         for label, make in loops.items():
             try:
                 loop = make(self.scene)
@@ -408,10 +405,7 @@ class CostStudy:
                 raise LimitError(f"{engine.name}: {answer.refusal}")
             assert answer.assembled is not None
             rows = np.flatnonzero(answer.assembled)
-            command = self.command._replace(
-                angle=self.command.theta_2[rows],
-                branch=self.command.branch[rows],
-            )
+            command = self.command.part(rows)
             quantities = {name: x[rows] for name, x in answer.quantities.items()}
             errors = compute_errors(self.scene, command, quantities)
             points.append(
@@ -431,12 +425,7 @@ class CostStudy:
 def _leave_out_first(trial: Trial) -> None:
     """Leave out the turn that a soft closure takes to settle from its exact start."""
     command = trial.at
-    trial.at = Command(
-        command.theta_2[1:],
-        command.branch[1:],
-        command.omega_2[1:],  # type: ignore[index]
-        command.alpha_2[1:],  # type: ignore[index]
-    )
+    trial.at = command.part(slice(1, None))
     trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
     ((rows, steps),) = trial.segments
     part = np.ptp(trial.at.theta_2) / np.ptp(command.theta_2)
