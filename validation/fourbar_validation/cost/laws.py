@@ -125,14 +125,14 @@ def _group_quantities(pairs: Sequence[tuple[str, str]]) -> list[str]:
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Fit the slope of log y over log x by least squares.
 
-    Return it and its standard error; no number of fewer points than FEWEST_FITTED.
+    Return it and its standard error, which two points do not have.
     """
-    if len(x) < FEWEST_FITTED:
+    if len(x) < 2:
         return math.nan, math.inf
     from scipy.stats import linregress
 
     line = linregress(np.log(x), np.log(y))
-    return float(line.slope), float(line.stderr)
+    return float(line.slope), float(line.stderr) if len(x) > 2 else math.inf
 
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
