@@ -466,13 +466,7 @@ class _Finder:
         coupled = self._find_coupled(chain)
         holds = self._list_holds(chain, motors, coupled, freedoms - 1)
         if not holds:
-            text = self._explain_coupling(chain, coupled)
-            if freedoms == len(motors) == 2:
-                one, other = (name_joint(self.model, joint) for joint, _ in motors)
-                text += (
-                    f"; --hold {one} (or {other}) leaves a four-bar that the rest loads"
-                )
-            return text
+            return self._explain_coupling(chain, coupled)
         text = f"{count} and {_spell_count(freedoms, 3)} freedoms"
         if len(motors) > 1:
             motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
