@@ -13,7 +13,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
 from fourbar_lab.simulators.motion import Course, Floats, Instant, Readings
-from fourbar_lab.simulators.mujoco_c import FileSimulator, reading
+from fourbar_lab.simulators.mujoco_c import FileSimulator, reading, states_of
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 jax.config.update("jax_enable_x64", True)
@@ -25,19 +25,26 @@ def advance(model: Any, state: Any, steps: int) -> Any:
     return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), state)
 
 
-@jax.jit  # type: ignore[untyped-decorator]
-@partial(jax.vmap, in_axes=(None, None, 0, 0))
-def _forward_all(
+def evaluate(
     model: Any,
     state: Any,
     q: Any,
     v: Any,
 ) -> tuple[Any, ...]:
-    """Evaluate states, and return what `reading` takes."""
+    """Evaluate a state, and return what `reading` takes."""
     placed = state.replace(qpos=q, qvel=v)
     now = mjx.rne_postconstraint(model, mjx.forward(model, placed))
     inner = getattr(now, "_impl", now)
     return q, v, now.qacc, now.actuator_force, inner.efc_force[:2], inner.cfrc_int
+
+
+_evaluate_one = jax.jit(evaluate)
+_evaluate_all = jax.jit(jax.vmap(evaluate, in_axes=(None, None, 0, 0)))
+
+
+def _read_state(model: Any, theirs: Any, state: Any, q: Any, v: Any) -> Instant:
+    world = _evaluate_one(theirs, state, q, v)
+    return reading(model, [np.array(array) for array in world])
 
 
 class MujocoMjx(FileSimulator):
@@ -72,10 +79,20 @@ class MujocoMjx(FileSimulator):
             return state
 
         def read(now: Any) -> Instant:
-            world = _forward_all(theirs, now, now.qpos[None], now.qvel[None])
-            return reading(model, [np.array(array)[0] for array in world])
+            return _read_state(model, theirs, now, now.qpos, now.qvel)
 
         return self.run(scene, course, further, read)
+
+    def states(self, scene: Scene) -> Readings:
+        """Evaluate single states one by one, which compiles once for any number."""
+        written = self.write(scene)
+        model, data = open_model(written)
+        theirs = mjx.put_model(model)
+        state = mjx.put_data(model, data)
+        readings = Readings()
+        for q, v in states_of(written, scene):
+            readings.read(scene, _read_state(model, theirs, state, q, v))
+        return readings
 
     def prepare(self, model: Any, data: Any, q: Array, v: Array) -> Any:
         """Evaluate the worlds in one call, in the precision that was chosen."""
@@ -84,16 +101,16 @@ class MujocoMjx(FileSimulator):
             state = mjx.put_data(model, data)
             placed = jax.numpy.array(q), jax.numpy.array(v)
 
-        def evaluate(states: tuple[Any, Any] = placed) -> Any:
+        def evaluate_worlds(states: tuple[Any, Any] = placed) -> Any:
             with jax.enable_x64(self.double):
-                return jax.block_until_ready(_forward_all(theirs, state, *states))
+                return jax.block_until_ready(_evaluate_all(theirs, state, *states))
 
         def exchange() -> tuple[Floats, ...]:
             with jax.enable_x64(self.double):
                 states = jax.numpy.array(q), jax.numpy.array(v)
-            return tuple(map(np.array, evaluate(states)))
+            return tuple(map(np.array, evaluate_worlds(states)))
 
-        return evaluate, exchange
+        return evaluate_worlds, exchange
 
     def slopes(self, scene: Scene) -> list[dict[str, Any]]:
         """Differentiate the driving torque by JAX, forwards and backwards.
