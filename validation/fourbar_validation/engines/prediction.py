@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fourbar.effects import LinearDrive
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, STAGE_OF, VECTORS, Array
 from fourbar.scene import Command, Scene, with_signs
@@ -78,6 +79,22 @@ def predict_in_world_axes(
     Pinocchio's frame Jacobians do so.
     """
     return _predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
+
+
+def predict_for_free_bodies(
+    scene: Scene,
+    command: Command,
+    quantity: str,
+    mask: Mask | None = None,
+) -> Array:
+    """Predict for bodies in angles and lengths, with the line of a cylinder by points.
+
+    Its direction is the difference of its ends in world axes, and its moments on two
+    bars, which cancel where it nearly passes their common pin, have the rounding of it.
+    """
+    by_points = isinstance(scene.drive, LinearDrive)
+    predict = predict_in_world_axes if by_points else predict_from_data
+    return predict(scene, command, quantity, mask)
 
 
 def predict_about_mass_centre(

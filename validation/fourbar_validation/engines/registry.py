@@ -41,6 +41,7 @@ from fourbar_validation.engines.prediction import (
     find_unpredicted,
     predict_about_mass_centre,
     predict_for_any_method,
+    predict_for_free_bodies,
     predict_from_data,
     predict_in_world_axes,
 )
@@ -244,7 +245,7 @@ ENGINES = (
         EQUIVALENCE,
         (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES),
         positions=_OF_A_POSITION,
-        predictor=predict_from_data,
+        predictor=predict_for_free_bodies,
     ),
 )
 

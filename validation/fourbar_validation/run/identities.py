@@ -228,16 +228,21 @@ def _check_sums(question: Question) -> Iterator[Row]:
     # the forces of the bars that are not driven are solved apart, and the torque is
     # that of virtual work
     placed = state_from_pins(scene)
-    acts = sum(
-        find_size(term, scene.linkage, solution)
-        for term in (*placed.loads, *placed.effects)
-        if term.key in ("load", "springs")
-    )  # a force at a place far from its bar's pins is balanced by as large a couple
+    sizes: dict[str, Array | float] = dict.fromkeys(("load", "springs", "torsion"), 0.0)
+    for term in (*placed.loads, *placed.effects):
+        if term.key in sizes:
+            sizes[term.key] += find_size(term, scene.linkage, solution)
+    # a force at a place far from its bar's pins is balanced by as large a couple
+    forces_acting = sizes["load"] + sizes["springs"]
+    # and a spring next to its free length has the rounding of that length
+    couples_acting = sum(sizes.values()) * max(scene.linkage.lengths)
     with np.errstate(divide="ignore", invalid="ignore"):
-        force_size = (balance.forces + acts) / (
+        force_size = (balance.forces + forces_acting) / (
             find_lever(scene.linkage) * solution.drive_condition
         )
-        moment_size = balance.moments / find_condition(drive, scene.linkage, solution)
+        moment_size = (balance.moments + couples_acting) / find_condition(
+            drive, scene.linkage, solution
+        )
     judged = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same
     # here as in the answer
