@@ -75,7 +75,7 @@ long-oracles:
 long-faults:
 	$(BIN)/python -m fourbar_lab faults
 long-fuzz:
-	DRAWINGS=10000 $(BIN)/python -m pytest tests/fourbar/files/test_drawing.py \
+	DRAWINGS=10000 $(BIN)/python -m pytest tests/fourbar/files/test_drawn_pins.py \
 		tests/fourbar/formulas/test_formulas.py
 	$(BIN)/python -m fourbar_lab fuzz-files --count 100000
 	$(BIN)/python -m fourbar_lab fuzz --scenes 50000

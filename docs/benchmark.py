@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import (
+from fourbar.show.plot.linkage_figure import (
     choose_drawing_scale,
     draw_mechanism,
     draw_support,

@@ -19,7 +19,7 @@ from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import EPS, K, find_condition
-from fourbar_validation.cost.pictures import (
+from fourbar_validation.cost.charts import (
     GRID,
     INK,
     PAPER,
@@ -27,7 +27,7 @@ from fourbar_validation.cost.pictures import (
     make_figure,
     set_axes,
 )
-from fourbar_validation.cost.study import PINOCCHIO
+from fourbar_validation.cost.work_precision import PINOCCHIO
 from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.report.hard_picture import list_approaches, list_errors
 from fourbar_validation.report.svg import LIGHT_COLOURS, choose_style, write_alone

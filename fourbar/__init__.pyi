@@ -54,7 +54,7 @@ from .show.duty import bearing_load as bearing_load
 from .show.duty import motor_duty as motor_duty
 from .show.duty import shaking_force as shaking_force
 from .show.duty import shaking_moment as shaking_moment
-from .show.units import units as units
+from .show.shown_units import units as units
 from .solution import Solution as Solution
 from .solving import solve as solve
 from .studies.derivatives import Sensitivity as Sensitivity

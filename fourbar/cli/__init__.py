@@ -5,7 +5,7 @@ import sys
 import click
 
 from fourbar import __version__
-from fourbar.cli.evaluate import (
+from fourbar.cli.analyze import (
     analyze,
     classify_command,
     equilibrium_command,

@@ -112,7 +112,7 @@ def _open_or_make_scene(
             yield described
         return
     from fourbar.mjcf import list_defaults, make_scene
-    from fourbar.show.units import units_of_length
+    from fourbar.show.shown_units import units_of_length
 
     assert lengths is not None
     speed = {}

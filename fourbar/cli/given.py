@@ -40,7 +40,7 @@ def _read_units(
     parameter: click.Parameter,
     text: str | None,
 ) -> Conversion | None:
-    from fourbar.show.units import units
+    from fourbar.show.shown_units import units
 
     return None if text is None else units(text)
 
@@ -157,7 +157,7 @@ def open_scene(path: Path) -> Iterator[Scene]:
     """
     from fourbar.files import parse_tables, read_scene_text, read_tables
     from fourbar.scene.motion import require_steps
-    from fourbar.show.units import states_radians, units_of_scene
+    from fourbar.show.shown_units import states_radians, units_of_scene
     from fourbar.writing import require_file
 
     context = click.get_current_context()
@@ -319,7 +319,7 @@ def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, floa
 
 def _read_drawn(scene: Scene, name: str, text: str) -> float:
     """Return the angle or stroke of the scene's drawing."""
-    from fourbar.files.drawing import list_drawn
+    from fourbar.files.drawn_pins import list_drawn
 
     drawing = scene.drawing
     if drawing is None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.edit.document import KeyPath, SceneDocument
+from fourbar.edit.scene_entries import KeyPath, SceneDocument
 from fourbar.effects import Load, Place
 from fourbar.effects.place import states_place
 from fourbar.errors import InputError

@@ -30,9 +30,9 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import write_facts
+from fourbar.show.shown_units import COMMON
 from fourbar.show.studies import write_type
 from fourbar.show.summary import summarize
-from fourbar.show.units import COMMON
 from fourbar.solution import Conversion, write_csv
 from fourbar.solving import find_last_stage, solve
 from fourbar.studies.passing import say_nowhere

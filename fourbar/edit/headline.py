@@ -10,8 +10,8 @@ import numpy as np
 
 from fourbar.linkage import PIN_FORCE
 from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
+from fourbar.show.shown_units import write_short
 from fourbar.show.summary import Facts
-from fourbar.show.units import write_short
 from fourbar.solution import Conversion, Solution
 
 _DRIVE = {"torque": "N m", "drive_force": "N"}

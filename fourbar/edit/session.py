@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.edit.document import SceneDocument, list_offers, name_entry
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
 from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.edit.headline import list_peaks
+from fourbar.edit.scene_entries import SceneDocument, list_offers, name_entry
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.fields import Reader
@@ -37,8 +37,8 @@ from fourbar.scene.motion import (
     require_steps,
 )
 from fourbar.scene.pictures import TracedPicture
+from fourbar.show.shown_units import find_length, units, units_of_scene
 from fourbar.show.summary import summarize
-from fourbar.show.units import find_length, units, units_of_scene
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_number

@@ -387,7 +387,7 @@ class Effect(Placed):
         One number or (n,) is returned. The harness asks for it before every comparison,
         of effects that are not part of the package. Effects of the package leave it
         out: the harness states their sizes itself, in
-        `fourbar_validation/compare/effects.py`.
+        `fourbar_validation/compare/effect_sizes.py`.
         """
         raise NotImplementedError
 

@@ -1,6 +1,6 @@
 """Files: scenes in TOML with units, pictures, and how somebody's file is read."""
 
-from fourbar.files.drawing import from_pins
+from fourbar.files.drawn_pins import from_pins
 from fourbar.files.scene_file import (
     load,
     loads,

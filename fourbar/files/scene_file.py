@@ -26,7 +26,7 @@ from fourbar.effects import (
 from fourbar.effects.place import settler
 from fourbar.errors import InputError, expect
 from fourbar.files.described import PLACES_OF_ENDS, list_keys, read_described
-from fourbar.files.drawing import (
+from fourbar.files.drawn_pins import (
     DrawnGround,
     choose_assembly,
     find_side_of_cylinder,

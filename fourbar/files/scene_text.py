@@ -16,7 +16,7 @@ import numpy as np
 from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
 from fourbar.files.described import write_described
-from fourbar.files.drawing import choose_assembly, meet_lengths, read_point
+from fourbar.files.drawn_pins import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
     Reader,
     convert_to_polar,

@@ -17,7 +17,7 @@ from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
-from fourbar.show.units import write_short
+from fourbar.show.shown_units import write_short
 from fourbar.solution import Conversion, Solution
 from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
 from fourbar.studies.passing import SAME_POSITION

@@ -40,8 +40,8 @@ from fourbar.show.plot.view import (
     list_sweep,
     set_branch,
 )
+from fourbar.show.shown_units import choose_unit
 from fourbar.show.tolerances import collect_tolerances
-from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Conversion, Solution
 from fourbar.solving import solve
 from fourbar.writing import null_nan, write_text

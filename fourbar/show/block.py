@@ -39,9 +39,8 @@ from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import acts, find_drive_rounding
-from fourbar.show.position import PositionSheet
-from fourbar.show.summary import Facts, summarize
-from fourbar.show.units import (
+from fourbar.show.position_sheet import PositionSheet
+from fourbar.show.shown_units import (
     COMMON,
     POSITION_DIGITS,
     SHOWN_AS_ZERO,
@@ -51,6 +50,7 @@ from fourbar.show.units import (
     write_ends,
     write_short,
 )
+from fourbar.show.summary import Facts, summarize
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.studies.passing import move_inside_limit
 

@@ -16,7 +16,7 @@ from fourbar.quantities import Array
 from fourbar.quantities.units import NUMBER_TEXT
 from fourbar.scene import Command, Scene
 from fourbar.show.columns import Column, read_column
-from fourbar.show.units import drop_rounding
+from fourbar.show.shown_units import drop_rounding
 from fourbar.solving import find_last_stage
 from fourbar.studies.course import MotionCourse
 from fourbar.studies.passing import SAME_POSITION, is_same_position

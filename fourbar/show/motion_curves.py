@@ -19,7 +19,7 @@ from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
-from fourbar.show.units import SHOWN_AS_ZERO, drop_rounding
+from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution
 from fourbar.solving import solve, split
 from fourbar.studies.course import Stretch, pair_ends

@@ -10,8 +10,8 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.driving import describe_drive
 from fourbar.show.plot import draw_figure
+from fourbar.show.shown_units import write_ends
 from fourbar.show.tables import list_columns, write_with_unit
-from fourbar.show.units import write_ends
 from fourbar.solution import SI, Solution
 from fourbar.writing import describe_extent, make_html
 

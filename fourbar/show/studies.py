@@ -39,13 +39,13 @@ from fourbar.show.acting import list_spring_notes
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.lines import wrap_line
 from fourbar.show.motion_curves import find_drive_rounding
+from fourbar.show.shown_units import COMMON, choose_unit
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
     make_plain_table,
     write_cells,
     write_table,
 )
-from fourbar.show.units import COMMON, choose_unit
 from fourbar.solution import Conversion, find_unit_in, find_unit_of_quantity
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity

@@ -25,7 +25,7 @@ from fourbar.show.columns import Column, read_column
 from fourbar.show.derived import list_derived_names
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.lines import wrap_line
-from fourbar.show.units import drop_rounding, write_cell
+from fourbar.show.shown_units import drop_rounding, write_cell
 from fourbar.solution import (
     DEGREES,
     Conversion,

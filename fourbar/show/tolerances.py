@@ -15,12 +15,12 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
+from fourbar.show.shown_units import drop_rounding, write_cell
 from fourbar.show.tables import (
     make_plain_table,
     show_running,
     write_table,
 )
-from fourbar.show.units import drop_rounding, write_cell
 from fourbar.solution import DEGREES, Conversion, find_unit_in
 from fourbar.studies.spread import (
     BAND_PERCENTILES,

@@ -36,7 +36,7 @@ from fourbar_lab.contenders import (
 )
 from fourbar_lab.starts import measure_starts
 from fourbar_validation.cost.formulas import make_bodies
-from fourbar_validation.cost.study import time_call
+from fourbar_validation.cost.work_precision import time_call
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine

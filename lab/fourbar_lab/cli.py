@@ -19,7 +19,7 @@ LAB_COMMANDS = {
         "Time NumPy, C and the 13x13 system side by side; ratios that must hold.",
     ),
     "effects": LazyCommand(
-        "fourbar_lab.effects:effects",
+        "fourbar_lab.effect_costs:effects",
         "Time each effect in each engine, and each flag of MuJoCo; a minute.",
     ),
     "worlds": LazyCommand(

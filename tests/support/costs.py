@@ -1,7 +1,7 @@
 """Points of a study of the cost, of stated errors."""
 
 from fourbar_validation.advise.worst_errors import ERROR_NAMES, WorstErrors
-from fourbar_validation.cost.study import STEPPED_MOTION, CostPoint
+from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
 
 
 def point(

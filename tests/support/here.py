@@ -3,7 +3,7 @@
 from collections import Counter
 
 from fourbar_validation.engines import workers
-from fourbar_validation.report.summary import Summary
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.run.plan import Progress
 
 

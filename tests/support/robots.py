@@ -21,10 +21,10 @@ from fourbar_validation.engines.mujoco.robots.examine import (
     examine_file,
     examine_mended,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.judge import LoopJudgement, judge_file, list_answers
+from fourbar_validation.robots.judge_loop import LoopJudgement, judge_file, list_answers
 
 Point = tuple[float, float]
 TILT = (0.3, -0.2, 0.7, 0.5)

@@ -15,7 +15,7 @@ from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import compute_errors
-from fourbar_validation.cost import pictures, study
+from fourbar_validation.cost import charts, work_precision
 from fourbar_validation.cost.conclusion import DEFAULT
 from fourbar_validation.cost.cost import write_subtitle
 from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP, design_curves
@@ -70,9 +70,9 @@ def compute_row(text, steps, folder):
         integrator=integrator,
         steps_per_revolution=steps,
     )
-    setup = study.CostStudy("page", SCENE, folder).setup(settled=True)
+    setup = work_precision.CostStudy("page", SCENE, folder).setup(settled=True)
     trial = setup.try_out(settings, restore_defaults)
-    study._leave_out_first(trial)
+    work_precision._leave_out_first(trial)
     return compute_errors(SCENE, trial.at, trial.quantities)
 
 
@@ -105,17 +105,17 @@ def read_words(svg):
 
 @pytest.mark.slow
 def test_the_pictures_are_those_that_few_points_draw(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 2)
-    monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-2, 1e-4))
+    monkeypatch.setattr(work_precision, "TIMINGS_OF_A_SETTING", 2)
+    monkeypatch.setattr(work_precision, "ERRORS_ADVISED", (1e-2, 1e-4))
     looks = (
-        pictures.METHOD_LOOKS,
-        pictures.INTEGRATOR_LOOKS,
-        pictures.TIMESTEPS,
-        pictures.SOFTNESS_LOOKS,
-        pictures.SOLVERS,
+        charts.METHOD_LOOKS,
+        charts.INTEGRATOR_LOOKS,
+        charts.TIMESTEPS,
+        charts.SOFTNESS_LOOKS,
+        charts.SOLVERS,
     )
     wanted = {look.curve for group in looks for look in group.values()}
-    made = study.CostStudy("page", SCENE, tmp_path)
+    made = work_precision.CostStudy("page", SCENE, tmp_path)
     curves = {}
     for curve in design_curves(SCENE):
         if curve.name in wanted:
@@ -127,7 +127,7 @@ def test_the_pictures_are_those_that_few_points_draw(tmp_path, monkeypatch):
     curves["formulas"] = made._time_formulas()
     with apply_style():
         title = write_subtitle(SCENE, SCENE.title)
-        drawn = pictures.make_pictures(curves, title)
+        drawn = charts.make_pictures(curves, title)
         for name in DRAWS["STUDIED"]:
             kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
             assert read_words(write_alone(drawn[name], name)) == read_words(kept), name

@@ -26,10 +26,10 @@ from fourbar.effects import list_kinds
 from fourbar.errors import FAILED, HOLDS
 from fourbar.files import load
 from fourbar_lab.cli import LAB_COMMANDS as LABS
-from fourbar_lab.effects import EFFECTS
+from fourbar_lab.effect_costs import EFFECTS
 from fourbar_validation.cli import COMMANDS
 from fourbar_validation.cli import status as harness
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.regression import record
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.scenes.suites import read_suite

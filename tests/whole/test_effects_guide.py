@@ -25,13 +25,18 @@ from fourbar.scene import command
 from fourbar.solving import solve
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.study import vary
-from fourbar_validation.compare import effects as in_scales
-from fourbar_validation.engines import effects as on_trees
+from fourbar_validation.compare import effect_sizes as in_scales
+from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.run.judge import judge
-from tests.validation.engines.test_effects import EXACT, ON_TREES, SIMULATED, failing
+from tests.validation.engines.test_applied_effects import (
+    EXACT,
+    ON_TREES,
+    SIMULATED,
+    failing,
+)
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("", "fourbar", "validation", "validation/fourbar_validation")

@@ -32,7 +32,7 @@ from fourbar.errors import (
 from fourbar.writing import write_text
 from fourbar_lab.bench import Measured
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
-from fourbar_validation.published.figures import PublishedFigure
+from fourbar_validation.published.printed_figures import PublishedFigure
 from fourbar_validation.regression.record import find_baseline
 from tests.support.alone import alone
 from tests.support.here import judge_here

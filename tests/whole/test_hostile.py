@@ -21,7 +21,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.columns import LONGEST_CELL, read_columns
+from fourbar_validation.compare.results_file import LONGEST_CELL, read_columns
 from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory

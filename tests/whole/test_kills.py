@@ -22,14 +22,14 @@ import fourbar_validation.run.plan
 from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, FourBarError, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.report.machine import CODE, build, hash_modules
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import pool
 from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
 from fourbar_validation.run.run import run
@@ -467,7 +467,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
         return judge(job)
 
     monkeypatch.setattr(pool, "judge_job", noting)
-    monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
+    monkeypatch.setattr("fourbar_validation.report.run_summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.plan, "PICTURED", 3)
     monkeypatch.setattr(
         fourbar_validation.run.run,

@@ -19,17 +19,17 @@ SOURCES = {
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": (
-        "fourbar/cli: evaluate export given; fourbar/show: tables"
+        "fourbar/cli: analyze export given; fourbar/show: tables"
     ),
     "whole/test_exits.py": (
         "validation: cli; validation/report: sentences terminal; lab: cli fuzz_files"
     ),
     "whole/test_kills.py": "validation/run: pool",
     "whole/test_narrow_terminal.py": "fourbar/show: folded",
-    "whole/test_results_format.py": "validation/compare: columns",
+    "whole/test_results_format.py": "validation/compare: results_file",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
-    "fourbar/edit/test_session.py": "fourbar/edit: document dragging exports",
+    "fourbar/edit/test_session.py": "fourbar/edit: dragging exports scene_entries",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect",
     "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
     "fourbar/formulas/test_formulas.py": (
@@ -41,21 +41,24 @@ JUDGED_BY = {
     "fourbar/test_solving.py": "fourbar/evaluation: case",
     "fourbar/show/test_located.py": "fourbar/studies: course",
     "fourbar/show/test_columns.py": "fourbar/show: derived",
-    "fourbar/show/test_position.py": "fourbar/show: change_point",
+    "fourbar/show/test_position_sheet.py": "fourbar/show: change_point",
     "fourbar/show/test_summary.py": "fourbar/show: driving motion_curves",
-    "fourbar/studies/test_paths.py": "fourbar/show: paths",
+    "fourbar/studies/test_paths.py": "fourbar/show: path_rows",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
-    "fourbar/show/plot/test_curves.py": "fourbar/show/plot: derived paths",
+    "fourbar/show/plot/test_curves.py": (
+        "fourbar/show/plot: derived_curves traced_paths"
+    ),
     "fourbar/show/plot/test_plot.py": (
-        "fourbar/show/plot: figures freebody labels linkage studies style view"
+        "fourbar/show/plot: figures freebody labels linkage_figure style"
+        " tolerance_figures view"
     ),
     # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": (
-        "validation/compare: answer effects; "
-        "validation/run: answers command identities law question"
+        "validation/compare: answer effect_sizes; "
+        "validation/run: command identities judge_engines law question"
     ),
     "validation/run/test_parts.py": "validation/run: plan progress request",
     # adapters: judged against printed figures, each other, and faults put in front of
@@ -70,7 +73,7 @@ JUDGED_BY = {
     ),
     "validation/engines/test_environments.py": "validation/engines: table",
     "validation/engines/test_pinocchio_plain_loop.py": (
-        "validation/engines: plain_loop; validation/engines/mujoco: plain_loop"
+        "validation/engines: plain_loop; validation/engines/mujoco: plain_mujoco"
     ),
     "validation/engines/test_free_body.py": (
         "validation/engines: free_body_closure free_body_effects"
@@ -84,37 +87,40 @@ JUDGED_BY = {
     ),
     "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": (
-        "validation/check: calculated columns fitted judge mistakes theirs variants"
+        "validation/check: calculated csv_columns fitted judge_table mistakes theirs"
+        " variants"
     ),
-    "validation/robots/test_check.py": (
-        "validation/robots: differences guard judge; "
+    "validation/robots/test_check_mjcf.py": (
+        "validation/robots: differences guard judge_loop; "
         "validation/engines/mujoco: describe; "
         "validation/engines/mujoco/robots: examine seen"
     ),
     "validation/engines/mujoco/robots/test_closures.py": (
-        "validation/engines/mujoco/robots: ancestry frame loop"
+        "validation/engines/mujoco/robots: ancestry frame loop_facts"
     ),
     "validation/engines/mujoco/robots/test_measure.py": (
         "validation/engines/mujoco/robots: planes"
     ),
     "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
-    "validation/robots/test_command.py": "validation/robots: options",
+    "validation/robots/test_loops.py": "validation/robots: options",
     "validation/published/test_published.py": (
-        "validation/published: comparison figures textbook thesis thirteen"
+        "validation/published: comparison printed_figures textbook thesis thirteen"
     ),
     "validation/regression/test_regression.py": (
         "validation/regression: accept engines history record render rules scenes"
     ),
     "validation/report/test_report.py": (
-        "validation/report: figures machine overview record "
-        "summary svg templating words"
+        "validation/report: machine overview run_summary scene_pictures "
+        "scene_record svg templating words"
     ),
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders starts",
-    "lab/test_effects.py": "lab: tables",
+    "lab/test_effect_costs.py": "lab: tables",
     "lab/test_stability.py": "lab: families slopes tally",
     "lab/test_faults.py": "lab: fault_scenes injection",
-    "validation/cost/test_cost.py": "validation/cost: series formulas pictures study",
+    "validation/cost/test_cost.py": (
+        "validation/cost: charts formulas series work_precision"
+    ),
     "validation/advise/test_advise.py": "validation/advise: judged_setup matters",
     "lab/test_benchmark.py": (
         "lab/simulators: slider_engines slider_mujoco slider_pinocchio"
@@ -124,9 +130,9 @@ JUDGED_BY = {
     ),
     # simulators that need not be there: their scripts run where they are installed
     "lab/simulators/test_simulators.py": (
-        "lab/simulators: dart drake_sap exudyn_simulated genesis_rigid gradients motion"
+        "lab/simulators: dart drake_sap exudyn_simulated genesis_rigid gradients"
         " mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco"
-        " pinocchio_simulated pybullet"
+        " pinocchio_simulated protocol_engines pybullet"
     ),
 }
 """Modules without a test of their name, folder by folder, and the test that says when

@@ -20,7 +20,7 @@ from fourbar.quantities import (
 )
 from fourbar.solution import Solution
 from fourbar_validation.cli import status
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FORMULAS, RESULT_COLUMNS, Row
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.registry import (

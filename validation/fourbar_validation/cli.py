@@ -48,11 +48,11 @@ COMMANDS = {
         "Judge your own torques and forces.",
     ),
     "loops": LazyCommand(
-        "fourbar_validation.robots.command:robot_command",
+        "fourbar_validation.robots.loops:robot_command",
         "List the closed loops of a robot's MJCF or SDF.",
     ),
     "check-mjcf": LazyCommand(
-        "fourbar_validation.robots.check:check_mjcf_command",
+        "fourbar_validation.robots.check_mjcf:check_mjcf_command",
         "Measure the loops of your own MJCF or SDF in MuJoCo, or judge one by a scene.",
         "mujoco",
     ),

@@ -5,8 +5,8 @@ extra ``plot``), which is loaded when something is drawn.
 """
 
 from fourbar.show.plot.figures import FIGURES, draw, draw_figure
-from fourbar.show.plot.studies import draw_tolerances
 from fourbar.show.plot.style import FORMATS, format_of
+from fourbar.show.plot.tolerance_figures import draw_tolerances
 
 __all__ = (
     "FIGURES",

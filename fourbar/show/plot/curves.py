@@ -40,7 +40,7 @@ from fourbar.show.plot.style import (
     write_number,
 )
 from fourbar.show.plot.view import View, collect_point_vectors
-from fourbar.show.units import choose_unit
+from fourbar.show.shown_units import choose_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import (
+from fourbar.show.plot.linkage_figure import (
     choose_drawing_scale,
     draw_mechanism,
     draw_paths,

@@ -17,7 +17,7 @@ from fourbar.scene import Scene
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import (
+from fourbar.show.plot.linkage_figure import (
     draw_mass_centre,
     draw_plate,
     locate_pins,
@@ -38,8 +38,8 @@ from fourbar.show.plot.style import (
     write_labelled_quantity,
 )
 from fourbar.show.plot.view import View, where_in_words
+from fourbar.show.shown_units import choose_unit
 from fourbar.show.summary import locate_bending
-from fourbar.show.units import choose_unit
 from fourbar.solution import Conversion
 from fourbar.studies.internal_forces import internal_forces
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, clean_line, expect, needing
 from fourbar.quantities import Array
-from fourbar.show.units import choose_unit
+from fourbar.show.shown_units import choose_unit
 from fourbar.solution import SI, Conversion
 from fourbar.writing import STANDARD_STREAM, write_bytes
 

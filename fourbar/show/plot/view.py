@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.units import choose_unit
+from fourbar.show.shown_units import choose_unit
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
 

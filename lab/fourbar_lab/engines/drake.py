@@ -24,6 +24,7 @@ from pydrake.multibody.tree import (
 from fourbar.errors import LimitError
 from fourbar.quantities import Array
 from fourbar.scene import Scene
+from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     find_unknown,
@@ -31,7 +32,6 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
     rotate_by,
 )
-from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree

@@ -38,6 +38,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, ExudynBodies
+from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     ON_BARS,
     PART_POINTS,
@@ -46,7 +47,6 @@ from fourbar_validation.engines.description import (
     place,
     reduce_angle,
 )
-from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.linear import solve_refined
 from fourbar_validation.engines.loaded import BarValues, Loaded
 from fourbar_validation.engines.loop import Exact

@@ -19,6 +19,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import resolve
+from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     ON_BARS,
     PART_POINTS,
@@ -27,7 +28,6 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
     reduce_angle,
 )
-from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.linear import solve_refined
 from fourbar_validation.engines.loaded import BarValues, Loaded
 from fourbar_validation.engines.loop import Exact

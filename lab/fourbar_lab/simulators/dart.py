@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.mjcf import size_flywheel
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.protocol_engines import (
     RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,

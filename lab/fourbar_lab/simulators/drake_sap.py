@@ -14,7 +14,7 @@ from pydrake.systems import analysis
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.protocol_engines import (
     RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,

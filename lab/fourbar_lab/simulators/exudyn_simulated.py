@@ -14,7 +14,13 @@ from fourbar.errors import LimitError
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from fourbar_lab.engines.exudyn import EXUDYN_SIZE, JOINTS, ExudynBars
-from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator, start
+from fourbar_lab.simulators.protocol_engines import (
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    start,
+)
 
 
 class ExudynIntegrators(Simulator):

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
+from fourbar_lab.simulators.protocol_engines import (
     Course,
     Instant,
     Readings,
@@ -18,7 +19,6 @@ from fourbar_lab.simulators.motion import (
     start,
     write_temp,
 )
-from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
 
 GENESIS_FLYWHEEL = 1e5
 """Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves

@@ -14,8 +14,8 @@ import numpy as np
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.studies.keys import command_key, list_entries, read_number, replace_numbers
-from fourbar_lab.simulators.motion import start
 from fourbar_lab.simulators.mujoco_c import states_of, write_opened_mjcf
+from fourbar_lab.simulators.protocol_engines import start
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 STEPS_OF_A_TURN = 156

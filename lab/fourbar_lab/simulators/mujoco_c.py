@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.mjcf import SIMULATORS, write_mjcf
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, with_signs
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.protocol_engines import (
     DEFAULT_STEPS_OF_A_TURN,
     Course,
     Floats,

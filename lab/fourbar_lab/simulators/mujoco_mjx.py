@@ -12,8 +12,8 @@ from mujoco import mjx
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
-from fourbar_lab.simulators.motion import Course, Floats, Instant, Readings
 from fourbar_lab.simulators.mujoco_c import FileSimulator, reading, states_of
+from fourbar_lab.simulators.protocol_engines import Course, Floats, Instant, Readings
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 jax.config.update("jax_enable_x64", True)

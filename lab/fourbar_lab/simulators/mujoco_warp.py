@@ -14,18 +14,18 @@ import warp
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
-from fourbar_lab.simulators.motion import (
-    DEFAULT_STEPS_OF_A_TURN,
-    Course,
-    Floats,
-    Instant,
-    Readings,
-)
 from fourbar_lab.simulators.mujoco_c import (
     FileSimulator,
     reading,
     states_of,
     write_opened_mjcf,
+)
+from fourbar_lab.simulators.protocol_engines import (
+    DEFAULT_STEPS_OF_A_TURN,
+    Course,
+    Floats,
+    Instant,
+    Readings,
 )
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 

@@ -16,7 +16,7 @@ from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_usd
 from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.protocol_engines import (
     RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,
     Instant,

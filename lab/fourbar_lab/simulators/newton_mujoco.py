@@ -7,7 +7,9 @@ import newton
 import warp
 
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
+from fourbar_lab.simulators.mujoco_warp import read_warp
+from fourbar_lab.simulators.protocol_engines import (
     Course,
     Instant,
     Readings,
@@ -16,8 +18,6 @@ from fourbar_lab.simulators.motion import (
     start,
     write_temp,
 )
-from fourbar_lab.simulators.mujoco_c import write_opened_mjcf
-from fourbar_lab.simulators.mujoco_warp import read_warp
 
 
 class NewtonMujoco(Simulator):

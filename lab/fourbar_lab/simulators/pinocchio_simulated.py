@@ -13,7 +13,7 @@ from fourbar.mjcf import size_flywheel
 from fourbar.quantities import Array
 from fourbar.scene import Scene, with_signs
 from fourbar.scene import command as list_positions
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.protocol_engines import (
     DEFAULT_STEPS_OF_A_TURN,
     RECIPE_WITH_A_LIGHT_FLYWHEEL,
     Course,

@@ -10,7 +10,7 @@ import pybullet as bullet
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import (
+from fourbar_lab.simulators.protocol_engines import (
     Course,
     Instant,
     Readings,

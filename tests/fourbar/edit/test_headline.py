@@ -10,7 +10,7 @@ import pytest
 import fourbar
 from fourbar import solve
 from fourbar.show.block import write_block
-from fourbar.show.units import COMMON
+from fourbar.show.shown_units import COMMON
 
 pytest.importorskip(
     "tomlkit",

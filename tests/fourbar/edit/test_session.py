@@ -28,9 +28,9 @@ pytest.importorskip(
     "tomlkit",
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
-from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import write_rounded
 from fourbar.edit.exports import evaluate_scene, pack_frame
+from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.edit.session import (
     MOST_KEPT,
     MOST_SOLVED_ANEW,

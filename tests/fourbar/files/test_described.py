@@ -10,8 +10,8 @@ from pytest import approx
 
 import fourbar
 from fourbar import Place, effects, solve
-from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import Dragged, drag, list_handles
+from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.scene.numbers import find_unit_of_key

@@ -17,7 +17,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_motor
 from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
-from fourbar.show.units import units
+from fourbar.show.shown_units import units
 from tests.support.scenes import CYLINDER, crank_rocker
 
 ROUND_OFF = 1e-11

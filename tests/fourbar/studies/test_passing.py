@@ -23,7 +23,7 @@ from fourbar.errors import (
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
 from fourbar.show.block import write_block
-from fourbar.show.units import units
+from fourbar.show.shown_units import units
 from fourbar.studies.passing import (
     INSIDE_LIMIT,
     find_positions,

@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull
 
 from fourbar.evaluation import free_motion
 from fourbar.files import loads
-from fourbar.show.paths import write_paths
-from fourbar.show.units import units
+from fourbar.show.path_rows import write_paths
+from fourbar.show.shown_units import units
 from fourbar.solving import solve
 from fourbar.studies.paths import measure_paths
 from tests.support.shares import slow_but

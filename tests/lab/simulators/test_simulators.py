@@ -21,9 +21,14 @@ from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command
 from fourbar_lab import benchmark
-from fourbar_lab.simulators import gradients, motion, mujoco_c, pinocchio_simulated
-from fourbar_lab.simulators.motion import Instant, Simulator
+from fourbar_lab.simulators import (
+    gradients,
+    mujoco_c,
+    pinocchio_simulated,
+    protocol_engines,
+)
 from fourbar_lab.simulators.problems import PROBLEMS
+from fourbar_lab.simulators.protocol_engines import Instant, Simulator
 from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.engine import open_engine, serve
 from fourbar_validation.engines import protocol
@@ -109,11 +114,11 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
     for branch, first in ((1, math.tau), (-1, 0.0)):
         turned = scene.motion.replace(branch=branch, speed=-10.0 * branch)
         moved = replace(scene, motion=turned)
-        begin = motion.start(moved)
+        begin = protocol_engines.start(moved)
         assert write_mjcf(moved, start=begin).count("<key ") == 1
         assert "coupler" in write_sdf(moved, "drake", begin)
-        theta = motion.bar_directions(begin.qpos)
-        assert motion.compute_gap_at_B(moved, theta) < 1e-15
+        theta = protocol_engines.bar_directions(begin.qpos)
+        assert protocol_engines.compute_gap_at_B(moved, theta) < 1e-15
         assert np.sin(theta[2] - theta[1]) * branch > 0.0
         assert (begin.qpos[0], begin.qvel[0]) == (first, -10.0 * branch)
 
@@ -122,7 +127,7 @@ def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated
     """Of a parallelogram bars 2 and 4 stay parallel there, and the coupler level."""
     scene = low_parallelogram()
     for qpos in (
-        motion.start(scene).qpos,
+        protocol_engines.start(scene).qpos,
         *(q for q, _ in mujoco_c.states_of(write_mjcf(scene), scene)),
         gradients.compile_and_assemble(scene, 4.0, "mujoco").qpos,
     ):
@@ -152,7 +157,9 @@ class Rigid(Simulator):
         def advance(steps):
             nonlocal done
             done += steps
-            return motion.start(scene).qpos[0] + speed * done * course.timestep
+            return (
+                protocol_engines.start(scene).qpos[0] + speed * done * course.timestep
+            )
 
         def read(theta):
             command = Command(np.array([theta]), branch, speed, 0.0)
@@ -188,9 +195,9 @@ def test_a_run_begins_before_its_first_position_where_the_linkage_closes(
 ):
     scene, command = ask_position(problem)
     scene = replace(scene, motion=scene.motion.replace(speed=speed))
-    led, course = motion.lay_out(scene, command._replace(speed=speed), 100)
+    led, course = protocol_engines.lay_out(scene, command._replace(speed=speed), 100)
     low, high = (math.pi * part for part in begins)
-    assert low - 1e-12 < motion.start(led).qpos[0] < high + 1e-12
+    assert low - 1e-12 < protocol_engines.start(led).qpos[0] < high + 1e-12
     assert course.timestep == pytest.approx(math.tau / 10.0 / 100)
     count = len(command.theta_2)
     assert course.rows.tolist() == list(range(count))[:: 1 if speed > 0 else -1]
@@ -215,7 +222,7 @@ def test_a_run_that_diverges_or_stops_is_no_answer(monkeypatch):
     monkeypatch.setattr(Rigid, "diverges_at", 100)
     with pytest.raises(ArithmeticError, match="diverged"):
         Rigid().answer(*ask_position())
-    monkeypatch.setattr(motion.Readings, "read", lambda *_: None)
+    monkeypatch.setattr(protocol_engines.Readings, "read", lambda *_: None)
     with pytest.raises(NotAssembledError, match="0 of 25 positions were read"):
         Rigid().answer(*ask_position())
 
@@ -325,7 +332,7 @@ def test_exudyn_refuses_what_it_has_no_element_for():
     assert apart < IN_EXUDYN * np.abs(torque).max()
     rubbing = replace(scene, effects=(Friction.at(B=0.01),))
     with pytest.raises(LimitError, match="alone"):
-        simulator.through(*motion.lay_out(rubbing, command, 314))
+        simulator.through(*protocol_engines.lay_out(rubbing, command, 314))
 
 
 @pytest.mark.slow

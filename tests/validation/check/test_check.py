@@ -19,8 +19,8 @@ from fourbar.scene.motion import Law
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.check.check import judge_table
-from fourbar_validation.check.columns import MADE_OF, list_names_of_points
-from fourbar_validation.check.judge import Allowance, Judge
+from fourbar_validation.check.csv_columns import MADE_OF, list_names_of_points
+from fourbar_validation.check.judge_table import Allowance, Judge
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
 from fourbar_validation.check.theirs import LARGEST_TABLE_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status

@@ -17,8 +17,8 @@ from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Scene, command
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import ReleasedAnswer
-from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import Comparison, Demands
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import (
     AGREES,
     DEGRADED,
@@ -36,7 +36,7 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import render
 from fourbar_validation.report.html import write_html as page_of
 from fourbar_validation.report.html import write_summary_page
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 from fourbar_validation.run.question import FREE_BODY

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from fourbar_validation.advise.worst_errors import WorstErrors
-from fourbar_validation.cost import conclusion, pictures
+from fourbar_validation.cost import charts, conclusion
 from tests.support.costs import point
 
 
@@ -17,7 +17,7 @@ def test_statement_and_conclusion_have_one_criterion():
         "RK4": [replace(point(10, 0.1), at_steps=WorstErrors(*[1e-9] * 5))],
     }
     assert (
-        pictures.write_statement(curves, "torque")
+        charts.write_statement(curves, "torque")
         == "Four digits of torque cost 0.06 ms a simulated second;\n"
         "MuJoCo's defaults have an error of 4e-3"
     )

@@ -28,7 +28,7 @@ from fourbar_validation.advise.worst_errors import (
     WorstErrors,
     compute_errors,
 )
-from fourbar_validation.cost import conclusion, formulas, laws, pictures, study
+from fourbar_validation.cost import charts, conclusion, formulas, laws, work_precision
 from fourbar_validation.cost import cost as command_module
 from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
@@ -104,8 +104,8 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc():
 
 @pytest.mark.slow
 def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
-    made = study.CostStudy("s", turning(), tmp_path)
-    curves = {curve.name: curve for curve in study.design_curves(turning())}
+    made = work_precision.CostStudy("s", turning(), tmp_path)
+    curves = {curve.name: curve for curve in work_precision.design_curves(turning())}
     curve = curves["RK4, MuJoCo's defaults"]
     spots = tuple(spot for spot in curve.spots if spot.x in (320, 2560))
     coarse, fine = (p.at_steps for p in made._try_curve(replace(curve, spots=spots)))
@@ -134,7 +134,7 @@ def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     sweep = fourbar.Sweep(math.radians(200.0), math.radians(340.0), 20)
     motion = fourbar.Motion(sweep, 10.0, branch=-1)
     scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
-    made = study.CostStudy("past a change point", scene, tmp_path)
+    made = work_precision.CostStudy("past a change point", scene, tmp_path)
     assert tried(scene)(replace(BEST, steps_per_revolution=640)).worst < 1e-4
     assert all(p.errors.worst < 1e-11 for p in made._time_inverse())
     *_, extrapolated = made._try_one_state()
@@ -265,10 +265,10 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping):
     assert laws_found["F43"].decided
     jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640 steps a revolution"
     assert laws.list_warnings(curves) == [f"Euler, tc held: F43: {jump}"]
-    assert "F43 jumps" in pictures.state_jumps(curves)
+    assert "F43 jumps" in charts.state_jumps(curves)
     drawn = {
         line.get_gid(): len(line.get_xdata())
-        for axes in pictures.draw_orders(curves, "").axes
+        for axes in charts.draw_orders(curves, "").axes
         for line in axes.lines
         if line.get_gid() and len(line.get_xdata())
     }
@@ -331,7 +331,7 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported():
     warning = "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
     assert laws.list_warnings(curves) == [warning]
     jumps = "No timestep brings F12 below 0.1\nwith Euler"
-    assert pictures.state_jumps(curves) == jumps
+    assert charts.state_jumps(curves) == jumps
 
 
 def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump():
@@ -356,7 +356,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
     done: list[str] = []
 
     def units(stop):
-        made = study.CostStudy("s", turning(), tmp_path)
+        made = work_precision.CostStudy("s", turning(), tmp_path)
 
         def unit(name):
             if name == stop:
@@ -373,9 +373,9 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
     curves = [p.curve for row in points.values() for p in row]
     assert done == curves == ["a", "b", "c"]
     stated = json.loads((tmp_path / "run.json").read_text())
-    assert stated["study"] == study.STUDY_VERSION
+    assert stated["study"] == work_precision.STUDY_VERSION
     # another scene in the same folder starts over
-    second_study = study.CostStudy("s", turning(20.0), tmp_path)
+    second_study = work_precision.CostStudy("s", turning(20.0), tmp_path)
     second_study.units = {}
     assert not list(second_study.points()) and not list((tmp_path / "parts").iterdir())
 
@@ -400,16 +400,16 @@ def once(function):
 @pytest.mark.slow
 def test_the_command_writes_table_report_and_pictures(tmp_path, monkeypatch):
     # a second run reads the points that the first one left, and draws alike
-    drawn = (pictures, "draw_pictures"), (command_module, "measure_influences")
+    drawn = (charts, "draw_pictures"), (command_module, "measure_influences")
     for module, name in drawn:
         monkeypatch.setattr(module, name, once(getattr(module, name)))
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     few = {"RK4, tc held", "RK4, MuJoCo's defaults", "tolerance, Newton"}
-    curves = [one for one in study.design_curves(turning()) if one.name in few]
-    monkeypatch.setattr(study, "design_curves", lambda scene: curves)
-    monkeypatch.setattr(study, "ERRORS_ADVISED", (1e-3,))
-    monkeypatch.setattr(study, "TIMINGS_OF_A_SETTING", 1)
+    curves = [one for one in work_precision.design_curves(turning()) if one.name in few]
+    monkeypatch.setattr(work_precision, "design_curves", lambda scene: curves)
+    monkeypatch.setattr(work_precision, "ERRORS_ADVISED", (1e-3,))
+    monkeypatch.setattr(work_precision, "TIMINGS_OF_A_SETTING", 1)
     process = measure(scene, tmp_path / "out")
     assert process.exception is None and process.return_value == 0, process.output
     printed = process.output.splitlines()
@@ -425,7 +425,7 @@ def test_the_command_writes_table_report_and_pictures(tmp_path, monkeypatch):
     assert "order of RK4 in the timestep" in detailed.output
     folder = tmp_path / "out" / "small"
     rows = (folder / "cost.csv").read_text().splitlines()
-    assert rows[0] == ",".join(study.COST_COLUMNS) and len(rows) > 25
+    assert rows[0] == ",".join(work_precision.COST_COLUMNS) and len(rows) > 25
     text = (folder / "cost.md").read_text()
     assert "order of RK4 in the timestep" in text and "steps a revolution on" in text
     (order,) = [line for line in text.splitlines() if "order of RK4" in line]
@@ -448,7 +448,7 @@ def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measur
 
 
 def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter():
-    assert study.summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8]) == (1.0, 1.0)
+    assert work_precision.summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8]) == (1.0, 1.0)
 
 
 def test_the_front_is_listed_by_what_lies_between_the_steps_too():
@@ -463,11 +463,11 @@ def test_the_front_is_listed_by_what_lies_between_the_steps_too():
 
 
 def test_names_in_a_picture_cover_no_other_and_are_not_cut():
-    near = {"kind": study.EXACT_MOTION, "seconds_per_second": 0.3}
+    near = {"kind": work_precision.EXACT_MOTION, "seconds_per_second": 0.3}
     curves = {
         "inverse": [
             replace(point(1, 1e-12), setting=name, **near)
-            for name in (study.PINOCCHIO, study.MUJOCO_INVERSE)
+            for name in (work_precision.PINOCCHIO, work_precision.MUJOCO_INVERSE)
         ],
         "Euler": [
             replace(point(20, 0.2), setting=conclusion.DEFAULT, seconds_per_second=0.3)
@@ -475,7 +475,7 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut():
         "recommended": [point(20 * 2**k, 1e-3 / 8**k) for k in range(4)],
     }
     with apply_style():
-        figure = pictures.draw_work_precision(curves, "torque", "title")
+        figure = charts.draw_work_precision(curves, "torque", "title")
     boxes = [text.get_window_extent() for text in figure.axes[0].texts]
     assert len(boxes) == 4
     assert not any(box.overlaps(other) for box, other in combinations(boxes, 2))
@@ -500,7 +500,7 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     )
     scene = drive_by(drive)
     settings = replace(BEST, steps_per_revolution=200.0)
-    made = study.CostStudy("s", scene, tmp_path)
+    made = work_precision.CostStudy("s", scene, tmp_path)
     (cost_point,) = made._try_spots("c", (Spot("s", settings),), made.setup())
     trial = JudgedSetup(scene).try_out(settings)
     assert cost_point.errors == judge_trial(scene, trial)
@@ -515,7 +515,7 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_a_settled_curve_is_judged_between_the_steps_of_its_last_turn(tmp_path):
-    made = study.CostStudy("s", replace(turning(), drive_bar=4), tmp_path)
+    made = work_precision.CostStudy("s", replace(turning(), drive_bar=4), tmp_path)
     settings = replace(BEST, steps_per_revolution=200.0)
     spots = (Spot("s", settings),)
     settled, fresh = (

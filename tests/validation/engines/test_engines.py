@@ -33,8 +33,8 @@ from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, 
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop, tree
+from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
-from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
@@ -47,7 +47,7 @@ from fourbar_validation.scenes.suites import Random
 from tests.support.engine_limits import compile_body
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
-from tests.validation.engines.test_effects import ACTING, scene
+from tests.validation.engines.test_applied_effects import ACTING, scene
 
 ENGINE = {
     engine.name: engine

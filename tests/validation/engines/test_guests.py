@@ -20,7 +20,7 @@ from fourbar.errors import InputError
 from fourbar.files import save
 from fourbar.scene.motion import Free
 from fourbar_validation.compare.answer import explain_refusal
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, processes
 from fourbar_validation.engines.asking import ask_at

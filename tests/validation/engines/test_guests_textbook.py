@@ -8,8 +8,8 @@ import fourbar
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.prediction import predict_for_any_method
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import make_question
+from fourbar_validation.run.judge_engines import compare_answer
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import balance
 from tests.support.textbook import Textbook

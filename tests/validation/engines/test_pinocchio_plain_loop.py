@@ -9,7 +9,7 @@ import fourbar
 from fourbar.errors import LimitError
 from fourbar.scene import command
 from fourbar_validation.advise.worst_errors import compute_errors
-from fourbar_validation.engines.mujoco.plain_loop import MujocoInverseLoop
+from fourbar_validation.engines.mujoco.plain_mujoco import MujocoInverseLoop
 from fourbar_validation.engines.pinocchio_plain_loop import PinocchioLoop
 from fourbar_validation.places import MODELS
 from tests.support.scenes import crank_rocker, low_parallelogram, thesis

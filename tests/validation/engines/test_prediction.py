@@ -32,8 +32,8 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import _bound_touching, predict_from_data
 from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.engines.tree import solve_closed, solve_multipliers
-from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import make_question
+from fourbar_validation.run.judge_engines import compare_answer
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
 pytest.importorskip("flint")

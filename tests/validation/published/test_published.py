@@ -24,7 +24,7 @@ from fourbar_validation.published.comparison import (
     list_ladder_rows,
     published,
 )
-from fourbar_validation.published.figures import (
+from fourbar_validation.published.printed_figures import (
     ERRATA,
     FOLDER,
     PublishedFigure,

@@ -21,7 +21,7 @@ import pytest
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar_validation.cli import status
-from fourbar_validation.compare.columns import ResultsWriter
+from fourbar_validation.compare.results_file import ResultsWriter
 from fourbar_validation.compare.rows import FAILS, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody

@@ -15,8 +15,8 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.overview import Overview
-from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import Summary, compute_shares
+from fourbar_validation.report.run_summary import Summary, compute_shares
+from fourbar_validation.report.scene_record import Record
 from tests.support.runs import ROW
 
 OUTCOMES = {

@@ -39,11 +39,6 @@ from fourbar_validation.engines import guests
 from fourbar_validation.engines.registry import ENGINES, WORK, load_further
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.report import svg
-from fourbar_validation.report.figures import (
-    STRETCHES,
-    draw_scene_figure,
-    find_worst_of_segments,
-)
 from fourbar_validation.report.html import (
     ALL_OPEN,
     Section,
@@ -51,8 +46,13 @@ from fourbar_validation.report.html import (
     write_summary_page,
 )
 from fourbar_validation.report.overview import Overview
-from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import OWN_CONSISTENCY
+from fourbar_validation.report.run_summary import OWN_CONSISTENCY
+from fourbar_validation.report.scene_pictures import (
+    STRETCHES,
+    draw_scene_figure,
+    find_worst_of_segments,
+)
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import LEAST_DRAWN_ERROR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
@@ -232,7 +232,7 @@ def test_an_engine_that_is_missing_is_reported_as_failing():
 
 @pytest.mark.slow
 def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
-    monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
+    monkeypatch.setattr("fourbar_validation.report.run_summary.SCENES_SHOWN", 20)
     pages = copies(100)
     for number, record in enumerate(pages):
         record.rows[0] = replace(record.rows[0], error=number * 8e-3, allowed=1.0)

@@ -9,7 +9,7 @@ import fourbar
 from fourbar.quantities import OK
 from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.scenes.suites import MODELS
 

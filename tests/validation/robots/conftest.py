@@ -5,7 +5,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-from fourbar_validation.robots import command, judge, measure, mimic
+from fourbar_validation.robots import judge_loop, judge_mimic, loop_errors, loops
 
 
 @pytest.fixture
@@ -16,5 +16,5 @@ def in_this_process(monkeypatch):
     def examine(file, seconds=None):
         yield lambda adapter, *arguments: resolve_name(adapter)(*arguments)
 
-    for module in (command, judge, measure, mimic):
+    for module in (loops, judge_loop, loop_errors, judge_mimic):
         monkeypatch.setattr(module, "examine_guarded", examine)

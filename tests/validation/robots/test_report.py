@@ -12,7 +12,7 @@ import pytest
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
@@ -21,9 +21,9 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     TriedSettings,
     WorstState,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
-from fourbar_validation.robots.measure import list_errors_by_method, write_percent
+from fourbar_validation.robots.loop_errors import list_errors_by_method, write_percent
 from fourbar_validation.robots.report import (
     STATES_FILE,
     TextTable,

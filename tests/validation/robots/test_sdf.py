@@ -16,8 +16,8 @@ from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
-from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
 from tests.validation.robots.test_files import TETRAHEDRON
 

@@ -15,7 +15,7 @@ from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.engines.pinocchio import PinocchioReleased
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 
@@ -213,12 +213,14 @@ def test_the_summary_names_the_change_points_of_a_release():
 
 @pytest.mark.slow
 def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch):
-    from fourbar_validation.report import figures
+    from fourbar_validation.report import scene_pictures
 
     scene = falling()
     shown = []
     monkeypatch.setattr(
-        figures, "_draw_quantity", lambda quantity, *_: shown.append(quantity) or ""
+        scene_pictures,
+        "_draw_quantity",
+        lambda quantity, *_: shown.append(quantity) or "",
     )
-    figures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
+    scene_pictures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
     assert shown == ["theta_4", "F32"]

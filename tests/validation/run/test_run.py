@@ -15,7 +15,7 @@ from fourbar_validation.regression.record import (
     describe_run,
     open_run,
 )
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.pool import Job, _judge_by_engine
 from fourbar_validation.run.run import run

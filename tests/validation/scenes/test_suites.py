@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from fourbar.scene.motion import Law
-from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.question import FREE_BODY

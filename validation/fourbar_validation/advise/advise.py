@@ -40,7 +40,7 @@ from fourbar_validation.engines.mujoco.trial import (
     make_settings,
 )
 from fourbar_validation.report.sentences import make_words_table, print_sentence
-from fourbar_validation.robots.measure import (
+from fourbar_validation.robots.loop_errors import (
     measure_robot,
     read_measure_options,
 )

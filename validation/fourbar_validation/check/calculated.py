@@ -20,7 +20,7 @@ from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array, ComplexA
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.judge import Judge
+from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.theirs import name_quantity
 from fourbar_validation.check.variants import Mistake, Wanted, always
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins

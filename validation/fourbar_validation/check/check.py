@@ -17,8 +17,8 @@ from fourbar.files import load
 from fourbar.quantities import UNITS
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
-from fourbar_validation.check.columns import list_names_of_points
-from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
+from fourbar_validation.check.csv_columns import list_names_of_points
+from fourbar_validation.check.judge_table import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
 from fourbar_validation.compare.rows import escape_controls

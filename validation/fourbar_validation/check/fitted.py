@@ -17,7 +17,7 @@ from fourbar.quantities.units import find_factor
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import Calculation, Change
-from fourbar_validation.check.judge import Judge
+from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
 from fourbar_validation.check.variants import (
     Mistake,

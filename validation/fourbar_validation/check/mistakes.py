@@ -22,7 +22,7 @@ from fourbar_validation.check.calculated import (
     find_single_precision,
 )
 from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
-from fourbar_validation.check.judge import Judge
+from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.variants import (
     Mistake,
     Predict,

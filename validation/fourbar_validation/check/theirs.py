@@ -29,7 +29,7 @@ from fourbar.errors import InputError
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
 from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
-from fourbar_validation.check.columns import GROWING
+from fourbar_validation.check.csv_columns import GROWING
 from fourbar_validation.compare.tolerance import EPS
 
 _DECIMALS = 4

@@ -24,7 +24,7 @@ from fourbar.quantities import COUPLE, LINE, OK, RATES, UNITS, Array
 from fourbar.scene import Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.effects import find_size
+from fourbar_validation.compare.effect_sizes import find_size
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
     find_centre,

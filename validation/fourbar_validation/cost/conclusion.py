@@ -9,7 +9,7 @@ from fourbar_validation.advise.matters import (
     write_sentence,
 )
 from fourbar_validation.cost.laws import ErrorLaw, find_floor
-from fourbar_validation.cost.study import (
+from fourbar_validation.cost.work_precision import (
     EXACT_MOTION,
     FORMULAS_CURVE,
     STEPPED_MOTION,

@@ -21,7 +21,12 @@ from fourbar_validation.cost.laws import (
     write_laws,
 )
 from fourbar_validation.cost.series import BEST
-from fourbar_validation.cost.study import COST_COLUMNS, CostPoint, CostStudy, list_cells
+from fourbar_validation.cost.work_precision import (
+    COST_COLUMNS,
+    CostPoint,
+    CostStudy,
+    list_cells,
+)
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.sentences import make_words_table
@@ -143,7 +148,7 @@ def write_cost(
     conclusion: Sequence[str],
 ) -> list[Path]:
     """Write cost.csv, cost.md and the pictures."""
-    from fourbar_validation.cost.pictures import draw_pictures
+    from fourbar_validation.cost.charts import draw_pictures
 
     pictures = draw_pictures(curves, write_subtitle(study.scene, title), study.folder)
     what = {

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fourbar_validation.advise.worst_errors import ERROR_NAMES
-from fourbar_validation.cost.study import STEPPED_MOTION, CostPoint
+from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
 
 LARGEST_LAWFUL_ERROR = 0.1
 """A larger error is not small enough for its law: the motion itself is another."""

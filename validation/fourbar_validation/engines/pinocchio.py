@@ -17,6 +17,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import ReleasedAnswer
+from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     find_unknown,
@@ -24,7 +25,6 @@ from fourbar_validation.engines.description import (
     rotate_back_by,
     rotate_by,
 )
-from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import KeptTree, keep_tree, solve_closed

@@ -13,7 +13,7 @@ import click
 from fourbar.errors import FAILED, HOLDS, needing
 from fourbar.writing import write_text
 from fourbar_validation.places import HARNESS_PROGRAM
-from fourbar_validation.published.figures import (
+from fourbar_validation.published.printed_figures import (
     ERRATA,
     FIGURE_VERDICTS,
     PublishedFigure,

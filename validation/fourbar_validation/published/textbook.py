@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import fourbar
 from fourbar_validation.places import MODELS
-from fourbar_validation.published.figures import FOLDER, PublishedFigure
+from fourbar_validation.published.printed_figures import FOLDER, PublishedFigure
 
 TEXTBOOK_FOLDER = MODELS / "textbook"
 COMPONENT_AXES = {"_x": 0, "_y": 1}

@@ -22,7 +22,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.published.figures import POSITIONS, read_printed
+from fourbar_validation.published.printed_figures import POSITIONS, read_printed
 from fourbar_validation.published.thirteen import EquationTerms, assemble_equations
 
 _PRINTED_FORCES = ("F12", "F32", "F23", "F43", "F14", "F34")

@@ -8,7 +8,7 @@ import click
 
 from fourbar.errors import HOLDS, InputError
 from fourbar.writing import write_text
-from fourbar_validation.compare.columns import CSV_ROWS
+from fourbar_validation.compare.results_file import CSV_ROWS
 from fourbar_validation.compare.rows import FAILS, Counts
 from fourbar_validation.engines.processes import bound_memory
 from fourbar_validation.regression import render

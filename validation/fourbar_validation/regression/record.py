@@ -1,7 +1,7 @@
 """A recorded run: its tables, and record.json with what it was made with.
 
 Recorded are versions, machine, settings and scenes. The record of one scene is in
-`report/record.py`.
+`report/scene_record.py`.
 """
 
 import csv
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import InputError
 from fourbar.writing import name_file, write_text
-from fourbar_validation.compare.columns import count_rows, read_columns, read_frame
+from fourbar_validation.compare.results_file import count_rows, read_columns, read_frame
 from fourbar_validation.compare.rows import Row, escape_controls, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.guests import Guest

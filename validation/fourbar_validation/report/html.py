@@ -19,13 +19,13 @@ from fourbar_validation.compare.rows import (
     write_rows,
 )
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
-from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import (
+from fourbar_validation.report.run_summary import (
     OWN_CONSISTENCY,
     STATEMENT,
     Summary,
     compute_shares,
 )
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.templating import (
     count_or_size,
     render,

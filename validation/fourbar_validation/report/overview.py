@@ -18,7 +18,7 @@ from fourbar_validation.compare.rows import (
     write_one_line,
 )
 from fourbar_validation.compare.tolerance import find_used
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.words import NUMBER_IN_A_REASON, AlikeTexts
 
 TORQUE_GROUP = "torque"

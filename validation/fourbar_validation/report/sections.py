@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import VERDICTS, Counts, Row
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.scenes.hard_families import HARD_FAMILIES

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from fourbar.errors import clean_line
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.sentences import write_two_digits
-from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.templating import write_error
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from fourbar.scene import Command
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import choose_style
 
 THUMBNAIL_HEIGHT, LINKAGE_WIDTH, _CURVE, EDGE = 76.0, 96.0, 150.0, 6.0

@@ -9,7 +9,7 @@ from typing import Any
 
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.tables import show_running
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.processes import (
     WORKER_MEMORY,
     bound_memory,

@@ -8,7 +8,7 @@ import click
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 
 ROBOT_PATH = click.Path(path_type=Path)
 RobotCommand = Callable[..., Any]

@@ -32,11 +32,11 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     SettingsAdvice,
     TriedSettings,
 )
-from fourbar_validation.engines.mujoco.robots.loop import name_following
+from fourbar_validation.engines.mujoco.robots.loop_facts import name_following
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell
-from fourbar_validation.robots.judge import LoopJudgement
-from fourbar_validation.robots.measure import (
+from fourbar_validation.robots.judge_loop import LoopJudgement
+from fourbar_validation.robots.loop_errors import (
     MEASURED_THROUGH_TIME,
     RIGID,
     STATES,

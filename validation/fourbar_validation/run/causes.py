@@ -4,9 +4,9 @@ import numpy as np
 
 from fourbar.errors import FourBarError
 from fourbar.quantities import OK, UNITS, Array
-from fourbar_validation.check.judge import Judge
+from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.mistakes import Explanation, explain
-from fourbar_validation.check.rows import RowCommands
+from fourbar_validation.check.row_commands import RowCommands
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
 from fourbar_validation.check.variants import Wanted, always
 from fourbar_validation.compare.answer import Answer

@@ -7,7 +7,7 @@ import click
 
 from fourbar.errors import HOLDS
 from fourbar.writing import write_text
-from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.regression.accept import add_output_options, report_differences
 from fourbar_validation.regression.record import PARQUET_FILE
 from fourbar_validation.report.junit import list_cases, write_document

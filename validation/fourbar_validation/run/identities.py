@@ -33,7 +33,7 @@ from fourbar.quantities import (
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import CLOSURE, NOT_DEMANDED
-from fourbar_validation.compare.effects import find_size
+from fourbar_validation.compare.effect_sizes import find_size
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row
 from fourbar_validation.compare.tolerance import (

@@ -16,15 +16,15 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import ENGINES, Engine
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import STYLE_NUMBERS
 from fourbar_validation.report.thumbnail import draw_thumbnail
-from fourbar_validation.run.answers import (
+from fourbar_validation.run.identities import check_identities, check_status
+from fourbar_validation.run.judge_engines import (
     check_mjcf,
     compare_answers,
     compare_inertia,
 )
-from fourbar_validation.run.identities import check_identities, check_status
 from fourbar_validation.run.law import check_law
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
@@ -125,7 +125,7 @@ def judge_for_report(
     figure = thumbnail = None
     STYLE_NUMBERS.update(number_guests(engines))
     if draw:
-        from fourbar_validation.report.figures import draw_scene_figure
+        from fourbar_validation.report.scene_pictures import draw_scene_figure
 
         figure = draw_scene_figure(record)
     if draw or sketch:

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from fourbar.errors import InputError
-from fourbar_validation.report.summary import Summary
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.run.plan import UNHEARD, Plan, Progress, RunPart
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import (

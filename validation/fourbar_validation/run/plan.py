@@ -16,7 +16,7 @@ from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
-from fourbar_validation.report.summary import PICTURED, SKETCHED, Summary
+from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Suite

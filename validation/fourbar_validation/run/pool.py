@@ -11,7 +11,7 @@ from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
 from fourbar_validation.engines.processes import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.suites import Suite
 

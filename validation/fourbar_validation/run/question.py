@@ -31,7 +31,7 @@ from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.processes import keep_printed
 from fourbar_validation.engines.registry import ENGINES, Engine
-from fourbar_validation.report.record import Record, Timing
+from fourbar_validation.report.scene_record import Record, Timing
 
 FREE_BODY = next(engine for engine in ENGINES if engine.name == FreeBody.name)
 """The free-body solution supplies a second set of condition numbers and sizes. The

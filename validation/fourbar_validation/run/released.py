@@ -51,7 +51,7 @@ from fourbar_validation.engines.registry import (
     find_missing,
     make_demands,
 )
-from fourbar_validation.report.record import Timing
+from fourbar_validation.report.scene_record import Timing
 from fourbar_validation.run.question import Question, select_positions, take_member
 
 FORWARD = {

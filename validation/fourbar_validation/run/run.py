@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from fourbar.writing import name_file, write_text
-from fourbar_validation.compare.columns import ResultsWriter, read_columns
+from fourbar_validation.compare.results_file import ResultsWriter, read_columns
 from fourbar_validation.compare.rows import (
     FAILS,
     FORMULAS,
@@ -36,9 +36,9 @@ from fourbar_validation.regression.record import (
 from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_summary_page
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.run_summary import Summary
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.sections import collect_sections
-from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.svg import STYLE_NUMBERS
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT

@@ -18,7 +18,7 @@ from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Rise, Sine, Sweep, require_steps
 from fourbar.scene.scene import default_places
-from fourbar.show.units import units_of_scene
+from fourbar.show.shown_units import units_of_scene
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene

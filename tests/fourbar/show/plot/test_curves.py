@@ -12,7 +12,7 @@ from fourbar import Gravity, Motion, Point, Sweep, solve
 from fourbar.files import loads
 from fourbar.show.derived import derive
 from fourbar.show.plot.figures import draw_figure
-from fourbar.show.plot.paths import trace
+from fourbar.show.plot.traced_paths import trace
 from fourbar.show.plot.view import make_view
 from tests.support.scenes import crank_rocker
 from tests.support.texts import COORDINATES

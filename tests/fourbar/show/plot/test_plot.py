@@ -51,7 +51,7 @@ from fourbar.show.plot.figures import FIGURES, TAKERS, draw_figure
 from fourbar.show.plot.film import choose_frames
 from fourbar.show.plot.freebody import list_actions
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_mechanism
+from fourbar.show.plot.linkage_figure import draw_mechanism
 from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
 from tests.support.rows import read_rows

@@ -22,7 +22,7 @@ from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import symbols
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import choose_drawing_scale, draw_mechanism
+from fourbar.show.plot.linkage_figure import choose_drawing_scale, draw_mechanism
 from fourbar.show.plot.symbols import list_acting
 from fourbar.show.plot.view import make_view
 from tests.fourbar.show.plot.test_plot import GALLERY, clashes, composed

@@ -21,7 +21,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
-from tests.validation.engines.test_effects import ACTING
+from tests.validation.engines.test_applied_effects import ACTING
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by

@@ -28,8 +28,8 @@ from fourbar_validation.engines.mujoco.runner import Lead
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observe_order
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.places import MODELS
-from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.judge_engines import compare_answer
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker, low_parallelogram, thesis

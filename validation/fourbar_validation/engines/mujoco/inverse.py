@@ -15,13 +15,13 @@ from fourbar.errors import LimitError
 from fourbar.linkage import uniform
 from fourbar.quantities import Array
 from fourbar.scene import Scene
+from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     MovingPart,
     find_unknown,
     list_moving_parts,
 )
-from fourbar_validation.engines.effects import has_term, list_wrenches
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact

@@ -33,7 +33,7 @@ from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Law, Motion, Rise, Sine
-from fourbar_validation.engines.effects import look_up
+from fourbar_validation.engines.applied_effects import look_up
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler

@@ -19,7 +19,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     list_closures,
     require_loops,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, file_of, rotation
 from tests.whole.test_imports import ROOT
 

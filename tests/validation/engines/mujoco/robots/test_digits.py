@@ -15,11 +15,11 @@ from fourbar_validation.engines.mujoco.robots.inside import (
     RESIDUAL_OF_AN_OPEN_LOOP,
     LoopInside,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
-from fourbar_validation.robots.measure import RIGID, list_errors_by_method
+from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
 from tests.support.robots import FOOT_PARALLELOGRAM, file_of, measure, rotation
 from tests.support.shares import slow_but
 

@@ -18,10 +18,10 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
 )
 from fourbar_validation.engines.mujoco.robots.examine import examine_file
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
-from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
-from fourbar_validation.robots.measure import find_left_out, list_errors_by_method
+from fourbar_validation.robots.loop_errors import find_left_out, list_errors_by_method
 from tests.support.robots import Planar, file_of, measure
 from tests.support.shares import slow_but
 

@@ -17,7 +17,7 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
 )
-from fourbar_validation.robots.judge import FILE_AT_ONE_STATE
+from fourbar_validation.robots.judge_loop import FILE_AT_ONE_STATE
 from tests.support.robots import answer_of, examine_text, measure
 from tests.whole.test_docs import blocks, read
 from tests.whole.test_imports import ROOT

@@ -26,14 +26,14 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
-from fourbar_validation.engines.mujoco.robots.loop import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
     RobotFile,
 )
+from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import make_loop_scene
 from fourbar_validation.robots.files import read_robot
 from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER, LIFTED, draw_knee
 

@@ -22,11 +22,11 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     RobotMeasurement,
 )
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
-from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.measure import (
+from fourbar_validation.robots.loop_errors import (
     MEASURED_THROUGH_TIME,
     RIGID,
     STATES,

@@ -12,7 +12,7 @@ import pytest
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from tests.support.robots import Planar
 from tests.support.shares import slow_but

@@ -14,7 +14,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.settings import (
@@ -22,7 +22,7 @@ from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
 )
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.measure import (
+from fourbar_validation.robots.loop_errors import (
     list_errors_by_method,
     read_measure_options,
 )

@@ -11,7 +11,7 @@ from fourbar.quantities import COUPLE, PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 
 FORCE_QUANTITIES = ("torque", *PIN_FORCES)
 OTHER_ASSEMBLY = (

@@ -31,7 +31,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
-from fourbar_validation.engines.mujoco.robots.loop import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
     RobotClosure,
     RobotFile,

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 
 _MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""

@@ -25,7 +25,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_tied_bodies,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import CompiledRobot
-from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 
 _TURN_OF_A_QUATERNION = 2.0
 """Angle by which a rotation changes over the change of its unit quaternion."""

@@ -12,7 +12,7 @@ from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
-from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 
 
 class _Wrench(NamedTuple):

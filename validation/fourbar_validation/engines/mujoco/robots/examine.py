@@ -37,7 +37,8 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import collect_warnings
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_scene import miss_output
 from fourbar_validation.engines.mujoco.robots.measure import (
     measure_on_scene,
     put_loop_inside,
@@ -46,7 +47,6 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
     find_loop_of_scene,
 )
-from fourbar_validation.engines.mujoco.robots.scene import miss_output
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 PRICING = 60.0

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.linkage import ENDS, FIRST_PIN
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import find_roots
-from fourbar_validation.engines.mujoco.robots.loop import RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 
 
 def list_bars(model: mujoco.MjModel, loop: RobotLoop) -> list[int | None]:

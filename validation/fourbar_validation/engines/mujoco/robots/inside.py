@@ -61,7 +61,7 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     read_equality_force,
 )
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
-from fourbar_validation.engines.mujoco.robots.loop import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     DRIVEN_PINS,
     FOLLOWING,
     RobotLoop,

@@ -49,7 +49,8 @@ from fourbar_validation.engines.mujoco.robots.inside import (
     HEAVY,
     LoopInside,
 )
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
     find_circuits,
@@ -57,7 +58,6 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
     find_turn,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.settings import (
     SettingsSearch,
     read_settings,

@@ -35,7 +35,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
 )
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
-from fourbar_validation.engines.mujoco.robots.loop import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
     FLAT,
     SITE_ROLES,
@@ -45,16 +45,16 @@ from fourbar_validation.engines.mujoco.robots.loop import (
     is_in_line,
     name_following,
 )
-from fourbar_validation.engines.mujoco.robots.pose import (
-    PosedRobot,
-    move_to,
-    pose_robot,
-)
-from fourbar_validation.engines.mujoco.robots.scene import (
+from fourbar_validation.engines.mujoco.robots.loop_scene import (
     SceneOfLoop,
     is_seen_from_behind,
     miss_output,
     write_pose,
+)
+from fourbar_validation.engines.mujoco.robots.pose import (
+    PosedRobot,
+    move_to,
+    pose_robot,
 )
 
 _NOTHING_CLOSES = {

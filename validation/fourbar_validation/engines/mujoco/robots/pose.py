@@ -24,7 +24,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_motors,
     name_joint,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
     evaluate_closures,

@@ -15,7 +15,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.closures import EQUALITY_KINDS
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
-from fourbar_validation.engines.mujoco.robots.loop import DRIVEN_PINS, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import DRIVEN_PINS, RobotLoop
 
 _PLANES = {2: "x-y", 1: "x-z", 0: "y-z"}
 """Plane of the world by the axis that is normal to it."""

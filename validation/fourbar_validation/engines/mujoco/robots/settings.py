@@ -27,7 +27,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     WorstState,
 )
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop import RobotFile, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, RobotLoop
 
 SEARCH_SECONDS = 75.0
 """Processor time in which combinations are tried, s. With the rest the command stays

@@ -18,8 +18,8 @@ import pytest
 import fourbar
 from fourbar.errors import InputError
 from fourbar.files import loads
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions
-from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from tests.support.robots import Planar, file_of
 from tests.whole.test_imports import ROOT
 

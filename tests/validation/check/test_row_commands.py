@@ -13,7 +13,7 @@ import fourbar
 from fourbar.errors import FAILED, HOLDS, InputError, LimitError
 from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import judge_table
-from fourbar_validation.check.rows import find_row_commands
+from fourbar_validation.check.row_commands import find_row_commands
 from fourbar_validation.check.theirs import read_table
 from tests.support.scenes import CYLINDER, crank_rocker
 

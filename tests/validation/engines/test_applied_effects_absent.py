@@ -15,7 +15,7 @@ from fourbar.effects import Friction, Viscous, list_kinds
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
-from tests.validation.engines.test_effects import ACTING
+from tests.validation.engines.test_applied_effects import ACTING
 
 ROOT = Path(fourbar.__file__).parent.parent
 

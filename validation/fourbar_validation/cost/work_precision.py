@@ -352,7 +352,7 @@ class CostStudy:
 
         The loop goes from position to position.
         """
-        from fourbar_validation.engines.mujoco.plain_loop import MujocoInverseLoop
+        from fourbar_validation.engines.mujoco.plain_mujoco import MujocoInverseLoop
         from fourbar_validation.engines.pinocchio_plain_loop import PinocchioLoop
 
         loops: dict[str, Callable[[Scene], PlainLoop]] = {

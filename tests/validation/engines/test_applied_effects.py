@@ -25,7 +25,7 @@ from fourbar.effects import (
     list_kinds,
 )
 from fourbar_validation.engines import free_body_effects
-from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker

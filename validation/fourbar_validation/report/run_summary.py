@@ -32,7 +32,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.machine import list_versions, name_machine
 from fourbar_validation.report.overview import Overview, OverviewLine
-from fourbar_validation.report.record import Record
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.words import NUMBER_IN_A_REASON
 
 T = TypeVar("T")

@@ -15,7 +15,7 @@ from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.show.plot.figures import draw_figure
-from fourbar.show.units import units, units_of_scene, write_digits
+from fourbar.show.shown_units import units, units_of_scene, write_digits
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 

@@ -24,8 +24,8 @@ from fourbar.mjcf import Plane, write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.solving import solve
-from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import Comparison, Demands
+from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry, Value
@@ -33,23 +33,23 @@ from fourbar_validation.engines.mujoco.describe import describe_model
 from fourbar_validation.engines.mujoco.robots import examine as examining
 from fourbar_validation.engines.mujoco.robots import measure as measuring
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 from fourbar_validation.engines.processes import WORKER_MEMORY
 from fourbar_validation.robots import guard
-from fourbar_validation.robots.check import check_mjcf_command
+from fourbar_validation.robots.check_mjcf import check_mjcf_command
 from fourbar_validation.robots.differences import (
     Difference,
     find_differences,
     order,
     price,
 )
-from fourbar_validation.robots.judge import (
+from fourbar_validation.robots.judge_loop import (
     _EXAMINE as EXAMINE,
 )
-from fourbar_validation.robots.judge import (
+from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
     JudgedError,

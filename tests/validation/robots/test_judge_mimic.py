@@ -12,7 +12,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
-from fourbar_validation.robots.mimic import (
+from fourbar_validation.robots.judge_mimic import (
     fit_minimax,
     fit_squares,
     measure_mimic,

@@ -25,7 +25,7 @@ from fourbar_validation.cost.conclusion import (
 )
 from fourbar_validation.cost.laws import LARGEST_LAWFUL_ERROR, find_jumps, find_pareto
 from fourbar_validation.cost.series import BEST
-from fourbar_validation.cost.study import (
+from fourbar_validation.cost.work_precision import (
     EXACT_MOTION,
     FORMULAS_CURVE,
     MUJOCO_INVERSE,

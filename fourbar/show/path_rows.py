@@ -6,7 +6,7 @@ import numpy as np
 
 from fourbar.errors import clean_line
 from fourbar.show.driving import name_places
-from fourbar.show.units import choose_unit, drop_rounding
+from fourbar.show.shown_units import choose_unit, drop_rounding
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.studies.paths import measure_paths
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar_validation.robots.command import robot_command
+from fourbar_validation.robots.loops import robot_command
 from fourbar_validation.robots.options import read_pose
 from tests.whole.test_imports import ROOT
 

@@ -24,8 +24,8 @@ from fourbar.show.plot.style import (
     shorten_text,
 )
 from fourbar.show.plot.view import axis_of
+from fourbar.show.shown_units import choose_unit
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
-from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Conversion
 from fourbar.studies.spread import BAND_PERCENTILES, Tolerances
 

@@ -18,8 +18,8 @@ from fourbar.files import loads
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command_at
 from fourbar.show.located import locate
-from fourbar.show.position import PositionSheet
-from fourbar.show.units import COMMON, units
+from fourbar.show.position_sheet import PositionSheet
+from fourbar.show.shown_units import COMMON, units
 from fourbar.studies.course import follow
 from fourbar.studies.passing import find_positions
 from tests.support.scenes import crank_rocker

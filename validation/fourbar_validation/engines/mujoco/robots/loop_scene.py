@@ -49,7 +49,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
 )
 from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
 from fourbar_validation.engines.mujoco.robots.inside import reflect
-from fourbar_validation.engines.mujoco.robots.loop import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     FLAT,
     LoopScene,
     PoseOptions,

@@ -13,7 +13,7 @@ import click
 from fourbar.files import dump
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.rows import escape_controls
-from fourbar_validation.engines.mujoco.robots.loop import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     LoopScene,
     RobotClosure,
     RobotReport,
@@ -35,7 +35,7 @@ _COLUMNS_OF_A_COMMENT = 78
 """Columns of a comment in a scene: a file's reader takes no line of a hundred dots."""
 PRINTED_AS_ZERO = 1e-12
 """m or deg; less is printed as 0."""
-SCENE = "fourbar_validation.engines.mujoco.robots.scene:read_loop_scene"
+SCENE = "fourbar_validation.engines.mujoco.robots.loop_scene:read_loop_scene"
 _LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
 
 

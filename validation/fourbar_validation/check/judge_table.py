@@ -16,8 +16,8 @@ from fourbar.quantities import OK, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.columns import compute_column, find_made_of
-from fourbar_validation.check.rows import (
+from fourbar_validation.check.csv_columns import compute_column, find_made_of
+from fourbar_validation.check.row_commands import (
     RowCommands,
     find_row_commands,
     list_stated_rates,

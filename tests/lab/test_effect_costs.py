@@ -8,9 +8,9 @@ import time
 import pytest
 
 from fourbar.errors import BROKEN, HOLDS
-from fourbar_lab import effects
+from fourbar_lab import effect_costs
 from fourbar_lab.cli import status
-from fourbar_lab.effects import DEFAULT_FLAGS
+from fourbar_lab.effect_costs import DEFAULT_FLAGS
 from fourbar_validation.engines import registry
 
 SAVED = 0.08
@@ -22,7 +22,8 @@ SAVED = 0.08
 @pytest.mark.slow
 def test_the_bare_scene_steps_faster_than_with_default_flags():
     works = {
-        effect: effects.prepare_simulation(effect) for effect in ("none", DEFAULT_FLAGS)
+        effect: effect_costs.prepare_simulation(effect)
+        for effect in ("none", DEFAULT_FLAGS)
     }
     best = dict.fromkeys(works, float("inf"))
     for _ in range(
@@ -39,8 +40,8 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch):
     def prepare(effect):
         return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
 
-    monkeypatch.setitem(effects.WORKLOADS, "formulas", prepare)
-    measured = effects.measure_effect("formulas", "twice", 25)
+    monkeypatch.setitem(effect_costs.WORKLOADS, "formulas", prepare)
+    measured = effect_costs.measure_effect("formulas", "twice", 25)
     assert (
         1.5 < measured.median < 2.5
         and measured.low <= measured.median <= measured.high
@@ -50,9 +51,11 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch):
 
 def test_the_table_has_a_row_for_each_effect_and_flag(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
-        effects,
+        effect_costs,
         "measure_effect",
-        lambda engine, effect: effects.EffectCost(engine, effect, 2e-6, 1.1, 1.2, 1.25),
+        lambda engine, effect: effect_costs.EffectCost(
+            engine, effect, 2e-6, 1.1, 1.2, 1.25
+        ),
     )
     assert (
         status(

@@ -35,7 +35,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
     measure_sizes,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.report.templating import write_error
 from fourbar_validation.robots.differences import (
     Difference,

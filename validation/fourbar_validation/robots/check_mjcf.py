@@ -13,15 +13,15 @@ from typing import Any
 import click
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.loop import BAR_ROLES, SITE_ROLES
+from fourbar_validation.engines.mujoco.robots.loop_facts import BAR_ROLES, SITE_ROLES
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.judge import judge_file
-from fourbar_validation.robots.measure import (
+from fourbar_validation.robots.judge_loop import judge_file
+from fourbar_validation.robots.judge_mimic import measure_mimic, show_mimic
+from fourbar_validation.robots.loop_errors import (
     find_worst_of_loop,
     measure_robot,
     read_measure_options,
 )
-from fourbar_validation.robots.mimic import measure_mimic, show_mimic
 from fourbar_validation.robots.options import (
     ROBOT_PATH,
     loop_option,

@@ -15,7 +15,12 @@ from fourbar.scene import Scene
 from fourbar.show.change_point import NoSideError, find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
-from fourbar.show.units import POSITION_DIGITS, choose_unit, drop_rounding, write_cell
+from fourbar.show.shown_units import (
+    POSITION_DIGITS,
+    choose_unit,
+    drop_rounding,
+    write_cell,
+)
 from fourbar.solution import (
     Conversion,
     Solution,

@@ -18,7 +18,11 @@ from fourbar.show.plot.curves import (
     plot_between_poles,
 )
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import choose_drawing_scale, draw_mechanism, locate_pins
+from fourbar.show.plot.linkage_figure import (
+    choose_drawing_scale,
+    draw_mechanism,
+    locate_pins,
+)
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     INK,

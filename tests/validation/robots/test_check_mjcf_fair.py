@@ -28,18 +28,18 @@ from fourbar_validation.engines.mujoco.robots.examine import (
     examine_file,
     predict_softness,
 )
-from fourbar_validation.engines.mujoco.robots.loop import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
-from fourbar_validation.engines.mujoco.robots.scene import read_loop_scene
 from fourbar_validation.robots.differences import find_differences
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.judge import (
+from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
     judge_file,
     list_rows,
 )
-from fourbar_validation.robots.measure import find_left_out
+from fourbar_validation.robots.loop_errors import find_left_out
 from fourbar_validation.run.transformed import _convert
 from tests.support.robots import Planar, answer_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine

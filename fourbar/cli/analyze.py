@@ -39,8 +39,8 @@ def classify_command(
     """
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.lines import wrap_line
+    from fourbar.show.shown_units import suit_units, units_of_length
     from fourbar.show.studies import write_type, write_type_json
-    from fourbar.show.units import suit_units, units_of_length
 
     ratios = [given.is_bare(text) for text in lengths]
     if any(ratios) and not all(ratios):
@@ -111,7 +111,7 @@ def new(
         write_drawn_scene,
         write_new_scene,
     )
-    from fourbar.show.units import units_of_length
+    from fourbar.show.shown_units import units_of_length
     from fourbar.writing import STANDARD_STREAM, write_text
 
     if (lengths is None) == (pins is None):
@@ -369,7 +369,7 @@ def _write_summary(
     """
     from fourbar.show.block import write_block
     from fourbar.show.located import list_positions
-    from fourbar.show.paths import write_paths
+    from fourbar.show.path_rows import write_paths
     from fourbar.solving import find_last_stage, solve
     from fourbar.studies.course import follow
 
@@ -405,7 +405,7 @@ def _write_positions(
     from fourbar.show.acting import list_arm_notes, list_spring_notes
     from fourbar.show.block import write_motor
     from fourbar.show.columns import choose_columns
-    from fourbar.show.paths import collect_paths
+    from fourbar.show.path_rows import collect_paths
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 

@@ -14,7 +14,6 @@ import numpy as np
 from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.paths import trace
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     GROUND_LINE,
@@ -36,8 +35,9 @@ from fourbar.show.plot.symbols import (
     list_acting,
     place_of,
 )
+from fourbar.show.plot.traced_paths import trace
 from fourbar.show.plot.view import View
-from fourbar.show.units import choose_unit
+from fourbar.show.shown_units import choose_unit
 from fourbar.solution import Solution
 from fourbar.studies.paths import measure_paths
 

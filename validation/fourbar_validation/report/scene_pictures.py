@@ -12,7 +12,7 @@ import numpy as np
 from fourbar.quantities import ANGLES, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_linkage
+from fourbar.show.plot.linkage_figure import draw_linkage
 from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
@@ -27,8 +27,8 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
 )
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import compute_shares
+from fourbar_validation.report.run_summary import compute_shares
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import (
     ALLOWED,
     BAND,
