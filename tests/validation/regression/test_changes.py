@@ -9,7 +9,7 @@ import pytest
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.compare.rows import DEGRADED, FAILS, REFUSES
-from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Kind
 from fourbar_validation.regression.record import NOTHING_KNOWN
@@ -234,6 +234,16 @@ def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone():
         assert (found.not_run, found.gone) == (not_run, gone), settings
         assert found.status == bool(gone) and not found.strange
         assert not found.sentences  # nobody disagrees
+
+
+def test_the_rule_that_a_row_is_held_to_is_not_stated_as_a_cause():
+    rule = f"{EQUIVALENCE.cause}: 50 eps over the condition 0.5"
+    for reason, stated in ((rule, f"held to {rule}"), (WHY, WHY)):
+        failing = changed(verdict=FAILS, error=1.0, reason=reason)
+        found = compare_rows((HERE, [ROW]), (HERE, [failing]))
+        text = render.write_differences(found)
+        assert f", agrees -> fails: {stated}\n" in text
+        assert f", agrees -> fails ({stated});" in text
 
 
 def test_a_scene_that_an_engine_newly_refuses_is_one_regression():

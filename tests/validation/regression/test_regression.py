@@ -95,11 +95,12 @@ def call(capsys):
 
 @pytest.fixture
 def compare(call):
-    """Compares two runs by the command: exit status, and the lines printed."""
+    """Compares two runs by the command: exit status, and the lines, unfolded."""
 
     def run(*arguments):
         code, printed, _ = call("compare", *arguments)
-        return code, printed.splitlines()
+        assert all(len(line) <= 80 or "/" in line for line in printed.splitlines())
+        return code, printed.replace("\n    ", " ").splitlines()
 
     return run
 

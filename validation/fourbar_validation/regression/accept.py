@@ -30,6 +30,7 @@ from fourbar_validation.regression.record import (
     is_half_accepted,
     open_run,
 )
+from fourbar_validation.report.sentences import print_sentence
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -103,7 +104,8 @@ def report_differences(
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](differences))
-    click.echo(render.write_differences(differences), nl=False)
+    for line in render.write_differences(differences).splitlines():
+        print_sentence(line)
     if differences.strange:
         raise InputError(
             "OLD",

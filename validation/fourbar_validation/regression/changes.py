@@ -19,7 +19,13 @@ from fourbar_validation.compare.rows import (
     VERDICTS,
     Counts,
 )
-from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    EQUIVALENCE,
+    IDENTITY,
+    SIMULATED,
+    K,
+)
 from fourbar_validation.regression.engines import move_engines, pair_engines
 from fourbar_validation.regression.record import About
 from fourbar_validation.regression.rules import (
@@ -55,6 +61,9 @@ counted.
 """
 EXACT_SETTING = "exact"
 """Setting of an engine that is held to round-off, and sees what is wrong by more."""
+
+_HELD_TO = tuple(bound.cause for bound in (EQUIVALENCE, IDENTITY, SIMULATED))
+"""Beginnings of the reasons that say what is allowed, and not what went wrong."""
 
 
 class Kind(StrEnum):
@@ -476,6 +485,8 @@ def _classify_rows(
     other = in_old & (table.verdict_old != table.verdict_new)
     came = (table.verdict_old + " -> ").where(other, "")
     told = (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE, Kind.STILL_FAILS)
+    of_rule = table.reason_new.str.startswith(_HELD_TO)
+    table["reason_new"] = table.reason_new.mask(of_rule, "held to " + table.reason_new)
     table["cause"] = (came + table.verdict_new + ": " + table.reason_new).where(
         table.kind.isin(told), ""
     )
