@@ -602,6 +602,18 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     assert first.startswith("units: numbers in rad where deg was announced")
 
 
+def test_a_ratio_of_one_is_no_mistake_and_a_reversed_sign_has_one_text(judged, read):
+    """One number is half as far again from ours as round-off allows."""
+    numbers = right(OURS)
+    judge = Judge(OURS, read(write(numbers)))
+    off = np.zeros((12, 2))
+    off[3, 0] = 1.5 * (judge.judged_right("F12")[1] * judge.size("F12"))[3]
+    for sign, texts in (1.0, []), (-1.0, ["sign reversed, or F_ij given for F_ji"]):
+        judgement = judged(OURS, numbers | {"F12": sign * (numbers["F12"] + off)})
+        assert judgement.differing
+        assert [one.text for one in judgement.explanations] == texts
+
+
 @pytest.mark.slow
 def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     numbers = right(OURS)
@@ -724,7 +736,7 @@ REFUSED_MOTIONS = [
         "not judged while released",
     ),
     ({"law": STRAIGHT}, "at the scene's own positions"),
-    ({"theta_2": [0.1, 0.2], "omega_2": [1.0, 2.0]}, "motion.omega_2 = "),
+    ({"theta_2": [0.1, 0.2], "omega_2": [1.0, 2.0]}, "motion.omega_2: a table"),
 ]
 
 
@@ -1086,6 +1098,7 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
         ("Tin", "rename it if it is torque"),
         ("rocker angle", "rename it if it is theta_2, theta_3 or theta_4"),
         ("angular speed", "rename it if it is omega_2, omega_3 or omega_4"),
+        ("a [deg]", "rename it if it is theta_2, theta_3 or theta_4"),
     ],
 )
 def test_a_column_of_an_unknown_name_says_what_it_may_be(heading, words, torques):
@@ -1260,9 +1273,10 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
 
     table = print_digits()
     code, printed, _ = check(THESIS, table)
-    option = ("--rtol", f"1e{power + 1}")
+    option = ("--rtol", f"1e{power}")
     assert code == FAILED
-    assert f"all agree within 1e{power}: {' '.join(option)} judges so" in printed
+    within = f"all agree within 1e{power} of each number"
+    assert f"{within}: {' '.join(option)} judges so" in printed
     assert check(THESIS, table, *option)[0] == HOLDS
     torque[7] *= 1.01
     code, printed, _ = check(THESIS, print_digits())

@@ -12,6 +12,7 @@ import pytest
 import fourbar
 from fourbar.errors import FAILED, HOLDS, InputError, LimitError
 from fourbar.scene import Command, Scene
+from fourbar.scene.motion import Rise
 from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.row_commands import find_row_commands
 from fourbar_validation.check.theirs import read_table
@@ -249,6 +250,54 @@ def test_an_angle_that_is_never_reached_has_no_motion(judged):
 )
 def test_the_word_angle_means_what_the_scene_commands(name, commanded, angle, read):
     assert read(f"{name} [deg],torque\n100,1.0\n", commanded).found_by == angle
+
+
+LOGGED = [
+    ("time theta_2 torque", HOLDS),
+    ("theta_2 omega_2 alpha_2 torque", HOLDS),
+    ("time theta_2 omega_2 alpha_2 torque", HOLDS),
+    ("theta_2 torque", "needs a column time beside theta_2, or columns omega_2 and"),
+    ("theta_2 omega_2 torque", "needs a column time beside theta_2, or columns"),
+    ("late theta_2 torque", "the law is at 20.0067 deg then, and the table at 20.0043"),
+    ("rounded theta_2 torque", HOLDS),
+    ("step theta_2 torque", "needs a column time"),
+]
+
+
+@pytest.mark.parametrize(("names", "judged_as"), LOGGED)
+def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, read):
+    """The law is 10 u^3 - 15 u^4 + 6 u^5, here differentiated by hand."""
+    law = Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
+    scene = crank_rocker(motion=fourbar.Motion(law=law), title="Servo")
+    time = np.arange(0.0123, 0.79, 0.0517)
+    u, h = time / 0.8, math.radians(120.0)
+    theta = math.radians(20.0) + h * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+    omega = h / 0.8 * 30.0 * u * u * (1.0 - 2.0 * u + u * u)
+    alpha = h / 0.64 * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u * u)
+    at = at_angles(theta)._replace(speed=omega, acceleration=alpha)
+    torque = fourbar.solve(scene, at=at).torque
+    columns = {
+        "time": (time, "time [ms]", 1e3, ".1f"),
+        "late": (time + 2e-3, "time [s]", 1.0, ".4f"),
+        "rounded": (time, "time", 1.0, ".3f"),
+        "step": (time, "time [rev]", 1e4, ".0f"),
+        "theta_2": (theta, "theta_2", 1.0, ".15g"),
+        "omega_2": (omega, "omega_2", 1.0, ".15g"),
+        "alpha_2": (alpha, "alpha_2 [deg/s^2]", 180.0 / math.pi, ".15g"),
+        "torque": (torque, "torque", 1.0, ".15g"),
+    }
+    chosen = [columns[name] for name in names.split()]
+    text = ",".join(heading for _, heading, _, _ in chosen) + "\n"
+    for row in range(len(time)):
+        cells = [format(n[row] * x, form) for n, _, x, form in chosen]
+        text += ",".join(cells) + "\n"
+    if judged_as == HOLDS:
+        judgement = judge_table(scene, read(text))
+        assert judgement.status == HOLDS and judgement.compared >= len(time)
+    else:
+        with pytest.raises(InputError, match=judged_as) as caught:
+            judge_table(scene, read(text))
+        assert scene.title not in str(caught.value)
 
 
 def test_a_command_of_a_stroke_is_refused(judged):

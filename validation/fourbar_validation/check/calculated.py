@@ -24,7 +24,7 @@ from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.theirs import name_quantity
 from fourbar_validation.check.variants import Mistake, Wanted, always
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
-from fourbar_validation.compare.tolerance import EPS, magnitude
+from fourbar_validation.compare.tolerance import EPS, Mask, magnitude
 from fourbar_validation.engines.description import (
     FORCE_AT,
     FORCE_BETWEEN,
@@ -625,8 +625,9 @@ def find_miscalculated(judge: Judge, wanted: Wanted = always) -> Iterator[Mistak
 def find_single_precision(judge: Judge) -> Iterator[Mistake]:
     """Yield the mistake of too short numbers if errors are such as these leave.
 
-    No error is beyond what round-off of that size allows, most are larger than those of
-    a file that is rounded elsewhere, and those of neighbours have nothing in common.
+    Each number is one of single precision, or ours but for the rounding to one. No
+    error is beyond what round-off of that size allows, most are larger than those of a
+    file that is rounded elsewhere, and those of neighbours have nothing in common.
     """
     errors = []
     common = []
@@ -637,11 +638,24 @@ def find_single_precision(judge: Judge) -> Iterator[Mistake]:
             return
         errors.append(error[error > 0.0])
         apart = (theirs - judge.ours(key))[mask]
+        if not np.all(_is_single(judge, key)[mask] | np.isnan(theirs[mask])):
+            return
         common.append(np.nansum(apart[1:] * apart[:-1]) / np.nansum(apart**2))
     typical = np.median(np.concatenate(errors))
     if typical >= LEAST_OF_SINGLE and np.nanmedian(common) < MOST_IN_COMMON:
         text = "numbers have some 7 digits, as those of single precision"
         yield _state(text, judge.table.values)
+
+
+def _is_single(judge: Judge, key: str) -> Mask:
+    """Mark the numbers that single precision holds, or that are off by its rounding."""
+    theirs = judge.table.values[key]
+    factor = judge.table.units[key].factor
+    rounding = judge.table.rounding[key].reshape(-1, *[1] * (theirs.ndim - 1))
+    printed = theirs / factor
+    held = np.abs(np.float32(printed) - printed) - EPS * np.abs(printed)
+    off = np.abs(theirs - judge.ours(key)) - 0.5 * EPS_SINGLE * np.abs(theirs)
+    return np.asarray((held * factor <= rounding) | (off <= rounding))
 
 
 def _state(

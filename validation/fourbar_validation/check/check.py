@@ -367,7 +367,8 @@ def check_command(
     of comments are understood. Half a unit of the last printed digit is allowed; the
     command prints to how many digits the numbers were compared. If --rtol or --atol is
     given, these decide, and the number of exact agreements is printed too. If the scene
-    states no speed, each row is judged at its own, say omega_2 and alpha_2.
+    states no speed, each row is judged at its own, say omega_2 and alpha_2. Along a law
+    each has the law's at its time, a column beside the angle, or its own.
 
     A row is found by the angle that the scene commands (theta_2, theta_3 or theta_4).
     In its place the angle of another bar may stand, if the motion passes it once or the
@@ -483,7 +484,8 @@ def show_judgement(
         elif not any(one.complete for one in judgement.explanations):
             print_sentence("these together explain all of it")
     if power is not None:
-        print_sentence(f"all agree within 1e{power}: --rtol 1e{power + 1} judges so")
+        within = f"all agree within 1e{power} of each number"
+        print_sentence(f"{within}: --rtol 1e{power} judges so")
     elif mended is not None:
         print_sentence(
             f"that apart, all agree within 1e{mended}: --rtol 1e{mended} judges so"

@@ -47,6 +47,7 @@ _FACTORS = {
     4.0: "m L^2/3, of a slender bar about its end, where m L^2/12 is right",
 }
 """Factors of a moment of inertia, and the mistake behind each."""
+REVERSED = "sign reversed, or F_ij given for F_ji"
 _INERTIA = "moment of inertia"
 LEAST_FACTOR = 1e-9
 """Least factor. What a smaller one multiplies was left out, which is a mistake of its
@@ -56,6 +57,8 @@ NEAR_A_PLAIN_NUMBER = 1e-2
 """Relative distance within which a fitted number is tried as a plain one."""
 OFFSETS_TRIED = 72
 """Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
+_NEARLY_ONE = 1e-3
+"""Distance from 1 below which five digits do not tell a ratio from it."""
 PROMISING = 0.5
 """Mean misfit, as a part of each quantity's size and at most 1 of each number, below
 which an offset is fitted. Within 2.5 deg of the right one it is a few hundredths.
@@ -150,16 +153,19 @@ def _round_ratio(
 ) -> tuple[str, float] | None:
     """Round to a power of ten, or keep the ratio as fitted.
 
-    A reversed sign is a mistake of its own.
+    A reversed sign is a mistake of its own, and is not named twice.
     """
     if judge.explained(key, -judge.ours(key)):
         return None
     power = round(math.log10(abs(near)))
     ten = math.copysign(10.0**power, near)
-    if power and judge.explained(key, ten * judge.ours(key)):
+    if judge.explained(key, ten * judge.ours(key), CARRIED):
+        if ten == -1.0:
+            return REVERSED, ten
         return f"every number is {'-' if near < 0.0 else ''}10^{power} times ours", ten
     if judge.explained(key, near * judge.ours(key), CARRIED):
-        return f"every number is {near:.5g} times ours", near
+        digits = 5 if abs(abs(near) - 1.0) > _NEARLY_ONE else 12
+        return f"every number is {near:.{digits}g} times ours", near
     return None
 
 

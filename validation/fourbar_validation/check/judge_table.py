@@ -20,7 +20,6 @@ from fourbar_validation.check.csv_columns import compute_column, find_made_of
 from fourbar_validation.check.row_commands import (
     RowCommands,
     find_row_commands,
-    list_stated_rates,
 )
 from fourbar_validation.check.theirs import TheirTable, name_quantity
 from fourbar_validation.compare.scales import Scale, TermSizes
@@ -118,10 +117,8 @@ class Judge:
         slack: float = 0.0,
     ) -> None:
         self.scene, self.tolerance, self.slack = scene, tolerance, slack
-        command_names: tuple[str, ...] = ()
         if rows is None:
             rows = find_row_commands(scene, table)
-            command_names = list_stated_rates(scene, table)
         self.rows = rows
         self.at = rows.at
         self.table = replace(
@@ -129,7 +126,7 @@ class Judge:
             values={
                 key: value
                 for key, value in table.values.items()
-                if key not in command_names
+                if key not in rows.rates
             },
         )
         self.stage = "position" if self.at.speed is None else "force"

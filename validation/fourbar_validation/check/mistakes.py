@@ -21,7 +21,11 @@ from fourbar_validation.check.calculated import (
     find_miscalculated,
     find_single_precision,
 )
-from fourbar_validation.check.fitted import ENOUGH_NUMBERS, find_fitted
+from fourbar_validation.check.fitted import (
+    ENOUGH_NUMBERS,
+    REVERSED,
+    find_fitted,
+)
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.variants import (
     Mistake,
@@ -290,7 +294,7 @@ def _is_angle(quantity: str) -> bool:
 _COLUMN_MISTAKES: tuple[
     tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...
 ] = (
-    ("sign reversed, or F_ij given for F_ji", np.negative, lambda quantity: True),
+    (REVERSED, np.negative, lambda quantity: True),
     ("the sign is lost: sizes alone", np.abs, lambda quantity: quantity not in VECTORS),
     ("degrees where radians were announced", np.degrees, _is_angular),
     (
@@ -390,7 +394,8 @@ def _list_explained(
     """List the keys that differ and agree once a mistake is assumed.
 
     Empty if a mistake of the calculation explains fewer than `least`, breaks one that
-    agreed, or is fitted to fewer than ENOUGH_NUMBERS.
+    agreed, or is fitted to fewer than ENOUGH_NUMBERS. Empty too if the right numbers
+    lie within what the mistake allows: then there is nothing to explain.
     """
     explained = []
     possible = len(differing)
@@ -417,6 +422,9 @@ def _list_explained(
             if possible < least:
                 return []
     if mistake.whole and mistake.fitted and numbers < ENOUGH_NUMBERS:
+        return []
+    slack = mistake.times, mistake.left
+    if all(judge.explained(key, judge.ours(key), *slack) for key in explained):
         return []
     return [key for key in judge.table.values if key in explained]
 

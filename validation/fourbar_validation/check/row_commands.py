@@ -31,14 +31,18 @@ class RowCommands(NamedTuple):
 
     at: Command
     near: tuple[Command, ...] = ()
-    """Commands half a unit of a rounded angle away, to either side."""
+    """Commands half a unit of a rounded angle or time away, to either side."""
+    rates: tuple[str, ...] = ()
+    """Names of the speed and acceleration that the table states, and not the scene."""
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     """Return what is commanded at each row of the table.
 
     The scene's command serves if it has the same positions. Where the scene states no
-    speed it is that of the row, as in the log of a simulator or a test stand.
+    speed it is that of the row, as in the log of a simulator or a test stand. At other
+    positions than those of a law or of listed speeds the rates are those of the law at
+    the time of the row, or else of the row.
 
     Raises InputError for a motion whose rows are not found by an angle, and for an
     angle that the motion passes at several positions.
@@ -53,49 +57,104 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
             "not judged while released; without free and omega_2 each row is judged at"
             " its own omega_2"
         )
-        raise InputError("motion.free", scene.title, allowed)
-    rates = list_stated_rates(scene, table)
+        raise InputError("motion.free", None, allowed)
+    commanded = table.found_by == base.commanded
+    if commanded:
+        same = base.angle.shape == table.places.shape and np.allclose(
+            base.angle, table.places, rtol=_AS_PRINTED, atol=0.0
+        )
+    else:
+        same = _has_positions_of(scene, table)
+    varies = scene.motion.law is not None or scene.motion.has_rate_of_each
+    if varies and not same and commanded and table.times is not None:
+        along = _follow_law(scene, table, base)
+        if along is not None:
+            return along
+    rates: tuple[str, ...] = ()
+    if not same if varies else scene.motion.speed is None:
+        rates = _list_stated_rates(scene, table, both=varies)
     if rates:
         speed, acceleration = rates
         base = base._replace(
             speed=table.values[speed],
             acceleration=table.values.get(acceleration, base.acceleration),
         )
-    if table.found_by == base.commanded:
-        same = base.angle.shape == table.places.shape and np.allclose(
-            base.angle, table.places, rtol=_AS_PRINTED, atol=0.0
-        )
-        if same:
-            return _with_rounding(base, table)
-        _refuse_law(scene)
-        return _with_rounding(_command_each(base, table.places, scene), table)
-    if _has_positions_of(scene, table):
-        return RowCommands(base)
-    _refuse_law(scene)
-    return _find_by_another_bar(scene, table, base)
+    if same:
+        found = _with_rounding(base, table) if commanded else RowCommands(base)
+    elif commanded:
+        at = _command_each(base, table.places, scene)
+        found = _with_rounding(at, table)
+    else:
+        found = _find_by_another_bar(scene, table, base)
+    return found._replace(rates=rates)
 
 
-def list_stated_rates(scene: Scene, table: TheirTable) -> tuple[str, ...]:
-    """List speed and acceleration of the command if the table states them.
+def _list_stated_rates(
+    scene: Scene,
+    table: TheirTable,
+    both: bool,
+) -> tuple[str, ...]:
+    """List speed and acceleration of the command if the table states the speed.
 
-    Otherwise the scene does, and the list is empty.
+    Raises InputError where `both` are needed and not stated: the speed of a law, or of
+    a list, is known at the scene's own positions alone.
     """
-    motion = scene.motion
-    rates = motion.names[1:]
-    if motion.law is None and motion.speed is None and rates[0] in table.values:
+    rates = scene.motion.names[1:]
+    if all(rate in table.values for rate in rates[: 1 + both]):
         return rates
+    if both:
+        names = " and ".join(rates)
+        law = scene.motion.law is not None
+        time = f"a column time beside {scene.motion.commanded}, or " if law else ""
+        raise InputError(
+            "motion.law" if law else f"motion.{rates[0]}",
+            None,
+            "a table is judged along a law or listed speeds at the scene's own"
+            f" positions, all of them in its order; at others it needs {time}columns"
+            f" {names}",
+        )
     return ()
 
 
-def _refuse_law(scene: Scene) -> None:
-    """Raise InputError for a law or a list, whose speed elsewhere is not known."""
-    if scene.motion.law is not None or scene.motion.has_rate_of_each:
-        allowed = (
-            "a table is judged along a law or listed speeds at the scene's own"
-            " positions, all of them in its order"
+def _follow_law(
+    scene: Scene,
+    table: TheirTable,
+    base: Command,
+) -> RowCommands | None:
+    """Take the rates of a law at the times of the rows; None if there is no law.
+
+    Raises InputError for a row at whose time the law is at another angle, unless the
+    table states its rates itself.
+    """
+    law = scene.motion.law
+    if law is None or table.times is None:
+        return None
+    time, half = table.times.T
+    at = _command_each(base, table.places, scene)
+    angles, *rates = law.at(np.clip(time, law.time[0], law.time[-1]))
+    apart = np.abs(wrap_difference(angles - table.places))
+    printed = table.rounding[table.found_by] + _AS_PRINTED * (1.0 + np.abs(angles))
+    off = apart > printed + np.abs(rates[0]) * half + _ONE_PLACE
+    if off.any():
+        names = scene.motion.names[1:]
+        if all(name in table.values for name in names):
+            return None
+        row = int(np.argmax(off))
+        law_at, place = np.degrees([angles[row], table.places[row]])
+        raise InputError(
+            f"line {table.lines[row]}, time",
+            float(time[row]),
+            f"the law is at {law_at:.6g} deg then, and the table at {place:.6g} deg:"
+            f" add columns {' and '.join(names)}",
         )
-        key = scene.motion.names[1] if scene.motion.law is None else "law"
-        raise InputError(f"motion.{key}", scene.title, allowed)
+    found = _with_rounding(at._replace(speed=rates[0], acceleration=rates[1]), table)
+    if np.all(apart <= printed):
+        return found  # the times are as exact as the angles
+    near = []
+    for shift in (-half, half):
+        _, *rates = law.at(np.clip(time + shift, law.time[0], law.time[-1]))
+        near.append(at._replace(speed=rates[0], acceleration=rates[1]))
+    return found._replace(near=(*found.near, *near))
 
 
 def _command_each(base: Command, angle: Array, scene: Scene) -> Command:

@@ -18,6 +18,7 @@ import io
 import math
 import re
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
@@ -37,7 +38,7 @@ _DECIMALS = 4
 one that was rounded.
 """
 NOT_JUDGED = {
-    "time": "a row is found by an angle",
+    "time": "a row is found by an angle, and along a law by the time too",
     **dict.fromkeys(
         (COUPLE.error, LINE.error, "force_error", "friction_residual"),
         "an error of the formulas themselves",
@@ -160,6 +161,8 @@ class TheirTable:
     """Sentences on how the table was read where it does not say so itself."""
     found_by: str = "theta_2"
     """Name of the angle by which rows are found."""
+    times: Array | None = None
+    """Time of each row and half a unit of its last digit, s, (n, 2)."""
 
     def label(self, key: str) -> str:
         """Name the quantity, or the one component of it that the table has."""
@@ -187,6 +190,7 @@ class TheirTable:
             rounding={key: value[rows] for key, value in self.rounding.items()},
             lines=self.lines[rows],
             places_rounding=self.places_rounding[rows],
+            times=None if self.times is None else self.times[rows],
         )
 
     def from_pin(self, origin: tuple[float, float]) -> "TheirTable":
@@ -242,6 +246,7 @@ def read_table(
     columns, left_out, renamings = _read_headings(
         path, headings, unit_line, commanded, points
     )
+    times = _read_times(columns, rows)
     _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
     found_by = next((name for name in (commanded, *_PLACES) if name in names), None)
@@ -300,6 +305,7 @@ def read_table(
         left_out,
         notes,
         found_by,
+        times,
     )
     for name in names:
         if name != found_by and not np.isnan(numbers[name]).all():
@@ -314,6 +320,20 @@ def read_table(
             str(path),
         )
     return table
+
+
+def _read_times(
+    columns: dict[int, tuple[str, Unit]],
+    rows: list[tuple[int, list[str]]],
+) -> Array | None:
+    """Take the times out of the columns; None if they are not all numbers."""
+    of_time = [index for index, (name, _) in columns.items() if name == "time"]
+    units = [columns.pop(index)[1] for index in of_time]
+    with suppress(InputError, IndexError):
+        for index, unit in zip(of_time, units, strict=True):
+            times = np.array([_read_cell(cells[index]) for _, cells in rows])
+            return times * unit.factor if np.isfinite(times).all() else None
+    return None
 
 
 def _require_cells(
@@ -562,10 +582,13 @@ def _read_headings(
     renamings: dict[str, str] = {}
     for index, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading.strip())
+        text = "".join(unit_line[index : index + 1]).strip(" []()")
         if match:
             name = match["name"] + (match["letter"] or "")
+            text = (match["square"] or match["round"] or text).strip()
         else:
             name = heading.strip()
+        plain = name
         name = _REACTIONS.get(name[:3], name[:3]) + name[3:]
         name = _find_name(name, commanded, points)
         vector = name[:-2] if name[-2:] in ("_x", "_y") else name
@@ -583,12 +606,18 @@ def _read_headings(
                 left_out[column] = "follows from columns that are judged"
                 continue
             left_out[column] = NOT_JUDGED.get(quantity, "not a known column")
+            if quantity == "time":
+                with suppress(InputError):
+                    unit = _read_unit(path, heading, quantity, text)
+                    columns[index] = (name, unit)
             if quantity not in NOT_JUDGED and (renaming := _suggest_column(name)):
                 left_out[column] += f": {renaming}"
                 renamings[column] = renaming
             continue
-        below = "".join(unit_line[index : index + 1]).strip(" []()")
-        text = (match["square"] or match["round"] or below).strip()
+        if name != plain and len(name) == 1 and text in OTHER_UNITS["rad"]:
+            renamings[heading] = _suggest_column("angle")
+            left_out[heading] = f"not a known column: {renamings[heading]}"
+            continue
         columns[index] = (
             f"|{name}|" if of_vector and name == vector else name,
             _read_unit(path, heading, quantity, text),
@@ -602,7 +631,7 @@ def _read_unit(
     quantity: str,
     text: str,
 ) -> Unit:
-    unit = find_unit_of_quantity(quantity)
+    unit = "s" if quantity == "time" else find_unit_of_quantity(quantity)
     if not text or text == unit:
         return Unit(unit, 1.0)
     from fourbar.quantities.units import find_factor
