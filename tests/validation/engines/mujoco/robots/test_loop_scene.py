@@ -8,6 +8,7 @@ Jacobian.
 
 import cmath
 import math
+import re
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -326,6 +327,70 @@ def test_a_right_angle_of_the_pose_meets_both_change_points():
     made = read(Planar(pins=square).text())
     solution = fourbar.solve(made.scene, "position")
     assert solution.status.count("change_point") == 2
+
+
+REVERSED = """
+<mujoco><compiler angle="degree"/><worldbody>
+  <body name="crank" euler="0 0 60">
+    <joint name="a" axis="0 0 -1" ref="30"/>
+    <geom size=".01" pos=".05 0 0" mass=".2"/>
+    <body name="coupler" pos=".1 0 0" euler="0 0 -28.58121702903738"><joint name="b"/>
+      <geom size=".01" pos=".12 0 0" mass=".5"/></body>
+  </body>
+  <body name="rocker" pos=".3 0 0" euler="0 0 99.59098992"><joint name="c"/>
+    <geom size=".01" pos=".11 0 0" mass=".4"/></body>
+</worldbody><equality>
+  <connect name="B" body1="rocker" body2="coupler" anchor=".22 0 0"/>
+</equality></mujoco>
+"""
+"""A crank from the origin, at 60 deg in the x-y plane where its joint stands at 30 deg.
+The joint turns it clockwise.
+"""
+FLOATING = """
+<mujoco><worldbody><body name="pelvis" pos="0 0 1"><freejoint/>
+  <geom size=".1" mass="8"/>
+  <body name="crank"><joint name="j" axis="0 1 0"/>
+    <geom size=".01" pos=".02 0 0" mass=".1"/>
+    <body name="rod" pos=".05 0 0"><joint axis="0 1 0"/>
+      <geom size=".01" pos="0 0 -.1" mass=".1"/></body>
+  </body>
+  <body name="shin" pos="-.04 0 -.25"><joint axis="0 1 0"/>
+    <geom size=".01" pos="0 0 -.1" mass=".5"/></body>
+</body></worldbody><equality>
+  <connect name="w" body1="rod" body2="shin" anchor=".02 0 -.25"/>
+</equality></mujoco>
+"""
+"""A crank along x where its joint stands at 0; about y it turns from x to -z."""
+RELATION = (
+    r"Angles: theta_2 = (-?)\S+(?: ([+-]) ([\d.]+) deg)?. Axes: x is (-?)([xyz])"
+    r" of the world, y is (-?)([xyz])(?: in this pose)?\."
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "joint", "crank"),
+    [
+        (REVERSED, 30.0, (math.cos(math.pi / 3.0), math.sin(math.pi / 3.0), 0.0)),
+        (REVERSED, 120.0, (math.sin(math.pi / 3.0), -math.cos(math.pi / 3.0), 0.0)),
+        (FLOATING, 0.0, (1.0, 0.0, 0.0)),
+        (FLOATING, 90.0, (0.0, 0.0, -1.0)),
+        (FLOATING.replace("0 1 0", "0 -1 0"), 90.0, (0.0, 0.0, 1.0)),
+    ],
+)
+def test_the_relation_of_joint_and_angle_is_that_of_the_world(text, joint, crank):
+    made = read(text)
+    said = re.fullmatch(RELATION, made.parts[-1])
+    assert said is not None, made.parts[-1]
+    sign, plus, constant, *axes = said.groups()
+    theta_2 = float(f"{plus or ''}{constant or 0}") + float(f"{sign}1") * joint
+    x, y = (
+        float(f"{minus}1") * crank["xyz".index(name)]
+        for minus, name in (axes[:2], axes[2:])
+    )
+    apart = theta_2 - math.degrees(math.atan2(y, x))
+    assert math.remainder(apart, 360.0) == pytest.approx(0.0, abs=1e-9)
+    sweep = made.scene.motion.angle
+    assert sweep.start - 1e-9 <= math.radians(theta_2) <= sweep.stop + 1e-9
 
 
 def test_a_scene_reads_back_and_says_what_it_is():

@@ -133,7 +133,8 @@ def make_loop_scene(
             f"a speed of {DEFAULT_SPEED:g} rad/s is taken; --speed states another"
         )
     notes = (*compiled.notes, *posed.notes)
-    return LoopScene(scene, made.loop, made.write_parts(), tuple(remarks), notes)
+    parts = (*made.write_parts(), made.write_relation())
+    return LoopScene(scene, made.loop, parts, tuple(remarks), notes)
 
 
 def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
@@ -180,6 +181,14 @@ def _round_angle(angle: float) -> float:
     return math.radians(round(math.degrees(angle), _DECIMALS_OF_A_DEGREE) + 0.0)
 
 
+def _write_axis(axis: Array) -> str:
+    """Write a unit vector: as x, y or z with its sign if it is one of these."""
+    for name, part in zip("xyz", axis, strict=True):
+        if abs(abs(part) - 1.0) <= _SKEW**2:
+            return f"-{name}" if part < 0.0 else name
+    return f"({', '.join(f'{round(part, 6) + 0.0:.6g}' for part in axis)})"
+
+
 def miss_output(scene: Scene, angles: Sequence[float]) -> float:
     """Return by how much the motion of a scene misses a loop in its pose, rad.
 
@@ -224,6 +233,8 @@ class SceneOfLoop:
         self.loop = loop
         self.seen = SeenLoop(posed.model, loop, 0.0)
         self.remarks: list[str] = []
+        self.shift = 0.0
+        """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""
         self.carried = {bar: self.seen.list_parts(bar) for bar in MOVING_BARS}
         self.bodies = {body for bodies in self.carried.values() for body in bodies}
         parts = list_unknown_parts(compiled, self.bodies)
@@ -251,6 +262,23 @@ class SceneOfLoop:
             lines.append(f"Held as they stand: {', '.join(held)}.")
         return tuple(lines)
 
+    def write_relation(self) -> str:
+        """Say how theta_2 of the scene and the driven joint are related.
+
+        Say too which axes of the world x and y of the scene are.
+        """
+        loop = self.loop
+        at_zero = loop.angles[0] + self.seen.angle_at("O2", 0.0) + self.shift
+        constant = round(math.degrees(at_zero), _DECIMALS_OF_A_DEGREE)
+        sign = "-" if loop.senses["O2"] < 0.0 else ""
+        angle = f"theta_2 = {sign}{self._name_hinge('O2')}"
+        if constant:
+            angle += f" {'+' if constant > 0.0 else '-'} {abs(constant):.12g} deg"
+        x, y = (_write_axis(axis) for axis in self.seen.axes)
+        fixed = not self.model.body_weldid[loop.bodies[1][0]]
+        when = "" if fixed else " in this pose"
+        return f"Angles: {angle}. Axes: x is {x} of the world, y is {y}{when}."
+
     def describe(self, speed: float, title: str, source: str) -> Scene:
         """Describe the scene."""
         lumps = {bar: self.seen.lump(bar) for bar in MOVING_BARS}
@@ -266,10 +294,10 @@ class SceneOfLoop:
         theta_1 = _round_angle(self.loop.angles[0])
         linkage = FourBar(lengths[0], bars[2], bars[3], bars[4], theta_1)
         *ends, at_start = self._find_sweep(linkage)
-        whole = math.tau * math.ceil((-math.pi - ends[0]) / math.tau)
-        start, stop = (_round_angle(end + whole) for end in ends)
+        self.shift = math.tau * math.ceil((-math.pi - ends[0]) / math.tau)
+        start, stop = (_round_angle(end + self.shift) for end in ends)
         theta_2 = Sweep(start, stop, SWEEP_INTERVALS) if stop > start else start
-        branch = self._find_branch(linkage, self.loop.angles[1] + whole)
+        branch = self._find_branch(linkage, self.loop.angles[1] + self.shift)
         motion = Motion(theta_2, speed, branch=branch)
         effects = tuple(self._list_effects(armature, at_start))
         self._remark_what_is_left_out(lumps)
