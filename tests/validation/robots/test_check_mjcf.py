@@ -42,6 +42,7 @@ from fourbar_validation.robots import guard
 from fourbar_validation.robots.check_mjcf import check_mjcf_command
 from fourbar_validation.robots.differences import (
     Difference,
+    _remark,
     find_differences,
     order,
     price,
@@ -375,6 +376,28 @@ def test_a_planted_difference_is_named(what, key, word):
     of_scene = described(GENERATED)
     listed = find_differences(of_scene, described(planted(what)))
     assert word in {d.key: d.remark for d in listed}[key]
+
+
+SPRING = "tendons.ground output.stiffness"
+
+
+@pytest.mark.parametrize(
+    ("key", "ours", "theirs", "remark"),
+    [
+        ("pins.A.damping", 0.0, 0.1, "a couple at this pin that the scene does not"),
+        ("pins.A.friction", 0.2, 0.0, "a couple at this pin that the file does not"),
+        ("pins.A.stiffness", 0.2, 0.1, "a spring at this pin, of another size than"),
+        (SPRING, 150.0, 155.0, "a spring along this tendon, of another size than"),
+        (SPRING, None, 155.0, "a spring along this tendon that the scene does not"),
+        ("closure.by", "connect of sites", "tendon", "a tendon leaves out"),
+    ],
+)
+def test_a_remark_says_which_of_both_has_what_acts(key, ours, theirs, remark):
+    assert _remark(key, ours, theirs).startswith(remark)
+
+
+def test_a_tendon_is_named_only_where_one_closes_the_loop():
+    assert not _remark("closure.by", "connect of sites", "weld of sites")
 
 
 def slip_at_A(s):
