@@ -3,12 +3,14 @@
 import csv
 import io
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
@@ -32,6 +34,7 @@ from fourbar_validation.robots.report import (
     describe_advice,
     describe_measurement,
     list_measured_rows,
+    show_block,
     write_markdown,
     write_report,
     write_states,
@@ -117,6 +120,14 @@ def test_a_page_holds_sentences_tables_and_elements():
     assert "```xml\n<connect/>\n```" in page
 
 
+def test_an_element_to_paste_is_folded_between_attributes(capsys):
+    text = f'<connect name="{"a" * 30}" solref="0.004 1" solimp="0.9 0.9 0.1 0.5 2" />'
+    show_block(Typed(text))
+    first, second = capsys.readouterr().out.splitlines()
+    assert f"{first} {second.strip()}" == text
+    assert second.startswith('    solimp="0.9 0.9 0.1 0.5 2"')
+
+
 @pytest.mark.slow
 def test_the_report_is_printed_and_written(
     tmp_path,
@@ -151,6 +162,31 @@ def test_how_near_a_state_is_to_a_change_point_is_told_within_ten_degrees(
         f"{abs(degrees):.2g} deg from a change point" if near else ""
     )
     assert bool(told) == near
+
+
+@pytest.mark.parametrize(("ground", "grow"), [(0.0, True), (90.0, False)])
+@pytest.mark.parametrize("side", [-5.0, 5.0])
+def test_forces_are_said_to_grow_only_where_those_of_rigid_pins_do(ground, grow, side):
+    """The bars of a rhombus in line hang along gravity, or across it.
+
+    Along it no moment about a pin asks for a force across the bars; across it the
+    moments of output and coupler ask for opposite ones.
+    """
+    bars = replace(uniform(4.0, 4.0, 4.0, 4.0), ground_angle=math.radians(ground))
+    scene = Scene(bars, Motion(1.0, 1.0), effects=(Gravity(),))
+    told = _describe_limit(SimpleNamespace(scene=scene), math.radians(ground + side))
+    assert told.startswith("5 deg from a change point, where ")
+    assert told.endswith("forces grow without bound") == grow
+
+
+def test_a_limit_of_the_bar_that_is_driven_is_told():
+    """Driven by its output, whose limits are those of 2 and 3 in line, near 3 + 10."""
+    lengths = uniform(9.0, 3.0, 10.0, 8.0)
+    limit = math.pi - math.acos((9.0**2 + 8.0**2 - 13.0**2) / (2.0 * 9.0 * 8.0))
+    scene = Scene(lengths, Motion(theta_4=2.0, omega_4=1.0))
+    told = _describe_limit(SimpleNamespace(scene=scene), limit + math.radians(2.0))
+    assert told == "2 deg from a limit position, where forces grow without bound"
+    assert not _describe_limit(SimpleNamespace(scene=scene), limit + 0.4)
 
 
 def test_a_small_transmission_angle_is_told_as_well():

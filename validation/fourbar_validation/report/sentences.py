@@ -1,6 +1,7 @@
 """Sentences and small tables that commands print."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +13,22 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def print_sentence(text: str) -> None:
-    """Print a sentence, broken where it is wider than a block."""
+_BLANK = "\ue000"
+"""Stand-in for a blank at which no line is broken."""
+
+
+def print_sentence(text: str, whole: re.Pattern[str] | None = None) -> None:
+    """Print a sentence, broken where it is wider than a block.
+
+    `whole`: what is never broken, like the value of an attribute.
+    """
     import click
 
-    for line in wrap_line(escape_controls(text), find_terminal_width()):
-        click.echo(line)
+    text = escape_controls(text)
+    if whole is not None:
+        text = whole.sub(lambda part: part[0].replace(" ", _BLANK), text)
+    for line in wrap_line(text, find_terminal_width()):
+        click.echo(line.replace(_BLANK, " "))
 
 
 def make_words_table(

@@ -64,6 +64,8 @@ class InsideError:
     """Position of the driven joint where the error is largest, rad."""
     theta_2: float
     """Angle of bar 2 there in the axes of the scene, rad."""
+    angle: float
+    """Angle of the commanded bar there in the same axes, rad."""
     median: float
     """Median of the errors over the states, over the same scale; infinite without an
     answer.
@@ -175,6 +177,7 @@ def _compare(
             loop.find_vanishing(name) is not None,
             rows[worst].joint,
             float(np.asarray(formulas.theta_2)[worst]),
+            float(commanded.angle[worst]),
             median,
         )
 

@@ -4,11 +4,13 @@ Forms are for the terminal, in Markdown, and as CSV.
 """
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
+import numpy as np
 
 from fourbar.formulas.mobility import (
     change_points,
@@ -17,7 +19,8 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.quantities import PIN_FORCES, UNITS
-from fourbar.scene import command
+from fourbar.scene import Command, Scene, command
+from fourbar.solving import solve
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import (
     UNDECIDED,
@@ -31,6 +34,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     RobotMeasurement,
     SettingsAdvice,
     TriedSettings,
+    measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import name_following
 from fourbar_validation.report.sentences import make_words_table, print_sentence
@@ -67,9 +71,17 @@ LEAST_LEFT_OUT = 1e-4
 it: MuJoCo's errors have about as many digits.
 """
 NEAR_A_LIMIT = math.radians(10.0)
-"""Angle of the driven bar from a limit position or a change point within which forces
-are told to grow: beyond a change point of a parallelogram they are then six times those
-of its rectangle.
+"""Angle of the driven bar from a limit position or a change point within which a
+report names it: beyond a change point of a parallelogram forces are then six times
+those of its rectangle.
+"""
+_APPROACH = (1e-3, 1e-5)
+"""Angles of the driven bar from a limit position or a change point at which forces are
+compared, rad.
+"""
+_GROWTH = 3.0
+"""Ratio of those forces from which they grow without bound: beside a limit position
+static ones go as the inverse root of the angle, to ten times.
 """
 STATES_FILE = (
     *("loop", "method", "joint [deg]", "omega [rad/s]", "alpha [rad/s^2]"),
@@ -275,10 +287,10 @@ def _describe_worst_near_limits(
     loop: LoopMeasurement,
     errors: Sequence[InsideError],
 ) -> Iterator[ReportBlock]:
-    """Say where errors are worst because forces grow there without bound."""
-    joints = {error.joint: error.theta_2 for error in errors}
-    for joint, theta_2 in joints.items():
-        near = _describe_limit(loop, theta_2)
+    """Say that errors are worst near a limit position or a change point."""
+    joints = {error.joint: error.angle for error in errors}
+    for joint, angle in joints.items():
+        near = _describe_limit(loop, angle)
         if near:
             yield (
                 f"{write_degrees(joint)} deg is {near}: the median tells of the rest of"
@@ -287,18 +299,22 @@ def _describe_worst_near_limits(
             return
 
 
-def _describe_limit(loop: LoopMeasurement, theta_2: float) -> str:
-    """Say how near an angle of the scene's bar 2 is to a place where forces are large.
+def _describe_limit(loop: LoopMeasurement, angle: float) -> str:
+    """Say how near the scene's commanded bar is to a place where errors are large.
 
-    Such a place is a limit, a change point or a small transmission angle. The text is
-    empty beyond NEAR_A_LIMIT. `theta_2`: rad.
+    Such a place is a limit, a change point or a small transmission angle of the input.
+    The text is empty beyond NEAR_A_LIMIT. `angle`: rad.
     """
-    linkage = loop.scene.linkage
-    unbounded = ", where forces grow without bound"
-    places = [(at, f"a change point{unbounded}") for at in change_points(linkage, 2)]
-    if not turns_fully(linkage):
-        limits = [end for ends in find_intervals(linkage) for end in ends]
-        places += [(limit, f"a limit position{unbounded}") for limit in limits]
+    scene = loop.scene
+    linkage = scene.linkage
+    bar = command(scene).bar
+    in_line = "where the bars are in line and the constraint is nearly singular"
+    places = [(at, f"a change point, {in_line}") for at in change_points(linkage, bar)]
+    if not turns_fully(linkage, bar):
+        limits = [end for ends in find_intervals(linkage, bar) for end in ends]
+        open_beyond = "beyond which the loop does not close"
+        places += [(limit, f"a limit position, {open_beyond}") for limit in limits]
+    places = [(at, _say_growth(scene, angle, at, kind)) for at, kind in places]
     mu = transmission_extremes(linkage)
     smallest = (
         (mu.theta_2_least, mu.least),
@@ -307,19 +323,45 @@ def _describe_limit(loop: LoopMeasurement, theta_2: float) -> str:
     places += [
         (
             at,
-            f"a transmission angle of {math.degrees(angle):.2g} deg, whose sine"
-            " divides the forces",
+            f"a transmission angle of {math.degrees(smallest_angle):.2g} deg, whose"
+            " sine divides the forces",
         )
-        for at, angle in smallest
-        if 0.0 < angle < NEAR_A_LIMIT
+        for at, smallest_angle in smallest
+        if bar == 2 and 0.0 < smallest_angle < NEAR_A_LIMIT
     ]
-    near = [
-        (abs(math.remainder(theta_2 - angle, math.tau)), kind) for angle, kind in places
-    ]
+    near = [(abs(math.remainder(angle - at, math.tau)), kind) for at, kind in places]
     distance, kind = min(near, default=(math.inf, ""))
     if distance > NEAR_A_LIMIT:
         return ""
     return f"{round(math.degrees(distance), 6):.2g} deg from {kind}"
+
+
+def _say_growth(scene: Scene, angle: float, place: float, kind: str) -> str:
+    """Say that forces grow without bound towards a place, where those of rigid pins do.
+
+    The scene is asked on the side of the place on which an angle lies, at the speed of
+    its position nearest to the angle. `kind`: what is said of the place otherwise.
+    """
+    away = math.remainder(angle - place, math.tau)
+    stated = command(scene)
+    nearest = int(np.argmin(np.abs(stated.angle - angle)))
+    rates = (0.0 if stated.speed is None else stated.speed, stated.acceleration)
+    speed, acceleration = (
+        np.broadcast_to(rate, stated.angle.shape)[nearest] for rate in rates
+    )
+    at = Command(
+        angle - away + np.copysign(_APPROACH, away),
+        np.full(len(_APPROACH), stated.branch[nearest]),
+        speed,
+        acceleration,
+        stated.bar,
+    )
+    solution = solve(scene, "force", at=at)
+    sizes = [measure_sizes(getattr(solution, name)) for name in PIN_FORCES]
+    far, close = np.max(sizes, axis=0)
+    if close > _GROWTH * far:
+        return f"{kind.partition(',')[0]}, where forces grow without bound"
+    return kind
 
 
 def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
@@ -435,7 +477,7 @@ def show_block(block: ReportBlock) -> None:
         )
         Console().print(table)
     elif isinstance(block, Typed):
-        click.echo(escape_controls(block.text))
+        print_sentence(block.text, whole=re.compile('"[^"]*"'))
     else:
         print_sentence(block)
 
