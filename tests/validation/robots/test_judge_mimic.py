@@ -259,16 +259,18 @@ COUPLER = """<mujoco><worldbody><body name="crank"><joint name="j2" axis="0 0 1"
 </mujoco>"""
 
 
+COUPLER_SCENE = Scene(
+    FourBar(0.02, Bar(0.057, 0.1), Bar(0.022, 0.1), Bar(0.055, 0.1)),
+    fourbar.Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0),
+)
+
+
 def test_a_follower_on_the_crank_turns_the_coupler(tmp_path):
     """Its angle is theta_3 - theta_2, here from the two circles of the loop."""
     path = tmp_path / "coupler.xml"
     path.write_text(COUPLER)
     swing = np.radians(np.linspace(30.0, 90.0, 61))
-    scene = Scene(
-        FourBar(0.02, Bar(0.057, 0.1), Bar(0.022, 0.1), Bar(0.055, 0.1)),
-        fourbar.Motion(swing, 1.0),
-    )
-    report = measure_mimic(path, "j3", scene)
+    report = measure_mimic(path, "j3", COUPLER_SCENE)
     assert report.equality.bars == (3, 2)
     pin_a = 0.057 * np.exp(1j * swing)
     to_a = pin_a - 0.02
@@ -293,6 +295,78 @@ def test_a_follower_on_the_crank_turns_the_coupler(tmp_path):
     assert report.squares[0].angle == pytest.approx(error, rel=1e-3)
     assert report.centred == pytest.approx(centred, rel=1e-3)
     assert math.degrees(report.shifted) == pytest.approx(7.418, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("polycoef", "angles", "error", "told"),
+    [
+        ("0 -1 0 0 0", "", math.nan, "7.4176 deg with the constant of least squares"),
+        ("0 -1 .1 0 0", "", math.nan, "of the file loses depends on theta_2 at that"),
+        ("0 -1 0 0 0", "theta_2=0deg", 38.65134, "theta_2 of the loop is -43.954 deg"),
+        ("1 -1 0 0 0", "theta_2=0deg,theta_3=-0.3rad", 57.19297, "is -17.189 deg"),
+    ],
+)
+def test_what_the_file_does_not_tell_is_stated_or_left_out(
+    polycoef, angles, error, told, tmp_path, capsys
+):
+    """The errors are those of pins B at the intersection of two circles."""
+    path = tmp_path / "coupler.xml"
+    path.write_text(COUPLER.replace("0 -1 0 0 0", polycoef))
+    stated = dict(one.split("=") for one in angles.split(",") if one)
+    report = measure_mimic(path, "j3", COUPLER_SCENE, angles=stated)
+    assert math.degrees(report.file.angle) == pytest.approx(error, nan_ok=True)
+    show_mimic(report)
+    printed = capsys.readouterr().out
+    assert told in " ".join(printed.split())
+    assert ("a0 to a4 -0.3616111 -0.8158249 0 0 0" in printed) == (not angles)
+    for wrong, reason in (("j3", "theta_2 or theta_3"), ("theta_3", "theta_2.*need")):
+        with pytest.raises(InputError, match=reason):
+            measure_mimic(path, "j3", COUPLER_SCENE, angles={wrong: "1 deg"})
+
+
+FINGER = """<robot name="finger"><link name="palm"/>{}{}</robot>"""
+LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="0.02"/>
+<inertia ixx="1e-6" ixy="0" ixz="0" iyy="3e-6" iyz="0" izz="3e-6"/></inertial></link>
+<joint name="{0}_j" type="continuous"><origin xyz="{2} 0 0" rpy="0 0 {3}"/>
+<parent link="palm"/><child link="{0}"/><axis xyz="0 0 1"/>{4}</joint>"""
+
+
+@pytest.mark.parametrize(
+    ("millimetres", "centres", "rest", "mimic", "error", "zero"),
+    [
+        # bars at 85 deg and where the loop has the output: no end of the input
+        ((60, 20, 55, 45), (10, 22), (85, 101.36063), (0.3935185, 0), 1.57838, "101."),
+        # the loop closes at the zero, and is not what the file has there
+        ((60, 20, 55, 45), (10, 22), (0, 0), (0.3935185, 1.2), 0.84337, "is 0 deg"),
+        ((60, 20, 55, 45), (10, 22), (-40, 0), (0.3935185, 0.9252723), 0.84337, "+ p"),
+        # the loop is open at the zero, as the file has it
+        ((30, 40, 22, 38), (20, 19), (0, 0), (1.1, -0.4), 29.01356, "is 0 deg"),
+        ((30, 40, 22, 38), (20, 12), (0, 0), (1.1, -0.4), math.nan, "theta_4=ANGLE"),
+        ((30, 40, 22, 38), (12, 19), (0, 0), (1.1, -0.4), math.nan, "theta_2=ANGLE"),
+    ],
+)
+def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
+    millimetres, centres, rest, mimic, error, zero, tmp_path, capsys
+):
+    """The errors are those of pins B at the intersection of two circles."""
+    ground, *moving = (1e-3 * length for length in millimetres)
+    places = [
+        (1e-3 * at, math.radians(turn)) for at, turn in zip(centres, rest, strict=True)
+    ]
+    follow = '<mimic joint="prox_j" multiplier="{}" offset="{}"/>'.format(*mimic)
+    prox = LINK.format("prox", places[0][0], 0.0, places[0][1], "")
+    dist = LINK.format("dist", places[1][0], ground, places[1][1], follow)
+    path = tmp_path / "finger.urdf"
+    path.write_text(FINGER.format(prox, dist))
+    motion = fourbar.Motion(np.radians(np.linspace(60.0, 110.0, 51)), 1.0)
+    scene = Scene(FourBar(ground, *map(Bar, moving)), motion)
+    report = measure_mimic(path, "dist_j", scene)
+    degrees = math.degrees(report.file.angle)
+    assert degrees == pytest.approx(error, abs=2e-5, nan_ok=True)
+    centred = 0.78919 if millimetres[0] == 60 else 1.32753
+    assert math.degrees(report.centred) == pytest.approx(centred, abs=2e-5)
+    show_mimic(report)
+    assert zero in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize("ground", [0.03, 0.04])

@@ -27,6 +27,7 @@ from fourbar_validation.robots.options import (
     loop_option,
     pose_options,
     range_option,
+    read_pose,
     speed_option,
     torque_option,
 )
@@ -84,7 +85,7 @@ def _read_role_names(pairs: tuple[str, ...]) -> dict[str, str]:
     metavar="JOINT",
     help=(
         "Joint whose equality, a polynomial, stands for the loop of SCENE: what it"
-        " loses."
+        " loses. --pose theta_2=ANGLE states the input in the rest pose of the file."
     ),
 )
 @click.option(
@@ -131,7 +132,8 @@ def check_mjcf_command(
     if mimic is not None:
         if suite is None:
             raise click.UsageError("--mimic needs the SCENE of the loop")
-        show_mimic(measure_mimic(theirs, mimic, suite.scene(0), assets))
+        angles = read_pose(robot).joints
+        show_mimic(measure_mimic(theirs, mimic, suite.scene(0), assets, angles))
         return 0
     options = read_measure_options(loop, wanted, robot)
     if suite is None:

@@ -4,6 +4,7 @@ A joint equality's polynomial is held against the four-bar that it stands for.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.linkage import require
 from fourbar.quantities import CHANGE_POINT, OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
@@ -31,6 +33,8 @@ FEWEST_POSITIONS = 6
 squares with an error to tell.
 """
 FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio")
+_SAME_ANGLE = 1e-3
+"""rad; files state angles with three or four digits."""
 _FITS = ("least squares", "smallest largest error")
 """Names of the fits of `_MimicReport.squares` and `_MimicReport.fitted`."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}"
@@ -42,7 +46,9 @@ class _MimicError:
     """Largest errors of a polynomial over the motion."""
 
     coefficients: tuple[float, ...]
-    """a0 to a4 of the leader counted from its zero."""
+    """a0 to a4 over the leader counted from its zero; over theta_2 where no zero of
+    the follower is known.
+    """
     angle: float
     """rad."""
     ratio: float
@@ -57,7 +63,15 @@ class _MimicReport:
     swing: tuple[float, float]
     """First and last theta_2 of the motion, rad."""
     file: _MimicError
-    """Angle counted from the position of the loop at the zero of the file."""
+    """Angle counted from the zeros of the file. Errors that depend on an unknown zero
+    are NaN.
+    """
+    zero: float
+    """Angle of the follower's bar at the leader's zero, rad; NaN if it is not known."""
+    other: tuple[float, float]
+    """Largest error counted from another angle there, and that angle, rad, where the
+    loop and the file have different ones; else NaN.
+    """
     shifted: float
     """Largest error of the angle with the constant of least squares, rad. It replaces
     the constant of the file.
@@ -69,31 +83,40 @@ class _MimicReport:
     fitted: tuple[_MimicError, ...]
     """Polynomials of POLYNOMIAL_DEGREES whose largest error of the angle is least."""
 
+    @property
+    def has_zeros(self) -> bool:
+        """True if it is known where both joints are at the zero of the file."""
+        return math.isfinite(self.zero)
+
 
 def measure_mimic(
     path: Path,
     joint: str,
     scene: Scene,
     assets: Path | None = None,
+    angles: Mapping[str, str] | None = None,
 ) -> _MimicReport:
     """Hold the polynomial of a joint against the loop of a scene over its motion.
 
-    The leader's zero is the theta_2 at which the file has the input, and the follower's
-    is the angle between its two bars there. Where the file does not tell,
-    the leader's position is theta_2.
+    The leader's zero is the theta_2 at which the file has the input. The follower's is
+    the angle between its two bars there: that of the loop, or that of the bars in the
+    file, whichever the polynomial fits better.
 
     Parameters
     ----------
     assets : a further folder in which includes and meshes are looked for.
+    angles : angles of bars in the rest pose of the file, "theta_2" to "theta_4", with
+        units. They win over what the file tells.
 
     Raises
     ------
-    InputError : no such equality, or the loop does not close at the zero of the file or
+    InputError : no such equality, an angle of another bar, or the loop does not close
         over the motion.
     """
     file = read_robot(path, assets)
     with examine_guarded(file) as examined:
         equality: JointEquality = examined(READ, file, joint, scene)
+    equality, stated = _state_angles(equality, angles or {})
     positions = np.unique(command(scene).theta_2)
     low = float(positions[0])
     high = float(positions[-1])
@@ -105,45 +128,115 @@ def measure_mimic(
             " a ratio is of a motion",
         )
     branch = int(command(scene).branch[0])
-    zero = _find_zero(equality, 0.5 * (low + high))
     theta_2 = np.union1d(np.linspace(low, high, POSITIONS_FITTED), positions)
-    through_zero = np.union1d(theta_2, zero)
-    angle, ratio = _follow(scene, through_zero, branch, equality.bars)
-    origin = angle[np.searchsorted(through_zero, zero)]
-    inside = np.searchsorted(through_zero, theta_2)
-    # both joints from their zeros, each in its own sense
-    turned = equality.side * equality.sense * (angle - origin)[inside]
-    ratio = equality.sense * ratio[inside]
-    x = equality.side * (theta_2 - zero)
-    own = _measure_polynomial(equality.coefficients, x, turned, ratio)
-    left = np.polynomial.polynomial.polyval(x, own.coefficients) - turned
-    stated = np.searchsorted(theta_2, positions)
+    angle, ratio = _follow(scene, theta_2, branch, equality.bars)
+    # both joints in their own senses
+    side = equality.side * equality.sense
+    x = theta_2
+    zeros: list[float] = []
+    if equality.theta_2 is not None:
+        middle = 0.5 * (low + high)
+        rest = middle + math.remainder(equality.theta_2 - middle, math.tau)
+        x = equality.side * (theta_2 - rest)
+        if not stated:
+            zeros += _find_in_loop(scene, rest, branch, equality.bars)
+        drawn = equality.follower_zero
+        if drawn is not None and not any(_is_same_angle(one, drawn) for one in zeros):
+            zeros.append(drawn)
+    turned = side * angle
+    own = _measure_polynomial(equality.coefficients, x, turned, equality.sense * ratio)
+    left = np.polynomial.polynomial.polyval(x, equality.coefficients) - turned
+    if equality.theta_2 is None and any(equality.coefficients[2:]):
+        own = replace(own, ratio=math.nan)
+        left = np.full_like(left, math.nan)
+    errors = sorted(
+        (float(np.abs(_drop_turns(left + side * zero)).max()), zero) for zero in zeros
+    )
+    (error, zero), other, *_ = [*errors, *[(math.nan, math.nan)] * 2]
+    y = angle
+    if errors:
+        missed = left + side * zero
+        y = turned - side * zero + (missed - _drop_turns(missed))
+        ratio = equality.sense * ratio
+    else:
+        x = theta_2
+    at_positions = np.searchsorted(theta_2, positions)
     squares = []
     fitted = []
     for degree in POLYNOMIAL_DEGREES:
-        least_squares = fit_squares(x[stated], turned[stated], degree)
-        minimax = fit_minimax(x, turned, degree)
-        squares.append(_measure_polynomial(least_squares, x, turned, ratio))
-        fitted.append(_measure_polynomial(minimax, x, turned, ratio))
+        least_squares = fit_squares(x[at_positions], y[at_positions], degree)
+        minimax = fit_minimax(x, y, degree)
+        squares.append(_measure_polynomial(least_squares, x, y, ratio))
+        fitted.append(_measure_polynomial(minimax, x, y, ratio))
     return _MimicReport(
         equality,
         (low, high),
-        own,
-        shifted=float(np.abs(left - left[stated].mean()).max()),
+        replace(own, angle=error),
+        zero,
+        other,
+        shifted=float(np.abs(left - left[at_positions].mean()).max()),
         centred=float(np.ptp(left)) / 2.0,
         squares=tuple(squares),
         fitted=tuple(fitted),
     )
 
 
-def _find_zero(equality: JointEquality, middle: float) -> float:
-    """Return theta_2 at the leader's zero, rad.
+def _state_angles(
+    equality: JointEquality,
+    angles: Mapping[str, str],
+) -> tuple[JointEquality, bool]:
+    """Return an equality with the stated angles, and whether they state its follower.
 
-    Whole turns bring what is read from the file near the motion.
+    Raises
+    ------
+    InputError : an angle of a bar that the equality does not turn, or only one of two
+        that tell where the follower is.
     """
-    if equality.theta_2 is None:
-        return equality.leader_zero
-    return middle + math.remainder(equality.theta_2 - middle, math.tau)
+    of_follower = [f"theta_{bar}" for bar in sorted(equality.bars) if bar > 2]
+    allowed = ["theta_2", *of_follower]
+    theta = {1: 0.0}
+    if equality.theta_2 is not None:
+        theta[2] = equality.theta_2
+    for name, text in angles.items():
+        if name not in allowed:
+            raise InputError(
+                "--pose",
+                name,
+                f"must be {' or '.join(allowed)} beside --mimic, the angle of a bar in"
+                " the rest pose of the file",
+            )
+        theta[int(name[-1])] = require(f"--pose {name}", text, "rad")
+    equality = replace(equality, theta_2=theta.get(2))
+    if not any(name in angles for name in of_follower):
+        return equality, False
+    for name in allowed:
+        if int(name[-1]) not in theta:
+            raise InputError(f"--pose {name}", None, "is needed beside the other angle")
+    turned, bearer = (theta[bar] for bar in equality.bars)
+    return replace(equality, follower_zero=turned - bearer), True
+
+
+def _is_same_angle(one: float, other: float) -> bool:
+    return abs(math.remainder(one - other, math.tau)) <= _SAME_ANGLE
+
+
+def _drop_turns(angles: Array) -> Array:
+    """Return angles without the whole turns of their mean."""
+    return np.asarray(angles - math.tau * np.round(angles.mean() / math.tau))
+
+
+def _find_in_loop(
+    scene: Scene,
+    theta_2: float,
+    branch: int,
+    bars: tuple[int, int],
+) -> list[float]:
+    """Return the angle of a bar against another, rad; none where the loop is open."""
+    try:
+        angle, _ = _follow(scene, np.array([theta_2]), branch, bars)
+    except InputError:
+        return []
+    return [float(angle[0])]
 
 
 def _follow(
@@ -162,14 +255,11 @@ def _follow(
     closed = solution.status_code == OK
     if not closed.all():
         angle = math.degrees(float(theta_2[~closed][0]))
-        reason = (
-            "the loop does not close there; the motion and the zero of the file's"
-            " joints must be in its range"
-        )
+        reason = "the loop does not close there; the motion must be in its range"
         if solution.status_code[~closed][0] == CHANGE_POINT:
             reason = (
-                "a change point, where the output may go on in two ways; neither the"
-                " motion nor the zero of the file's joints may be there"
+                "a change point, where the output may go on in two ways; the motion"
+                " may not go through it"
             )
         raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
     still = np.zeros_like(theta_2)
@@ -252,20 +342,27 @@ def fit_minimax(
 def show_mimic(report: _MimicReport) -> None:
     """Print what the polynomial of the file loses, and the best of each degree."""
     equality = report.equality
-    own = report.file
-    low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
+    angle = _write_angle("theta", equality)
     print_sentence(
-        f"{equality.follower} ({_write_angle('theta', equality)}) follows"
+        f"{equality.follower} ({angle}) follows"
         f" {equality.leader} by polycoef"
-        f" {_write_coefficients(equality.coefficients)};"
-        f" theta_2 is {_write_theta_2(equality)}, from {low} to {high} deg"
+        f" {_write_coefficients(equality.coefficients)}; {_write_theta_2(report)}"
     )
-    print_sentence(
-        f"largest error of the angle: {_deg(own.angle)} deg through the zero of the "
-        f"file; {_deg(report.shifted)} deg with the constant of least squares, "
-        f"{_deg(report.centred)} deg with the best one; "
-        f"of the ratio {_write_ratio(equality)}: {own.ratio:.4g}"
-    )
+    print_sentence(_write_errors(report))
+    other_error, zero = report.other
+    if math.isfinite(other_error):
+        print_sentence(
+            f"{angle} at the zero of the file is another in the loop than in the"
+            f" picture of the file: through {_deg(math.remainder(zero, math.tau))} deg"
+            f" the largest error is {_deg(other_error)} deg"
+        )
+    label = "polycoef"
+    if not report.has_zeros:
+        label = "a0 to a4"
+        print_sentence(
+            f"the polynomials below need no zero: {angle} = a0 + a1 theta_2 + a2"
+            " theta_2^2 + ..., in rad"
+        )
     click.echo(ROW.format(*FIT_HEADINGS))
     for degree, *errors in zip(
         POLYNOMIAL_DEGREES,
@@ -277,7 +374,7 @@ def show_mimic(report: _MimicReport) -> None:
             polycoef = _write_coefficients(error.coefficients)
             ratio = f"{error.ratio:.4g}"
             click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio))
-            click.echo(f"{'':8}polycoef {polycoef}")
+            click.echo(f"{'':8}{label} {polycoef}")
 
 
 def _write_angle(symbol: str, equality: JointEquality) -> str:
@@ -291,17 +388,50 @@ def _write_ratio(equality: JointEquality) -> str:
     return f"({speed})/omega_2" if " " in speed else f"{speed}/omega_2"
 
 
-def _write_theta_2(equality: JointEquality) -> str:
+def _write_theta_2(report: _MimicReport) -> str:
     """Write theta_2 as what the file makes it: the leader and an angle."""
+    equality = report.equality
+    low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
     if equality.theta_2 is None:
         return (
-            f"{equality.leader} (the file does not tell its zero: a site at the end of"
-            " the input bar, and a joint of the output on the ground, would)"
+            f"theta_2 runs from {low} to {high} deg; the file does not tell it at the"
+            f" zero of {equality.leader}, and --pose theta_2=ANGLE states it"
         )
     zero = equality.theta_2 - equality.side * equality.leader_zero
     angle = f"{math.degrees(math.remainder(zero, math.tau)) + 0.0:.6g} deg"
     sign = "+" if equality.side > 0.0 else "-"
-    return f"{angle} {sign} {equality.leader}"
+    return f"theta_2 is {angle} {sign} {equality.leader}, from {low} to {high} deg"
+
+
+def _write_errors(report: _MimicReport) -> str:
+    """Write the errors of the polynomial of the file that the known zeros tell."""
+    equality = report.equality
+    if math.isnan(report.centred):
+        return "what the polynomial of the file loses depends on theta_2 at that zero"
+    angle = _write_angle("theta", equality)
+    through_zero = ""
+    missing = ""
+    if report.has_zeros:
+        drawn = equality.follower_zero
+        in_file = drawn is not None and _is_same_angle(report.zero, drawn)
+        through_zero = (
+            f"{_deg(report.file.angle)} deg through the zero of the file, where {angle}"
+            f"{'' if in_file else ' of the loop'} is"
+            f" {_deg(math.remainder(report.zero, math.tau))} deg; "
+        )
+    elif equality.theta_2 is not None:
+        bars = sorted(bar for bar in equality.bars if bar > 2)
+        stated = ",".join(f"theta_{bar}=ANGLE" for bar in bars)
+        missing = (
+            "; the loop does not close at the zero of the file, which does not tell"
+            f" {angle} there: --pose {stated} states it"
+        )
+    return (
+        f"largest error of the angle: {through_zero}"
+        f"{_deg(report.shifted)} deg with the constant of least squares, "
+        f"{_deg(report.centred)} deg with the best one; "
+        f"of the ratio {_write_ratio(equality)}: {report.file.ratio:.4g}{missing}"
+    )
 
 
 def _deg(angle: float) -> str:

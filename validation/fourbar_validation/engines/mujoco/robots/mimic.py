@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.linkage import Bar
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -27,6 +28,8 @@ _SAME_LENGTH = 1e-3
 """Relative difference of a length in a file from that in a scene: files state three or
 four digits.
 """
+_SAME_CENTRE = 0.05
+"""Relative difference of a mass centre's distance: files state two digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,10 @@ class JointEquality:
     """theta_2 of the scene in the rest pose, rad; None where the file does not tell
     where the input or the ground ends.
     """
+    follower_zero: float | None
+    """Angle of the follower's bar against its bearer in the rest pose, rad; None where
+    the file does not tell it.
+    """
     side: float
     """+1 if theta_2 grows with the leader, -1 if it falls."""
     bars: tuple[int, int]
@@ -63,7 +70,8 @@ def read_joint_equality(
     """Read the equality by which a joint follows another, in the loop of a scene.
 
     The leader turns the input. The tree of bodies tells which bars the follower joins.
-    Where the input points in the rest pose is read from what the file has at its end.
+    Where the bars point in the rest pose is read from what the file has at their ends,
+    or from their mass centres.
 
     Raises
     ------
@@ -101,7 +109,7 @@ def _describe_follower(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = float(data.xaxis[follower] @ data.xaxis[leader])
-    theta_2, side = _measure_input(model, data, leader, follower, scene)
+    theta_2, follower_zero, side = _measure_bars(model, data, tie, scene)
     return JointEquality(
         name_joint(model, follower),
         name_joint(model, leader),
@@ -109,6 +117,7 @@ def _describe_follower(
         float(model.qpos0[model.jnt_qposadr[leader]]),
         math.copysign(1.0, along),
         theta_2,
+        follower_zero,
         side,
         _find_bars(model, leader, follower),
     )
@@ -129,39 +138,49 @@ def _find_bars(model: mujoco.MjModel, leader: int, follower: int) -> tuple[int, 
     return 3, 4
 
 
-def _measure_input(
+def _measure_bars(
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    leader: int,
-    follower: int,
+    tie: Follower,
     scene: Scene,
-) -> tuple[float | None, float]:
-    """Return theta_2 in the rest pose, rad, and the sense in which the leader turns it.
+) -> tuple[float | None, float | None, float]:
+    """Return theta_2 and the follower's angle in the rest pose, and the leader's sense.
 
     The plane is seen from the tip of the leader's axis, or from behind where the output
-    of the scene is then that of the file. None if the input or the ground is not found.
+    of the scene is then that of the file. None if the ground or the bar is not found.
     """
+    follower, leader, coefficients = tie
     linkage = scene.linkage
-    ground, input_length, _, output_length = linkage.lengths
     normal = data.xaxis[leader]
     across = np.eye(3) - np.outer(normal, normal)
     for rocker in _list_rockers(model, leader, follower):
         line = across @ (data.xanchor[rocker] - data.xanchor[leader])
-        if _is_same_number(float(np.linalg.norm(line)), ground):
+        if _is_same_number(float(np.linalg.norm(line)), linkage.lengths[0]):
             break
     else:
-        return None, 1.0
+        return None, None, 1.0
     x = line / np.linalg.norm(line)
-    y = np.cross(normal, x)
-    input_angle = _find_angle_of_bar(model, data, leader, input_length, (x, y))
+    axes = (x, np.cross(normal, x))
+    input_angle = _find_angle_of_bar(model, data, leader, linkage.input, axes)
+    output_angle = _find_angle_of_bar(model, data, rocker, linkage.output, axes)
     if input_angle is None:
-        return None, 1.0
-    output_angle = _find_angle_of_bar(model, data, rocker, output_length, (x, y))
-    behind = output_angle is not None and is_seen_from_behind(
-        scene, (0.0, input_angle, math.nan, output_angle)
-    )
+        return None, None, 1.0
+    behind = False
+    if output_angle is not None:
+        # where the equality turns the output while the leader is at its zero
+        turn = coefficients[0] * float(data.xaxis[follower] @ normal)
+        turned = output_angle + (turn if rocker == follower else 0.0)
+        behind = is_seen_from_behind(scene, (0.0, input_angle, math.nan, turned))
     side = -1.0 if behind else 1.0
-    return linkage.ground_angle + side * input_angle, side
+    follower_zero = None
+    bars = _find_bars(model, leader, follower)
+    if bars == (4, 1) and rocker == follower and output_angle is not None:
+        follower_zero = linkage.ground_angle + side * output_angle
+    elif bars == (3, 2):
+        coupler = _find_angle_of_bar(model, data, follower, linkage.coupler, axes)
+        if coupler is not None:
+            follower_zero = side * (coupler - input_angle)
+    return linkage.ground_angle + side * input_angle, follower_zero, side
 
 
 def _list_rockers(model: mujoco.MjModel, leader: int, follower: int) -> list[int]:
@@ -178,21 +197,23 @@ def _find_angle_of_bar(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     joint: int,
-    length: float,
+    bar: Bar,
     axes: tuple[Array, Array],
 ) -> float | None:
     """Return the angle of a bar from its hinge to its other pin, rad.
 
     The pin is what lies at the length of the bar: a hinge, else a site, else the end of
-    a capsule or cylinder. None if there is nothing, or if it lies in several
-    directions.
+    a capsule or cylinder. Else a mass centre as far from the hinge as that of the scene
+    tells the line, if the scene has it on the line. None if there is nothing, or if it
+    lies in several directions.
     """
-    for places in _list_places(model, data, int(model.jnt_bodyid[joint])):
+    body = int(model.jnt_bodyid[joint])
+    for places in _list_places(model, data, body):
         directions = []
         for place in places:
             apart = place - data.xanchor[joint]
             across, up = (float(apart @ axis) for axis in axes)
-            if _is_same_number(math.hypot(across, up), length):
+            if _is_same_number(math.hypot(across, up), bar.length):
                 directions.append(math.atan2(up, across))
         if directions:
             first, *others = directions
@@ -200,7 +221,11 @@ def _find_angle_of_bar(
             if max(spread, default=0.0) <= _SAME_LENGTH:
                 return first
             return None
-    return None
+    distance, turn = bar.centre or (0.5 * bar.length, 0.0)
+    apart = data.xipos[body] - data.xanchor[joint]
+    across, up = (float(apart @ axis) for axis in axes)
+    is_centre = math.isclose(math.hypot(across, up), distance, rel_tol=_SAME_CENTRE)
+    return math.atan2(up, across) if is_centre and turn == 0.0 and distance else None
 
 
 def _list_places(
