@@ -10,7 +10,7 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -24,6 +24,8 @@ LONGEST_VALUE = 160
 """Characters of a value that an error repeats."""
 LONGEST_MESSAGE = 400
 """Characters of the line that a command prints of an error."""
+LONGEST_LIST = 300
+"""Characters of the names that an error lists; they are whole, the others counted."""
 ELSEWHERE = (
     "this is a planar four-bar linkage with pins alone: synthesis of paths is in "
     "pylinkage and MotionGen, sliders and several loops (six bars) in PMKS+, any "
@@ -96,6 +98,38 @@ def abbreviate(text: str, longest: int) -> str:
     kept = longest - len("...")
     end = kept // 2
     return f"{text[: kept - end]}...{text[-end:]}"
+
+
+def list_allowed(wrong: str, names: Iterable[str]) -> str:
+    """Say what names are allowed in place of a wrong one, those like it first.
+
+    Names are whole; those beyond LONGEST_LIST characters are counted.
+
+    >>> list_allowed("forc", ["position", "velocity", "force"])
+    'must be among force, position, velocity'
+    """
+    from difflib import get_close_matches
+
+    names = list(names)
+    like = [name for name in names if wrong.casefold() in name.casefold()]
+    like += get_close_matches(wrong, names)
+    listed = list(dict.fromkeys([*like, *names]))
+    shown = len(listed)
+    while shown > 1 and len(", ".join(listed[:shown])) > LONGEST_LIST:
+        shown -= 1
+    more = f" and {len(listed) - shown} more" if shown < len(listed) else ""
+    return f"must be among {', '.join(listed[:shown])}{more}"
+
+
+def write_count(count: int, noun: str) -> str:
+    """Write a number of things, in the singular if it is one.
+
+    >>> write_count(1, "entry"), write_count(2, "entry"), write_count(0, "position")
+    ('1 entry', '2 entries', '0 positions')
+    """
+    if count == 1:
+        return f"1 {noun}"
+    return f"{count} {noun[:-1]}ies" if noun.endswith("y") else f"{count} {noun}s"
 
 
 class FourBarError(Exception):

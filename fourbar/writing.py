@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, write_count
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -212,10 +212,10 @@ def make_data_frame(columns: Mapping[str, Any]) -> "DataFrame":
 
 def describe_extent(theta_2: Any) -> str:
     """Say how many positions there are, of how many linkages."""
-    count = f"{theta_2.shape[-1]} position{'s' if theta_2.shape[-1] != 1 else ''}"
+    count = write_count(theta_2.shape[-1], "position")
     if theta_2.ndim == 1:
         return count
-    return f"{len(theta_2)} linkage{'s' if len(theta_2) != 1 else ''}, {count} each"
+    return f"{write_count(len(theta_2), 'linkage')}, {count} each"
 
 
 def write_between(values: Any) -> str:

@@ -302,6 +302,7 @@ def analyze(  # noqa: PLR0913 - one for each option
             )
         _print_sensitivity(scene, form == "json", out)
         return
+    from fourbar.show.lines import wrap_line
     from fourbar.solving import find_last_stage, solve
     from fourbar.studies.course import follow
     from fourbar.studies.passing import join_commands
@@ -313,7 +314,7 @@ def analyze(  # noqa: PLR0913 - one for each option
             described = given.take_motion(stated, positions)
         bore = _read_pressure(described, pressure)
         shown = _choose_units(form, units, degrees)
-        asked = {text: given.read_positions(described, text) for text in at}
+        asked, without = _find_positions(described, at)
         wanted = join_commands([*asked.values()]) if asked else None
         solution = solve(described, find_last_stage(described), at=wanted)
         if asked:
@@ -324,9 +325,34 @@ def analyze(  # noqa: PLR0913 - one for each option
         with state_messages_in(shown):
             width = given.find_width(out)
             text = _write_summary(described, solution, shown, bore, asked, width)
+            text += "".join(
+                f"{part}\n" for line in without for part in wrap_line(line, width)
+            )
     else:
         text = _write_positions(solution, form, shown, columns, every, decimal, out)
+        for line in without:
+            click.echo(line, err=True)
     given.print_to(text, out)
+
+
+def _find_positions(
+    scene: Scene,
+    at: tuple[str, ...],
+) -> tuple[dict[str, Command], list[str]]:
+    """Find the positions of each `--at`, and say which of them no position has.
+
+    Raises NotAssembledError if none has one.
+    """
+    asked = dict[str, Command]()
+    without = list[NotAssembledError]()
+    for text in at:
+        try:
+            asked[text] = given.read_positions(scene, text)
+        except NotAssembledError as error:
+            without.append(error)
+    if without and not asked:
+        raise without[0]
+    return asked, [f"left out: {error}" for error in without]
 
 
 def _choose_units(

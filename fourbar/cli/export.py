@@ -35,7 +35,10 @@ def _plane_options(command: Callable[..., str]) -> Callable[..., str]:
         default="0 0 1",
         show_default=True,
         metavar='"X Y Z"',
-        help="Direction of the pins' axes in the world.",
+        help=(
+            "Direction of the pins' axes in the world, to which z is turned the"
+            ' shortest way. "0 -1 0" sets the plane upright: its x stays, its y is z.'
+        ),
     )
     @click.option(
         "--origin",

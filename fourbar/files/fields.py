@@ -9,7 +9,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from fourbar.errors import ELSEWHERE, InputError, name_unit, names_other_mechanism
+from fourbar.errors import (
+    ELSEWHERE,
+    InputError,
+    name_unit,
+    names_other_mechanism,
+    write_count,
+)
 from fourbar.linkage import (
     ANY_NUMBER,
     BAR_NAMES,
@@ -434,13 +440,13 @@ def _shorten_for_error(value: object) -> object:
     if isinstance(value, str):
         return value[: 2 * LONGEST_FIELD]
     if isinstance(value, dict):
-        return _Words(f"a table of {len(value)} entries")
+        return _Words(f"a table of {write_count(len(value), 'entry')}")
     if isinstance(value, list):
         if len(value) <= 3 and all(
             isinstance(entry, (str, float, bool)) for entry in value
         ):
             return [_shorten_for_error(entry) for entry in value]
-        return _Words(f"a list of {len(value)} entries")
+        return _Words(f"a list of {write_count(len(value), 'entry')}")
     if isinstance(value, int) and value.bit_length() > 64:
         return _Words("a huge whole number")
     return value

@@ -18,6 +18,8 @@ from fourbar.quantities import Array
 Vector = tuple[float, float, float]
 _OPPOSITE = 1e-12
 """Sum of 1 and the tilt's cosine below which the axis points down; x stays x there."""
+_ROUNDING = 2.0**-50
+"""Part of a vector's length below which a turned component is rounding of zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +63,26 @@ class Plane:
         x, y, z = self.axis
         if 1.0 + z < _OPPOSITE:
             return 0.0, 1.0, 0.0, 0.0
-        size = math.sqrt(2.0 * (1.0 + z))
+        size = math.sqrt(2.0 * self._one_plus_z)
         return 0.5 * size, 0.0 - y / size, x / size, 0.0
+
+    @property
+    def _one_plus_z(self) -> float:
+        """Return 1 + z of the axis, without cancellation where it points down."""
+        x, y, z = self.axis
+        return 1.0 + z if z > 0.0 else (x * x + y * y) / (1.0 - z)
 
     @property
     def rotation(self) -> Array:
         """Return the axes of the frame as columns in world axes, (3, 3)."""
-        w, x, y, z = self.quaternion
-        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        return np.asarray(np.eye(3) + 2.0 * (w * across + across @ across))
+        x, y, z = self.axis
+        if 1.0 + z < _OPPOSITE:
+            return np.diag([1.0, -1.0, -1.0])
+        # by the quaternion, zeros of a turn by 90 deg would be rounding
+        f = 1.0 / self._one_plus_z
+        mixed = -x * y * f
+        rows = [[1.0 - x * x * f, mixed, x], [mixed, 1.0 - y * y * f, y], [-x, -y, z]]
+        return np.array(rows)
 
     @property
     def roll_pitch_yaw(self) -> Vector:
@@ -81,8 +94,13 @@ class Plane:
         return roll, pitch, yaw
 
     def turn(self, x: float, y: float, z: float = 0.0) -> list[float]:
-        """Turn a vector of the frame into world axes."""
-        return (self.rotation @ (x, y, z)).tolist()  # type: ignore[no-any-return]
+        """Turn a vector of the frame into world axes.
+
+        A component that is rounding of zero is zero.
+        """
+        turned = self.rotation @ (x, y, z)
+        lost = np.abs(turned) <= _ROUNDING * math.hypot(x, y, z)
+        return np.where(lost, 0.0, turned).tolist()  # type: ignore[no-any-return]
 
     def place(self, x: float, y: float, z: float = 0.0) -> list[float]:
         """Return a point of the frame in world axes, m."""

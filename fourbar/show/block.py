@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.errors import clean_line
+from fourbar.errors import clean_line, write_count
 from fourbar.formulas.mobility import (
     PARALLELOGRAM,
     TURN,
@@ -300,8 +300,8 @@ class _SceneBlock:
             for name, count in counts.items()
             if count
         ]
-        total = len(self.solution)
-        yield f"{total} position{'s' if total > 1 else ''}: {', '.join(parts)}"
+        total = write_count(len(self.solution), "position")
+        yield f"{total}: {', '.join(parts)}"
 
     def _find_beside_change_points(self) -> Array:
         """Return the distances of positions evaluated beside a change point, rad, (n,).
@@ -378,8 +378,8 @@ class _SceneBlock:
         if kind == "turn":
             begin = f"{name} turns fully"
         elif kind == "list":
-            count = len(self.solution)
-            begin = f"{count} positions from {self._place(first)} to {stop}"
+            count = write_count(len(self.solution), "position")
+            begin = f"{count} from {self._place(first)} to {stop}"
         elif kind == "released":
             begin = self._write_release()
             following = [2, 4]

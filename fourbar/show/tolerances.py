@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, write_count
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
@@ -140,9 +140,10 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
     """
     samples = spreads.samples
     count = len(spreads.scene.tolerances)
-    tolerance = f"{count} tolerance{'s' if count > 1 else ''}"
+    tolerance = write_count(count, "tolerance")
+    positions = write_count(len(spreads.theta_2), "position")
     drawn = f"{samples} samples ({spreads.describe_seed()})"
-    lines = [f"{tolerance}, {drawn}, {len(spreads.theta_2)} positions"]
+    lines = [f"{tolerance}, {drawn}, {positions}"]
     for lost, why in (
         (
             spreads.invalid,

@@ -189,7 +189,8 @@ def draw_figure(
             raise InputError(
                 key,
                 value,
-                f"must be left out of {figure}; it shows in {', '.join(TAKERS[key])}",
+                f"must be left out of the figure {figure}, which does not show it;"
+                f" these do: {', '.join(TAKERS[key])}",
             )
     if position is not None:
         position = require("position", position)

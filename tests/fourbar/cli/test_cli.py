@@ -616,6 +616,10 @@ analyze @gallery/excavator_bucket.toml --pressure 210 | did you mean "210 bar"?
 plot @crank_rocker.toml -o a.svg --at 12 | did you mean "12 deg"?
 plot @capabilities/stroke_input.toml -o a.svg --at 350 | did you mean "350 mm"?
 plot @crank_rocker.toml -o a.doc | a.doc
+plot @crank_rocker.toml -o a.svg --figure bars --at 9deg | --at: must be left out of
+plot @crank_rocker.toml -o a.svg --figure torque --dimensions | --dimensions: must
+plot @crank_rocker.toml -o a.svg --figure pie | --figure = 'pie': must be one of
+mjcf @crank_rocker.toml -o a.xml --axis '0 0 0' | --axis = (0.0, 0.0, 0.0): must
 new --lengths 3 1 2 2 | name the new file once
 new a.toml --lengths 300 100 250 220 | --unit mm
 classify 30cm 100 250 220 | unit
@@ -704,6 +708,20 @@ def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
     assert re.search(rf"bar 4 +{limit:.4f} ", out)
     _, out, _ = run("analyze", CRANK_ROCKER, "--at", "t=0.1 s")
     assert f"at theta_2 = {math.degrees(1.0):.6g} deg" in out
+
+
+def test_a_value_that_no_position_has_leaves_the_others(run):
+    """In a circle of 0.1 m about O2 A_x is at most 0.1 m, and 0.05 m at 60 deg."""
+    wanted = ("--at", "A_x=0.2 m", "--at", "A_x=max", "--at", "60 deg")
+    code, out, err = run("analyze", CRANK_ROCKER, *wanted)
+    assert (code, err) == (0, "")
+    assert re.findall(r"^at theta_2 = (.*)", out, re.MULTILINE) == ["0 deg", "60 deg"]
+    left_out = "left out: --at A_x = 0.2 m: no position has it"
+    assert out.splitlines()[-1].startswith(left_out)
+    code, out, err = run("analyze", CRANK_ROCKER, *wanted, "--csv", "--columns", "A_x")
+    assert code == 0 and err.startswith(left_out)
+    assert [float(cell) for cell in out.split()[2:]] == approx([100.0, 50.0])
+    refuses(run("analyze", CRANK_ROCKER, *wanted[:2]), "error: --at A_x = 0.2 m: no")
 
 
 def test_points_in_the_table_have_the_coordinates_of_the_drawing(run):

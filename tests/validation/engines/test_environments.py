@@ -3,6 +3,7 @@
 Read from engines.toml, installed once, and judged side by side.
 """
 
+import re
 import shutil
 import sys
 import zipfile
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import fourbar
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import LONGEST_MESSAGE, DependencyError, InputError
 from fourbar.scene import command as list_positions
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments
@@ -235,3 +236,15 @@ def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known():
     known = r"must be among pinocchio-inverse, .*mujoco 3\.3\.7"
     with pytest.raises(InputError, match=known):
         choose_engines("nobody")
+    with pytest.raises(InputError, match="among Newton: MuJoCo solver, Newton: Kam"):
+        choose_engines("newton")
+
+
+def test_the_list_of_known_engines_has_whole_names():
+    with pytest.raises(InputError) as error:
+        choose_engines("nobody")
+    names, count = re.search(r"among (.*) and (\d+) more$", str(error.value)).groups()
+    table = fill_table()
+    assert set(names.split(", ")) < {*table}
+    assert len(names.split(", ")) + int(count) == len(table)
+    assert len(str(error.value)) < LONGEST_MESSAGE

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, list_allowed
 from fourbar_validation.engines.environments import (
     Entry,
     read_engines,
@@ -87,5 +87,5 @@ def _read_names(text: str, table: Table) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names or [text]:
         if name not in table:
-            raise InputError("--engines", name, f"must be among {', '.join(table)}")
+            raise InputError("--engines", name, list_allowed(name, table))
     return names

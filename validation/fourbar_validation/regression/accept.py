@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fourbar.errors import HOLDS, InputError
+from fourbar.errors import HOLDS, InputError, list_allowed
 from fourbar.writing import write_text
 from fourbar_validation.compare.results_file import CSV_ROWS
 from fourbar_validation.compare.rows import FAILS, Counts
@@ -44,8 +44,6 @@ FORMS: dict[str, Callable[[Differences], str]] = {
 """Forms in which the differences can be written, besides the text that is printed."""
 _FORM_NAMES = {"markdown": "Markdown", "html": "HTML", "junit": "JUnit"}
 """Names of these forms in help texts."""
-MOST_NAMES_LISTED = 50
-"""Names of a column that a message lists."""
 _CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 """Option, and the column that it chooses by."""
 
@@ -148,8 +146,8 @@ def _read_choice(
         offered = {*tables[0][column], *tables[1][column]}
         names = {name.strip() for name in text.split(",") if name.strip()}
         for name in sorted(names - offered) or ([] if names else [text]):
-            listed = ", ".join(sorted(offered)[:MOST_NAMES_LISTED])
-            raise InputError(f"--{option}", name, f"must be among {listed}")
+            allowed = list_allowed(name, sorted(offered))
+            raise InputError(f"--{option}", name, allowed)
         choice[column] = names
     return choice
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS, write_count
 from fourbar_validation.compare.rows import (
     COMPARED_VERDICTS,
     FAILS,
@@ -310,7 +310,7 @@ def _name(names: "Series[str]") -> list[str]:
     """Count rows by name; of more than MOST_ONE_BY_ONE names the others are one."""
     counts = names.value_counts(sort=False)
     lines = [
-        f"{name} ({n} row{'s' if n > 1 else ''})"
+        f"{name} ({write_count(n, 'row')})"
         for name, n in counts[:MOST_ONE_BY_ONE].items()
     ]
     more = counts[MOST_ONE_BY_ONE:]

@@ -18,7 +18,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, write_count
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.results_file import count_rows, read_columns, read_frame
 from fourbar_validation.compare.rows import Row, escape_controls, read_cell_text
@@ -189,7 +189,7 @@ def _require_undamaged(
             continue
         else:
             try:
-                rows = f"{count_rows(path)} rows"
+                rows = write_count(count_rows(path), "row")
             except (KeyError, OSError, ValueError):
                 rows = "no rows that can be read"
             why = (

@@ -12,6 +12,7 @@ from pathlib import Path
 import click
 import numpy as np
 
+from fourbar.errors import write_count
 from fourbar.formulas.mobility import (
     change_points,
     find_intervals,
@@ -136,8 +137,8 @@ def describe_judgement(judgement: LoopJudgement, stated: str) -> Iterator[Report
         yield f"note: {note}"
     yield from judgement.sentences()
     yield (
-        f"{judgement.counts.sentence()}. It differs in {len(judgement.differences)}"
-        " entries"
+        f"{judgement.counts.sentence()}. It differs in"
+        f" {write_count(len(judgement.differences), 'entry')}"
     )
 
 
@@ -390,8 +391,8 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         f"{name} {math.hypot(*force):.4g} N" for name, force in worst.forces.items()
     )
     yield (
-        f"under the torque, let go at {len(loop.torn)} positions: gap at most"
-        f" {1e3 * worst.gap:.3g} mm, when {loop.joint} has come to"
+        f"under the torque, let go at {write_count(len(loop.torn), 'position')}: gap at"
+        f" most {1e3 * worst.gap:.3g} mm, when {loop.joint} has come to"
         f" {write_degrees(worst.joint)} deg with {forces}"
     )
 

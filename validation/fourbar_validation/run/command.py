@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from fourbar.errors import HOLDS
+from fourbar.errors import HOLDS, write_count
 from fourbar.writing import write_text
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.regression.accept import add_output_options, report_differences
@@ -132,7 +132,8 @@ def run_command(**stated: Any) -> int:
         scenes = plan.count_scenes(plan.list_tasks(part))
         with ShownProgress(scenes) as progress:
             judge_part(plan, part, request, progress)
-        click.echo(f"part {request.part}: {scenes} scenes, in {request.out / 'parts'}")
+        count = write_count(scenes, "scene")
+        click.echo(f"part {request.part}: {count}, in {request.out / 'parts'}")
         plan.require_engines()
         return HOLDS
     with ShownProgress(len(plan.suite)) as progress:

@@ -484,7 +484,7 @@ OTHERS = {
 REFUSED = read_rows("""
 crank-rocker | {} | must
 crank-rocker | {"figure": "pie"} | must
-crank-rocker | {"figure": "torque", "dimensions": true} | must be left out of
+crank-rocker | {"figure": "torque", "dimensions": true} | left out of the figure torque
 crank-rocker | {"figure": "energy"} | free motion
 crank-rocker | {"figure": "stroke"} | needs a linear drive
 cylinder | {"figure": "stroke"} | needs a linear drive
