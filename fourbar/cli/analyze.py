@@ -428,7 +428,11 @@ def _write_positions(
     out: Path | None,
 ) -> str:
     """Write every position, as JSON, CSV or a table, whose columns may be named."""
-    from fourbar.show.acting import list_arm_notes, list_spring_notes
+    from fourbar.show.acting import (
+        list_arm_notes,
+        list_spring_notes,
+        list_torsion_notes,
+    )
     from fourbar.show.block import write_motor
     from fourbar.show.columns import choose_columns
     from fourbar.show.path_rows import collect_paths
@@ -441,6 +445,7 @@ def _write_positions(
     if form == "json":
         motor = write_motor(scene, solution, units)
         notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]
+        notes += list_torsion_notes(scene, solution, units)
         paths = collect_paths(solution, units)
         return write_json(solution, units, motor=motor, notes=notes, paths=paths)
     if form == "csv":

@@ -8,16 +8,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Spring, Springs
+from fourbar.effects import Spring, Springs, Torsion
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import FIRST_PIN
-from fourbar.quantities import Array
+from fourbar.linkage import FIRST_PIN, PINS
+from fourbar.quantities import WOUND, Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
-from fourbar.show.shown_units import write_short
+from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
 from fourbar.solution import Conversion, Solution
 from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
 from fourbar.studies.passing import SAME_POSITION
@@ -155,6 +155,47 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
             length = write_short(end, "m", units)
             said = sentence.format(length=length, where=where)
             notes.append(f"spring {number}{said}")
+    return notes
+
+
+def list_torsion_notes(
+    scene: Scene,
+    solution: Solution,
+    units: Conversion,
+) -> list[str]:
+    """Say how far torsion springs are wound at one position, and from what line.
+
+    Of a motion it is said that springs on the ground count from its line, where that is
+    not along x: the angle at O2 is not theta_2 then.
+    """
+    effects = scene.settled().effects
+    torsions = [effect for effect in effects if isinstance(effect, Torsion)]
+    springs = [row for effect in torsions for row in effect.springs]
+    theta_1 = math.remainder(scene.linkage.ground_angle, TURN)
+    on_ground = [pin for pin, *_ in springs if PINS[pin][0] == 1]
+    if abs(theta_1) < SAME_POSITION or not on_ground:
+        lies = ""
+    else:
+        angle = write_short(theta_1, "rad", units, digits=POSITION_DIGITS)
+        lies = f"the ground's line, which lies at {angle}"
+    if len(solution) > 1 or not solution.assembled[0]:
+        one = f"torsion spring{'s' if len(on_ground) > 1 else ''}"
+        said = f"{one} at {' and '.join(on_ground)}: rest counts from {lies}"
+        return [said] if lies else []
+    if solution.status_code[0] == WOUND:
+        return []
+    notes = []
+    state = compute_shown_state(scene, solution.at)
+    for pin, _, rest, _ in springs:
+        i, j = PINS[pin]
+        turned = state.direction(j) * np.conj(state.direction(i))
+        wound = np.angle(np.ravel(turned)[0] * np.exp(-1j * rest))
+        shown = drop_rounding(np.array([rest + wound, wound]), 1.0).tolist()
+        angle, by = (
+            write_short(one, "rad", units, digits=POSITION_DIGITS) for one in shown
+        )
+        line = f"the line of bar {i}" if i > 1 else lies or "the ground's line"
+        notes.append(f"torsion spring at {pin}: wound by {by}, at {angle} from {line}")
     return notes
 
 

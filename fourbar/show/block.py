@@ -32,6 +32,7 @@ from fourbar.show.acting import (
     list_drawn_notes,
     list_law_notes,
     list_spring_notes,
+    list_torsion_notes,
 )
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.columns import explain_static
@@ -773,6 +774,7 @@ class _SceneBlock:
         yield from list_arm_notes(scene)
         yield from list_law_notes(scene, self.units)
         yield from list_spring_notes(scene, solution, self.units)
+        yield from list_torsion_notes(scene, solution, self.units)
         if self.drive is not None and self._is_balanced():
             yield f"the {self.drive.name} is zero within rounding"
         elif facts.error is not None:

@@ -45,6 +45,21 @@ def reach(distance):
     return f"{math.degrees(math.asin(sine)):.4g} deg"
 
 
+def torsion(line, motion, **rests):
+    """A hatch on a ground at `line` degrees with torsion springs of these rests, deg.
+
+    Its bar 3 stays parallel to the ground.
+    """
+    springs = ", ".join(
+        f'{pin} = {{ stiffness = "1 N m/rad", rest = "{rest} deg" }}'
+        for pin, rest in rests.items()
+    )
+    text = hatch(motion=motion).replace(
+        "input =", f'ground_angle = "{line} deg"\ninput ='
+    )
+    return text.replace("[effects]", f"[effects]\ntorsion = {{ {springs} }}")
+
+
 DRIVE = """
 [drive]
 from = { bar = 1, from_pin = ["200 mm", "-90 deg"] }
@@ -93,11 +108,30 @@ side = "left"
 """
 TOO_LONG = "extended length of 400 mm"
 PULLS = "spring 1 pulls"
+AT_50 = 'theta_2 = "50 deg"\nomega_2 = "0 rad/s"\n'
+FROM_LINE = "from the ground's line, which lies at -20 deg"
 TOLD = [
     (hatch(), f"{TOO_LONG} from theta_2 = {reach(0.4)} on"),
     (hatch("600 mm"), f"compressed length of 450 mm up to theta_2 = {reach(0.45)}"),
     (hatch("300 mm"), "extended length of 300 mm throughout"),
     (hatch("600 mm", "300 mm"), "!gas spring"),
+    (torsion(-20, AT_50, O2=115), f"at O2: wound by -45 deg, at 70 deg {FROM_LINE}"),
+    (torsion(-20, AT_50, O4=290), f"at O4: wound by 140 deg, at 430 deg {FROM_LINE}"),
+    (
+        torsion(0, AT_50, O2=40),
+        "at O2: wound by 10 deg, at 50 deg from the ground's line",
+    ),
+    (
+        torsion(-20, AT_50, A=30),
+        "at A: wound by -100 deg, at -70 deg from the line of bar 2",
+    ),
+    (
+        torsion(-20, AT_50, B=70),
+        "at B: wound by 0 deg, at 70 deg from the line of bar 3",
+    ),
+    (torsion(-20, SWEEP, O2=9, O4=9), f"springs at O2 and O4: rest counts {FROM_LINE}"),
+    (torsion(0, SWEEP, O2=9), "!torsion"),
+    (torsion(-20, SWEEP, A=9), "!torsion"),
     (hatch(LONGEST), "!gas spring"),
     (hatch(motion=AT_80), f"longer than its {TOO_LONG} here"),
     (hatch(motion=LISTED), "at theta_2 = 80 deg and from theta_2 = 50 deg on"),
