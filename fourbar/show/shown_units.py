@@ -18,6 +18,8 @@ from fourbar.solution import DEGREES, SI, Conversion, find_unit_in
 
 ALLOWED_UNITS = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
 _PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp psi"}
+_FEET = "ft lbf lbf.ft lb deg rpm hp psi"
+"""Imperial units of a scene whose lengths are in feet."""
 STATABLE_UNITS = (
     "m",
     "N",
@@ -117,11 +119,18 @@ def suit_units(length: str) -> Conversion:
     Inches and feet give imperial units, other lengths `COMMON`: a result has the prefix
     that suits its size, where a message repeats the unit that was typed.
     """
-    from fourbar.quantities.units import IMPERIAL, find_unit
+    from fourbar.quantities.units import find_unit
 
-    if find_unit(length, "m").casefold() in IMPERIAL:
-        return units("imperial")
-    return COMMON
+    return _find_imperial(find_unit(length, "m")) or COMMON
+
+
+def _find_imperial(name: str) -> Conversion:
+    """Return the imperial units that suit a unit of length; none if it is metric."""
+    from fourbar.quantities.units import IMPERIAL
+
+    if name.casefold() not in IMPERIAL:
+        return SI
+    return units("imperial" if name.casefold().startswith("in") else _FEET)
 
 
 def units_of_length(length: str) -> Conversion:
@@ -135,7 +144,7 @@ def units_of_length(length: str) -> Conversion:
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
-    Lengths in inches or feet give imperial units; otherwise lengths have the unit of
+    Lengths in inches or feet give imperial units with these; otherwise lengths have the unit of
     lengths.ground, and speeds and accelerations of bars those that the motion is stated
     in, or rad/s if it is a released one. Tables that are no scene give `COMMON`: the
     reader says what is wrong with them.
@@ -174,11 +183,11 @@ def states_radians(document: Mapping[str, Any]) -> bool:
 @cache
 def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
     """Return the units that suit a length, speeds and accelerations as written."""
-    from fourbar.quantities.units import IMPERIAL, find_unit
+    from fourbar.quantities.units import find_unit
 
     name = find_unit(length, "m")
-    if name.casefold() in IMPERIAL:
-        shown = dict(units("imperial"))
+    if imperial := _find_imperial(name):
+        shown = dict(imperial)
     else:
         shown = {**COMMON, **(units(name) if name in _METRIC else {})}
     for texts in rates:

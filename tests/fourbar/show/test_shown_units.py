@@ -140,6 +140,19 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
     assert of_scene["rad/s"][0] == shown
 
 
+@pytest.mark.parametrize(
+    "length, names",
+    [("12 in", ["in", "in/s", "lbf in"]), ("1 foot", ["ft", "ft/s", "lbf ft"])],
+)
+def test_inches_and_feet_have_results_in_their_unit(length, names):
+    """12 in and 1 ft are 0.3048 m; 1 lbf ft is 1.35581795 N m."""
+    shown = units_of_scene({"lengths": {"ground": length}})
+    assert [shown[unit][0] for unit in ("m", "m/s", "N m")] == names
+    assert 0.3048 * shown["m"][1] == approx(float(length.split()[0]))
+    inches = 12.0 if names[0] == "in" else 1.0
+    assert 1.3558179483314004 * shown["N m"][1] == approx(inches)
+
+
 def test_a_ground_by_coordinates_has_their_unit():
     one = {"x": "3 in", "y": "1 in"}
     other = "3 in"
