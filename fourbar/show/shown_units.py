@@ -144,10 +144,10 @@ def units_of_length(length: str) -> Conversion:
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
-    Lengths in inches or feet give imperial units with these; otherwise lengths have the unit of
-    lengths.ground, and speeds and accelerations of bars those that the motion is stated
-    in, or rad/s if it is a released one. Tables that are no scene give `COMMON`: the
-    reader says what is wrong with them.
+    Lengths in inches or feet give imperial units with these; otherwise lengths have the
+    unit of lengths.ground, and speeds and accelerations of bars those that the motion
+    is stated in, or rad/s if it is a released one. Tables that are no scene give
+    `COMMON`: the reader says what is wrong with them.
     """
     try:
         length = str(find_length(document))

@@ -451,7 +451,7 @@ force = ["33 lbf", "-90 deg"]
 [effects]
 gravity = ["1 g_0", "-90 deg"]
 """,
-        {"torque": (12.0 * 38.0 * 4.0 * np.sin(np.radians(20.0)),)},
+        {"torque": (38.0 * 4.0 * np.sin(np.radians(20.0)),)},
     ),
 }
 
