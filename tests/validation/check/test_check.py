@@ -344,6 +344,16 @@ def in_other_frame(scene):
     return OURS if scene is TURNING else TURNING
 
 
+def mirrored(by):
+    """Reverse all that turns, the commanded angle too, and vectors by a factor."""
+    return changed(
+        lambda right: {
+            name: (by if name in VECTORS else -1.0) * values
+            for name, values in right.items()
+        }
+    )
+
+
 def differences(*at):
     """Rates by differences of angles at these steps; first and last for speeds."""
 
@@ -472,6 +482,7 @@ IN_CRANK_ROCKER = {
         for words, factor in {
             "rev/min taken for rad/s": 1.0 / RPM,
             "rad/s taken for rev/min": RPM,
+            "rev/s taken for rad/s": 0.5 / math.pi,
             "deg/s taken for rad/s": math.degrees(1.0),
             "rad/s taken for deg/s": math.radians(1.0),
         }.items()
@@ -504,6 +515,10 @@ IN_CRANK_ROCKER = {
     "read as degrees": shifted(np.radians),
     "in radians where degrees": units("theta_2", factor=math.pi / 180),
     "relative to bar 2": relative_to("theta_2"),
+    "omega_2 0.5 times ours": solved(speed=5.0),
+    "omega_2 1.7 times ours": solved(speed=17.0),
+    "theta_2 counted clockwise, with all angles and torques": mirrored(1.0),
+    "all angles and torques, and y reversed": mirrored((1.0, -1.0)),
     "one step late: numbers of the position before": changed(
         lambda right: {name: np.roll(right[name], 1, axis=0) for name in ALL}
     ),
@@ -655,6 +670,15 @@ def test_two_mistakes_in_two_columns_are_both_named(judged):
     assert causes["units: numbers"].quantities == ("torque",)
     assert causes["sign reversed,"].quantities == ("F43",)
     assert not any(one.complete for one in causes.values())
+
+
+def test_the_other_branch_is_named_where_the_torque_has_a_slip_besides(check):
+    numbers = right(OURS, branch=np.full(12, -1, np.int8))
+    numbers["torque"] *= 1.0 + 0.1 * np.sin(np.arange(12))
+    code, out, _ = check(OURS, write(numbers, ("theta_4", "torque")))
+    assert code == FAILED and out.count("looks like") == 1
+    assert "looks like: the other branch (explains theta_4)" in out
+    assert "no single known mistake explains the rest" in out
 
 
 EVERY_QUANTITY = [

@@ -346,7 +346,7 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, capsys):
     cost = "fourbar_validation.cost."
-    monkeypatch.setattr(f"{cost}study.CostStudy.points", lambda _: iter(()))
+    monkeypatch.setattr(f"{cost}work_precision.CostStudy.points", lambda _: iter(()))
     monkeypatch.setattr(f"{cost}cost.write_cost", lambda *_: [])
     law = ErrorLaw("order", "torque", 4.0, 0.1, 4.0, 9)
     for laws, code in (

@@ -14,7 +14,7 @@ import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, abbreviate
 from fourbar.files import load
-from fourbar.quantities import UNITS
+from fourbar.quantities import STAGE_OF, UNITS
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
 from fourbar_validation.check.csv_columns import list_names_of_points
@@ -207,7 +207,7 @@ def judge_table(
     if differing:
         if len(of_formulas) < len(table.values):
             judge = Judge(scene, replace(table, values=of_formulas), tolerance)
-        explanations = explain(judge, differing)
+        explanations = explain(judge, differing) or _explain_motion(judge, differing)
     else:
         explanations = []
     judgement = Judgement(
@@ -221,6 +221,21 @@ def judge_table(
     if tolerance is None and unexplained and judgement.agreed_power is None:
         return _explain_in_fewer_digits(scene, table, judgement)
     return judgement
+
+
+def _explain_motion(judge: Judge, differing: list[str]) -> list[Explanation]:
+    """Explain what differs in the motion where no mistake explains the forces too."""
+    values = {
+        key: values
+        for key, values in judge.table.values.items()
+        if STAGE_OF.get(name_quantity(key)) != "force"
+    }
+    wrong = [key for key in differing if key in values]
+    if len(wrong) in (0, len(differing)):
+        return []
+    table = replace(judge.table, values=values)
+    of_motion = Judge(judge.scene, table, judge.tolerance, judge.rows)
+    return [replace(one, complete=False) for one in explain(of_motion, wrong)]
 
 
 def _explain_in_fewer_digits(
@@ -480,7 +495,8 @@ def show_judgement(
     mended = judgement.explained_power
     if differing and mended is None:
         if not judgement.is_explained():
-            print_sentence("no single known mistake explains it")
+            what = "the rest" if judgement.explanations else "it"
+            print_sentence(f"no single known mistake explains {what}")
         elif not any(one.complete for one in judgement.explanations):
             print_sentence("these together explain all of it")
     if power is not None:

@@ -4,8 +4,9 @@ The number is a ratio, a factor, an offset or another order.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
+from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import Calculation, Change
@@ -29,6 +31,8 @@ from fourbar_validation.check.variants import (
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
 from fourbar_validation.scenes.bars import list_moving
 
+_Vary = Callable[[float], Variant]
+"""Function of a factor that returns the problem in which a number has it."""
 ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
@@ -67,8 +71,10 @@ _TRIED = 37
 """Rows by which the offsets are tried."""
 MOST_FITTED = 3
 """Quantities to which an offset is fitted, those of the motion first."""
-NEWTON = 6
-"""Steps of the fit; it is quadratic, and starts within 2.5 deg."""
+NEWTON = 9
+"""Steps of the fit. It is quadratic; an offset starts within 2.5 deg, and a speed that
+is a sixth of the right one takes eight steps.
+"""
 FIT_STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope, rad."""
 MOST_ROWS_REORDERED = 1000
@@ -91,8 +97,7 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         yield from _try_factors(judge, differing)
     if moved:
         yield from _try_offset(judge)
-        if any(key.startswith("theta") for key in judge.table.values):
-            yield from _try_lengths(judge)
+    yield from _try_motions(judge, lengths=moved)
 
 
 def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
@@ -310,18 +315,39 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     )
 
 
-def _try_lengths(judge: Judge) -> Iterator[Mistake]:
-    """Try other lengths, each fitted by Gauss and Newton from the right one."""
+def _list_varied(judge: Judge, scene: Scene, lengths: bool) -> dict[str, _Vary]:
+    """List the speed, and the lengths where angles are stated, as functions."""
+    varied: dict[str, _Vary] = {}
+    if lengths and any(key.startswith("theta") for key in judge.table.values):
+        usual = {name: bar.length for name, bar in list_moving(scene)}
+        for name, length in (*usual.items(), ("ground", scene.linkage.ground)):
+            varied[f"{name}: length"] = partial(_stretch, name, length)
+    if judge.at.speed is not None:
+        varied[f"omega_{judge.at.bar}"] = partial(_hasten, judge.at, judge.at.speed)
+    return varied
+
+
+def _stretch(name: str, length: float, factor: float) -> Variant:
+    return Variant(name, {f"lengths.{name}": factor * length})
+
+
+def _hasten(at: Command, speed: float | Array, factor: float) -> Variant:
+    return Variant("", at=at._replace(speed=factor * speed))
+
+
+def _try_motions(judge: Judge, *, lengths: bool) -> Iterator[Mistake]:
+    """Try another speed and other lengths, each fitted by Gauss and Newton."""
     scene = state_all(judge.scene)
-    lengths = {name: bar.length for name, bar in list_moving(scene)}
-    lengths["ground"] = scene.linkage.ground
+    varied = _list_varied(judge, scene, lengths)
+    if not varied:
+        return
     keys = _list_fitted(judge)
-    factors = dict.fromkeys(lengths, 1.0)
+    factors = dict.fromkeys(varied, 1.0)
 
     def predict_all(*shifts: float) -> list[Predict]:
         variants = [
-            Variant(name, {f"lengths.{name}": lengths[name] * (factors[name] + shift)})
-            for name in lengths
+            vary(factors[name] + shift)
+            for name, vary in varied.items()
             for shift in shifts
         ]
         return predict_variants(scene, judge.at, variants)
@@ -333,7 +359,7 @@ def _try_lengths(judge: Judge) -> Iterator[Mistake]:
             if predicted is not None:
                 theirs = judge.table.values[key]
                 parts.append(_compute_residual(judge, key, theirs, predicted))
-        return np.concatenate(parts)
+        return np.concatenate([np.zeros(0), *parts])
 
     least = math.inf
     for _ in range(NEWTON):
@@ -346,15 +372,15 @@ def _try_lengths(judge: Judge) -> Iterator[Mistake]:
         if not least < 0.5 * before:
             break  # nothing fits better, or only by rounding
         for name, here, more, less in zip(
-            lengths, residuals[::3], residuals[1::3], residuals[2::3], strict=True
+            varied, residuals[::3], residuals[1::3], residuals[2::3], strict=True
         ):
             slope = (less - more) / (2.0 * FIT_STEP)
             squares = float(slope @ slope)
             step = float(slope @ here) / squares if squares else math.nan
             if 0.0 < factors[name] + step < math.inf:
                 factors[name] += step
-    for name, predict in zip(lengths, predict_all(0.0), strict=True):
-        text = f"{name}: length {factors[name]:.6g} times ours (fitted)"
+    for name, predict in zip(varied, predict_all(0.0), strict=True):
+        text = f"{name} {factors[name]:.6g} times ours (fitted)"
         yield Mistake(text, predict, times=CARRIED)
 
 

@@ -48,9 +48,12 @@ _DEGREES_TAKEN = {
 _OF_SPEEDS = {
     "rev/min taken for rad/s": 1.0 / _RPM,
     "rad/s taken for rev/min": _RPM,
+    "rev/s taken for rad/s": 1.0 / TURN,
     **_DEGREES_TAKEN,
 }
 """The same of a speed."""
+_OTHER_BRANCH = "the other branch"
+_CLOCKWISE = "counted clockwise, with all angles and torques"
 MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
 _BETWEEN = {
@@ -192,13 +195,16 @@ def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
 def _list_other_commands(command: Command) -> Iterator[Variant]:
     name = command.commanded
     angle = command.angle
-    yield Variant("the other branch", at=command._replace(branch=-command.branch))
+    yield Variant(_OTHER_BRANCH, at=command._replace(branch=-command.branch))
     as_degrees = command._replace(angle=np.radians(angle))
     yield Variant(f"{name} read as degrees", at=as_degrees)
     # a whole turn is 6.28 of these degrees
     in_degrees = command._replace(angle=np.degrees(np.fmod(angle, TURN)))
     text = f"{name} in radians where degrees were announced"
     yield Variant(text, at=in_degrees, times=float(np.degrees(1.0)))
+    clockwise = f"{name} {_CLOCKWISE}"
+    for text, mirror in ((clockwise, 1.0), (f"{clockwise}, and y reversed", -1.0)):
+        yield Variant(text, at=command._replace(angle=-angle), mirror=mirror)
     if command.speed is not None:
         at_rest = command._replace(speed=0.0, acceleration=0.0)
         yield Variant("no inertial forces (statics)", at=at_rest)
@@ -344,7 +350,10 @@ class Explanation:
     def narrows(self, other: "Explanation") -> bool:
         """Tell whether the text adds to another's, and nothing shows what it adds."""
         more = (f"{other.text},", f"{other.text} ")
-        return self.quantities == other.quantities and self.text.startswith(more)
+        adds = self.text.startswith(more)
+        if other.text == _OTHER_BRANCH:  # its angles are those of the mirror image
+            adds = adds or _CLOCKWISE in self.text
+        return self.quantities == other.quantities and adds
 
 
 @np.errstate(all="ignore")

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.effects import Gravity
-from fourbar.quantities import UNITS, Array
+from fourbar.quantities import UNITS, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar.studies.keys import list_entries, read_number
@@ -25,7 +25,8 @@ Predict = Callable[[str, Solution], Array | None]
 None: the quantity has none.
 """
 
-
+_TURNING = ("rad", "rad/s", "rad/s^2", "N m")
+"""Units of what is reversed where angles are counted clockwise."""
 Wanted = Callable[[str], bool]
 """Function of the text of a mistake that returns True if it is tried."""
 
@@ -80,6 +81,9 @@ class Variant(NamedTuple):
     """Quantities that were taken from it."""
     times: float = 1.0
     """Factor on what is allowed, where the rounding of an angle is magnified."""
+    mirror: float = 0.0
+    """Factor on y where angles, their rates and torques are reversed; 0: they are not.
+    """
 
 
 def state_all(scene: Scene) -> Scene:
@@ -120,16 +124,23 @@ def predict_variants(
     stage = "position" if at.speed is None else "force"
     wrong = Study(scene, values, invalid, together).solve(stage)
 
-    def predict_member(member: int, names: Collection[str]) -> Predict:
+    def predict_member(member: int, variant: Variant) -> Predict:
         def predict(quantity: str, right: Solution) -> Array | None:
             values = getattr(wrong, quantity, None)
-            if values is None or quantity not in names or quantity == right.commanded:
+            if values is None or quantity == right.commanded:
                 return None
-            return np.asarray(values[member])
+            if quantity not in variant.names:
+                return None
+            factor: Any = 1.0
+            if variant.mirror and quantity in VECTORS:
+                factor = 1.0, variant.mirror
+            elif variant.mirror and UNITS[quantity] in _TURNING:
+                factor = -1.0
+            return np.asarray(values[member] * factor)
 
         return predict
 
-    return [predict_member(i, variant.names) for i, variant in enumerate(variants)]
+    return [predict_member(i, variant) for i, variant in enumerate(variants)]
 
 
 def _leave_out_lost(command: Command) -> Command:
