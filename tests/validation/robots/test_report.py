@@ -64,7 +64,7 @@ def test_what_was_switched_off_and_left_out_is_said():
     )
     assert "contacts, joint limits and motors are off" in text
     let_go = len(measured().loops[0].torn)
-    assert f"under the torque, let go at {let_go} positions: gap at most" in text
+    assert f"under the torque, let go from rest at {let_go} positions for ten" in text
     assert "with rigid pins the robot differs from the formulas by" in text
 
 
@@ -222,7 +222,8 @@ def test_advice_begins_with_what_was_reached(changes, error, reached, said):
     settings = RobotSettings((0.02, 1.0), (0.9,), 0.001, "Euler", "Newton", 100, 1e-8)
     worst = WorstState(error, "F12", 0.5, 0.5)
     tried = TriedSettings(settings, changes, worst, WorstState(0.0), 0.0, 1e-6)
-    advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None)
+    without = math.inf if reached else 0.4 * error
+    advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None, ("knee",), without)
     assert advice.reached == reached
     loop = SimpleNamespace(
         refusal="too many steps", scene=SCENE, turned=0.0, joint="knee"
@@ -232,5 +233,7 @@ def test_advice_begins_with_what_was_reached(changes, error, reached, said):
     assert first.startswith(said)
     no_part = any("No part of the range" in str(block) for block in others)
     assert no_part == (error == 0.1)
+    held = any("knee (frictionloss) holds it back" in str(block) for block in others)
+    assert held == no_part
     decides = "F12 at single states decides, at knee = 28.65 deg"
     assert (decides in others) == math.isfinite(error)

@@ -81,8 +81,8 @@ torque_option = click.option(
     "--torque",
     metavar="T",
     help=(
-        "Torque of the motor, N m or with a unit, under which the gap and the pin"
-        " forces are printed."
+        "Torque of the motor on its joint, N m or with a unit: the loop is let go under"
+        " it from rest, and the largest gap is printed with the pin forces."
     ),
 )
 

@@ -235,9 +235,9 @@ def _describe_loop(
         count = sum(name in row.sticking for row in loop.states.rows)
         yield (
             f"note: at {count} of {len(loop.states.rows)} states the dry"
-            f" friction of {name} is less than its couple: it turns too slowly there"
-            " for MuJoCo's soft friction (solreffriction and solimpfriction of the"
-            " joint)"
+            f" friction of {name} does not oppose its motion in full: it turns too"
+            " slowly there, or accelerates too fast, for MuJoCo's soft friction"
+            " (solreffriction and solimpfriction of the joint)"
         )
     yield from _describe_torn(loop)
     for remark in loop.remarks:
@@ -391,8 +391,10 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
         f"{name} {math.hypot(*force):.4g} N" for name, force in worst.forces.items()
     )
     yield (
-        f"under the torque, let go at {write_count(len(loop.torn), 'position')}: gap at"
-        f" most {1e3 * worst.gap:.3g} mm, when {loop.joint} has come to"
+        "under the torque, let go from rest at"
+        f" {write_count(len(loop.torn), 'position')} for ten time constants of the"
+        " closure, with the file's joint limits: gap at most"
+        f" {1e3 * worst.gap:.3g} mm, when {loop.joint} has come to"
         f" {write_degrees(worst.joint)} deg with {forces}"
     )
 
@@ -455,6 +457,13 @@ def _describe_deciding(
         )
     elif not advice.reached and math.isfinite(advice.best.error):
         yield "No part of the range was found in which it is within the wanted error."
+    if advice.without_friction < 0.5 * advice.best.error:
+        yield (
+            f"The dry friction of {', '.join(advice.rubbing)} (frictionloss) holds it"
+            f" back: without it the error would be {advice.without_friction:.2g}."
+            " MuJoCo's is soft: it opposes a motion in full only where the joint turns"
+            " fast enough for its acceleration"
+        )
 
 
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:

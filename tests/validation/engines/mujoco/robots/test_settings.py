@@ -4,7 +4,10 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.answers import (
@@ -159,6 +162,69 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     assert within[0] == pytest.approx(0.0, abs=1e-9) and 4 < count < 8
     assert search(0, count).measure(stiff).error <= wanted
     assert search(0, 8).find_range(stiff, 1e-12) is None
+
+
+TURN = math.acos((0.32**2 + 0.3**2 - 0.15**2) / (2.0 * 0.32 * 0.3))
+"""rad; crank and rod are in line there, and the shank turns back."""
+LOSS = 1.0
+"""N m."""
+
+
+def couple_in_plain_mujoco(text, angle, speed):
+    """Find what turns the crank of the leg uniformly, N m, and omega_4 over omega_2."""
+
+    def turns(angle):
+        pin, knee = bend(angle)
+        bars = np.angle([pin, knee - pin, knee - 0.3])
+        return np.array([bars[0], bars[1] - bars[0], bars[2]])
+
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    data = mujoco.MjData(model)
+    rates = (turns(angle + 1e-6) - turns(angle - 1e-6)) / 2e-6
+
+    def accelerate(couple):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = turns(angle) - turns(math.radians(10.0))
+        data.qvel[:] = rates * speed
+        data.qfrc_applied[0] = couple
+        mujoco.mj_forward(model, data)
+        return data.qacc[0]
+
+    return brentq(accelerate, -10.0, 10.0, xtol=1e-12), rates[2]
+
+
+@pytest.mark.slow
+def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
+    """Dry friction asks for its couple times |omega_4 / omega_2|: virtual work."""
+    speed = 10.0
+    leg = write_leg(1)
+    free = '<joint name="shank" axis="0 -1 0"'
+    file = replace(leg, text=leg.text.replace(free, f'{free} frictionloss="{LOSS}"'))
+    posed = pose_robot(compile_robot(file).model, PoseOptions())
+    (loop,) = (one.loop for one in find_closures(posed, PoseOptions()))
+    assert loop is not None
+    first = loop.angles[1] + TURN - math.radians(10.0)
+    angles = tuple(first + math.radians(6.0 * step - 15.0) for step in range(9))
+    motion = LoopMotion(angles, speed, 0.0)
+    search = SettingsSearch(LoopInside(posed.model, loop), motion)
+    stiff = replace(search.own, solimp=STIFFEST_IMPEDANCE)
+    rows = search._answer(stiff, motion)[0].rows
+    assert [bool(row.sticking) for row in rows] == [step == 2 for step in range(9)]
+    advice = search.advise(0.01, file)
+    assert advice.reached and "solreffriction" in advice.best.changes
+    closure, joint = (one.removesuffix(" />") for one in advice.typed[-2:])
+    plain = closure[: closure.index(" sol")]
+    assert plain in leg.text and joint.startswith(f'{free} frictionloss="{LOSS}" sol')
+
+    def ask(hinge):
+        text = leg.text.replace(plain, closure).replace(free, hinge)
+        return couple_in_plain_mujoco(text, TURN - math.radians(3.0), speed)
+
+    smooth, rate = ask(free)
+    due = LOSS * abs(rate)
+    assert ask(joint)[0] - smooth == pytest.approx(due, rel=0.02)
+    assert ask(f'{free} frictionloss="{LOSS}"')[0] - smooth < 0.0
 
 
 @pytest.mark.slow

@@ -163,7 +163,7 @@ class InsideRow:
     condition: float
     """|sin| of the angle between the bars that follow in that closed state."""
     sticking: tuple[str, ...] = ()
-    """Hinges that turn and whose dry friction MuJoCo has not let reach its couple."""
+    """Hinges that turn and whose dry friction does not oppose it in full in MuJoCo."""
 
 
 @dataclass(slots=True)
@@ -266,6 +266,9 @@ class RobotSettings:
     solver: str
     iterations: int
     tolerance: float
+    solreffriction: tuple[float, ...] | None = None
+    """Of the loop's hinges with dry friction; None: as each has it in the file."""
+    solimpfriction: tuple[float, ...] | None = None
 
     def list_changes(self, other: "RobotSettings") -> dict[str, str]:
         """List the attributes in which this differs from another, as MJCF has them."""
@@ -326,6 +329,12 @@ class SettingsAdvice:
     within: tuple[float, float] | None
     """Widest range of the driven joint found, rad, in which the best combination is
     within the wanted error. None where it is so everywhere, or in no range tried.
+    """
+    rubbing: tuple[str, ...] = ()
+    """Hinges of the loop with dry friction."""
+    without_friction: float = math.inf
+    """Error of the best combination without this friction; infinite if it was not
+    asked.
     """
 
     @property

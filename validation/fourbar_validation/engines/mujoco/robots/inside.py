@@ -545,7 +545,8 @@ class LoopInside:
     def _list_sticking(self) -> tuple[str, ...]:
         """List the hinges of the loop that turn and stick.
 
-        A hinge sticks if its dry friction has not reached its couple.
+        A hinge sticks if its dry friction does not oppose its motion in full: the
+        soft constraint may even push it on.
         """
         model = self.model
         data = self.data
@@ -554,8 +555,8 @@ class LoopInside:
         for row in np.flatnonzero(kinds == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF):
             dof = int(data.efc_id[row])
             reached = _REACHED * model.dof_frictionloss[dof]
-            sticks = abs(data.efc_force[row]) < reached and data.qvel[dof]
-            if dof in self.moving and sticks:
+            opposes = -data.efc_force[row] * np.sign(data.qvel[dof])
+            if dof in self.moving and data.qvel[dof] and opposes < reached:
                 names.append(name_joint(model, int(model.dof_jntid[dof])))
         return tuple(names)
 

@@ -18,6 +18,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 
 from fourbar.errors import LimitError
+from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     LoopMotion,
@@ -56,6 +57,8 @@ wanted error everywhere.
 """
 _FIRST_CONSTANT = 0.02
 """MuJoCo's own time constant, s, tried if the file states a stiffness in its place."""
+_OF_CLOSURES = ("solref", "solimp")
+_OF_FRICTION = ("solreffriction", "solimpfriction")
 
 
 def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
@@ -82,6 +85,14 @@ def _name_value(
     return next(word for word in words if word.upper() == name)
 
 
+def _list_rubbing(model: mujoco.MjModel, loop: RobotLoop) -> list[int]:
+    """List the degrees of freedom of a loop's hinges with dry friction."""
+    if not is_enabled(model, "frictionloss", "constraint"):
+        return []
+    dofs: list[int] = model.jnt_dofadr[[*loop.hinges.values()]].tolist()
+    return [dof for dof in dofs if model.dof_frictionloss[dof]]
+
+
 def _set_settings(
     model: mujoco.MjModel,
     loop: RobotLoop,
@@ -95,6 +106,11 @@ def _set_settings(
     for equality in loop.closures:
         changed.eq_solref[equality] = settings.solref
         changed.eq_solimp[equality] = settings.solimp
+    rubbing = _list_rubbing(model, loop)
+    if settings.solreffriction is not None:
+        changed.dof_solref[rubbing] = settings.solreffriction
+    if settings.solimpfriction is not None:
+        changed.dof_solimp[rubbing] = settings.solimpfriction
     option = changed.opt
     option.timestep = settings.timestep
     integrators = mujoco.mjtIntegrator
@@ -118,6 +134,7 @@ class SettingsSearch:
         self.whole = motion
         self.motion = motion.thin_out(POSITIONS_OF_A_TRIAL)
         self.own = read_settings(inside.given, inside.loop)
+        self.rubbing = _list_rubbing(inside.given, inside.loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
         self.end = time.process_time() + SEARCH_SECONDS * share
 
@@ -128,8 +145,13 @@ class SettingsSearch:
         best = self._find_cheapest(wanted)
         tried = len(self.tried)
         within = None
+        without = math.inf
         if best.error > wanted:
             within = self.find_range(best.settings, wanted)
+            without = self._measure_without_friction(best.settings)
+        model = self.inside.given
+        joints = model.dof_jntid[self.rubbing].tolist()
+        rubbing = tuple(name_joint(model, joint) for joint in joints)
         return SettingsAdvice(
             wanted,
             len(self.motion.angle),
@@ -137,8 +159,10 @@ class SettingsSearch:
             tuple(alone),
             best,
             tried,
-            _write_elements(file, self.inside.loop, best),
+            _write_elements(file, self.inside.loop, best, rubbing),
             within,
+            rubbing,
+            without,
         )
 
     def _answer(
@@ -197,6 +221,21 @@ class SettingsSearch:
                 return min(ends), max(ends)
         return None
 
+    def _measure_without_friction(self, settings: RobotSettings) -> float:
+        """Return the error of settings if no hinge of the loop has dry friction.
+
+        It is infinite if none has.
+        """
+        if not self.rubbing:
+            return math.inf
+        given = self.inside
+        model = copy(given.given)
+        model.dof_frictionloss[self.rubbing] = 0.0
+        inside = LoopInside(
+            model, given.loop, given.acting, bar=given.bar, branch=given.branch
+        )
+        return SettingsSearch(inside, self.motion).measure(settings).error
+
     def measure(self, settings: RobotSettings) -> TriedSettings:
         """Measure what settings reach."""
         if settings in self.tried:
@@ -240,6 +279,9 @@ class SettingsSearch:
         shortest = FEWEST_TIMESTEPS * own.timestep
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
+        model = self.inside.given
+        soft_friction = model.dof_solref[self.rubbing, 0] > shortest
+        yielding = model.dof_solimp[self.rubbing, 1] < STIFFEST_IMPEDANCE[1]
         return {
             "solimp": [
                 own.solimp,
@@ -251,6 +293,11 @@ class SettingsSearch:
                 *(name for name in INTEGRATORS_TRIED if name != own.integrator),
             ],
             "timestep": [own.timestep, *(factor * own.timestep for factor in _FINER)],
+            "solreffriction": [
+                None,
+                *([(shortest, 1.0)] if soft_friction.any() else []),
+            ],
+            "solimpfriction": [None, *([STIFFEST_IMPEDANCE] if yielding.any() else [])],
         }
 
     def _find_cheapest(self, wanted: float) -> TriedSettings:
@@ -292,16 +339,22 @@ def _write_elements(
     file: RobotFile,
     loop: RobotLoop,
     tried: TriedSettings,
+    rubbing: Sequence[str],
 ) -> tuple[str, ...]:
-    """Return the elements of the file that are to be changed, with their new values."""
+    """Return the elements of the file that are to be changed, with their new values.
+
+    `rubbing`: hinges with dry friction.
+    """
     written = []
     option = dict(tried.changes)
-    names: list[str] = [name for name in ("solref", "solimp") if name in option]
-    closure = {name: option.pop(name) for name in names}
+    closure, friction = (
+        {name: option.pop(name) for name in names if name in option}
+        for names in (_OF_CLOSURES, _OF_FRICTION)
+    )
     if option:
         written.append(ET.tostring(ET.Element("option", option), encoding="unicode"))
+    root = ET.fromstring(file.text)
     if closure:
-        root = ET.fromstring(file.text)
         equalities = [
             element for section in root.iter("equality") for element in section
         ]
@@ -311,4 +364,10 @@ def _write_elements(
                 equalities[number].tag, {**equalities[number].attrib, **closure}
             )
             written.append(ET.tostring(element, encoding="unicode"))
+    joints = [one for body in root.iter("worldbody") for one in body.iter("joint")]
+    stated = {joint.get("name"): joint.attrib for joint in joints}
+    for name in rubbing if friction else ():
+        attributes = {"name": name, **stated.get(name, {}), **friction}
+        element = ET.Element("joint", attributes)
+        written.append(ET.tostring(element, encoding="unicode"))
     return tuple(written)
