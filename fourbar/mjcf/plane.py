@@ -82,7 +82,7 @@ class Plane:
         f = 1.0 / self._one_plus_z
         mixed = -x * y * f
         rows = [[1.0 - x * x * f, mixed, x], [mixed, 1.0 - y * y * f, y], [-x, -y, z]]
-        return np.array(rows)
+        return np.array(rows) + 0.0  # no zero has a sign
 
     @property
     def roll_pitch_yaw(self) -> Vector:

@@ -177,7 +177,7 @@ DAMAGE = (
         "4 rows of 4, and not the SHA-256",
     ),
     (TABLE, lambda _: b"\xff", "no rows that can be read"),
-    (TIMINGS, lambda text: text.replace(b"3.0", b"3.1"), "1 rows of 1"),
+    (TIMINGS, lambda text: text.replace(b"3.0", b"3.1"), "1 row of 1"),
     (TIMINGS, None, "is missing"),
     ("results.parquet", lambda _: b"", "is not of this run"),
     *(
@@ -355,9 +355,9 @@ def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
     """They are too long for a text, and for a history."""
     scenes = 300
     for name, few in (
-        ("compare.columns.GROUP_ROWS", 60),
-        ("compare.columns.BATCH_ROWS", 60),
-        ("compare.columns.CSV_ROWS", 100),
+        ("compare.results_file.GROUP_ROWS", 60),
+        ("compare.results_file.BATCH_ROWS", 60),
+        ("compare.results_file.CSV_ROWS", 100),
         ("regression.accept.CSV_ROWS", 100),
     ):
         monkeypatch.setattr(f"fourbar_validation.{name}", few)
