@@ -63,21 +63,21 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     drive_bar: int
     """2, 3 or 4; None where the drive exerts a force."""
     status_code: NDArray[np.uint8]
-    """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular
-    (velocities are 0/0); of friction that depends on the pin forces: 3 jammed (no
-    forces fulfil it: they are NaN; at rest, where it is the motion that would begin,
-    torque_low or torque_high is), 4 several (more than one set does: those of the least
-    friction); of springs, forces NaN: 5 no_direction (both ends in one point), 6 wound
-    (turned beyond half a turn from rest). 7 no_torque: the two bars that are not driven
-    are in line, no couple on the driven bar holds them in balance, forces are NaN (T3
-    and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond
-    the range of doubles; from the first stage (position, velocity, ...) that meets them
-    on everything is NaN. 9 invalid: a member of a study with numbers that a scene
-    refuses (a length that is not positive, a mass below 0); all of it is NaN. 10
-    no_lever: the stroke of a linear drive stands still, or the point of a driving force
-    moves across its direction; forces are NaN. 11 change_point: all bars are in line;
-    positions, speeds and the drive are their limits along the assembly, pin forces,
-    which have no bound there, are NaN.
+    """0 ok: every quantity that was requested is a number. 1 not_assembled: all but
+    what is commanded is NaN. 2 singular (velocities are 0/0); of friction that depends
+    on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is
+    the motion that would begin, torque_low or torque_high is), 4 several (more than one
+    set does: those of the least friction); of springs, forces NaN: 5 no_direction (both
+    ends in one point), 6 wound (turned beyond half a turn from rest). 7 no_torque: the
+    two bars that are not driven are in line, no couple on the driven bar holds them in
+    balance, forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8
+    overflow: numbers beyond the range of doubles; from the first stage (position,
+    velocity, ...) that meets them on everything is NaN. 9 invalid: a member of a study
+    with numbers that a scene refuses (a length that is not positive, a mass below 0);
+    all of it is NaN. 10 no_lever: the stroke of a linear drive stands still, or the
+    point of a driving force moves across its direction; forces are NaN. 11
+    change_point: all bars are in line; positions, speeds and the drive are their limits
+    along the assembly, pin forces, which have no bound there, are NaN.
     """
     branch: NDArray[np.int8]
     """Sign of sin(theta_4 - theta_3): +1 or -1."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     "--all",
     "everything",
     is_flag=True,
-    help="Print the limits of all bars, not only of the output.",
+    help="Print the limits of the coupler too.",
 )
 @given.json_option
 @given.text_option(*given.TABLE_ENDINGS)

@@ -42,6 +42,7 @@ from fourbar.quantities import (
     WOUND,
 )
 from fourbar.scene import Command
+from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.scene.numbers import POINT_STAGES
 
 if TYPE_CHECKING:
@@ -98,6 +99,8 @@ def evaluate(
     if "condition" in wanted:
         values["condition"] = values["condition"] * command.condition
     codes = _find_codes_of_loop(case.path, state, command)
+    if is_any(codes == NOT_ASSEMBLED):
+        _withhold_unassembled(codes, values, command)
     if last_stage < FORCE:
         return Evaluated(codes, values, state)
     dynamics = case.dynamics(state, command.acceleration, case.side)
@@ -156,6 +159,18 @@ def _find_codes_of_loop(path: LoopPath, state: State, command: Command) -> Any:
     # theta_2 - theta_1 overflows, so the loop cannot be evaluated
     codes[np.isnan(half.kk)] = OVERFLOW
     return codes
+
+
+def _withhold_unassembled(
+    codes: NDArray[np.uint8], values: dict[str, Any], command: Command
+) -> None:
+    """Put NaN where the loop does not close, for all but what is commanded.
+
+    Points of the commanded bar, and the stroke of a cylinder on it, would go on there.
+    """
+    missing = codes == NOT_ASSEMBLED
+    for name in values.keys() - {*COMMAND_NAMES[command.bar], *command.names}:
+        values[name] = np.where(missing, _make_no_value(values[name]), values[name])
 
 
 def _list_forces(

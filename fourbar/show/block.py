@@ -40,6 +40,7 @@ from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import acts, find_drive_rounding
+from fourbar.show.panels import TIED
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import (
     COMMON,
@@ -557,7 +558,7 @@ class _SceneBlock:
         if duty.peak_power is None:
             row = self._write_growth("power")
         else:
-            row = f"peak {self._value(duty.peak_power, 'W')}{self._of_positions}"
+            row = f"peak {self._write_peak_power(duty.peak_power)}{self._of_positions}"
         energies = duty.energy_in, duty.energy_out
         if facts.kind != "list" and None not in energies:
             over = "over the motion" if facts.kind == "law" else "over the sweep"
@@ -582,8 +583,18 @@ class _SceneBlock:
         mean = ""
         if duty.rms_torque is not None:
             mean = f" (RMS {self._beside(duty.rms_torque, 'N m', duty.peak_torque)})"
-        power = self._value(duty.peak_power, "W")
+        power = self._write_peak_power(duty.peak_power)
         return f"at least {torque} at {speed}{mean}, {power}"
+
+    def _write_peak_power(self, peak: float) -> str:
+        """Write the largest power; if the drive brakes there, say what drives too."""
+        panels = self.facts.motion.panels
+        driving = max(panels.find_peak("power", 1).value, 0.0)
+        text = self._value(peak, "W")
+        if driving >= (1.0 - TIED) * peak:
+            return text
+        driving = 0.0 if driving <= SHOWN_AS_ZERO * peak else driving
+        return f"{text} braking, {self._value(driving, 'W', peak)} driving"
 
     def _write_cycle(self, duty: MotorDuty) -> Iterator[str]:
         """Write the mean torque of a closed sweep, and what a flywheel must store."""

@@ -262,6 +262,8 @@ def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
     """Sum up the duty over the positions of a list, or of each member of a study."""
     values = getattr(solution, drive.keys.value)
     power = _require_quantity(solution, "power")
+    speed = _require_quantity(solution, drive.speed_key)
+    speed = np.where(solution.assembled, speed, np.nan)
     closed = is_once_round(solution)
     peak = _find_peak_value(values)
     rms = _find_rms(solution, values)
@@ -274,7 +276,7 @@ def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
         mean_torque = _find_mean_torque(solution, work)
     return MotorDuty(
         **_name_effort(solution, peak, rms),
-        peak_speed=_find_peak_value(_require_quantity(solution, drive.speed_key)),
+        peak_speed=_find_peak_value(speed),
         peak_power=_find_peak_value(power),
         rms_power=_find_rms(solution, power),
         energy_in=energy_in,

@@ -336,20 +336,28 @@ def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
 
 
 def _list_position_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
-    """List the curves of the positions alone, by name."""
+    """List the curves of the positions alone, by name.
+
+    A commanded angle has a value where the linkage does not assemble, too.
+    """
     curves = {name: getattr(solution, name) for name in _POSITION_CURVES}
     if solution.stroke is not None:
-        curves["stroke"] = solution.stroke
+        curves["stroke"] = np.where(solution.assembled, solution.stroke, np.nan)
     return curves
 
 
 def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
-    """List the curves of loads, or where nothing acts of rates, by name."""
+    """List the curves of loads, or where nothing acts of rates, by name.
+
+    Commanded rates end, as all others do, where the linkage ceases to assemble.
+    """
     curves = {}
+    missing = ~solution.assembled
     if solution.omega_4 is not None and not (acts(scene) and solution.F12 is not None):
         for letter in ("omega", "alpha"):
             for bar in MOVING_BARS:
-                curves[f"{letter}_{bar}"] = getattr(solution, f"{letter}_{bar}")
+                rate = getattr(solution, f"{letter}_{bar}")
+                curves[f"{letter}_{bar}"] = np.where(missing, np.nan, rate)
     if solution.F12 is None:
         return curves
     loads = compute_pin_loads(solution)
@@ -364,7 +372,7 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
         return curves
     # what a balanced linkage leaves of a load is rounding, and has no peak
     idle = drive.sizes <= SHOWN_AS_ZERO * largest * _find_longest_arm(solution)
-    curves["speed"] = getattr(solution, drive.speed_key)
+    curves["speed"] = np.where(missing, np.nan, getattr(solution, drive.speed_key))
     for name in (drive.keys.value, "power"):
         curves[name] = np.where(idle, 0.0, getattr(solution, name))
     return curves

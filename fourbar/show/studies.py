@@ -66,8 +66,8 @@ def write_type(
 
     Further lines say which bars turn, how far, and between which limits.
 
-    `units`: of the lengths; None where they are ratios. `everything`: the limits of all
-    bars, not of the output alone.
+    `units`: of the lengths; None where they are ratios. `everything`: the limits of the
+    coupler too.
     """
     mobility = classify(linkage)
     relation = {1.0: "<", -1.0: ">", 0.0: "="}[float(np.sign(mobility.surplus))]
@@ -135,7 +135,7 @@ def _write_mobility(
         yield f"bars that swing: {', '.join(swings)}"
     limits = [
         (bar, limit)
-        for bar in (MOVING_BARS if everything else (4,))
+        for bar in (MOVING_BARS if everything else (2, 4))
         for limit in limit_positions(linkage, bar)
     ]
     if limits:

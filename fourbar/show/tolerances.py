@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, write_count
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
@@ -48,6 +49,12 @@ TOLERANCE_SCHEMA = "fourbar-tolerance/1"
 
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
+    """List what is drawn, and the angles that follow the command."""
+    parts = list_drawn_parts(spreads)
+    return list(dict.fromkeys([*parts, *_list_angles(spreads)]))
+
+
+def list_drawn_parts(spreads: Tolerances) -> list[str]:
     """List torque, magnitudes of pin forces and the scene's points.
 
     If the scene states no speed, or nothing loads its drive at any position, angles
@@ -56,11 +63,19 @@ def list_shown_parts(spreads: Tolerances) -> list[str]:
     parts = [
         name
         for name in (COUPLE.value, LINE.value)
-        if name in spreads.spreads and np.any(spreads.spreads[name].nominal)
+        if name in spreads.spreads
+        and np.nan_to_num(spreads.spreads[name].nominal).any()
     ]
-    parts += [f"|{name}|" for name in PIN_FORCES] if parts else ["theta_3", "theta_4"]
+    parts += [f"|{name}|" for name in PIN_FORCES] if parts else _list_angles(spreads)
     points = [point.name for point in spreads.scene.points]
     return [*parts, *(f"{name}_{letter}" for name in points for letter in "xy")]
+
+
+def _list_angles(spreads: Tolerances) -> list[str]:
+    """List the angles that follow the command."""
+    angles = [f"theta_{bar}" for bar in MOVING_BARS]
+    commanded = spreads.scene.motion.commanded
+    return [name for name in angles if name in spreads.spreads and name != commanded]
 
 
 def find_part_unit(part: str) -> str:

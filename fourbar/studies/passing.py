@@ -224,8 +224,12 @@ def _find_times(scene: Scene, name: str, value: float) -> Command:
             )
         return course.command(np.array([value]))
 
+    def read(solution: Solution) -> Array:
+        values = _require_values(getattr(solution, name), name)
+        return np.where(solution.assembled, values, np.nan)
+
     def measure_gaps(solution: Solution) -> Array:
-        gaps = _require_values(getattr(solution, name), name) - value
+        gaps = read(solution) - value
         if name in COMMANDED_ANGLES:
             gaps = np.angle(np.exp(1j * gaps))
         return np.asarray(gaps)
@@ -248,7 +252,7 @@ def _find_times(scene: Scene, name: str, value: float) -> Command:
         )
         times = np.concatenate([times, passed])
     if not times.size:
-        low, high = _write_extent(getattr(course.solution, name), name)
+        low, high = _write_extent(read(course.solution), name)
         raise NotAssembledError(
             f"{_say_position(name, value)}: the motion does not pass it; it stays"
             f" within {low} and {high}"

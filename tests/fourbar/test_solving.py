@@ -18,6 +18,7 @@ from fourbar import Bar, FourBar, uniform
 from fourbar.effects import (
     Friction,
     Gravity,
+    LinearDrive,
     Load,
     PinFriction,
     Place,
@@ -32,6 +33,7 @@ from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
+from fourbar.scene.numbers import Point
 from fourbar.show.plot import draw
 from fourbar.solving import solve
 from tests.support.scenes import bare, crank_rocker
@@ -185,6 +187,25 @@ def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene, stag
         if (values := getattr(solution, name)) is not None and np.isinf(values).any()
     ]
     assert infinite == [], "no value is NaN, never infinite"
+
+
+@pytest.mark.parametrize("kind", ("angle", "stroke"))
+def test_where_the_loop_does_not_close_only_what_is_commanded_has_a_value(kind):
+    """Bar 2 alone, its points and the stroke of its cylinder would go on."""
+    cylinder = LinearDrive(Place(1, (0.25, -1.0)), Place(2, (0.2, 0.0)))
+    motion = Motion(Sweep(0.0, 1.5, 20), 1.0)
+    if kind == "stroke":
+        motion = Motion(stroke=Sweep(0.3, 0.44, 20), stroke_speed=0.1, side="left")
+    points = (Point("P", 2, (0.3, 0.1)),)
+    linkage = bare(0.6, 0.3, 0.35, 0.25)
+    solution = solve(Scene(linkage, motion, points=points, drive=cylinder))
+    open_ = ~solution.assembled
+    commanded = {"theta_2", "omega_2", "alpha_2"}
+    assert 0 < open_.sum() < len(solution)
+    commanded |= {"stroke", "stroke_speed"} if kind == "stroke" else set()
+    names = [*solution.evaluated(), "P", "v_P", "a_P"]
+    with_value = {name for name in names if np.isfinite(solution[name][open_]).any()}
+    assert with_value == commanded
 
 
 PARALLELOGRAM = uniform(1.0, 0.5, 1.0, 0.5)

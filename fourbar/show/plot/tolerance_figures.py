@@ -25,7 +25,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import axis_of
 from fourbar.show.shown_units import choose_unit
-from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
+from fourbar.show.tolerances import describe_parted, find_part_unit, list_drawn_parts
 from fourbar.solution import SI, Conversion
 from fourbar.studies.spread import BAND_PERCENTILES, Tolerances
 
@@ -68,7 +68,7 @@ def draw_tolerances(
     with apply_style():
         from matplotlib.figure import Figure
 
-        parts = list_shown_parts(spreads)[:_MOST_BANDS]
+        parts = list_drawn_parts(spreads)[:_MOST_BANDS]
         columns = (len(parts) + 2) // 2
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
         panels = figure.subplots(2, columns, squeeze=False).ravel()

@@ -317,6 +317,9 @@ CLASSIFIED = read_rows(r"""
 300 100 250 220 | s + l = 400 < p + q = 470
 30cm 100mm 25cm 0.22m | s + l = 400 mm < p + q = 470 mm
 30in 10in 25in 22in | s + l = 40 in < p + q = 47 in
+# at its limits the input is the corner of 80, 100 and 90 + 50, or 90 - 50 mm
+80mm 100mm 50mm 90mm | input: coupler, output folded      22.3316
+80mm 100mm 50mm 90mm | input: coupler, output stretched  101.5370
 2 1 2 1 | change points: theta_2 = 0.0000 deg and 180.0000 deg
 2 1 2 1 | at change points alone:\n    ground + input = 3 = coupler
 """)

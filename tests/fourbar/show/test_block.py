@@ -277,6 +277,38 @@ says = [
     "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s",
 ]
 never = "motor"
+["a cylinder whose sweep begins before the linkage assembles"]
+lengths = { ground = "24 in", input = "14 in", coupler = "20 in", output = "16 in" }
+bars.output = { mass = "300 lb", centre = ["30 in", "20 deg"] }
+motion.theta_4 = { from = "60 deg", to = "110 deg", steps = 50 }
+motion.omega_4 = "0.2 rad/s"
+drive.from = { bar = 1, from_pin = ["40 in", "-30 deg"] }
+drive.to = { bar = 4, from_pin = ["12 in", "-10 deg"] }
+effects.gravity = ["1 g_0", "-90 deg"]
+# by cosines at 65.05 deg and 110 deg: the weight of 300 lbf 30 in from O4
+says = ["stroke 763.8 mm to 870.4 mm", "peak 0.04091 m/s", "W braking, 17.56 W driving"]
+never = "745.2"
+["a law that goes on where the linkage does not assemble"]
+lengths = { ground = "0.6 m", input = "0.3 m", coupler = "0.35 m", output = "0.25 m" }
+motion.law = { time = ["0 s", "1 s"], theta_2 = ["20 deg", "140 deg"], ends = "rest" }
+says = ["omega 29.93 rpm"]
+never = "30 rpm"
+["a list of which the linkage does not assemble at the fastest"]
+lengths = { ground = "0.6 m", input = "0.3 m", coupler = "0.35 m", output = "0.25 m" }
+bars.input.mass = "1 kg"
+motion.theta_2 = ["30 deg", "60 deg", "90 deg"]
+motion.omega_2 = ["1 rad/s", "1 rad/s", "5 rad/s"]
+effects.gravity = ["10 m/s^2", "-90 deg"]
+says = [" at 9.549 rpm "]
+never = "N m at 47"
+["a drive that brakes more than it drives"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
+bars.input = { mass = "2 kg", centre = ["0.1 m", "0 deg"] }
+motion.theta_2 = { from = "60 deg", to = "180 deg", steps = 5 }
+motion.omega_2 = "1 rad/s"
+effects.gravity = ["10 m/s^2", "-90 deg"]
+says = ["power peak 2 W braking, 1 W driving;", "), 2 W braking, 1 W driving"]
+never = "unbounded"
 ["strokes that nothing loads"]
 lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
 motion.stroke = { from = "0.17 m", to = "0.33 m", steps = 40 }

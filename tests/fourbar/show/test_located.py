@@ -216,6 +216,8 @@ def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
     )
     found = locate(scene, "transmission", f"{float(math.asin(at.sin_mu[0]))!r} rad")
     assert found.places == approx([place], abs=1e-9)
+    for name, value in (("A_x", "min"), ("theta_2", "max")):
+        assert locate(scene, name, value).places == approx([limit], abs=1e-9)
 
 
 def test_springs_have_their_length_and_pull_as_columns():

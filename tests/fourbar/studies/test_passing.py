@@ -49,6 +49,11 @@ LAW = crank_rocker(
         law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")
     )
 )
+BEYOND = Scene(
+    bare(0.6, 0.3, 0.35, 0.25),
+    Motion(law=fourbar.Law((0.0, 1.0), (0.4, 2.0), ends="rest")),
+)
+"""Assembles up to cos(theta_2) = 1/4."""
 SWEPT = Sweep(0.2, 1.2, 10)
 DROPPED = crank_rocker(
     motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
@@ -120,12 +125,13 @@ REFUSED = [
     (crank_rocker(), "theta_4", 0.0, "no position of this assembly"),
     (STILL, "time", 1.0, "needs a motion over time: a sweep at one"),
     (LAW, "theta_2", 3.0, "it stays within"),
+    (BEYOND, "theta_2", 1.5, r"and 75\.5225 deg"),
     (LAW, "time", 3.0, "goes from 0 to 2 s"),
     (DROPPED, "time", 3.0, "goes from 0 to 1 s"),
 ]
 
 
-@pytest.mark.parametrize("scene, name, value, words", slow_but(REFUSED[1:5], REFUSED))
+@pytest.mark.parametrize("scene, name, value, words", slow_but(REFUSED[1:6], REFUSED))
 def test_a_place_out_of_range_is_refused_with_the_range(scene, name, value, words):
     with raises(FourBarError, match=words):
         find_positions(scene, name, value)

@@ -195,7 +195,8 @@ def test_the_command_prints_draws_and_writes(tmp_path, capsys):
     printed = show("-o", str(plot)).out
     assert "64 samples (seed 0), 13 positions" in printed and "lengths.input" in printed
     assert plot.read_bytes().startswith(b"\x89PNG")
-    assert re.search(r"^torque +N m ", printed, re.M)
+    for part, unit in (("torque", "N m"), ("theta_4", "deg")):
+        assert re.search(rf"^{part} +{unit} ", printed, re.M)
     in_N_mm = show("--units", "N.mm rad").out
     assert re.search(r"^torque +N mm ", in_N_mm, re.M)
     assert re.search(r"unit +rad +nominal", in_N_mm)
