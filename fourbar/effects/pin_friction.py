@@ -194,10 +194,7 @@ def _find_regular(matrix: Array) -> NDArray[np.bool_]:
 
 
 class _Problems(NamedTuple):
-    """Independent problems in p unknowns x_p = k_p |F_p + sum over q of C_pq x_q|.
-
-    An axis of the problems may stand for many points x of one problem.
-    """
+    """Independent problems in p unknowns x_p = k_p |F_p + sum over q of C_pq x_q|."""
 
     F: Array
     """(n, p), complex, N."""
@@ -338,14 +335,17 @@ def _compute_step(gap: Array, slope: Array) -> Array:
 
 
 def _follow_newton(problems: _Problems, x: Array) -> Array:
-    """Take Newton's steps from starts, (n, p), until all stand still."""
-    most = 1e12 * problems.size()[..., None]
+    """Take Newton's steps from starts, (n, p), each until it stands still."""
+    most = 1e12 * problems.size()[:, None]
+    moving = np.arange(len(x))
     for _ in range(NEWTON_STEPS):
-        right, slope = problems.right_side(x)
-        new = np.clip(x + _compute_step(right - x, slope), 0.0, most)
-        change = np.abs(new - x).max(axis=-1)
-        x = new
-        if np.all(change <= SETTLED * x.max(axis=-1)):
+        last = x[moving]
+        right, slope = problems.part(moving).right_side(last)
+        new = np.clip(last + _compute_step(right - last, slope), 0.0, most[moving])
+        x[moving] = new
+        change = np.abs(new - last).max(axis=1)
+        moving = moving[change > SETTLED * new.max(axis=1)]
+        if not moving.size:
             break
     return x
 
@@ -353,9 +353,11 @@ def _follow_newton(problems: _Problems, x: Array) -> Array:
 def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
     """Find the least solution of each problem from many starts, and how many it has."""
     n, p = problems.k.shape
-    at_starts = problems.part((slice(None), None))
-    x = _follow_newton(at_starts, at_starts.size()[..., None] * _list_starts(p))
-    solves = at_starts.are_solved(x)
+    starts = problems.size()[:, None, None] * _list_starts(p)
+    at_starts = problems.part(np.repeat(np.arange(n), starts.shape[1]))
+    ends = _follow_newton(at_starts, starts.reshape(-1, p))
+    solves = at_starts.are_solved(ends).reshape(n, -1)
+    x = ends.reshape(starts.shape)
     sums = np.where(solves, x.sum(axis=2), np.inf)
     # some starts have not settled where solutions meet
     least = _follow_newton(problems, x[np.arange(n), np.argmin(sums, axis=1)])
