@@ -151,7 +151,6 @@ class SettingsSearch:
             without = self._measure_without_friction(best.settings)
         model = self.inside.given
         joints = model.dof_jntid[self.rubbing].tolist()
-        rubbing = tuple(name_joint(model, joint) for joint in joints)
         return SettingsAdvice(
             wanted,
             len(self.motion.angle),
@@ -159,9 +158,9 @@ class SettingsSearch:
             tuple(alone),
             best,
             tried,
-            _write_elements(file, self.inside.loop, best, rubbing),
+            _write_elements(file, self.inside.loop, best, model, joints),
             within,
-            rubbing,
+            tuple(name_joint(model, joint) for joint in joints),
             without,
         )
 
@@ -339,7 +338,8 @@ def _write_elements(
     file: RobotFile,
     loop: RobotLoop,
     tried: TriedSettings,
-    rubbing: Sequence[str],
+    model: mujoco.MjModel,
+    rubbing: Sequence[int],
 ) -> tuple[str, ...]:
     """Return the elements of the file that are to be changed, with their new values.
 
@@ -364,10 +364,18 @@ def _write_elements(
                 equalities[number].tag, {**equalities[number].attrib, **closure}
             )
             written.append(ET.tostring(element, encoding="unicode"))
-    joints = [one for body in root.iter("worldbody") for one in body.iter("joint")]
+    joints = [
+        element
+        for section in root.iter("worldbody")
+        for element in section.iter()
+        if element.tag in {"joint", "freejoint"}
+    ]
     stated = {joint.get("name"): joint.attrib for joint in joints}
-    for name in rubbing if friction else ():
-        attributes = {"name": name, **stated.get(name, {}), **friction}
-        element = ET.Element("joint", attributes)
+    names = [joint.get("name", "") for joint in joints]
+    in_order = names == [model.joint(number).name for number in range(model.njnt)]
+    for number in rubbing if friction else ():
+        name = name_joint(model, number)
+        own = joints[number].attrib if in_order else stated.get(name, {"name": name})
+        element = ET.Element("joint", {**own, **friction})
         written.append(ET.tostring(element, encoding="unicode"))
     return tuple(written)
