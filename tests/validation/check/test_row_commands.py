@@ -264,18 +264,34 @@ LOGGED = [
 ]
 
 
-@pytest.mark.parametrize(("names", "judged_as"), LOGGED)
-def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, read):
-    """The law is 10 u^3 - 15 u^4 + 6 u^5, here differentiated by hand."""
-    law = Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
-    scene = crank_rocker(motion=fourbar.Motion(law=law), title="Servo")
-    time = np.arange(0.0123, 0.79, 0.0517)
+RISE = Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
+SERVO = crank_rocker(motion=fourbar.Motion(law=RISE), title="Servo")
+
+
+def follow_rise(time):
+    """Return angle and rates of 10 u^3 - 15 u^4 + 6 u^5, by hand, and the torque."""
     u, h = time / 0.8, math.radians(120.0)
     theta = math.radians(20.0) + h * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
     omega = h / 0.8 * 30.0 * u * u * (1.0 - 2.0 * u + u * u)
     alpha = h / 0.64 * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u * u)
     at = at_angles(theta)._replace(speed=omega, acceleration=alpha)
-    torque = fourbar.solve(scene, at=at).torque
+    return theta, omega, alpha, fourbar.solve(SERVO, at=at).torque
+
+
+@pytest.mark.parametrize(("lag", "side"), [(2e-3, "before"), (-5e-3, "after")])
+def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
+    time = np.arange(0.0123, 0.79, 0.0517)
+    columns = time, follow_rise(time)[0], follow_rise(time - lag)[3]
+    rows = [f"{t:.4f},{a!r},{b!r}" for t, a, b in np.transpose(columns).tolist()]
+    judgement = judge_table(SERVO, read("\n".join(["time,theta_2,torque", *rows])))
+    (only,) = judgement.explanations
+    assert only.complete and f"time {abs(lag):g} s {side} its own" in only.text
+
+
+@pytest.mark.parametrize(("names", "judged_as"), LOGGED)
+def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, read):
+    time = np.arange(0.0123, 0.79, 0.0517)
+    theta, omega, alpha, torque = follow_rise(time)
     columns = {
         "time": (time, "time [ms]", 1e3, ".1f"),
         "late": (time + 2e-3, "time [s]", 1.0, ".4f"),
@@ -292,12 +308,12 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
         cells = [format(n[row] * x, form) for n, _, x, form in chosen]
         text += ",".join(cells) + "\n"
     if judged_as == HOLDS:
-        judgement = judge_table(scene, read(text))
+        judgement = judge_table(SERVO, read(text))
         assert judgement.status == HOLDS and judgement.compared >= len(time)
     else:
         with pytest.raises(InputError, match=judged_as) as caught:
-            judge_table(scene, read(text))
-        assert scene.title not in str(caught.value)
+            judge_table(SERVO, read(text))
+        assert "Servo" not in str(caught.value)
 
 
 def test_a_command_of_a_stroke_is_refused(judged):

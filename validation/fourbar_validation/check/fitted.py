@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,7 @@ _FACTORS = {
 }
 """Factors of a moment of inertia, and the mistake behind each."""
 REVERSED = "sign reversed, or F_ij given for F_ji"
+_LATE = "each row has the numbers of the time"
 _INERTIA = "moment of inertia"
 LEAST_FACTOR = 1e-9
 """Least factor. What a smaller one multiplies was left out, which is a mistake of its
@@ -324,6 +326,9 @@ def _list_varied(judge: Judge, scene: Scene, lengths: bool) -> dict[str, _Vary]:
             varied[f"{name}: length"] = partial(_stretch, name, length)
     if judge.at.speed is not None:
         varied[f"omega_{judge.at.bar}"] = partial(_hasten, judge.at, judge.at.speed)
+    law, times = judge.scene.motion.law, judge.table.times
+    if law is not None and times is not None:
+        varied[_LATE] = partial(_delay, judge.at, law, times[:, 0])
     return varied
 
 
@@ -335,8 +340,16 @@ def _hasten(at: Command, speed: float | Array, factor: float) -> Variant:
     return Variant("", at=at._replace(speed=factor * speed))
 
 
+def _delay(at: Command, law: Any, time: Array, factor: float) -> Variant:
+    """Return the problem of the law at times that are earlier by factor - 1, in s."""
+    earlier = np.clip(time - (factor - 1.0), law.time[0], law.time[-1])
+    angle, speed, acceleration = law.at(earlier)
+    moved = at._replace(angle=angle, speed=speed, acceleration=acceleration)
+    return Variant(_LATE, at=moved, names=UNITS.keys() - {*at.names})
+
+
 def _try_motions(judge: Judge, *, lengths: bool) -> Iterator[Mistake]:
-    """Try another speed and other lengths, each fitted by Gauss and Newton."""
+    """Try another speed, other lengths and times, each fitted by Gauss and Newton."""
     scene = state_all(judge.scene)
     varied = _list_varied(judge, scene, lengths)
     if not varied:
@@ -381,6 +394,10 @@ def _try_motions(judge: Judge, *, lengths: bool) -> Iterator[Mistake]:
                 factors[name] += step
     for name, predict in zip(varied, predict_all(0.0), strict=True):
         text = f"{name} {factors[name]:.6g} times ours (fitted)"
+        if name == _LATE:
+            lag = factors[name] - 1.0
+            side = "before" if lag > 0.0 else "after"
+            text = f"{_LATE} {abs(lag):.6g} s {side} its own (fitted)"
         yield Mistake(text, predict, times=CARRIED)
 
 
