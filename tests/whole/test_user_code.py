@@ -21,7 +21,7 @@ PAGE = "tests/support/user_code.py"
     reason="not run: pyright is not installed: pip install 'pyright[nodejs]'",
 )
 def test_pyright_passes_the_page():
-    line = [sys.executable, "-m", "pyright", PAGE]
+    line = [sys.executable, "-m", "pyright", "--pythonpath", sys.executable, PAGE]
     done = subprocess.run(line, cwd=ROOT, stdout=subprocess.PIPE, check=False)
     assert done.returncode == 0, done.stdout.decode()
 
