@@ -618,11 +618,11 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
 
 
 def test_a_ratio_of_one_is_no_mistake_and_a_reversed_sign_has_one_text(judged, read):
-    """One number is half as far again from ours as round-off allows."""
+    """Four numbers are half as far again from ours as round-off allows."""
     numbers = right(OURS)
     judge = Judge(OURS, read(write(numbers)))
     off = np.zeros((12, 2))
-    off[3, 0] = 1.5 * (judge.judged_right("F12")[1] * judge.size("F12"))[3]
+    off[::3, 0] = 1.5 * (judge.judged_right("F12")[1] * judge.size("F12"))[::3]
     for sign, texts in (1.0, []), (-1.0, ["sign reversed, or F_ij given for F_ji"]):
         judgement = judged(OURS, numbers | {"F12": sign * (numbers["F12"] + off)})
         assert judgement.differing
