@@ -317,11 +317,10 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench, monkeypatch
 ):
-    program = (
-        "import sys, time, pathlib; print('agrees', flush=True); out ="
-        " pathlib.Path(sys.argv[-1]); "
-    )
+    program = "import sys, time, pathlib; out = pathlib.Path(sys.argv[-1]); "
+    # the report first: a line is what the test waits for before it stops the check
     program += "(out / 'report.html').write_text('<p>report'); "
+    program += "print('agrees', flush=True); "
     program += "time.sleep(float(out.parent.joinpath('wait').read_text()))"
     monkeypatch.setattr(
         exports, "find_harness", lambda: [sys.executable, "-c", program]
