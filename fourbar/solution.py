@@ -278,6 +278,14 @@ def _is_equal(one: Any, another: Any) -> bool:
     return bool(one == another)
 
 
+def where_assembled(solution: Solution, values: Any) -> Array:
+    """Return values at positions; NaN where the linkage does not assemble.
+
+    What is commanded, and what follows from the command alone, has a value there too.
+    """
+    return np.where(solution.assembled, values, np.nan)
+
+
 def split_parts(name: str, values: Array) -> dict[str, Array]:
     """Split a quantity into scalars: components, and the magnitude of a force."""
     if is_scalar(name):

@@ -53,11 +53,18 @@ class Torsion(PinRows):
 
         M = -(preload + k (theta_j - theta_i - rest)).
         """
-        for pin, k, rest, preload in self.springs:
+        windings = self.list_windings(state)
+        for wound, (pin, k, _, preload) in zip(windings, self.springs, strict=True):
+            actions.pin_couple(pin, -(preload + k * wound))
+
+    def list_windings(self, state: State) -> list[Number]:
+        """List theta_j - theta_i - rest of each spring, within half a turn, rad."""
+        windings = []
+        for pin, _, rest, _ in self.springs:
             i, j = PINS[pin]
             relative = state.direction(j) * state.direction(i).conjugate()
-            turned = angle(relative)
-            actions.pin_couple(pin, -(preload + k * wrap_angle(turned - rest)))
+            windings.append(wrap_angle(angle(relative) - rest))
+        return windings
 
     def begin_at(self, start: State, branch: Number) -> "Torsion":
         """Count whole turns where the motion begins."""

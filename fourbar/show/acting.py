@@ -18,7 +18,7 @@ from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
-from fourbar.solution import Conversion, Solution
+from fourbar.solution import Conversion, Solution, where_assembled
 from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
 from fourbar.studies.passing import SAME_POSITION
 
@@ -140,7 +140,7 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
     notes = []
     for number, spring in enumerate(springs, 1):
         distance = measure_end_distance(scene, spring, solution.at)
-        distance = np.where(solution.assembled, distance, np.nan)
+        distance = where_assembled(solution, distance)
         for sense, end, room, sentence in _list_ends(spring):
             beyond = sense * (distance - end) > room
             # a spring that pulls throughout may be one that does
@@ -186,10 +186,13 @@ def list_torsion_notes(
         return []
     notes = []
     state = compute_shown_state(scene, solution.at)
-    for pin, _, rest, _ in springs:
-        i, j = PINS[pin]
-        turned = state.direction(j) * np.conj(state.direction(i))
-        wound = np.angle(np.ravel(turned)[0] * np.exp(-1j * rest))
+    windings = [
+        np.ravel(wound)[0]
+        for effect in torsions
+        for wound in effect.list_windings(state)
+    ]
+    for wound, (pin, _, rest, _) in zip(windings, springs, strict=True):
+        i = PINS[pin][0]
         shown = drop_rounding(np.array([rest + wound, wound]), 1.0).tolist()
         angle, by = (
             write_short(one, "rad", units, digits=POSITION_DIGITS) for one in shown

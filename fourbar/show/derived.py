@@ -28,6 +28,7 @@ from fourbar.solution import (
     find_unit_in,
     find_unit_of_quantity,
     shift_to_drawing,
+    where_assembled,
 )
 from fourbar.studies.points import instant_centres
 
@@ -66,7 +67,7 @@ def _measure_spring(solution: Solution, number: int, kind: str) -> Array:
     """Measure the length of a spring, m, or its pull, N."""
     spring = list_springs(solution.scene)[number]
     distance = measure_end_distance(solution.scene, spring, solution.at)
-    distance = np.where(solution.assembled, distance, np.nan)
+    distance = where_assembled(solution, distance)
     if kind == "length":
         return distance
     return np.asarray(spring.pull(distance))

@@ -17,7 +17,7 @@ from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
 from fourbar.show.motion_curves import describe_motion
-from fourbar.solution import Solution
+from fourbar.solution import Solution, where_assembled
 
 
 class BearingLoad(NamedTuple):
@@ -262,8 +262,7 @@ def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
     """Sum up the duty over the positions of a list, or of each member of a study."""
     values = getattr(solution, drive.keys.value)
     power = _require_quantity(solution, "power")
-    speed = _require_quantity(solution, drive.speed_key)
-    speed = np.where(solution.assembled, speed, np.nan)
+    speed = where_assembled(solution, _require_quantity(solution, drive.speed_key))
     closed = is_once_round(solution)
     peak = _find_peak_value(values)
     rms = _find_rms(solution, values)

@@ -17,7 +17,7 @@ from fourbar.quantities.units import NUMBER_TEXT
 from fourbar.scene import Command, Scene
 from fourbar.show.columns import Column, read_column
 from fourbar.show.shown_units import drop_rounding
-from fourbar.solution import Solution
+from fourbar.solution import where_assembled
 from fourbar.solving import find_last_stage
 from fourbar.studies.course import MotionCourse
 from fourbar.studies.passing import SAME_POSITION, is_same_position
@@ -82,13 +82,13 @@ class _LocatedSearch:
         self.commanded = self.course.commanded
         column = read_column(scene, self.course.solution, name)
         self.unit = _find_column_unit(column)
-        self.values = _withhold_unassembled(self.course.solution, column)
+        self.values = where_assembled(self.course.solution, column.values)
 
     def _read(self, places: Array) -> Array:
         """Return the column at places in an array of any shape."""
         solution = self.course.solve(np.ravel(places))
         column = read_column(self.scene, solution, self.name)
-        return _withhold_unassembled(solution, column).reshape(np.shape(places))
+        return where_assembled(solution, column.values).reshape(np.shape(places))
 
     def _gap(self, places: Array) -> Array:
         """Return the gaps at places in an array of any shape."""
@@ -247,11 +247,6 @@ class _LocatedSearch:
             place = least.x
             value = side * least.f_x
         return float(place), float(value)
-
-
-def _withhold_unassembled(solution: Solution, column: Column) -> Array:
-    """Return a column; NaN where what is commanded has a value, but no assembly."""
-    return np.where(solution.assembled, column.values, np.nan)
 
 
 def _find_column_unit(column: Column) -> str:

@@ -20,7 +20,7 @@ from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
 from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
-from fourbar.solution import Solution
+from fourbar.solution import Solution, where_assembled
 from fourbar.solving import solve, split
 from fourbar.studies.course import Stretch, pair_ends
 from fourbar.studies.internal_forces import Bending, largest_bending
@@ -342,7 +342,7 @@ def _list_position_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
     """
     curves = {name: getattr(solution, name) for name in _POSITION_CURVES}
     if solution.stroke is not None:
-        curves["stroke"] = np.where(solution.assembled, solution.stroke, np.nan)
+        curves["stroke"] = where_assembled(solution, solution.stroke)
     return curves
 
 
@@ -352,12 +352,11 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
     Commanded rates end, as all others do, where the linkage ceases to assemble.
     """
     curves = {}
-    missing = ~solution.assembled
     if solution.omega_4 is not None and not (acts(scene) and solution.F12 is not None):
         for letter in ("omega", "alpha"):
             for bar in MOVING_BARS:
                 rate = getattr(solution, f"{letter}_{bar}")
-                curves[f"{letter}_{bar}"] = np.where(missing, np.nan, rate)
+                curves[f"{letter}_{bar}"] = where_assembled(solution, rate)
     if solution.F12 is None:
         return curves
     loads = compute_pin_loads(solution)
@@ -372,7 +371,7 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
         return curves
     # what a balanced linkage leaves of a load is rounding, and has no peak
     idle = drive.sizes <= SHOWN_AS_ZERO * largest * _find_longest_arm(solution)
-    curves["speed"] = np.where(missing, np.nan, getattr(solution, drive.speed_key))
+    curves["speed"] = where_assembled(solution, getattr(solution, drive.speed_key))
     for name in (drive.keys.value, "power"):
         curves[name] = np.where(idle, 0.0, getattr(solution, name))
     return curves

@@ -22,7 +22,7 @@ from fourbar.scene.motion import (
     Motion,
 )
 from fourbar.scene.scene import default_places, write_stroke_ranges
-from fourbar.solution import Solution, compute_times
+from fourbar.solution import Solution, compute_times, where_assembled
 from fourbar.solving import solve
 from fourbar.studies.course import MotionCourse, bisect
 
@@ -226,7 +226,7 @@ def _find_times(scene: Scene, name: str, value: float) -> Command:
 
     def read(solution: Solution) -> Array:
         values = _require_values(getattr(solution, name), name)
-        return np.where(solution.assembled, values, np.nan)
+        return where_assembled(solution, values)
 
     def measure_gaps(solution: Solution) -> Array:
         gaps = read(solution) - value
@@ -287,7 +287,7 @@ def _write_position(name: str, value: float, digits: int = 6) -> str:
 def join_commands(values: Sequence[Any]) -> Any:
     """Join commands of one motion into one command.
 
-    Their arrays are joined, those of their origins too; of others the first is taken.
+    Arrays are joined, those of origins too; of other fields the first is taken.
     """
     first = values[0]
     if isinstance(first, tuple):

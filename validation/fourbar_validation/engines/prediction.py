@@ -89,8 +89,8 @@ def predict_for_free_bodies(
 ) -> Array:
     """Predict for bodies in angles and lengths, with the line of a cylinder by points.
 
-    Its direction is the difference of its ends in world axes, and its moments on two
-    bars, which cancel where it nearly passes their common pin, have the rounding of it.
+    The direction of that line is the difference of its ends in world axes, and its
+    moments on two bars cancel where it nearly passes their common pin.
     """
     by_points = isinstance(scene.drive, LinearDrive)
     predict = predict_in_world_axes if by_points else predict_from_data
