@@ -127,4 +127,6 @@ def browse(chromium, tmp_path: Path):
         return chromium
 
     yield open_page
+    # the browser goes on to the tests of other pages, for which nothing is printed
+    chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
     assert chromium.get_log("browser") == []
