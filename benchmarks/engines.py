@@ -1,7 +1,4 @@
-"""Largest error, failing rows and time of every engine on every model.
-
-They are over commits and versions of the engines.
-"""
+"""Largest error, failing rows and time of every engine on every model, over commits."""
 
 import math
 

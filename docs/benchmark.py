@@ -276,7 +276,7 @@ def write_findings(*, known: bool) -> list[str]:
 def write_runs() -> list[str]:
     """Write the worst error of torque and forces in one loop, for each engine.
 
-    It is that in its finest timestep or at states.
+    Engines through time have that of their finest timestep, the others that of states.
     """
     runs: dict[str, dict[str, dict[str, str]]] = {}
     for row in read_rows():

@@ -36,10 +36,7 @@ SPACE = '<mspace width="0.17em" />'
 
 
 def append_reference(app, page, source):
-    """Append to a page what is made of the code.
-
-    That is docstrings, and options of commands.
-    """
+    """Append to a page what is made of the code: docstrings, options of commands."""
     if page in ("api", "commands"):
         source[0] += (
             "\n" + runpy.run_path(str(Path(__file__).with_name(f"{page}.py")))["text"]()

@@ -70,10 +70,7 @@ def list_hard_points() -> Iterator[tuple[Array, Array, str]]:
 
 
 def draw_hard() -> Any:
-    """Draw the error of the exact engines over the condition.
-
-    It is towards three kinds of singular position.
-    """
+    """Draw the error of exact engines over the condition, near three singularities."""
     figure = make_figure(
         4.6,
         "Near a singular position the error grows as\n1/condition, and stays below the"

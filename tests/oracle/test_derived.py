@@ -1,6 +1,6 @@
 """What is derived from `solve` is judged by the oracles where that is hard.
 
-That an oracle fails what errs is tried by the planted faults of the lab too.
+Planted faults of the lab try, too, that an oracle fails what errs.
 """
 
 import math

@@ -78,10 +78,7 @@ def balance(left, omega_2=0.01):
 
 
 def balanced_lamp(omega_2: float | None = None) -> Scene:
-    """Make a parallelogram lamp that a spring of no free length balances.
-
-    Its stiffness is k = m g l/(r h).
-    """
+    """Make a lamp that a spring of no free length balances: k = m g l/(r h)."""
     arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
     linkage = FourBar(0.06, *arms, 0.5 * math.pi)
     ends = Place(1, (0.1, 0.0)), Place(2, (0.08, 0.0))

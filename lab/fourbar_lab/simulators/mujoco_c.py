@@ -94,7 +94,7 @@ def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
 class FileSimulator(Simulator):
     """A simulator of MuJoCo's family, which reads the generated file.
 
-    It evaluates states of many worlds at once; single states are as many worlds.
+    States of many worlds are evaluated at once; single states are as many worlds.
     """
 
     single_states = True

@@ -171,10 +171,7 @@ LEAST_SINE = 1e-2
 
 
 def compare_with_free_bodies(scene, s):
-    """Compare pin forces with those of free bodies that are told so to move.
-
-    These need no drive.
-    """
+    """Compare pin forces with those of free bodies that move so, without a drive."""
     F = np.stack([s[name] for name in PINS], axis=1)
     size = np.max(np.hypot(F[..., 0], F[..., 1]))
     # each position by the bar between whose others the sine is the larger

@@ -46,10 +46,7 @@ def reach(distance):
 
 
 def torsion(line, motion, **rests):
-    """A hatch on a ground at `line` degrees with torsion springs of these rests, deg.
-
-    Its bar 3 stays parallel to the ground.
-    """
+    """A parallelogram hatch, its ground at `line` deg, with springs of these rests."""
     springs = ", ".join(
         f'{pin} = {{ stiffness = "1 N m/rad", rest = "{rest} deg" }}'
         for pin, rest in rests.items()

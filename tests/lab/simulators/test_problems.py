@@ -274,7 +274,7 @@ def test_a02_passes_every_angle_when_energy_says():
 def solve_pin_forces(problem, theta, omega):
     """Solve the pin forces of a released parallelogram in many digits, N.
 
-    Its bars 2 and 4 are parallel, and it needs no torque at its own acceleration.
+    Bars 2 and 4 are parallel, and no torque is needed at their own acceleration.
     """
     exact = pytest.importorskip("fourbar_validation.engines.exact")
     pytest.importorskip("flint")

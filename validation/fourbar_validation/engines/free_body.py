@@ -366,10 +366,7 @@ def solve_wrenches(
     motion: BodyMotion,
     wrenches: Sequence[BodyWrenches],
 ) -> tuple[Array, float]:
-    """Solve the thirteen equations for each of k sums of wrenches, (n, 13, k).
-
-    Their residual is returned too.
-    """
+    """Return the unknowns (n, 13, k) of k sums of wrenches, and the residual."""
     columns = [_make_right_sides(motion.linkage, one) for one in wrenches]
     matrix = _make_matrix(scene, motion)
     unknowns, residual = solve_system(matrix, np.stack(columns, axis=-1))

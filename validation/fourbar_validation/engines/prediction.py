@@ -1,6 +1,6 @@
 """Sensitivities in 320-bit arithmetic, and the error that rounding makes.
 
-The error is expected by these sensitivities.
+These sensitivities predict the error:
 
     predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 
@@ -12,9 +12,9 @@ coordinates as long as `reach` (z_j, one rounding of them). Where the first orde
 torque vanishes, the product of two first orders is what remains: the error of a force
 times that of its lever arm.
 
-It replaces K eps/condition where no power of a sine is the right law: near change
-points, where a torque cancels, and for forces near a toggle, which a law in s^2 would
-excuse too much.
+The prediction replaces K eps/condition where no power of a sine is the right law: near
+change points, where a torque cancels, and for forces near a toggle, which a law in s^2
+would excuse too much.
 """
 
 import cmath

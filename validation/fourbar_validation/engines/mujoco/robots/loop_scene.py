@@ -138,9 +138,9 @@ def make_loop_scene(
 
 
 def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
-    """Return armature, kg m^2, or damping, N m s/rad, of a hinge and of its motors.
+    """Return armature, kg m^2, or damping, N m s/rad, of a hinge.
 
-    Those of a motor count behind its gear.
+    A motor on the hinge adds its own times the square of its gear.
     """
     own = getattr(model, f"dof_{name}")[model.jnt_dofadr[joint]]
     if name == "damping":

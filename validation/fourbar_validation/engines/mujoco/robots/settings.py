@@ -221,9 +221,9 @@ class SettingsSearch:
         return None
 
     def _measure_without_friction(self, settings: RobotSettings) -> float:
-        """Return the error of settings if no hinge of the loop has dry friction.
+        """Return the error that settings would have without dry friction in the loop.
 
-        It is infinite if none has.
+        Where no hinge of the loop has any, the error is infinite: none is gained.
         """
         if not self.rubbing:
             return math.inf
