@@ -37,7 +37,7 @@ class Trace(NamedTuple):
 
         Positions that stand closer than needed are left out.
         """
-        shown = np.where(self.solution.assembled, join_points(points), np.nan)
+        shown = join_points(points)
         if self.circuit:
             shown = np.append(shown, shown[0])
         return _thin(shown)
