@@ -6,13 +6,8 @@ On linkages that it has never seen, against an exhaustive search.
 import pytest
 
 from fourbar.errors import FAILED, HOLDS
-from fourbar.scene import command
 from fourbar_lab import advice
-from fourbar_lab.advice import try_all_settings
 from fourbar_lab.cli import status as ended
-from fourbar_validation.advise import advise
-from fourbar_validation.engines.mujoco.trial import TrialSetup
-from tests.validation.cost.test_cost import turning
 
 RK4_ALONE = {("RK4", True): 1.0}
 
@@ -25,18 +20,6 @@ def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
     """
     case = advice.measure_case(99, index, RK4_ALONE)
     assert case.met and case.cheap, case
-
-
-@pytest.mark.slow
-def test_the_search_knows_when_nothing_serves():
-    scene = turning(positions=12)
-    setup = TrialSetup(scene, command(scene))
-    assert try_all_settings(setup, 1e-3, RK4_ALONE) is not None
-    lost = setup.try_out(advise.make_settings(10.0, 3.0))
-    lost.broken = "lost"
-    trials = []
-    setup.try_out = lambda settings: trials.append(settings) or lost
-    assert try_all_settings(setup, 1e-3, RK4_ALONE) is None and len(trials) > 50
 
 
 @pytest.fixture
@@ -59,13 +42,3 @@ def measured(monkeypatch):
 @pytest.mark.parametrize(("count", "decided"), [(72, FAILED), (73, HOLDS)])
 def test_few_cases_cannot_tell_how_often_the_advice_is_met(count, decided, tmp_path):
     assert ended(["advice", "--count", str(count), "--out", str(tmp_path)]) == decided
-
-
-def test_a_measure_is_resumed(tmp_path, measured):
-    list(advice.measure_cases(3, 2, tmp_path))
-    cases = list(advice.measure_cases(3, 4, tmp_path))
-    assert [case.number for case in cases] == measured == [0, 1, 2, 3]
-    assert all(case.met and case.cheap for case in cases)
-    measured.clear()
-    list(advice.measure_cases(4, 1, tmp_path))  # another seed starts over
-    assert measured == [0]

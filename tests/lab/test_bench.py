@@ -90,16 +90,6 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch):
         ).all(), name
 
 
-def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch):
-    monkeypatch.setattr(contenders, "POSITIONS_OF_ONE_CALL", 1000)
-    monkeypatch.setattr(contenders, "LEAST_POSITIONS", 1)
-    sizes = []
-    times = contenders.time_positions(
-        {"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1
-    )
-    assert set(times["it"]) == {1000, 10_000} and sizes == [1000] * (2 + 2 * 10)
-
-
 @pytest.fixture
 def run_bench(monkeypatch):
     """Return a function that runs the command with these rows."""
@@ -113,14 +103,6 @@ def run_bench(monkeypatch):
         return done.return_value, done.output
 
     return run
-
-
-def test_what_is_missing_is_named_with_its_reason(monkeypatch, run_bench):
-    monkeypatch.setenv("PATH", "")
-    loops, not_run = contenders.collect_loops()
-    assert loops.keys() == {"NumPy"} and not_run.keys() == {"C"}
-    ended, output = run_bench({"growth from 1000 positions on": 1.0}, not_run)
-    assert ended == HOLDS and "not run: C: no C compiler is installed\n" in output
 
 
 @pytest.mark.parametrize("name", bench.SPEED_LIMITS)

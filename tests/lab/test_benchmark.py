@@ -15,7 +15,6 @@ from fourbar_lab.benchmark import (
     PANELS,
     REFUSED,
     find_panel,
-    name_row,
     read_reasons,
     read_work,
 )
@@ -115,32 +114,6 @@ def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too():
     assert all(reason.startswith(rows) for reason in read_reasons(BENCHMARKED_ENGINES))
 
 
-def test_a_row_names_its_version_before_its_way():
-    assert name_row("MuJoCo: simulated", "4.0.0") == "MuJoCo 4.0.0: simulated"
-    assert (
-        name_row("mujoco 3.3.7", "3.3.7") == "mujoco 3.3.7"
-        and name_row("mine", "") == "mine"
-    )
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[[engine]]",
-        '[[engine]]\nname = "x"',
-        '[[engine]]\nname = "x"\ncommand = "y"\ncolour = 1',
-        "]",
-        None,
-    ],
-)
-def test_entries_that_cannot_be_read_are_named_in_one_line(text, tmp_path, capsys):
-    if text is not None:
-        (tmp_path / "engines.toml").write_text(text)
-    words = ["--engines", tmp_path / "engines.toml", "-o", tmp_path / "out"]
-    assert status(["benchmark", *map(str, words)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("library", ["mujoco", "pinocchio"])
 def test_an_engine_answers_the_slider_cranks(library, folder):
@@ -211,34 +184,6 @@ def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(fol
     page = (folder / "out" / "benchmark.html").read_text()
     for text in ("order 2.0", "Derivatives of the torque, by hand", "slow 2: bad"):
         assert text in page
-
-
-@pytest.mark.slow
-def test_a_simulator_answers_single_states_at_its_own_motion(folder):
-    pytest.importorskip("mujoco")
-    adapter = "fourbar_lab.simulators.mujoco_c:MujocoFile"
-    (folder / "engines.toml").write_text(
-        f'[[engine]]\nname = "it"\nadapter = "{adapter}"\nsetting = "generated file"\n'
-    )
-    problems = ("crank_rocker", "sprung", "change_point", "second_on_the_crank")
-    letters, _ = run(folder, *problems)
-    assert sorted(letters.values()) == ["AA", REFUSED, REFUSED, REFUSED]
-    (file,) = (folder / "out" / "results").glob("*/crank_rocker.json")
-    assert "at" in json.loads(file.read_text())
-
-
-@pytest.mark.slow
-def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(folder):
-    pytest.importorskip("pinocchio")
-    released = "fourbar_validation.engines.pinocchio:PinocchioReleased"
-    (folder / "engines.toml").write_text(
-        '[[engine]]\nname = "it"\nadapter = "pinocchio-inverse"\n'
-        f'[[engine]]\nname = "it (released)"\nadapter = "{released}"\n'
-    )
-    letters, _ = run(folder, "crank_rocker", "gz_physics_987", "slider_crank")
-    assert letters["it", "crank_rocker"] == "AA"
-    assert letters["it", "slider_crank"] == REFUSED
-    assert letters["it", "gz_physics_987"] in ("-A", "-B")
 
 
 def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family():

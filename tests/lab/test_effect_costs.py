@@ -7,11 +7,10 @@ import time
 
 import pytest
 
-from fourbar.errors import BROKEN, HOLDS
+from fourbar.errors import HOLDS
 from fourbar_lab import effect_costs
 from fourbar_lab.cli import status
 from fourbar_lab.effect_costs import DEFAULT_FLAGS
-from fourbar_validation.engines import registry
 
 SAVED = 0.08
 """Part of the time of a step that the flags of the bare scene must save; they save some
@@ -73,9 +72,3 @@ def test_the_table_has_a_row_for_each_effect_and_flag(tmp_path, monkeypatch, cap
         "| none, island left on |  | +20 % [+10, +25] |  |  |" in text
         and "written to" in capsys.readouterr().out
     )
-
-
-def test_an_engine_that_is_missing_is_named(monkeypatch, capsys):
-    monkeypatch.setattr(registry, "find_missing", lambda _: "mujoco is not installed")
-    assert status(["effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN
-    assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"

@@ -103,15 +103,3 @@ def test_an_injected_fault_fails_the_harness_where_its_entry_says():
 def test_what_does_not_fail_or_fails_elsewhere_survives(failing, why):
     said = explain_survival({"caught_by": ["torque"]}, failing)
     assert why in said if why else said is None
-
-
-def test_a_fault_that_ends_the_process_costs_no_other_one(monkeypatch):
-    def tried(numbers):
-        if 2 in numbers:
-            return "it ended"
-        return [{"crank": [f"free-body F{n}: "]} for n in numbers]
-
-    monkeypatch.setattr(faults, "try_faults", tried)
-    (zero, one) = faults.try_in_turn([0, 1])
-    assert (zero, one) == ({"crank": ["free-body F0: "]}, *tried([1]))
-    assert faults.try_in_turn([1, 2]) == [one, "it ended"]

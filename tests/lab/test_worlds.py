@@ -4,12 +4,11 @@ MJX and MuJoCo Warp need not be there. Where they are, they run on any device.
 """
 
 import math
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from fourbar.errors import BAD_INPUT, BROKEN, HOLDS
+from fourbar.errors import BROKEN, HOLDS
 from fourbar_lab import worlds
 from fourbar_lab.cli import status
 from fourbar_lab.simulators.mujoco_c import MujocoFile
@@ -69,25 +68,6 @@ def test_a_world_that_is_not_finite_fails():
     results[2][0] = np.nan
     with pytest.raises(ArithmeticError, match="diverged"):
         prepared.read(results)
-
-
-def test_a_wrong_world_is_seen(monkeypatch):
-    plain = MujocoFile.prepare
-
-    def with_an_error(*arguments):
-        evaluate, exchange = plain(*arguments)
-
-        def exchange_wrong():
-            results = exchange()
-            # the closing force of the last position
-            results[4][-1] *= 1.1
-            return results
-
-        return evaluate, exchange_wrong
-
-    monkeypatch.setattr(MujocoFile, "prepare", with_an_error)
-    cost = measure_worlds(MUJOCO, TWO_TURNS)
-    assert cost.force > 1e-3 and cost.torque < EXACT
 
 
 def test_times_are_divided_by_those_of_the_formulas():
@@ -155,21 +135,6 @@ def test_what_is_not_run_is_named_and_nothing_is_claimed_of_it(
         assert (f"| {name} |" in page) == (reason is None)
         line = f"{name}: not run: {reason}"
         assert (line in printed) == (line in page) == (reason is not None)
-
-
-def test_a_call_that_fails_costs_its_own_row(monkeypatch, capsys):
-    fail = Mock(side_effect=MemoryError("out of memory"))
-    monkeypatch.setattr(worlds, "measure_worlds", fail)
-    assert status(["worlds", "--worlds", str(TWO_TURNS)]) == BROKEN
-    printed = capsys.readouterr().out
-    assert f"{MUJOCO}, {TWO_TURNS} worlds: failed: out of memory" in printed
-    assert FORMULAS_ON_ONE_CORE in printed
-
-
-@pytest.mark.parametrize("text", ["30", "0", "many", ""])
-def test_worlds_are_whole_turns(text, capsys):
-    assert status(["worlds", "--worlds", text]) == BAD_INPUT
-    assert "must be multiples of 25" in capsys.readouterr().err
 
 
 def test_the_page_states_errors_that_hold():

@@ -8,10 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from fourbar.errors import DependencyError
-from fourbar_lab.cli import status
 from fourbar_lab.simulators import findings as module
 from fourbar_lab.simulators.findings import (
     FIELDS,
@@ -21,7 +18,6 @@ from fourbar_lab.simulators.findings import (
     read_docstring,
     read_findings,
 )
-from fourbar_validation.engines.environments import Entry
 
 ALL = read_findings()
 SECONDS = 100.0
@@ -70,45 +66,3 @@ def test_a_script_that_breaks_down_is_not_fixed(code, state, tmp_path):
     assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"
     seconds = 1.0 if "sleep" in code else SECONDS
     assert finding.run(Path(sys.executable), seconds) == state
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("engine", "says", "ended"),
-    [
-        ("nothing-such (nothing_such)", "not run: nothing-such is not installed", 1),
-        ("pytest (pytest)", f"holds in pytest {pytest.__version__}, Python", 0),
-    ],
-)
-def test_the_command_says_what_could_not_run(
-    engine, says, ended, monkeypatch, tmp_path
-):
-    script = tmp_path / "one.py"
-    script.write_text(f'"""It is so.\n\nEngine: {engine}\nWith: also, more\n"""\n')
-    monkeypatch.setattr(module, "FINDINGS", tmp_path)
-    done = CliRunner().invoke(module.findings_command)
-    assert f"one.py: {says}" in done.output and done.exit_code == ended
-
-
-def test_a_simulator_is_sought_in_the_environments_of_engines(monkeypatch):
-    packages = ("nothing", "nothing-such", "nothing-such")
-    entries = {
-        f"{n}": Entry(f"{n}", "a:B", requires=(f"{name}[sim]>=1",))
-        for n, name in enumerate(packages)
-    }
-
-    def make(entry):
-        if entry.name == "1":
-            raise DependencyError("no network")
-        return f"python of {entry.name}"
-
-    monkeypatch.setattr(module, "read_engines", lambda _: entries)
-    monkeypatch.setattr(module, "make_environment", make)
-    pythons = list(module._list_interpreters("nothing-such"))
-    assert pythons == [sys.executable, "python of 2"]
-
-
-@pytest.mark.parametrize("arguments", [[__file__], ["no_such.py"]])
-def test_bad_input_is_one_line(arguments, capsys):
-    assert status(["findings", *arguments]) == 2
-    assert capsys.readouterr().err.count("\n") == 1

@@ -7,10 +7,8 @@ import math
 import os
 import re
 import runpy
-import zipfile
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,6 @@ import pytest
 import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command
-from fourbar_lab.cli import status as lab_status
 from fourbar_lab.simulators.problems import PROBLEMS, collect_problem, list_problems
 from fourbar_validation.check.problem import (
     LEVELS,
@@ -419,13 +416,3 @@ def test_the_command_judges_a_result_file(text, status_of_it, said, tmp_path, ca
     printed = capsys.readouterr()
     assert said in printed.out + printed.err
     assert printed.err.count("\n") == (status_of_it == 2)
-
-
-def test_the_archive_holds_the_set_and_is_the_same_bytes_each_time(tmp_path):
-    for name in ("one.zip", "two.zip"):
-        assert lab_status(["problems", "--archive", str(tmp_path / name)]) == 0
-    assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
-    archived = zipfile.ZipFile(tmp_path / "one.zip").namelist()
-    names = {Path(name).name for name in archived}
-    assert {f"{name}.{end}" for name in NAMES for end in ("json", "svg")} <= names
-    assert {"LICENSE", "CITATION.cff", "benchmark.md"} <= names

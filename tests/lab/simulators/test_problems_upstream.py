@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fourbar_lab.simulators.problems import PROBLEMS
-from tests.whole.test_imports import ROOT, imported
+from tests.whole.test_imports import ROOT
 
 UPSTREAM = ROOT / "docs/upstream"
 FILES = sorted(UPSTREAM.glob("*/*four_bar*.py"))
@@ -44,20 +44,6 @@ def test_newton_s_free_bodies_find_our_answers():
         assert np.abs(np.array(theirs) - ours).max() <= DIGITS * np.abs(ours).max()
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in UPSTREAM.glob("*/*.py") if path.name != "conftest.py"],
-    ids=str,
-)
-def test_every_test_for_another_project_says_what_it_compares(path):
-    tree = ast.parse(path.read_text())
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    tests = [node for node in functions if node.name.startswith("test_")]
-    assert tests and all(ast.get_docstring(node) for node in (tree, *tests))
-    assert "expectedFailure" not in path.read_text()
-    assert not any(name.startswith("fourbar") for name in imported(path))
-
-
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
 def test_a_file_for_another_project_states_our_answers(path):
     text, stated = path.read_text(), run_statements(path, ast.Assign)
@@ -79,13 +65,3 @@ def test_a_file_for_another_project_states_our_answers(path):
                 assert apart <= DIGITS * np.abs(ours).max(), (name, degrees, column)
                 compared += 1
     assert compared >= 16
-
-
-def test_each_project_has_its_file():
-    projects = {path.parent.name for path in UPSTREAM.glob("*/*.py")}
-    assert projects == {"drake", "genesis", "mujoco_warp", "newton", "pinocchio"}
-    page = (ROOT / "docs/findings.md").read_text()
-    assert all(
-        f"(upstream/{path.relative_to(UPSTREAM).as_posix()})" in page
-        for path in [*FILES, NEWTON]
-    )

@@ -7,15 +7,13 @@ import json
 import math
 from dataclasses import replace
 from importlib.util import find_spec
-from io import BytesIO
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Friction, Viscous
-from fourbar.errors import LimitError, NotAssembledError
+from fourbar.errors import NotAssembledError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
@@ -30,7 +28,6 @@ from fourbar_lab.simulators import (
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_lab.simulators.protocol_engines import Instant, Simulator
 from fourbar_validation.check.problem import judge_answers, read_problem
-from fourbar_validation.engine import open_engine, serve
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import read_engines_of
 from fourbar_validation.engines.free_body import FreeBody
@@ -43,8 +40,6 @@ THROUGH = 1e-5
 """Of a turn in 157 steps with the generated file; measured 4e-7."""
 DIFFERENCES = 1e-5
 """Of MuJoCo's torques (1e-12) over 2e-6; measured 5e-7."""
-IN_EXUDYN = 1e-3
-"""Of a turn in 314 steps of its trapezoidal rule; measured 1.6e-4."""
 IN_PINOCCHIO = {True: 1e-6, False: 5e-3}
 """Of a turn in 314 steps, by RK4 (measured 2e-7) and by the semi-implicit Euler method
 (3.8e-3).
@@ -55,7 +50,6 @@ COARSE = 0.05
 """
 JUDGES = {"problems.py"}
 """Modules that state the formulas' answers; every other hands things to a simulator."""
-RIGID = f"{__name__}:Rigid"
 PROBLEM = read_problem(PROBLEMS / "crank_rocker.json")
 ENTRIES = {
     name: entry
@@ -233,31 +227,6 @@ def test_a_force_that_is_not_read_is_missing_and_the_others_count(monkeypatch):
     assert np.isnan(errors.pop("F43")) and max(errors.values()) < EXACT
 
 
-@pytest.mark.slow
-def test_the_host_serves_a_simulator_its_settings_and_derivatives(monkeypatch):
-    def tell(ask="answer", **setting):
-        question = {"id": 1, "ask": ask, "setting": setting or None, **told}
-        replies = BytesIO()
-        serve(RIGID, BytesIO(json.dumps(question).encode()), replies)
-        reply = json.loads(replies.getvalue())
-        return reply.get("setting") or reply
-
-    told = {key: PROBLEM[key] for key in ("scene", "command")}
-    hello = open_engine(RIGID)[1]
-    assert hello["settings"] == ["plain", "wrong"]
-    assert (hello["device"], hello["made_for"]) == ("abacus", "tests")
-    assert tell() == "plain, 628/rev"
-    assert tell(name="wrong") == "wrong, 628/rev"
-    assert tell(name="wrong", steps_per_turn=50) == "wrong, 50/rev"
-    assert "it has no setting 'no'; it has: plain" in tell(name="no")["refusal"]
-    assert "it knows no law of its error" in tell(error=0.1)["refusal"]
-    assert "setting = {'steps': 3}" in tell(steps=3)["error"]
-    assert tell("slopes")["refusal"] == "it has no derivatives"
-    by_hand = [{"how": "by hand"}]
-    monkeypatch.setattr(Rigid, "slopes", lambda *_: by_hand, raising=False)
-    assert tell("slopes")["slopes"] == by_hand
-
-
 @pytest.mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn():
     at_states = find_errors(mujoco_c.MujocoFile)
@@ -312,27 +281,6 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
     assert {of_zero[key] for key in by} == {"zero"}
     assert refused == ("refused", {})
     assert unread == ("no derivatives that can be read: KeyError: 'how'", {})
-
-
-@pytest.mark.nightly
-def test_exudyn_refuses_what_it_has_no_element_for():
-    module = pytest.importorskip(
-        "fourbar_lab.simulators.exudyn_simulated",
-        exc_type=ImportError,
-    )
-    integrators = module.ExudynIntegrators
-    setting = {"name": list(integrators.settings)[1], "steps_per_turn": 314}
-    assert max(find_errors(integrators, **setting).values()) < IN_EXUDYN
-    scene, command = ask_position()
-    simulator = integrators().at_setting(**setting)
-    damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
-    answer = simulator.answer(damped, command)
-    torque = fourbar.solve(damped, "force", at=answer.at).torque
-    apart = np.abs(answer.quantities["torque"] - torque).max()
-    assert apart < IN_EXUDYN * np.abs(torque).max()
-    rubbing = replace(scene, effects=(Friction.at(B=0.01),))
-    with pytest.raises(LimitError, match="alone"):
-        simulator.through(*protocol_engines.lay_out(rubbing, command, 314))
 
 
 @pytest.mark.slow
