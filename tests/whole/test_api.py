@@ -6,7 +6,6 @@ Every public name documented, the list of them, and what a slip is answered.
 import itertools
 import json
 import math
-import pydoc
 import re
 import runpy
 from dataclasses import fields, is_dataclass, replace
@@ -60,21 +59,6 @@ def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == names
     reference = runpy.run_path(str(DOCS / "api.py"))["text"]()
     assert all(f"\n### {name}\n" in reference for name in names)
-
-
-def test_dir_shows_what_there_is_and_nothing_else():
-    assert {
-        "classify",
-        "limit_positions",
-        "coupler_curve",
-        "point_coefficients",
-        "instant_centres",
-    } <= set(dir(fourbar))
-    for name in dir(fourbar):
-        thing = getattr(fourbar, name)
-        assert name == "__version__" or (
-            thing.__doc__ and thing.__module__.startswith("fourbar.")
-        ), name
 
 
 @pytest.mark.parametrize("number", [0.25, np.float64(0.25)])
@@ -354,23 +338,6 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     assert not holes, "\n".join(holes)
 
 
-@pytest.mark.slow
-def test_a_figure_is_refused_arguments_of_another_type(tmp_path):
-    scene = crank_rocker()
-    drawing = scene.plot("linkage")
-    calls = (
-        lambda x: scene.plot("torque", position=x),
-        lambda x: scene.plot("torque", units=x),
-        scene.plot,
-        drawing.save,
-    )
-    wrong = (*ALWAYS_WRONG, tmp_path / "no" / "a.svg")
-    for call, argument in itertools.product(calls, wrong):
-        with pytest.raises(InputError) as caught:
-            call(argument)
-        assert "\n" not in str(caught.value)
-
-
 def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert status(["classify", "0.3", "0.1", "0.25", "0.22", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
@@ -385,30 +352,6 @@ def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert worst == fourbar.transmission_extremes(linkage).worst
     assert status(["classify", "3", "1", "1", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["barker"] is None
-
-
-@pytest.mark.slow
-def test_a_scene_draws_itself(tmp_path):
-    pytest.importorskip(
-        "matplotlib",
-        reason="drawing needs matplotlib: pip install matplotlib",
-    )
-    drawing = crank_rocker().plot("torque")
-    assert drawing._repr_svg_().rstrip().endswith("</svg>")
-    drawing.save(tmp_path / "a.png")
-    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
-    with pytest.raises(InputError, match="must be one of"):
-        crank_rocker().plot("pie")
-
-
-def test_help_says_the_parameters():
-    shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)
-    for name in ("figure", "position", "units", "dimensions"):
-        assert f"{name} :" in shown
-    shown = pydoc.render_doc(Scene, renderer=pydoc.plaintext)
-    for field in fields(Scene):
-        listed = re.search(rf"^ \|  .*\b{field.name}\b.* : ", shown, re.MULTILINE)
-        assert listed, field.name
 
 
 def test_scenes_compare_by_value(tmp_path):
@@ -429,22 +372,6 @@ def test_scenes_compare_by_value(tmp_path):
     file = DOCS.parent / "models" / "thesis.toml"
     save(fourbar.load(file), tmp_path / "a.toml")
     assert fourbar.load(file) == fourbar.load(tmp_path / "a.toml")
-
-
-def test_loads_without_a_speed_are_pointed_to_the_static_torque(
-    tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    save(crank_rocker(motion=Motion(1.0)), "still.toml")
-    bars = (Bar(length) for length in (0.1, 0.25, 0.22))
-    save(Scene(FourBar(0.3, *bars), Motion(1.0)), "bare.toml")
-    hint = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
-    assert status(["analyze", "still.toml"]) == 0
-    assert hint in capsys.readouterr().out
-    assert status(["plot", "still.toml", "--figure", "torque", "-o", "a.svg"]) == 2
-    assert hint in capsys.readouterr().err
-    assert status(["analyze", "bare.toml"]) == 0
-    assert hint not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])

@@ -15,10 +15,8 @@ from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import compute_errors
-from fourbar_validation.cost import charts, work_precision
-from fourbar_validation.cost.conclusion import DEFAULT
-from fourbar_validation.cost.cost import write_subtitle
-from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP, design_curves
+from fourbar_validation.cost import work_precision
+from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP
 from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
 from fourbar_validation.report.svg import write_alone
@@ -101,41 +99,6 @@ def read_words(svg):
     """Read what is written in a picture, but for lines with numbers."""
     texts = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
     return {text for text in texts if text.strip() and not re.search(r"\d", text)}
-
-
-@pytest.mark.slow
-def test_the_pictures_are_those_that_few_points_draw(tmp_path, monkeypatch):
-    monkeypatch.setattr(work_precision, "TIMINGS_OF_A_SETTING", 2)
-    monkeypatch.setattr(work_precision, "ERRORS_ADVISED", (1e-2, 1e-4))
-    looks = (
-        charts.METHOD_LOOKS,
-        charts.INTEGRATOR_LOOKS,
-        charts.TIMESTEPS,
-        charts.SOFTNESS_LOOKS,
-        charts.SOLVERS,
-    )
-    wanted = {look.curve for group in looks for look in group.values()}
-    made = work_precision.CostStudy("page", SCENE, tmp_path)
-    curves = {}
-    for curve in design_curves(SCENE):
-        if curve.name in wanted:
-            spots = [spot for spot in curve.spots[2:] if spot.label == DEFAULT]
-            few = replace(curve, spots=(*curve.spots[:2], *spots))
-            curves[curve.name] = made._try_curve(few)
-    curves["recommended"] = made._try_recommended()
-    curves["inverse"] = made._time_inverse()
-    curves["formulas"] = made._time_formulas()
-    with apply_style():
-        title = write_subtitle(SCENE, SCENE.title)
-        drawn = charts.make_pictures(curves, title)
-        for name in DRAWS["STUDIED"]:
-            kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
-            assert read_words(write_alone(drawn[name], name)) == read_words(kept), name
-    two, four = curves["recommended"]
-    assert 1.0 < four.seconds_per_second / two.seconds_per_second < 4.0
-    assert max(two.errors.worst, 100.0 * four.errors.worst) < 1e-2
-    formulas, *_ = curves["formulas"]
-    assert formulas.seconds_per_second < four.seconds_per_second * 3.0
 
 
 @pytest.mark.slow

@@ -10,7 +10,6 @@ import math
 import re
 import runpy
 import shlex
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -26,15 +25,11 @@ from fourbar.effects import list_kinds
 from fourbar.errors import FAILED, HOLDS
 from fourbar.files import load
 from fourbar_lab.cli import LAB_COMMANDS as LABS
-from fourbar_lab.effect_costs import EFFECTS
 from fourbar_validation.cli import COMMANDS
 from fourbar_validation.cli import status as harness
 from fourbar_validation.compare.results_file import read_columns
-from fourbar_validation.regression import record
-from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.scenes.suites import read_suite
 from tests.support.here import judge_here
-from tests.support.runs import read_run, save_run
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -84,33 +79,6 @@ def test_the_examples_of_continuous_integration_use_commands_that_exist():
             taken = {name for option in options_of for name in option.opts}
             wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
             assert wanted <= taken and wanted, (file.name, name, wanted - taken)
-
-
-@pytest.mark.slow
-def test_the_run_of_a_pull_request_is_held_against_what_comes_along(
-    checkout, monkeypatch
-):
-    """The accepted state of the project is cut down to the scene and the engine of this
-    run.
-    """
-    about, rows = read_run(find_baseline(ACCEPTED))
-    others = {*about.engines} - {"free-body"}
-    few = [
-        row for row in rows if row.scene == "crank_rocker" and row.engine not in others
-    ]
-    (checkout / "comes").mkdir()
-    save_run(checkout / "comes" / ACCEPTED, few, about=about)
-    monkeypatch.setattr(record, "SHIPPED", checkout / "comes")
-    judge_here(monkeypatch)
-    workflow = read("docs/ci/four-bar.yml")
-    (line,) = re.findall(r"validation (run [^:]*?)\n\s+- ", workflow)
-    scene = ["models/crank_rocker.toml", "--engines=free-body", "--no-pictures"]
-    assert not Path("results").exists()
-    assert harness([*line.split(), *scene]) == HOLDS
-    changes = Path("results/changes.md").read_text(encoding="utf-8")
-    assert changes.startswith("# No regression against the run that comes with fourbar")
-    assert f"in {len(few)} rows:" in changes
-    assert "<testcase" in Path("results/changes.xml").read_text(encoding="utf-8")
 
 
 def test_every_long_part_is_run_in_the_night():
@@ -267,10 +235,6 @@ def test_every_out_has_its_short_name():
     assert len(writing) > 12 and all("-o" in names for names in writing)
 
 
-def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list():
-    assert not any("," in name for name in EFFECTS)
-
-
 @pytest.mark.parametrize(
     ("program", "commands"), [("fourbar-validation", COMMANDS), ("fourbar_lab", LABS)]
 )
@@ -322,18 +286,6 @@ def test_the_readme_keeps_to_its_length():
     assert len(read("README.md").splitlines()) <= 90
 
 
-@pytest.mark.parametrize(
-    "page",
-    [page for page in PAGES if page.parent == DOCS],
-    ids=lambda page: page.stem,
-)
-def test_a_page_begins_with_what_its_reader_can_do(page):
-    title, first = read(page).split("\n\n")[:2]
-    assert title.startswith("# ")
-    begins = first.startswith(("After this page", "After reading"))
-    assert begins or page.stem == "index"
-
-
 def prose(page):
     """Return the text of a page without programs and formulas."""
     flags = re.MULTILINE | re.DOTALL
@@ -361,17 +313,6 @@ def test_no_table_is_wider_than_the_column_of_a_page(page):
 
 def measure_word(word):
     return LETTER * len(word) + CAPITAL * sum(map(str.isupper, word))
-
-
-@pytest.mark.parametrize(
-    "page",
-    [page for page in PAGES if page.parent in (ROOT, DOCS)],
-    ids=lambda page: page.stem,
-)
-def test_paragraphs_are_short_and_tables_hold_the_rest(page):
-    for paragraph in re.split(r"\n\s*\n", prose(page)):
-        if not re.match(r"[|#!\-`]|\d+\. |---", paragraph.strip()):
-            assert len(paragraph.split()) <= 95
 
 
 def test_the_page_of_the_commands_lists_each_and_its_reference_every_option():
@@ -429,24 +370,6 @@ def test_the_pictures_are_those_that_are_drawn(name, options, tmp_path):
 )
 def test_every_figure_has_a_form_for_dark_pages(path):
     assert "prefers-color-scheme" in read(path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_pictures_follow_the_switch_of_the_site(browse, theme):
-    """A reader of a light system may switch the site to dark, and the other way."""
-    image = pytest.importorskip("PIL.Image", reason="pixels are read by pillow")
-    style = read("docs/style/pages.css")
-    picture = (DOCS / "thesis.svg").as_uri()
-    driver = browse(
-        f'<style>{style}</style><body data-theme="{theme}" style="margin:0">'
-        f'<img src="{picture}" alt="">',
-        540,
-        dark=theme == "light",
-    )
-    shown = image.open(io.BytesIO(driver.get_screenshot_as_png())).convert("L")
-    corner = shown.getpixel((8, 480))  # of the picture, beneath its axes
-    assert corner > 240 if theme == "light" else corner < 40
 
 
 @pytest.mark.slow
@@ -511,33 +434,6 @@ def test_hoecken_s_curve_is_straight_to_1_5_mm_over_440():
     straight = curve.y < 0.4015
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999
     assert np.ptp(curve.x[straight]) > 0.44
-
-
-@pytest.mark.slow
-def test_the_wiper_of_the_page_needs_less_torque_by_other_means(monkeypatch):
-    """Check the optimum by `solve`, `swing` and `transmission_extremes`.
-
-    The optimiser does not use them.
-    """
-    pytest.importorskip("scipy")
-    monkeypatch.chdir(ROOT)
-    names = {}
-    with contextlib.redirect_stdout(io.StringIO()):
-        exec(blocks("python", read("docs/guide-roboticist.md"))[-1], names)
-    scene, lengths = names["scene"], [float(length) for length in names["lengths"]]
-    bars = [
-        replace(bar, length=length)
-        for bar, length in zip(scene.linkage.moving, lengths[1:], strict=True)
-    ]
-    better = replace(scene, linkage=fourbar.FourBar(lengths[0], *bars))
-    torques = [abs(fourbar.solve(wiper).torque).max() for wiper in (scene, better)]
-    assert torques[1] < 0.95 * torques[0]
-    swings = [fourbar.swing(wiper.linkage) for wiper in (scene, better)]
-    assert swings[1] == pytest.approx(swings[0], abs=1e-6)
-    worst = fourbar.transmission_extremes(better.linkage).worst
-    assert math.degrees(worst) > 40.0 - 1e-3
-    ratios = np.divide(better.linkage.lengths, scene.linkage.lengths)
-    assert ratios.min() >= 0.5 and ratios.max() <= 2.0
 
 
 def test_the_python_page_goes_to_a_table_of_torque_in_five_lines(capsys):

@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 import textwrap
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +17,15 @@ import pytest
 
 from fourbar import effects
 from fourbar.effects import Load
-from fourbar.errors import InputError, LimitError
+from fourbar.errors import LimitError
 from fourbar.files import dump, loads
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import command
 from fourbar.solving import solve
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.study import vary
 from fourbar_validation.compare import effect_sizes as in_scales
 from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
-from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.run.judge import judge
 from tests.validation.engines.test_applied_effects import (
@@ -85,24 +82,6 @@ def test_one_file_is_all_that_the_example_needs(latch):
     assert "latch" in effects.list_kinds()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["act_on_engine", "act_on_free_bodies", "act"])
-def test_the_test_of_the_page_fails_for_a_mistake_in_one_derivation(
-    latch, method, monkeypatch
-):
-    right = getattr(latch, method)
-
-    def twice(*arguments):
-        right(*arguments)
-        right(*arguments)
-
-    monkeypatch.setattr(latch, method, twice)
-    names = {}
-    exec(block("python", number=1), names)
-    with pytest.raises(AssertionError):
-        names["test_every_exact_engine_agrees"]()
-
-
 def guide_scene():
     return loads(SCENE + block("toml"))
 
@@ -155,41 +134,6 @@ def test_without_its_size_nothing_is_judged_by_another_scale(latch, monkeypatch)
     rows = judge("scene", guide_scene(), EXACT).rows
     engines = {row.engine for row in rows if row.failed and "'latch'" in row.reason}
     assert engines >= {engine.name for engine in EXACT}
-
-
-def test_without_its_file_a_scene_neither_reads_nor_writes_the_example(
-    latch, monkeypatch
-):
-    scene = guide_scene()
-    classes = {k: v for k, v in effects.list_classes().items() if v is not latch}
-    monkeypatch.setattr(effects, "list_classes", lambda: classes)
-    with pytest.raises(InputError, match=r"effects\.latch"):
-        guide_scene()
-    with pytest.raises(InputError, match=r"effects\.latch"):
-        dump(scene)
-
-
-def test_the_drive_makes_up_for_what_the_example_takes(latch):
-    """The couple, at angles and speeds of the free bodies, has the power that the drive
-    makes up for: at few positions, and in both senses.
-    """
-    scene = guide_scene()
-    with_it, without = solve(scene).torque, solve(replace(scene, effects=())).torque
-    assert with_it is not None and without is not None
-    motion = FreeBody().answer(scene, command(scene)).quantities
-    x = (np.degrees(motion["theta_4"]) - 115.0) / 5.0
-    couple = np.where(
-        np.abs(x) < 1.0,
-        -0.8 * x * (1.0 - np.abs(x)),
-        0.0,
-    )
-    assert 2 <= np.count_nonzero(couple) < 20 and couple.min() < 0.0 < couple.max()
-    power = -couple * motion["omega_4"]
-    assert (with_it - without) * 10.0 == pytest.approx(
-        power,
-        abs=1e-12 * np.abs(with_it).max(),
-        rel=0,
-    )
 
 
 def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch):

@@ -4,18 +4,14 @@ Refused in one line with exit status 2, or bounded and stopped.
 """
 
 import os
-import signal
 import subprocess
-import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 import fourbar.cli
 import fourbar_validation.cli
-from fourbar.errors import BAD_INPUT, INTERRUPTED
+from fourbar.errors import BAD_INPUT
 from fourbar.evaluation import free_motion
 
 ROOT = Path(__file__).parents[2]
@@ -107,37 +103,6 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
             and "released.toml: motion.free.duration = 1000000000.0" in printed
         )
         assert "followed for 500 steps" in printed and not out.exists()
-
-
-@pytest.mark.slow
-@pytest.mark.posix
-@pytest.mark.usefixtures("interruptible")
-def test_a_long_free_motion_stops_at_ctrl_c(tmp_path):
-    (tmp_path / "released.toml").write_text(RELEASED)
-    begin = "from fourbar.cli import main; print(flush=True); main()"
-    command = [sys.executable, "-c", begin, "analyze", str(tmp_path / "released.toml")]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    ) as running:
-        assert running.stdout is not None and running.stdout.readline()
-        time.sleep(1.0)
-        assert running.poll() is None
-        presses = 0
-        # Python drops an interrupt that falls into a destructor; a user presses again
-        while presses < 3:
-            presses += 1
-            running.send_signal(signal.SIGINT)
-            with suppress(subprocess.TimeoutExpired):
-                running.wait(timeout=10.0)
-                break
-        _, printed = running.communicate(timeout=10.0)
-    assert (
-        running.returncode == INTERRUPTED
-        and printed.splitlines()[-1] == b"error: interrupted"
-    )
-    assert presses > 1 or printed.strip() == b"error: interrupted"
 
 
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(

@@ -16,7 +16,7 @@ import pytest
 
 import fourbar
 import fourbar_validation.run.plan
-from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
+from fourbar.errors import BAD_INPUT, FAILED, InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar_validation.cli import status
@@ -29,7 +29,6 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, write_about
 from fourbar_validation.report.terminal import print_table
-from fourbar_validation.run import pool
 from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import LARGEST_LIST, Suite, read_suite
@@ -248,34 +247,6 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(name, tmp_path, caps
     assert len(printed.splitlines()) == 1
 
 
-@pytest.mark.slow
-def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
-    tmp_path, monkeypatch, capsys
-):
-    judge_here(monkeypatch)
-    names = ("\x1b[31m<b>[red]x.toml", "a\nb.toml")
-    for name in names:
-        (tmp_path / name).write_text(scene_text("fine"))
-    suite = tmp_path / "suite.toml"
-    suite.write_text(f"scenes = {json.dumps(names)}")
-    arguments = [
-        "--suite",
-        str(suite),
-        "--engines",
-        "free-body",
-        "--no-pictures",
-        "--out",
-        str(tmp_path / "out"),
-    ]
-    assert status(["run", *arguments]) == HOLDS
-    assert {row.scene for row in read_columns(tmp_path / "out" / "results.csv")} == {
-        "\\x1b[31m<b>[red]x",
-        "a\\nb",
-    }
-    # the progress bar steers the terminal itself; what is printed at the end does not
-    assert not STEERING.search(capsys.readouterr().out)
-
-
 def listed(tmp_path, text, name="suite.txt"):
     for file in ("a.toml", "b.toml"):
         (tmp_path / file).write_text(scene_text(file))
@@ -344,17 +315,6 @@ def test_a_bad_suite_in_toml_is_one_line(text, tmp_path):
 def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path):
     suite = read_suite(listed(tmp_path, 'scenes = ["*.toml"]', "suite.toml"))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
-
-
-def test_a_worker_carries_only_its_own_scenes(tmp_path):
-    suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
-    (job,) = pool.make_jobs(
-        suite,
-        [1],
-        (),
-        draw=False,
-    )
-    assert job.name == "b" and len(job.suite) == 1
 
 
 class Greedy:

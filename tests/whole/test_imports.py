@@ -236,16 +236,6 @@ def test_the_formulas_know_numpy_and_the_linkage_alone():
         assert {layer(name) for name in used} <= {"formulas", "linkage", "errors"}, path
 
 
-@pytest.mark.parametrize("name", ["compare", "report"])
-def test_what_judges_knows_no_engine_library(name):
-    paths = [*(PACKAGES["fourbar_validation"] / name).rglob("*.py")]
-    assert paths
-    for path in paths:
-        assert not {module.partition(".")[0] for module in imported(path)} & set(
-            ENGINES
-        ), path
-
-
 def test_nothing_that_is_shipped_knows_the_lab():
     """Not even as a text such as "module:Class", which no import shows."""
     shipped = [

@@ -17,8 +17,6 @@ from fourbar.edit.session import Session
 from fourbar.errors import HOLDS, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
-from fourbar_validation.run import plan
-from tests.support.here import judge_here
 from tests.support.runs import HERE, read_run, save_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.posix]
@@ -85,35 +83,6 @@ def test_a_killed_accept_leaves_one_accepted_state_and_is_completed_by_another(
             assert open_run(target).verified
     left = {path.name for path in target.iterdir() if not path.match(DRAFT)}
     assert left <= {"results.csv", "timings.csv", "record.json", "history.parquet"}
-
-
-def list_same(out, whole):
-    """Return which tables are there, with the bytes of the undisturbed ones."""
-    names = {table.name for table in out.glob("results.*")}
-    for name in names:
-        assert (out / name).read_bytes() == (whole / name).read_bytes()
-    return names
-
-
-def test_a_killed_collect_is_done_again_with_the_same_bytes(tmp_path, monkeypatch):
-    judge_here(monkeypatch)
-    monkeypatch.setattr(plan, "SCENES_OF_A_QUICK_TASK", 2)
-    options = ["--random", "8", "--engines", "free-body", "--no-pictures"]
-    folders = [str(tmp_path / str(k)) for k in (1, 2)]
-    for k, folder in enumerate(folders, 1):
-        line = ["run", *options, "--part", f"{k}/2", "-o", folder]
-        assert status(line) == HOLDS
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    assert status(["collect", *folders, "-o", str(whole)]) == HOLDS
-    line = ["collect", *folders, "-o", str(out)]
-    for _ in die_at_each_name(lambda: status(line)):
-        list_same(out, whole)
-    assert list_same(out, whole) == {"results.csv", "results.parquet"}
-    names = [
-        {path.name for path in folder.iterdir() if not path.match(DRAFT)}
-        for folder in (out, whole)
-    ]
-    assert names[0] == names[1]
 
 
 def test_a_killed_workbench_leaves_a_whole_scene_file(tmp_path):

@@ -7,16 +7,12 @@ is a machine here: it shares with the others what the page says that it shares.
 import importlib.util
 import json
 import os
-import re
-import shlex
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from string import Template
 
 import pytest
 
@@ -96,39 +92,6 @@ def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     assert_same_bytes(collect_as_shown(tmp_path), alone)
 
 
-def test_a_matrix_of_a_workflow_changes_no_byte(alone, tmp_path, monkeypatch):
-    """Every machine has folders of its own; artefacts alone go from one to another.
-
-    The first one is a shell, the others are this process.
-    """
-    workflow = (CI / "parts.yml").read_text(encoding="utf-8")
-    (numbers,) = re.findall(r"part: \[(.*)\]", workflow)
-    judge, collect = re.findall(
-        r"- run: \.venv/bin/python -m validation ((?:run|collect) .*)", workflow
-    )
-    (options,) = re.findall(r"^  RUN: (.*)$", workflow, re.MULTILINE)
-    assert {"--random", "--engines", "--no-pictures"} <= set(options.split())
-    parts = numbers.split(", ")
-    assert f"/{len(parts)}" in judge
-    last = tmp_path / "last"
-    judge_here(monkeypatch)
-    for part in parts:
-        machine = tmp_path / part
-        machine.mkdir()
-        variables = {"RUN": " ".join([*OPTIONS, "--workers", "1"]), "PART": part}
-        if part == parts[0]:
-            run_shell(f"fourbar-validation {judge}", machine, **variables)
-        else:
-            monkeypatch.chdir(machine)
-            words = shlex.split(Template(judge).substitute(variables))
-            assert status(words) == HOLDS
-        monkeypatch.chdir(tmp_path)
-        shutil.copytree(machine / "parts", last / "parts", dirs_exist_ok=True)
-        shutil.rmtree(machine)
-    run_shell(f"fourbar-validation {collect}", last)
-    assert_same_bytes(last / "results", alone)
-
-
 @contextmanager
 def started(*line, folder):
     """Start a program of Dask, and end it."""
@@ -183,47 +146,3 @@ def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(alone, tmp_pa
             with started(*worker, folder=tmp_path):
                 assert program.wait(TIME) == 0
     assert_same_bytes(out, alone)
-
-
-@pytest.mark.skipif(
-    importlib.util.find_spec("distributed") is None,
-    reason="not run: distributed is not installed: pip install distributed",
-)
-def test_a_worker_with_other_code_judges_nothing():
-    with pytest.raises(AssertionError, match="other versions or code"):
-        load_dask_run().judge("1/1", {"code": "of yesterday"}, OPTIONS)
-
-
-@pytest.mark.skipif(
-    importlib.util.find_spec("distributed") is None,
-    reason="not run: distributed is not installed: pip install distributed",
-)
-def test_a_part_whose_unpacking_is_interrupted_is_not_there(tmp_path, monkeypatch):
-    program = load_dask_run()
-    (tmp_path / "judged").mkdir()
-    (tmp_path / "judged" / "results.csv").write_text("scene")
-    archive = shutil.make_archive(str(tmp_path / "a"), "zip", tmp_path / "judged")
-    packed = Path(archive).read_bytes()
-    parts = tmp_path / "parts"
-    parts.mkdir()
-
-    def interrupted(archive, folder):
-        folder.mkdir()
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as context:
-        context.setattr(shutil, "unpack_archive", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            program.unpack(packed, parts / "1")
-    assert not list(parts.iterdir())
-    program.unpack(packed, parts / "1")
-    assert [path.name for path in parts.rglob("*")] == ["1", "results.csv"]
-
-
-def load_dask_run():
-    """Import the program that the page on many machines shows."""
-    spec = importlib.util.spec_from_file_location("dask_run", CI / "dask_run.py")
-    assert spec is not None and spec.loader is not None
-    program = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(program)
-    return program

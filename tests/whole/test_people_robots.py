@@ -7,7 +7,6 @@ by MuJoCo asked by bisection on the couple, and from the loop's own angles.
 import csv
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,6 @@ from fourbar.cli import status as ask_formulas
 from fourbar_validation.cli import status as ask_harness
 
 COMMANDS = {"fourbar": ask_formulas, "fourbar-validation": ask_harness}
-Steps = Callable[..., str]
 
 ARM = """\
 title = "Arm"
@@ -32,12 +30,6 @@ mass = "0.3 kg"
 [bars.output]
 mass = "0.3 kg"
 [motion]
-"""
-FRICTION = f"""{ARM}\
-theta_2 = {{ from = "30 deg", to = "90 deg", steps = 60 }}
-omega_2 = "1 rad/s"
-[effects]
-friction = {{ O2 = "0.5 N m", A = "0.5 N m" }}
 """
 ROTOR = f"""{ARM}\
 theta_2 = {{ from = "30 deg", to = "60 deg", steps = 30 }}
@@ -131,32 +123,6 @@ def spoil(name, old, new):
     changed, times = re.subn(old, new, text, count=1)
     assert times == 1
     write(name, changed)
-
-
-@pytest.mark.slow
-def test_a_file_with_dry_friction_is_right(ask):
-    """MuJoCo's default friction.
-
-    1.2243167 N m at 30 deg by bisection where 1.2243155 is exact.
-    """
-    write("friction.toml", FRICTION)
-    ask("fourbar mjcf friction.toml --drive none -o friction.xml")
-    text = Path("friction.xml").read_text()
-    write("friction.xml", re.sub(' sol(ref|imp)friction="[^"]*"', "", text))
-    told = ask("fourbar-validation check-mjcf friction.toml friction.xml")
-    assert "All 22 comparisons hold" in told
-    assert "The file is right as far as MuJoCo's constraints let it be" in told
-    off = re.search(r"mjcf-one-state as compiled: torque is off by (\S+),", told)
-    assert off is not None and float(off[1]) == pytest.approx(3.4e-6, rel=0.03)
-
-
-@pytest.mark.slow
-def test_a_file_whose_friction_is_wrong_is_not(ask):
-    write("friction.toml", FRICTION)
-    ask("fourbar mjcf friction.toml --drive none -o friction.xml")
-    spoil("friction.xml", 'frictionloss="0.5"', 'frictionloss="0.505"')
-    told = ask("fourbar-validation check-mjcf friction.toml friction.xml", code=1)
-    assert "do not hold" in told
 
 
 @pytest.mark.slow

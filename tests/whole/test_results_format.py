@@ -9,16 +9,10 @@ import pytest
 
 from fourbar import Motion, solve
 from fourbar.effects import PinFriction
-from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import (
-    FORCE_NAMES,
     LINE_QUANTITIES,
-    PIN_FORCES,
     QUANTITIES,
-    STAGES,
-    UNKNOWNS,
 )
-from fourbar.solution import Solution
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FORMULAS, RESULT_COLUMNS, Row
@@ -42,24 +36,6 @@ from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
-NOT_QUANTITIES = (
-    *(
-        "title",
-        "scene",
-        "drive",
-        "drive_bar",
-        "status_code",
-        "branch",
-        "ground",
-        "change_points",
-        "with_extremes",
-        "command_at",
-        "lengths",
-        "origin",
-        "at",
-    ),
-    *("points", "velocity", "acceleration"),
-)
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 """Of every engine, besides what it says of positions and of the linkage."""
 SHIPPED_RUN = find_baseline(ACCEPTED)
@@ -133,23 +109,6 @@ def test_every_quantity_of_a_scene_is_described(results):
     assert {row.quantity for row in rows} <= {*described, *of_positions}
 
 
-def test_the_fields_of_a_solution_are_the_rows_of_the_table():
-    fields = [field.name for field in dataclasses.fields(Solution)]
-    assert [name for name in fields if name not in NOT_QUANTITIES] == [
-        q.name for q in QUANTITIES
-    ]
-    assert set(NOT_QUANTITIES) <= set(fields)
-    assert {q.kind for q in QUANTITIES} == {"scalar", "vector"}
-    assert {q.group for q in QUANTITIES} == {
-        "",
-        "unknown",
-        "dry friction",
-        "pin loads",
-        "linear drive",
-    }
-    assert STAGES == ("position", "velocity", "acceleration", "force", "error")
-
-
 def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity():
     solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)), "error")
     for q in QUANTITIES:
@@ -158,15 +117,6 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity():
         assert values is None or values.shape == (
             (len(solution), 2) if q.kind == "vector" else (len(solution),)
         )
-
-
-def test_the_formulas_name_the_pin_forces_as_the_table_does():
-    assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
-    assert (
-        tuple(name for name in UNKNOWNS if name not in FORCE_NAMES) + FORCE_NAMES[:5]
-        == UNKNOWNS
-    )
-    assert FORCE_NAMES[5:] == ("drive_force", "power")
 
 
 def test_the_parquet_file_holds_the_rows_of_the_table(results):

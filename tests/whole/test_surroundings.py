@@ -11,55 +11,12 @@ import numpy as np
 import pytest
 
 from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
-from fourbar_validation.cli import status
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
-from tests.support.here import judge_here
 
 MODELS = Path(__file__).parents[2] / "models"
 RUN = ["--random", "6", "--engines", "free-body", "--no-pictures", "--workers", "1"]
 LINKAGE = ["--figure", "linkage"]
 MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
-CLOCK_THAT_GOES_BACK = r"""
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <time.h>
-/* the clock on the wall goes back by a day at each look */
-int clock_gettime(clockid_t id, struct timespec *t) {
-    static int (*real)(clockid_t, struct timespec *);
-    static long looks;
-    if (!real) real = dlsym(RTLD_NEXT, "clock_gettime");
-    int status = real(id, t);
-    if (id == CLOCK_REALTIME) t->tv_sec -= looks++ * 86400;
-    return status;
-}
-"""
-
-
-def harness(*line, **settings):
-    words = [sys.executable, "-m", "fourbar_validation", *map(str, line)]
-    return subprocess.run(
-        words, capture_output=True, text=True, check=False, **settings
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.linux
-@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
-def test_a_clock_that_goes_back_changes_no_byte(tmp_path, monkeypatch):
-    (tmp_path / "clock.c").write_text(CLOCK_THAT_GOES_BACK, encoding="utf-8")
-    library = tmp_path / "clock.so"
-    compile_it = ["cc", "-shared", "-fPIC", "-o", str(library)]
-    subprocess.run([*compile_it, str(tmp_path / "clock.c"), "-ldl"], check=True)
-    jumping = os.environ | {"LD_PRELOAD": str(library)}
-    code = "import time; print(len({time.time() // 43200 for _ in range(3)}))"
-    seen = subprocess.check_output([sys.executable, "-c", code], env=jumping)
-    assert int(seen) > 1
-    done = harness("run", *RUN, "-o", tmp_path / "back", env=jumping)
-    assert (done.returncode, done.stderr) == (HOLDS, "")
-    judge_here(monkeypatch)
-    assert status(["run", *RUN, "-o", str(tmp_path / "steady")]) == HOLDS
-    back, steady = (tmp_path / name / "results.csv" for name in ("back", "steady"))
-    assert back.read_bytes() == steady.read_bytes()
 
 
 @pytest.fixture
