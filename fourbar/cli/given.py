@@ -216,16 +216,17 @@ def commands_radians() -> bool:
 
 def is_bare(text: str) -> bool:
     """Return True if a text is a number without a unit."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    from fourbar.quantities.units import read_bare
+
+    return read_bare(text) is not None
 
 
 def read_number(key: str, text: str, unit: str, bound: str = ANY_NUMBER) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
-    return require(key, float(text) if is_bare(text) else text, unit, bound)
+    from fourbar.quantities.units import read_bare
+
+    number = read_bare(text)
+    return require(key, text if number is None else number, unit, bound)
 
 
 def read_positions(scene: Scene, text: str) -> Command:

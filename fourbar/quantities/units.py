@@ -67,7 +67,7 @@ _GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
 RAISED_TEXT = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 SUPERSCRIPT_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FRACTION = re.compile(
-    r"([+-]?)(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])"
+    r"([+-]?)(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″]|$)"
 )
 """1/2 or -12 1/2, as inches are written; the sign is that of the sum."""
 _FEET = re.compile(r"([+-]?)([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
@@ -84,8 +84,8 @@ UNIT_TEXT = re.compile(
 parser, no tower of powers. Names are taken whole (`++`), so that a text which does not
 fit is refused in one pass.
 """
-IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet")
-"""Units of a length with which a scene is shown in imperial units."""
+IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet", "yd", "yard", "yards")
+"""Units of a length with which a scene is shown in imperial units, yards in feet."""
 _LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""
@@ -152,6 +152,16 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError("the number is too large")
     # Fraction has no -0.0
     return -0.0 if value == 0.0 and number_text[0].startswith("-") else value
+
+
+def read_bare(text: str) -> float | None:
+    """Return the number of a text, a fraction too; None if it has a unit."""
+    if fraction := _FRACTION.fullmatch(text.strip()):
+        return float(_read_fraction(fraction))
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def write_pint_quantity(quantity: Any) -> Any:

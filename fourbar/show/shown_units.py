@@ -41,8 +41,6 @@ speeds that of length.
 _RATE_NAMES = ("omega", "alpha")
 _POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
 """Names of the pound, a mass; a list that names no force may mean pounds-force."""
-_METRIC = ("mm", "cm", "dm", "m")
-"""Units of lengths.ground in which lengths are shown as they are stated."""
 _ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
 """Units of omega and alpha in which rates are shown as they are stated."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
@@ -116,8 +114,8 @@ def _hint_at_unit(name: str) -> str:
 def suit_units(length: str) -> Conversion:
     """Return the units that suit a length as it was typed.
 
-    Inches and feet give imperial units, other lengths `COMMON`: a result has the prefix
-    that suits its size, where a message repeats the unit that was typed.
+    Inches, feet and yards give imperial units, other lengths `COMMON`: a result has the
+    prefix that suits its size, where a message repeats the unit that was typed.
     """
     from fourbar.quantities.units import find_unit
 
@@ -136,7 +134,7 @@ def _find_imperial(name: str) -> Conversion:
 def units_of_length(length: str) -> Conversion:
     """Return the units of messages on a length as it was typed.
 
-    Inches and feet give imperial units; other lengths keep their unit.
+    Inches, feet and yards give imperial units; other lengths keep their unit.
     """
     return _suit_texts(length, ())
 
@@ -144,7 +142,7 @@ def units_of_length(length: str) -> Conversion:
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     """Return the units that suit the tables of a scene file.
 
-    Lengths in inches or feet give imperial units with these; otherwise lengths have the
+    Lengths in inches, feet or yards give imperial units; otherwise lengths have the
     unit of lengths.ground, and speeds and accelerations of bars those that the motion
     is stated in, or rad/s if it is a released one. Tables that are no scene give
     `COMMON`: the reader says what is wrong with them.
@@ -183,13 +181,14 @@ def states_radians(document: Mapping[str, Any]) -> bool:
 @cache
 def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
     """Return the units that suit a length, speeds and accelerations as written."""
-    from fourbar.quantities.units import find_unit
+    from fourbar.quantities.units import converts, find_unit
 
     name = find_unit(length, "m")
     if imperial := _find_imperial(name):
         shown = dict(imperial)
     else:
-        shown = {**COMMON, **(units(name) if name in _METRIC else {})}
+        named = units(name.replace(" ", ".")) if converts(name, "m") else {}
+        shown = {**COMMON, **named}
     for texts in rates:
         for text, unit in zip(texts, ("rad/s", "rad/s^2"), strict=True):
             stated = find_unit(text, "")

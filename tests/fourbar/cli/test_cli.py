@@ -320,6 +320,7 @@ CLASSIFIED = read_rows(r"""
 # at its limits the input is the corner of 80, 100 and 90 + 50, or 90 - 50 mm
 80mm 100mm 50mm 90mm | input: coupler, output folded      22.3316
 80mm 100mm 50mm 90mm | input: coupler, output stretched  101.5370
+3/2 1/2 1 9/8 | s + l = 2 < p + q = 2.125
 2 1 2 1 | change points: theta_2 = 0.0000 deg and 180.0000 deg
 2 1 2 1 | at change points alone:\n    ground + input = 3 = coupler
 """)
@@ -370,6 +371,7 @@ NEW = read_rows("""
 300 100 25cm 220 --unit mm | 0.3 0.1 0.25 0.22
 '12"' '4"' '10"' '9"' | 0.3048 0.1016 0.254 0.2286
 12″ '4 ″' 10” '9 in' | 0.3048 0.1016 0.254 0.2286
+3 1-1/4 25/8 2.5 --unit ft | 0.9144 0.381 0.9525 0.762
 "2'" '8"' "1'8\\"" "1'6\\"" | 0.6096 0.2032 0.508 0.4572
 """)
 """Lengths as people write them, and in metres."""
