@@ -164,7 +164,7 @@ def _find_number(
         if values is None:
             values = compute_times(solution.scene, solution.at)
         if values is None:
-            none = "the positions are passed at no one speed: no time"
+            none = "passed at no one speed, without a law, the positions have no time"
             raise InputError("--columns", name, none)
         return "s", values
     stem, axis = _split_axis(name)
@@ -192,6 +192,9 @@ def _refuse_name(scene: Scene, solution: Solution, name: str) -> InputError:
     if _is_number(with_speed, name):
         return _ask_for_speed(scene, name)
     known = ["time", *_list_column_quantities(with_speed)]
+    if name in ("status", "branch", "drive_bar"):
+        text = "is no quantity: --csv without --columns has it"
+        return InputError("--columns", name, text)
     close = get_close_matches(name, known, 1)
     hint = f'did you mean "{close[0]}"? ' if close else ""
     there = ", ".join(["time", *_list_column_quantities(solution)])

@@ -67,6 +67,7 @@ F12_z | F12_x is a component
 torque_x | unknown
 P/F12 | is a place: P_x or P_y
 drive_force | unknown
+status | --csv without --columns has it
 """)
 
 

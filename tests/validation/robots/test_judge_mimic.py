@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.errors import InputError
+from fourbar.errors import BAD_INPUT, InputError
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
+from fourbar_validation.cli import status
 from fourbar_validation.robots.judge_mimic import (
     fit_minimax,
     fit_squares,
@@ -415,3 +416,10 @@ def test_the_tree_tells_which_bars_a_follower_joins(
         '<joint joint1="F" joint2="L"/></equality></mujoco>'
     )
     assert measure_mimic(path, "F", GRIPPER).equality.bars == bars
+
+
+@pytest.mark.parametrize("option", ["--key", "--hold", "--error"])
+def test_an_option_that_would_be_ignored_is_refused(option, tmp_path, capsys):
+    line = ["check-mjcf", "scene.toml", str(write(tmp_path)), "--mimic", "s"]
+    assert status([*line, option, "1"]) == BAD_INPUT
+    assert f"{option} has no use beside --mimic" in capsys.readouterr().err

@@ -134,7 +134,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
     rows = rows_of(OffAtTheReversal, scene)
     for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]
-        noted = "1 positions at which dry friction reverses not judged" in row.reason
+        noted = "1 position at which dry friction reverses not judged" in row.reason
         if quantity in FORCE_NAMES:
             assert row.verdict == AGREES and noted, quantity
         else:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.errors import write_count
 from fourbar.quantities import (
     CHANGE_POINT,
     COUPLE,
@@ -398,10 +399,8 @@ class Comparison:
                     continue
                 note += f"; not judged: {unstated}"
             if reversals[i]:
-                note += (
-                    f"; {reversals[i]} positions at which dry friction reverses not"
-                    " judged"
-                )
+                count = write_count(reversals[i], "position")
+                note += f"; {count} at which dry friction reverses not judged"
             if compared[i]:
                 due.append(_Due(quantity, ours, theirs, masks[i], note))
             else:
@@ -640,9 +639,11 @@ def judge_errors(
         if judged[i].any():
             if undecided[i]:
                 limit = f"more than {MOST_ALLOWED:g} allowed"
-                why += f"; {undecided[i]} positions with {limit} not judged"
+                count = write_count(undecided[i], "position")
+                why += f"; {count} with {limit} not judged"
             if again := errors.settled[i]:
-                why += f"; {again} positions within the rounding of theta_2"
+                count = write_count(again, "position")
+                why += f"; {count} within the rounding of theta_2"
         yield _WorstPosition(
             position,
             verdict,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.loop_facts import BAR_ROLES, SITE_ROLES
@@ -38,6 +39,9 @@ from fourbar_validation.robots.report import (
     write_report,
 )
 from fourbar_validation.scenes.suites import read_scene_files
+
+_BESIDE_MIMIC = ("files", "mimic", "pose", "assets")
+"""Arguments that --mimic takes."""
 
 
 def _read_role_names(pairs: tuple[str, ...]) -> dict[str, str]:
@@ -126,6 +130,8 @@ def check_mjcf_command(
     """
     if len(files) > 2:
         raise click.UsageError("give one FILE.xml, and SCENE before it or not")
+    if mimic is not None:
+        _refuse_beside_mimic(click.get_current_context())
     theirs = files[-1]
     suite = read_scene_files(files[:-1]) if len(files) > 1 else None
     assets = robot.pop("assets")
@@ -152,6 +158,15 @@ def check_mjcf_command(
     rows = [one.row for one in judgement.errors]
     write_report(theirs, out, blocks, rows, [judgement.measured])
     return judgement.counts.status
+
+
+def _refuse_beside_mimic(context: click.Context) -> None:
+    """Refuse the options that say something of a robot alone, or of its report."""
+    for option in context.command.params:
+        name = str(option.name)
+        source = context.get_parameter_source(name)
+        if source is ParameterSource.COMMANDLINE and name not in _BESIDE_MIMIC:
+            raise click.UsageError(f"{option.opts[-1]} has no use beside --mimic")
 
 
 def _write_stated(robot: Mapping[str, Any]) -> str:

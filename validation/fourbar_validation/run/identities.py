@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Actions
 from fourbar.effects.effect import list_bodies
+from fourbar.errors import write_count
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
@@ -446,7 +447,8 @@ def compare_status(
         reason = "every position has its values"
     if differ.any():
         reason = (
-            f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
+            f"other at {write_count(int(wrong), 'position')}, the first is"
+            f" {formulas.status[index]}; {reason}"
         )
     return question.row(
         "status",
