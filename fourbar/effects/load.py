@@ -71,7 +71,8 @@ class Table(Described):
                 "needs two or more angles and as many factors",
             )
         if any(b <= a for a, b in pairwise(angles)):
-            raise InputError(f"{key}.theta_2", angles, "must rise", unit="rad")
+            allowed = "must rise; a jump needs a second angle just beside the first"
+            raise InputError(f"{key}.theta_2", angles, allowed, unit="rad")
         if angles[-1] - angles[0] > TURN and not self.covers_a_turn:
             allowed = "must not exceed one turn"
             raise InputError(f"{key}.theta_2", angles, allowed, unit="rad")

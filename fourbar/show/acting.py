@@ -12,13 +12,14 @@ from fourbar.effects import Spring, Springs, Torsion
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN, PINS
-from fourbar.quantities import WOUND, Array
+from fourbar.quantities import CHANGE_POINT, WOUND, Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
 from fourbar.solution import Conversion, Solution, where_assembled
+from fourbar.solving import solve
 from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
 from fourbar.studies.passing import SAME_POSITION
 
@@ -52,7 +53,8 @@ def list_couple_notes(scene: Scene) -> list[str]:
     if not entries:
         return []
     return [
-        f"  a moment alone: {', '.join(entries)}; its from_pin states another place"
+        f"  a moment alone: {', '.join(entries)}; its from_pin would state another"
+        " place"
     ]
 
 
@@ -165,8 +167,9 @@ def list_torsion_notes(
 ) -> list[str]:
     """Say how far torsion springs are wound at one position, and from what line.
 
-    Of a motion it is said that springs on the ground count from its line, where that is
-    not along x: the angle at O2 is not theta_2 then.
+    Of a motion it is said where springs are wound too far, and that springs on the
+    ground count from its line, where that is not along x: the angle at O2 is not
+    theta_2 then.
     """
     effects = scene.settled().effects
     torsions = [effect for effect in effects if isinstance(effect, Torsion)]
@@ -178,13 +181,11 @@ def list_torsion_notes(
     else:
         angle = write_short(theta_1, "rad", units, digits=POSITION_DIGITS)
         lies = f"the ground's line, which lies at {angle}"
-    if len(solution) > 1 or not solution.assembled[0]:
+    notes = _list_wound(scene, solution, springs, units)
+    if len(solution) > 1 or not solution.assembled[0] or notes:
         one = f"torsion spring{'s' if len(on_ground) > 1 else ''}"
         said = f"{one} at {' and '.join(on_ground)}: rest counts from {lies}"
-        return [said] if lies else []
-    if solution.status_code[0] == WOUND:
-        return []
-    notes = []
+        return [*notes, *([said] if lies else [])]
     state = compute_shown_state(scene, solution.at)
     windings = [
         np.ravel(wound)[0]
@@ -199,6 +200,33 @@ def list_torsion_notes(
         )
         line = f"the line of bar {i}" if i > 1 else lies or "the ground's line"
         notes.append(f"torsion spring at {pin}: wound by {by}, at {angle} from {line}")
+    return notes
+
+
+def _list_wound(
+    scene: Scene,
+    solution: Solution,
+    springs: list[tuple[str, float, float, float]],
+    units: Conversion,
+) -> list[str]:
+    """Say which torsion springs are half a turn or more from rest, and where."""
+    notes = []
+    known = solution.status_code != CHANGE_POINT
+    places = solution.at.places[known]
+    for spring in springs if WOUND in solution.status_code else []:
+        alone = replace(scene, loads=(), effects=(Torsion((spring,)),))
+        wound = solve(alone, at=solution.at).status_code[known] == WOUND
+        edges = np.flatnonzero(np.diff(wound))
+        ends = np.where(wound[edges], places[edges], places[edges + 1])
+        where = " and ".join(
+            _write_stretch(solution, stretch, units)
+            for stretch in pair_ends(bool(wound[0]), ends, bool(wound[-1]))
+        )
+        if where:
+            notes.append(
+                f"torsion spring at {spring[0]}: half a turn or more from rest {where},"
+                " where there are no forces"
+            )
     return notes
 
 
@@ -291,7 +319,7 @@ def _command_between(scene: Scene, at: Command, places: Array) -> Command:
 
 
 def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
-    """Write a stretch as "from theta_2 = 61.2 deg on"."""
+    """Write a stretch as "from theta_2 = 61.2 deg on", of falling places "down"."""
     start, stop = stretch
     if start is None and stop is None:
         return "here" if len(solution) == 1 else "throughout"
@@ -302,8 +330,9 @@ def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> s
     ]
     if start == stop:
         return f"at {ends[0]}"
+    falls = bool((np.diff(solution.at.places) < 0.0).all())
     if start is None:
-        return f"up to {ends[1]}"
+        return f"{'down' if falls else 'up'} to {ends[1]}"
     if stop is None:
-        return f"from {ends[0]} on"
+        return f"from {ends[0]} {'down' if falls else 'on'}"
     return f"from {ends[0]} to {ends[1]}"

@@ -23,7 +23,15 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, PIN_FORCE
-from fourbar.quantities import LINE, OK, PIN_FORCES, Array
+from fourbar.quantities import (
+    JAMMED,
+    LINE,
+    OK,
+    PIN_FORCES,
+    SEVERAL,
+    WOUND,
+    Array,
+)
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
@@ -48,6 +56,7 @@ from fourbar.show.shown_units import (
     SHOWN_AS_ZERO,
     SHOWN_DIGITS,
     choose_unit,
+    drop_place_rounding,
     write_digits,
     write_ends,
     write_short,
@@ -81,14 +90,12 @@ _MOST_POLES = 4
 """Number of places at which a quantity grows without bound that are listed."""
 _MOST_HELD = 4
 """Number of places at which dry friction holds a pin that are listed."""
-PLACE_ROUNDING = 1e-6
-"""Part of the motion within which the place of a flat maximum is located. A place
-nearer to zero than that is zero.
-"""
 _IN_LINE = 1e-9
 """Sine below which two bars are in line: places are located to some 1e-12."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
+_WITHOUT_FORCES = (WOUND, JAMMED, SEVERAL)
+"""Statuses of positions between which no forces exist either."""
 BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
@@ -244,10 +251,10 @@ class _SceneBlock:
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
         first, last = self.facts.ends
-        if abs(place) <= PLACE_ROUNDING * abs(last - first):
-            place = 0.0
         text = self._value(
-            place, self.unit, {"m": self.longest, "s": 1.0}.get(self.unit)
+            drop_place_rounding(place, last - first),
+            self.unit,
+            {"m": self.longest, "s": 1.0}.get(self.unit),
         )
         return f"{self.symbol}{_NBSP}={_NBSP}{text}" if named else text
 
@@ -304,6 +311,11 @@ class _SceneBlock:
         ]
         total = write_count(len(self.solution), "position")
         yield f"{total}: {', '.join(parts)}"
+        if (
+            self.facts.pins
+            and np.isin(self.solution.status_code, _WITHOUT_FORCES).any()
+        ):
+            yield "    peaks and means are without the positions that have no forces"
 
     def _find_beside_change_points(self) -> Array:
         """Return the distances of positions evaluated beside a change point, rad, (n,).
@@ -508,7 +520,7 @@ class _SceneBlock:
         """Write between which torques or forces dry friction holds, and where."""
         held = self.facts.held
         parts = []
-        for low, high, (first, last) in held[:_MOST_HELD]:
+        for low, high, (first, last), varies in held[:_MOST_HELD]:
             size = max(abs(low), abs(high))
             holds = f"{self._value(low, unit, size)} to {self._value(high, unit, size)}"
             if len(self.solution) == 1:
@@ -518,7 +530,8 @@ class _SceneBlock:
             else:
                 until = self._place(last, named=False)
                 over = f"{self._place(first)} to {until}"
-                parts.append(f"{holds} over {over}, a part of it at each position")
+                share = ", a part of it at each position" if varies else ""
+                parts.append(f"{holds} over {over}{share}")
         if len(held) > _MOST_HELD:
             parts.append(f"and at {len(held) - _MOST_HELD} more places")
         return f"{', '.join(parts)}: dry friction holds"
@@ -690,7 +703,7 @@ class _SceneBlock:
         rows = [("pins", [*pins]), ("  peak", cells), ("  at", places)]
         means = [load.rms for load in pins.values()]
         if any(mean is not None for mean in means):
-            rows.append(("  RMS", self._cells(_drop_small(means), "N")))
+            rows.append(("  RMS", self._cells(means, "N")))
         yield from _align(rows, self.width)
         if self.facts.kind in ("list", "released"):
             yield "  peak and RMS are those of these positions"
@@ -748,7 +761,7 @@ class _SceneBlock:
         self, values: Iterable[float | None], unit: str, missing: str = "-"
     ) -> list[str]:
         """Write quantities of one kind; `missing` stands for none."""
-        values = [*values]
+        values = _drop_small([*values])
         largest = max((abs(value) for value in values if value), default=0.0)
         return [
             missing if value is None else self._value(value, unit, largest)
@@ -769,16 +782,13 @@ class _SceneBlock:
         if facts.pins and not facts.motion.is_steady:
             yield "the positions are passed at no one speed: no RMS values, no energies"
         if facts.motion.reversals:
-            # of a motion law too by its angle, not by its time
-            unit = solution.at.unit
-            largest = self.longest if unit == "m" else None
             places = ", ".join(
-                f"{self._value(place, unit, largest)} ({pin})"
+                f"{self._place(place, named=False)} ({pin})"
                 for place, pin in facts.motion.reversals
             )
-            name = solution.commanded
             yield (
-                f"dry friction reverses, and the pin forces jump, at {name} = {places}"
+                "dry friction reverses, and the pin forces jump, at"
+                f" {self.symbol} = {places}"
             )
         yield from self._warn()
         yield from list_drawn_notes(scene, self.units)

@@ -59,7 +59,7 @@ class MotionCurves:
     """
     reversals: list[tuple[float, str]]
     """Place, and the pin at which dry friction reverses, in the order of the motion.
-    Pin forces jump there; of a motion law the place is its angle.
+    Pin forces jump there.
     """
     breaks: Array
     """Places at which forces jump or bend."""
@@ -193,10 +193,6 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         panels = fit_panels(compute, edges, wanted, SHALLOW)
         panels = panels.with_points(exact, compute(exact))
     reversals = [(place, name) for place, name in located if name in PINS]
-    if scene.motion.law is not None:
-        angles, *_ = scene.motion.law.at(np.array([place for place, _ in reversals]))
-        names = [name for _, name in reversals]
-        reversals = list(zip(angles.tolist(), names, strict=True))
     return MotionCurves(scene, solution, positions, panels, reversals, breaks)
 
 

@@ -237,6 +237,10 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
 
 SHOWN_AS_ZERO = 1e-13
 """Part of the largest number of its kind below which a number is shown as zero."""
+PLACE_ROUNDING = 1e-6
+"""Part of the motion within which the place of a flat maximum is located. A place
+nearer to zero than that is zero.
+"""
 SHOWN_DIGITS, POSITION_DIGITS = 4, 6
 """Significant digits of a number of a summary, and of one about a single position."""
 
@@ -244,6 +248,11 @@ SHOWN_DIGITS, POSITION_DIGITS = 4, 6
 def drop_rounding(values: Array, largest: float | Array) -> Array:
     """Return numbers with zero for what is rounding of the largest of their kind."""
     return np.where(np.abs(values) <= SHOWN_AS_ZERO * largest, 0.0, values)
+
+
+def drop_place_rounding(place: float, extent: float) -> float:
+    """Return a place of a motion of this extent, and zero for one that is rounding."""
+    return 0.0 if abs(place) <= PLACE_ROUNDING * abs(extent) else place
 
 
 def write_cell(number: float, form: str) -> str:

@@ -72,6 +72,8 @@ class HeldRange(NamedTuple):
     """Greatest torque or force that holds one of them."""
     ends: tuple[float, float]
     """Commanded angle or stroke of the first and the last, rad or m, or the time, s."""
+    varies: bool
+    """False if each of them is held from `low` to `high`, as in a dwell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +280,10 @@ def _list_held(solution: Solution, drive: Driving, kind: str) -> list[HeldRange]
         if kind == "turn" and ranges and run[0] == len(solution) - 1 and rows[0] == 0:
             continue
         ends = float(places[run[0]]), float(places[run[-1]])
-        ranges.append(HeldRange(float(low[run].min()), float(high[run].max()), ends))
+        least, most = float(low[run].min()), float(high[run].max())
+        gap = max(np.ptp(low[run]), np.ptp(high[run]))
+        varies = bool(gap > TIED * (most - least))
+        ranges.append(HeldRange(least, most, ends, varies))
     return ranges
 
 

@@ -23,6 +23,8 @@ the square of the steps.
 """
 MOST_LINES = 300
 """Directions of nearest lines that are told apart. A circle has more of them."""
+SAME_HEIGHT = 1e-13
+"""Part of the largest height by which others differ by rounding."""
 MOST_PLACES = 50_000
 """Places from which on the steps are not divided: they are short all around."""
 
@@ -79,7 +81,9 @@ def _measure_path(course: MotionCourse, name: str) -> Path:
         points = np.concatenate([points, _locate_point(course, name, between)])
         order = np.argsort(places)
         places, points = places[order], points[order]
-    return _measure_points(places, points)
+    law = course.scene.motion.law
+    stated = [*course.places[[0, -1]], *([] if law is None else law.time)]
+    return _measure_points(places, points, np.isin(places, stated))
 
 
 def _locate_point(course: MotionCourse, name: str, places: Array) -> Array:
@@ -164,13 +168,30 @@ def _list_hull(points: Array) -> list[int]:
     return corners or order[:1]
 
 
-def _measure_points(places: Array, points: Array) -> Path:
-    """Measure the points of a path, at these places of the motion."""
+def _list_first_ends(heights: Array, stated: NDArray[np.bool_]) -> list[int]:
+    """List the rows of the least and the greatest height.
+
+    Of heights that differ by rounding, as where a law comes to rest, one is taken where
+    the motion or a part of it ends.
+    """
+    rows = []
+    for sizes in (-heights, heights):
+        rounding = SAME_HEIGHT * np.nanmax(np.abs(sizes))
+        tied = sizes >= np.nanmax(sizes) - rounding
+        rows.append(int(np.argmax(tied & stated if (tied & stated).any() else tied)))
+    return rows
+
+
+def _measure_points(places: Array, points: Array, stated: NDArray[np.bool_]) -> Path:
+    """Measure the points of a path, at these places of the motion.
+
+    `stated`: True where the motion begins, ends, or has a new part of a law.
+    """
     along, _ = _find_direction(points)
     if along[0] < 0.0 or (along[0] == 0.0 and along[1] < 0.0):
         along = -along
     across = np.array([-along[1], along[0]])
-    ends = _list_ends(points @ along)
+    ends = _list_first_ends(points @ along, stated)
     lengths = (points @ along)[ends]
     heights = (points @ across)[_list_ends(points @ across)]
     (x_low, y_low), (x_high, y_high) = (

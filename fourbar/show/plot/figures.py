@@ -212,12 +212,11 @@ def _look_between(shown: View) -> None:
     if motion.reversals:
         axis = shown.axis
         places = ", ".join(
-            f"{axis.factor * place:.4g}{axis.unit} ({pin})"
-            for place, pin in motion.reversals
+            f"{axis.write(place)} ({pin})" for place, pin in motion.reversals
         )
         shown.notes.append(
             f"Dry friction reverses, and the pin forces jump, at {axis.symbol} ="
-            f" {places}.".replace("-", "−")
+            f" {places}."
         )
 
 

@@ -137,10 +137,15 @@ class Symbol(NamedTuple):
 
 
 def list_acting(scene: Scene) -> list[Symbol]:
-    """List everything that acts, the drive first; nothing that has no size."""
+    """List everything that acts, the drive first; nothing that has no size.
+
+    A torque is no drive where positions alone are asked for.
+    """
     symbols = list[Symbol]()
     scene = scene.settled()
-    if scene.motion.free is None:
+    motion = scene.motion
+    has_torque = motion.speed is not None or motion.law is not None
+    if motion.free is None and (has_torque or scene.drive is not None):
         symbols.append(_make_drive(scene))
     for number, load in enumerate(scene.loads, 1):
         at = load.foot(scene.linkage.bar(load.bar).to_centre)

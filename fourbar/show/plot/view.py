@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.shown_units import choose_unit
+from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
 
@@ -109,10 +109,12 @@ class Axis(NamedTuple):
 
     def words(self, place: float, digits: int = 4) -> str:
         """Write a place, which is in SI, with its symbol and unit."""
-        return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace(
-            "-",
-            "−",
-        )
+        return f"{self.symbol} = {self.write(place, digits)}"
+
+    def write(self, place: float, digits: int = 4) -> str:
+        """Write a place, which is in SI, with its unit."""
+        shown = drop_place_rounding(self.factor * place, np.ptp(self.values))
+        return f"{shown:.{digits}g}{self.unit}".replace("-", "−")
 
 
 def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:

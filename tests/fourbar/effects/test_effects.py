@@ -205,6 +205,7 @@ SAME_BAR = Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0))
         (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
         (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),
         (lambda: Table((0.0, 1.0, 7.0), (1.0, 1.0, 1.0)), "loads.table.theta_2"),
+        (lambda: Table((0.0, 1.0, 1.0), (1.0, 1.0, 2.0)), "loads.table.theta_2"),
     ],
 )
 def test_bad_input_names_its_key(make, key):

@@ -30,6 +30,7 @@ from fourbar.scene import command_at
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_block, write_facts
 from fourbar.show.lines import BLOCK_WIDTH
+from fourbar.show.plot.figures import draw_figure
 from fourbar.show.studies import write_equilibria
 from fourbar.show.summary import summarize
 from fourbar.show.tables import write_cells
@@ -495,15 +496,27 @@ def test_each_position_at_rest_has_its_own_range():
     assert "of these positions" not in text and "without bound" not in text
 
 
-@pytest.mark.slow
-def test_a_reversal_of_a_motion_law_is_named_by_its_angle():
-    """Half of A (1 - cos) swings from 0.3 to 2.0 rad and back; O2 reverses there."""
-    time = np.linspace(0.0, 2.0, 41)
-    angle = 0.3 + 0.85 * (1.0 - np.cos(pi * time))
-    law = Law(tuple(time), tuple(angle), steps=30, ends="rest")
+def test_a_reversal_of_a_motion_law_is_named_by_its_time():
+    """A sine of 0.5 Hz that begins at 30 deg of its turn turns back at 1/3 s."""
+    law = fourbar.Sine(1.0, 0.7, pi, 0.6, pi / 6.0, steps=30)
     scene = crank_rocker(motion=Motion(law=law), effects=(Friction.at(O2=0.05),))
-    said = "reverses, and the pin forces jump, at theta_2 = 114.6 deg (O2)"
-    assert said in block(scene)
+    said = "reverses, and the pin forces jump, at t = "
+    assert f"{said}0.3333 s (O2)" in block(scene)
+    figure = draw_figure(scene, "kinematics").figure
+    assert f"{said}333.3 ms (O2)" in figure.subfigs[0].get_supxlabel()
+
+
+def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero():
+    """Friction of 5 N m at O2 holds; the law comes to rest at 0.3 and 0.8 rad."""
+    torques = solve(crank_rocker(motion=Motion([0.3, 0.8], 0.0))).torque
+    law = fourbar.Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, steps=30)
+    effects = (*WEIGHT, Friction.at(O2=5.0))
+    text = block(crank_rocker(motion=Motion(law=law), effects=effects))
+    first, last = (f"{x - 5.0:.4g} N m to {x + 5.0:.4g} N m" for x in torques)
+    assert f"{first} at t = 0 s, {last} over t = 0.2 s to 0.3 s: dry" in text
+    angles = (radians(10.0), radians(70.0))
+    lifts = Motion(law=Law((0.0, 2.5), angles, omega_2=(0.0, 0.0)))
+    assert "over the motion given, 0 mJ taken back" in block(crank_rocker(motion=lifts))
 
 
 CORNERS = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))

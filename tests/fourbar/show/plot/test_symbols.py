@@ -53,7 +53,9 @@ def test_everything_that_acts_has_a_symbol(everything):
         assert {"springs": "spring"}.get(key, key) in kinds
     assert kinds.count("force") == 2 and kinds[0] == "drive"
     released = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
-    assert "drive" not in [symbol.kind for symbol in list_acting(released)]
+    unasked = crank_rocker(motion=fourbar.Motion(0.5))
+    for scene in (released, unasked):
+        assert "drive" not in [symbol.kind for symbol in list_acting(scene)]
 
 
 @pytest.mark.parametrize("index", [5, 30])
