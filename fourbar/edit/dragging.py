@@ -296,8 +296,12 @@ def put_place(
         before = "xy" if isinstance(old, dict) else "polar"
         by = by or before
     lengths = (
-        *((*path, DRAWN_WORD, 0), (*path, "x"), (*path, 0)),
-        *(("lengths", "ground", "x"), ("lengths", "ground"), ("pins", "A", 0)),
+        (*path, DRAWN_WORD, 0),
+        (*path, "x"),
+        (*path, 0),
+        ("lengths", "ground", "x"),
+        ("lengths", "ground"),
+        ("pins", "A", 0),
     )
     length = next(filter(None, map(document.at, lengths)))
     parts: dict[str | int, str]

@@ -237,7 +237,10 @@ class HarnessRun:
             write_text(scene, text)
             self.process = await asyncio.create_subprocess_exec(
                 *command,
-                *("run", str(scene.absolute()), "--out", str(self.folder.absolute())),
+                "run",
+                str(scene.absolute()),
+                "--out",
+                str(self.folder.absolute()),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # so that it ends with all that it starts

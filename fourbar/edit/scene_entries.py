@@ -53,8 +53,12 @@ EXAMPLES = {
 _SECTION = ("20 mm", "5 mm")
 """Example of a pair of lengths: height and thickness of a cross-section."""
 _MOVING = {
-    **{"rad": "60 deg", "rad/s": "10 rad/s", "rad/s^2": "0 rad/s^2"},
-    **{"m": "500 mm", "m/s": "100 mm/s", "m/s^2": "0 mm/s^2"},
+    "rad": "60 deg",
+    "rad/s": "10 rad/s",
+    "rad/s^2": "0 rad/s^2",
+    "m": "500 mm",
+    "m/s": "100 mm/s",
+    "m/s^2": "0 mm/s^2",
 }
 """Examples of what is commanded, likewise."""
 

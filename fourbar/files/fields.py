@@ -46,20 +46,29 @@ DIRECTION_WORDS = {
 _FURTHER_PIN = re.compile(r"[C-F]|O_?[5-9]")
 """Pins of more than four bars, as they are usually named."""
 _MEANT = {
-    **{"weight": "mass", "torque": "moment", "couple": "moment"},
-    **{"rate": "stiffness", "k": "stiffness", "material": "density"},
-    **{"crank": "input", "rocker": "output", "follower": "output", "frame": "ground"},
-    **{
-        "x": "from_pin",
-        "y": "from_pin",
-        "at": "from_pin",
-        "pin": "from_pin",
-        **dict.fromkeys(("theta", "angle"), "theta_2"),
-        **dict.fromkeys(("omega", "speed", "rpm"), "omega_2"),
-        "alpha": "alpha_2",
-    },
+    "weight": "mass",
+    "torque": "moment",
+    "couple": "moment",
+    "rate": "stiffness",
+    "k": "stiffness",
+    "material": "density",
+    "crank": "input",
+    "rocker": "output",
+    "follower": "output",
+    "frame": "ground",
+    "x": "from_pin",
+    "y": "from_pin",
+    "at": "from_pin",
+    "pin": "from_pin",
+    **dict.fromkeys(("theta", "angle"), "theta_2"),
+    **dict.fromkeys(("omega", "speed", "rpm"), "omega_2"),
+    "alpha": "alpha_2",
     **dict.fromkeys(("cg", "cog", "com", "G"), "centre"),
-    **{"I": "inertia", "link": "bar", "start": "from", "stop": "to", "end": "to"},
+    "I": "inertia",
+    "link": "bar",
+    "start": "from",
+    "stop": "to",
+    "end": "to",
 }
 """Words that are no keys, and the keys that may be meant by them."""
 _FORMULAS = dict.fromkeys(

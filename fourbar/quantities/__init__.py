@@ -312,8 +312,18 @@ FORCE_NAMES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
 PIN_LOAD_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 STATUS_NAMES = (
-    *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
-    *("no_torque", "overflow", "invalid", "no_lever", "change_point"),
+    "ok",
+    "not_assembled",
+    "singular",
+    "jammed",
+    "several",
+    "no_direction",
+    "wound",
+    "no_torque",
+    "overflow",
+    "invalid",
+    "no_lever",
+    "change_point",
 )
 """Status names by code; `Solution.status_code` explains each."""
 (

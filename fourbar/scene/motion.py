@@ -494,9 +494,15 @@ class Motion:
     ) -> None:
         expect("motion.law", law, Law, Rise, Sine, type(None))
         of_bars = (
-            *(theta_2, omega_2, alpha_2),
-            *(theta_3, omega_3, alpha_3),
-            *(theta_4, omega_4, alpha_4),
+            theta_2,
+            omega_2,
+            alpha_2,
+            theta_3,
+            omega_3,
+            alpha_3,
+            theta_4,
+            omega_4,
+            alpha_4,
         )
         numbers = dict(zip(_NAMES_OF_BARS, of_bars, strict=True))
         stated = _find_bar("motion", numbers)

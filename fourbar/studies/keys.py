@@ -45,8 +45,22 @@ from fourbar.scene.numbers import PIN_COORDINATE, Tolerance
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
 _SAME_FOR_ALL = {
-    *("title", "source", "drive", "bar", "branch", "free", "law", "frame", "table"),
-    *("picture", "acts", "from", "to", "steps", "limit", "offset"),
+    "title",
+    "source",
+    "drive",
+    "bar",
+    "branch",
+    "free",
+    "law",
+    "frame",
+    "table",
+    "picture",
+    "acts",
+    "from",
+    "to",
+    "steps",
+    "limit",
+    "offset",
 }
 """Parts of keys that name no number. They name a word, a whole number, or what has
 another form in a study.

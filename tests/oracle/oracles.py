@@ -13,8 +13,14 @@ from tests.oracle.sensitivities import sensitivity, study, tolerances
 from tests.oracle.summary import summary
 
 OF_FORCES = (
-    *(study, sensitivity, tolerances, internal_forces),
-    *(summary, equilibria, sdf, usd),
+    study,
+    sensitivity,
+    tolerances,
+    internal_forces,
+    summary,
+    equilibria,
+    sdf,
+    usd,
 )
 """Oracles that need the forces of the free bodies."""
 ORACLES = {oracle.__name__: oracle for oracle in (points, *OF_FORCES)}

@@ -36,8 +36,13 @@ def list_unknown() -> Iterator[str]:
     programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     done = subprocess.run(
         [
-            *(sys.executable, "-m", "pyright", "--outputjson"),
-            *("--verifytypes", "fourbar", "--ignoreexternal"),
+            sys.executable,
+            "-m",
+            "pyright",
+            "--outputjson",
+            "--verifytypes",
+            "fourbar",
+            "--ignoreexternal",
         ],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": path, "PATH": programs},

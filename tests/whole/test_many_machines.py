@@ -132,7 +132,11 @@ def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(alone, tmp_pa
     worker = (*worker, "--no-nanny", "--no-dashboard")
     out = tmp_path / "parts"
     with started(
-        *("scheduler", "--scheduler-file", str(scheduler), "--port", "0"),
+        "scheduler",
+        "--scheduler-file",
+        str(scheduler),
+        "--port",
+        "0",
         "--no-dashboard",
         folder=tmp_path,
     ) as serving:

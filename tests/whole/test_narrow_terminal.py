@@ -39,8 +39,13 @@ OTHER = [
 ]
 """Commands that choose columns by the width, print times, or take long."""
 NO_TABLE = {
-    *("fourbar new", "fourbar edit", "fourbar plot", "fourbar animate"),
-    *("fourbar mjcf", "fourbar sdf", "fourbar usd"),
+    "fourbar new",
+    "fourbar edit",
+    "fourbar plot",
+    "fourbar animate",
+    "fourbar mjcf",
+    "fourbar sdf",
+    "fourbar usd",
     *(f"fourbar-validation {name}" for name in ("accept", "collect", "compare")),
     "fourbar-validation cost",  # for minutes, and a table like that of `advise`
 }

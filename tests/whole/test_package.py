@@ -290,7 +290,9 @@ def test_wheel_and_archive_install_on_every_python(tmp_path):
     with tarfile.open(archive) as packed:
         inner = {name.partition("/")[2] for name in packed.getnames()}
     assert {
-        *("LICENSE", "CHANGELOG.md", "CITATION.cff"),
+        "LICENSE",
+        "CHANGELOG.md",
+        "CITATION.cff",
         "docs/index.md",
         "tests/conftest.py",
         "models/thesis.toml",

@@ -29,9 +29,14 @@ PROGRAMS = ("docs/tutorial", "docs/thesis", "docs/recipes")
 @pytest.mark.parametrize(
     ("page", "sessions"),
     [
-        *(("docs/tutorial", 12), ("docs/thesis", 3), ("docs/recipes", 8)),
-        *(("README", 2), ("docs/commands", 7), ("docs/gallery", 1)),
-        *(("docs/guide-designer", 4), ("docs/guide-roboticist", 8)),
+        ("docs/tutorial", 12),
+        ("docs/thesis", 3),
+        ("docs/recipes", 8),
+        ("README", 2),
+        ("docs/commands", 7),
+        ("docs/gallery", 1),
+        ("docs/guide-designer", 4),
+        ("docs/guide-roboticist", 8),
     ],
 )
 def test_a_page_does_and_prints_what_it_says(

@@ -70,5 +70,5 @@ def test_a_file_is_written_to_standard_output(arguments, start, call, tmp_path):
 
 @pytest.mark.slow
 def test_the_defaults_of_lengths_do_not_enter_the_file(call):
-    _, out, err = call(*["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.22", "-o", "-"])
+    _, out, err = call("mjcf", "--lengths", "0.3", "0.1", "0.25", "0.22", "-o", "-")
     assert ET.fromstring(out).tag == "mujoco" and b"kg/m" in err

@@ -405,8 +405,11 @@ def test_equilibria_are_printed_in_the_units_of_the_file(run):
     printed = run("inches.toml")
     slope = FALLS / (pound * 9.80665 * inch)
     for words in (
-        *("(lbf in/rad)", "(lb in^2)", "torque (lbf in)"),
-        *(f"{J / (pound * inch**2):.6g}", f"{slope:.6g}"),
+        "(lbf in/rad)",
+        "(lb in^2)",
+        "torque (lbf in)",
+        f"{J / (pound * inch**2):.6g}",
+        f"{slope:.6g}",
     ):
         assert words in printed
 

@@ -366,7 +366,9 @@ def spoil(error):
     ("torque", "level"),
     [
         *((spoil(error), "A") for error in (0.0, 5e-10)),
-        *((spoil(5e-7), "B"), (spoil(5e-4), "C"), (spoil(5e-3), "D")),
+        (spoil(5e-7), "B"),
+        (spoil(5e-4), "C"),
+        (spoil(5e-3), "D"),
         *((none, "-") for none in (None, [], [1.0], "x")),
         *((none, "-") for none in ([[1.0, 2.0]] * 37, [math.nan] * 37)),
     ],

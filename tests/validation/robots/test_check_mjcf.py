@@ -708,7 +708,10 @@ def test_lengths_of_another_linkage_come_before_what_costs_more():
         Difference("lengths.coupler", 3.5, 2.66, "", cost=0.6),
     ]
     assert [one.key for one in order(entries)] == [
-        *("lengths.coupler", "contacts", "closure.solimp", "lengths.input"),
+        "lengths.coupler",
+        "contacts",
+        "closure.solimp",
+        "lengths.input",
         "pins.A.positive",
     ]
 

@@ -360,8 +360,14 @@ def reverse_y(numbers, at):
 
 
 OTHER_COMMANDS = [
-    *("kite", "parallelogram", "command_coupler", "command_output"),
-    *("stroke_input", "stroke_output", "cylinder_1_3", "law_cycloidal"),
+    "kite",
+    "parallelogram",
+    "command_coupler",
+    "command_output",
+    "stroke_input",
+    "stroke_output",
+    "cylinder_1_3",
+    "law_cycloidal",
 ]
 
 

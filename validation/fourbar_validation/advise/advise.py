@@ -493,7 +493,10 @@ def _advise_robot(
     help="Relative error of torque and pin forces.",
 )
 @click.option(
-    *("-o", "--out", "--output", "output"),
+    "-o",
+    "--out",
+    "--output",
+    "output",
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the MJCF of one SCENE.",
 )

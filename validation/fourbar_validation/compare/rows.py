@@ -20,8 +20,11 @@ from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.tolerance import Mask, find_used
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
-    *("agrees", "degraded as predicted"),
-    *("undecided", "refuses", "fails"),
+    "agrees",
+    "degraded as predicted",
+    "undecided",
+    "refuses",
+    "fails",
 )
 VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
 """Verdicts from the best to the worst."""

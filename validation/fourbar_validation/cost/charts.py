@@ -174,7 +174,9 @@ def make_figure(
 
     figure = Figure(figsize=(PICTURE_WIDTH, height), facecolor=PAPER)
     figure.text(
-        *(0.02, 1.0 - 0.1 / height, statement),
+        0.02,
+        1.0 - 0.1 / height,
+        statement,
         fontsize=10.5,
         weight="bold",
         color=INK,
@@ -182,7 +184,9 @@ def make_figure(
         wrap=True,
     )
     figure.text(
-        *(0.02, 1.0 - 0.52 / height, title),
+        0.02,
+        1.0 - 0.52 / height,
+        title,
         fontsize=TEXT,
         color=SOFT,
         va="top",

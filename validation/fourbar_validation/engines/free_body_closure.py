@@ -20,8 +20,16 @@ from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import place
 
 STARTING_ANGLES = (
-    *((30, 30), (15, 15), (45, 45), (5, 5), (5, 120)),
-    *((120, 5), (60, 60), (2, 150), (150, 2), (1, 1)),
+    (30, 30),
+    (15, 15),
+    (45, 45),
+    (5, 5),
+    (5, 120),
+    (120, 5),
+    (60, 60),
+    (2, 150),
+    (150, 2),
+    (1, 1),
 )
 """Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn
 where the triangle of the lengths is none to start from; they alone served 8000 of 8000

@@ -46,17 +46,23 @@ _SHORTEST_STEP = 2.0**-40
 """A step halved this often moves nothing that a gap above the rounding could tell."""
 NOT_ANSWERED = frozenset(
     (
-        *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
-        *(
-            "torque_error",
-            "force_error",
-            "torque_low",
-            "torque_high",
-            "friction_residual",
-            "power",
-            *LINE_QUANTITIES,
-        ),
-        *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
+        "theta_2",
+        "omega_2",
+        "alpha_2",
+        "condition",
+        "drive_condition",
+        "torque_error",
+        "force_error",
+        "torque_low",
+        "torque_high",
+        "friction_residual",
+        "power",
+        *LINE_QUANTITIES,
+        "v_A",
+        "v_B",
+        "v_G2",
+        "v_G3",
+        "v_G4",
     )
 )
 """Quantities that no exact engine answers: commanded ones, those that follow from

@@ -51,14 +51,14 @@ another.
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
 _PLOT_COLOURS = {
-    **{
-        "#1a1a1a": "--ink",
-        "#6b6b6b": "--soft",
-        "#d9d9d9": "--grid",
-        "#e4e4e4": "--grid",
-        "#ffffff": "--paper",
-    },
-    **{"#007a5a": "--e2", "#d55e00": "--e3", "#8a3b78": "--e4"},
+    "#1a1a1a": "--ink",
+    "#6b6b6b": "--soft",
+    "#d9d9d9": "--grid",
+    "#e4e4e4": "--grid",
+    "#ffffff": "--paper",
+    "#007a5a": "--e2",
+    "#d55e00": "--e3",
+    "#8a3b78": "--e4",
 }
 """Colours of `fourbar plot`, and the page's own that take their place."""
 _MOTION_AND_FORCE = ("theta_4", "F32")

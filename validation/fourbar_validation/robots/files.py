@@ -42,10 +42,15 @@ _REACHING_OUT = ("attach", "model")
 _FOR_THE_EYE = ("texture", "skin", "layer", "sensor")
 """Elements that are dropped without a word; so is every attribute `texture`."""
 _LEFT_OUT = (
-    *("extension", "plugin"),
-    *("composite", "flexcomp", "flex", "deformable"),
-    *("flexvert", "flexstrain"),
-    *("hfield",),
+    "extension",
+    "plugin",
+    "composite",
+    "flexcomp",
+    "flex",
+    "deformable",
+    "flexvert",
+    "flexstrain",
+    "hfield",
 )
 """Elements that are dropped and named: plugins, deformable bodies and height fields."""
 FOLDER_ATTRIBUTES = ("assetdir", "meshdir", "texturedir")

@@ -85,8 +85,13 @@ _GROWTH = 3.0
 static ones go as the inverse root of the angle, to ten times.
 """
 STATES_FILE = (
-    *("loop", "method", "joint [deg]", "omega [rad/s]", "alpha [rad/s^2]"),
-    *("drive [N m or N]", "drive of rigid pins [N m or N]"),
+    "loop",
+    "method",
+    "joint [deg]",
+    "omega [rad/s]",
+    "alpha [rad/s^2]",
+    "drive [N m or N]",
+    "drive of rigid pins [N m or N]",
     *(f"{name} [N]" for name in PIN_FORCES),
     *(f"{name} of rigid pins [N]" for name in PIN_FORCES),
     "gap [mm]",

@@ -37,18 +37,42 @@ _WELD = "drake:weld_constraint"
 _FRAMES = ("drake:parent_frame", "drake:child_frame")
 """Elements of a joint that name its frame on each link; they coincide at its zero."""
 _AXES = {
-    **{"fixed": (), "ball": ()},
+    "fixed": (),
+    "ball": (),
     **dict.fromkeys(("revolute", "continuous", "prismatic"), ("axis",)),
     **dict.fromkeys(("universal", "revolute2"), ("axis", "axis2")),
 }
 """Elements that state the axes of each type of joint that is read."""
 _MEMBERS = ("link", "joint", "frame", "model", "include")
 _NAMED_NOWHERE = {
-    *(*_MEMBERS, "world", "pose", "inertial", "collision", "gravity", "static"),
-    *("physics", "parent", "child", "axis", "axis2", "uri", "name", "placement_frame"),
-    *(_PIN, _WELD, *_FRAMES),
-    *("visual", "light", "scene", "gui", "audio", "atmosphere", "magnetic_field"),
-    *("spherical_coordinates", "self_collide", "allow_auto_disable"),
+    *_MEMBERS,
+    "world",
+    "pose",
+    "inertial",
+    "collision",
+    "gravity",
+    "static",
+    "physics",
+    "parent",
+    "child",
+    "axis",
+    "axis2",
+    "uri",
+    "name",
+    "placement_frame",
+    _PIN,
+    _WELD,
+    *_FRAMES,
+    "visual",
+    "light",
+    "scene",
+    "gui",
+    "audio",
+    "atmosphere",
+    "magnetic_field",
+    "spherical_coordinates",
+    "self_collide",
+    "allow_auto_disable",
 }
 """Elements that are read, or that no force of a loop depends on."""
 

@@ -48,8 +48,16 @@ _OF_A_REPORT = ("against", *FORMS)
 _REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 OPTIONS_OF_A_PART = (
-    *("scenes", "engines", "error", "suite", "random", "seed", "type"),
-    *("guest", "time_limit", "no_pictures"),
+    "scenes",
+    "engines",
+    "error",
+    "suite",
+    "random",
+    "seed",
+    "type",
+    "guest",
+    "time_limit",
+    "no_pictures",
 )
 """Options that a part keeps."""
 

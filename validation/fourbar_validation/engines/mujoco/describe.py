@@ -52,16 +52,16 @@ _TENDON = {
     "solimp_fri": "solimpfriction",
 }
 COMPARED_OPTIONS = (
-    *(
-        "timestep",
-        "integrator",
-        "solver",
-        "tolerance",
-        "iterations",
-        "ls_iterations",
-        "noslip_iterations",
-    ),
-    *("density", "viscosity", "wind"),
+    "timestep",
+    "integrator",
+    "solver",
+    "tolerance",
+    "iterations",
+    "ls_iterations",
+    "noslip_iterations",
+    "density",
+    "viscosity",
+    "wind",
 )
 ENUMERATIONS = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver}
 MJCF_WORDS = {
