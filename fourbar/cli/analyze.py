@@ -433,7 +433,7 @@ def _write_positions(
         list_spring_notes,
         list_torsion_notes,
     )
-    from fourbar.show.block import write_motor
+    from fourbar.show.block import list_duty
     from fourbar.show.columns import choose_columns
     from fourbar.show.path_rows import collect_paths
     from fourbar.show.tables import print_positions
@@ -443,7 +443,7 @@ def _write_positions(
     assert scene is not None
     columns = [] if names is None else choose_columns(scene, solution, names)
     if form == "json":
-        motor = write_motor(scene, solution, units)
+        motor = list_duty(scene, solution, units)
         notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]
         notes += list_torsion_notes(scene, solution, units)
         paths = collect_paths(solution, units)

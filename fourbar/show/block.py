@@ -884,7 +884,7 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
     ]
 
 
-def write_motor(
+def list_duty(
     scene: Scene,
     solution: Solution,
     units: Conversion,

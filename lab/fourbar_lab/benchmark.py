@@ -40,7 +40,7 @@ from fourbar_validation.engines.environments import (
     read_engines_of,
 )
 from fourbar_validation.engines.guests import HELLO
-from fourbar_validation.engines.processes import Running
+from fourbar_validation.engines.programs import Running
 from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.svg import (

@@ -16,7 +16,7 @@ import click
 from fourbar.errors import FAILED, HOLDS
 from fourbar_lab import injection
 from fourbar_lab.injection import read_faults
-from fourbar_validation.engines.processes import Ended, run_to_end
+from fourbar_validation.engines.programs import Ended, run_to_end
 from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.places import CHECKOUT, FORMULAS_FOLDER, PACKAGE
 

@@ -11,7 +11,7 @@ from fourbar_lab import faults
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_lab.faults import explain_survival, try_faults
 from fourbar_lab.injection import inject_fault, read_faults
-from fourbar_validation.engines.processes import Ended
+from fourbar_validation.engines.programs import Ended
 from fourbar_validation.places import CHECKOUT
 
 ENTRIES = {entry["fault"]: number for number, entry in enumerate(read_faults())}

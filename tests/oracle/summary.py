@@ -21,7 +21,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
 from fourbar.scene import command_at
 from fourbar.scene.motion import FromLimit
-from fourbar.show.block import write_block, write_motor
+from fourbar.show.block import list_duty, write_block
 from fourbar.show.duty import shaking_force
 from fourbar.show.summary import Facts, summarize
 from fourbar_validation.compare.pins import state_from_pins
@@ -170,7 +170,7 @@ class _SummaryJudge:
     @cached_property
     def motor(self):
         """Return the entry of the JSON."""
-        entry = write_motor(self.scene, self.solution, {})
+        entry = list_duty(self.scene, self.solution, {})
         assert entry is not None
         return entry
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from fourbar_validation import engine
-from fourbar_validation.engines import guests, processes
+from fourbar_validation.engines import guests, programs
 from tests.whole.test_imports import ROOT
 
 PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ def write_program(folder, name, *replacements):
     return shlex.join([sys.executable, "-I", "-S", str(file)])
 
 
-class Hosted(processes.Running):
+class Hosted(programs.Running):
     """A class or adapter that our host serves in this process; programs run as ever."""
 
     def _ask(self, question, positions):

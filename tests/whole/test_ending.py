@@ -143,7 +143,7 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
 )
 def test_a_process_bounds_itself(program, status):
     name = program.partition("(")[0]
-    line = f"import sys; from fourbar_validation.engines.processes import {name}\n"
+    line = f"import sys; from fourbar_validation.engines.programs import {name}\n"
     ended = subprocess.run(
         [sys.executable, "-c", line + program], timeout=60, check=False
     )

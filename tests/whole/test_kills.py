@@ -30,7 +30,7 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.report.machine import CODE, build, hash_modules
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.run import pool
+from fourbar_validation.run import jobs
 from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
 from fourbar_validation.run.run import run
 from fourbar_validation.run.store import Store
@@ -419,8 +419,8 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging():
     """One of fifty thousand needs minutes in the simulators."""
-    one = pool.find_time_limit(Random(1, 0, TYPES), ())
-    assert pool.find_time_limit(Files((), 50_000), ()) > 5.0 * one
+    one = jobs.find_time_limit(Random(1, 0, TYPES), ())
+    assert jobs.find_time_limit(Files((), 50_000), ()) > 5.0 * one
 
 
 class Blunders:
@@ -450,13 +450,13 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     """
     judge_here(monkeypatch)
     drawn = []
-    judge = pool.judge_job
+    judge = jobs.judge_job
 
     def noting(job):
         drawn.extend([job.name] * job.draw)
         return judge(job)
 
-    monkeypatch.setattr(pool, "judge_job", noting)
+    monkeypatch.setattr(jobs, "judge_job", noting)
     monkeypatch.setattr("fourbar_validation.report.run_summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.plan, "PICTURED", 3)
     monkeypatch.setattr(

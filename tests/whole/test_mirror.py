@@ -24,7 +24,7 @@ JUDGED_BY = {
     "whole/test_exits.py": (
         "validation: cli; validation/report: sentences terminal; lab: cli fuzz_files"
     ),
-    "whole/test_kills.py": "validation/run: pool",
+    "whole/test_kills.py": "validation/run: jobs",
     "whole/test_narrow_terminal.py": "fourbar/show: folded",
     "whole/test_results_format.py": "validation/compare: results_file",
     # one table or one evaluation, whose rows are no use alone
@@ -69,7 +69,7 @@ JUDGED_BY = {
         " validation/engines/mujoco: closed_loop inverse"
     ),
     "validation/engines/test_guests.py": (
-        "validation: engine; validation/engines: processes workers"
+        "validation: engine; validation/engines: programs workers"
     ),
     "validation/engines/test_environments.py": "validation/engines: table",
     "validation/engines/test_pinocchio_plain_loop.py": (

@@ -15,7 +15,7 @@ import click
 
 from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines.environments import make_environment, read_engines
-from fourbar_validation.engines.processes import Ended, run_to_end
+from fourbar_validation.engines.programs import Ended, run_to_end
 from fourbar_validation.places import CHECKOUT
 
 FINDINGS = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"

@@ -15,7 +15,7 @@ import fourbar
 from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, uniform, vary
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import Law
-from fourbar.show.block import write_motor
+from fourbar.show.block import list_duty
 from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
 from fourbar.show.shown_units import units
 from tests.support.scenes import CYLINDER, crank_rocker
@@ -111,7 +111,7 @@ def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
 def test_the_json_holds_the_duty():
     s = solve(crank_rocker(motion=LISTED))
     duty = motor_duty(s)
-    entry = write_motor(s.scene, s, units("imperial"))
+    entry = list_duty(s.scene, s, units("imperial"))
     inch = 0.0254
     pound = 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp"

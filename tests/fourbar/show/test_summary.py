@@ -20,7 +20,7 @@ from fourbar.files import loads
 from fourbar.files.scene_file import read_tables
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command_at
-from fourbar.show.block import write_motor
+from fourbar.show.block import list_duty
 from fourbar.show.motion_curves import acts, describe_motion
 from fourbar.show.summary import summarize
 from fourbar.studies.internal_forces import largest_bending
@@ -209,7 +209,7 @@ def check_loads(facts, sizes, weights):
     """Check the loads of pins and drive, and that the JSON has the same numbers."""
     motion = facts.motion
     panels = facts.motion.panels
-    entry = write_motor(facts.scene, facts.solution, {})
+    entry = list_duty(facts.scene, facts.solution, {})
     for pin, force in PIN_FORCE.items():
         peak = panels.find_peak(force)
         rms = sqrt(weights @ sizes[force] ** 2)
@@ -229,7 +229,7 @@ def test_a_list_has_its_own_peaks_and_means():
     scene = crank_rocker(motion=Motion(angles, 10.0))
     solution = solve(scene)
     assert describe_motion(solution).solve_with_peaks() is solution
-    entry = write_motor(scene, solution, {})
+    entry = list_duty(scene, solution, {})
     assert entry["peak_torque"] == np.abs(solution.torque).max()
     rms = sqrt(np.square(solution.torque).mean())
     assert entry["rms_torque"] == approx(rms, rel=EXACT)

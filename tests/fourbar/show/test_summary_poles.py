@@ -18,7 +18,7 @@ from fourbar.effects import PinFriction
 from fourbar.files import loads
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
-from fourbar.show.block import write_facts, write_motor
+from fourbar.show.block import list_duty, write_facts
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.summary import summarize
 from tests.fourbar.show.test_summary import list_sizes
@@ -160,7 +160,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
     for quantity in growing:
         poles = panels.list_poles(quantity)
         assert np.abs(np.subtract.outer(poles, places)).min(axis=1).max() < LOCATED
-    entry = write_motor(scene, facts.solution, {})
+    entry = list_duty(scene, facts.solution, {})
     for pin, force in PIN_FORCE.items():
         peaks = facts.pins[pin].peak, facts.pins[pin].rms, entry["pins"][pin]["peak"]
         assert [peak is None for peak in peaks] == [force in growing] * 3

@@ -23,7 +23,7 @@ from fourbar_validation.engines.environments import (
     start_engine,
 )
 from fourbar_validation.engines.guests import adjust_engines
-from fourbar_validation.engines.processes import Ended
+from fourbar_validation.engines.programs import Ended
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.record import describe_run

@@ -22,7 +22,7 @@ from fourbar.scene.motion import Free
 from fourbar_validation.compare.answer import explain_refusal
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
-from fourbar_validation.engines import guests, processes
+from fourbar_validation.engines import guests, programs
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
@@ -261,7 +261,7 @@ FINE = {
     ],
 )
 def test_the_reason_of_a_dead_program_is_the_line_that_says_why(errors, line):
-    assert processes.find_reason(errors) == line
+    assert programs.find_reason(errors) == line
 
 
 def test_a_torque_that_is_a_hundredth_off_fails_alone(tmp_path):
@@ -274,7 +274,7 @@ def test_a_torque_that_is_a_hundredth_off_fails_alone(tmp_path):
 @pytest.mark.linux
 @pytest.mark.timeout(300)
 def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, mark):
-    monkeypatch.setattr(processes, "WORKER_MEMORY", 2 * 10**8)
+    monkeypatch.setattr(programs, "WORKER_MEMORY", 2 * 10**8)
     replaced = {name: pair for name, (pair, _) in PROGRAMS.items()} | FINE
     entries = [write_program(tmp_path, name, pair) for name, pair in replaced.items()]
     by_engine = judged(SCENE, *entries)
@@ -296,7 +296,7 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, mark)
 @pytest.mark.timeout(120)
 def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch, mark):
     """With what it started, and is not asked again for that scene."""
-    monkeypatch.setattr(processes, "MOST_ERRORS", 10**7)
+    monkeypatch.setattr(programs, "MOST_ERRORS", 10**7)
     entries = [write_program(tmp_path, name, pair) for name, pair in SILENT.items()]
     began = time.monotonic()
     by_engine = judged(SCENE, *entries, seconds=3.0)

@@ -37,7 +37,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, Rob
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
-from fourbar_validation.engines.processes import WORKER_MEMORY
+from fourbar_validation.engines.programs import WORKER_MEMORY
 from fourbar_validation.robots import guard
 from fourbar_validation.robots.check_mjcf import check_mjcf_command
 from fourbar_validation.robots.differences import (

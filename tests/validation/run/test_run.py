@@ -16,8 +16,8 @@ from fourbar_validation.regression.record import (
     open_run,
 )
 from fourbar_validation.report.scene_record import Record
+from fourbar_validation.run.jobs import Job, _judge_by_engine
 from fourbar_validation.run.plan import Plan, RunOptions
-from fourbar_validation.run.pool import Job, _judge_by_engine
 from fourbar_validation.run.run import run
 from tests.support.here import judge_here
 from tests.support.runs import changed, save_run
@@ -40,7 +40,7 @@ def test_a_rule_that_is_weaker_than_before_stands_first(tmp_path, monkeypatch):
         STATED_BY_THE_ENGINE, "0.01 of the scale: fewer digits", 1e-2, False
     )
     monkeypatch.setattr(
-        "fourbar_validation.run.pool.judge_job",
+        "fourbar_validation.run.jobs.judge_job",
         lambda job: Record(job.name, rows=[replace(ROW, allowed=1e-2)]),
     )
     options = RunOptions(drawn=False, against=before.table.parent)
@@ -67,7 +67,7 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
         "c": [replace(FAILED, scene="c", error=1e-2)],
     }
     monkeypatch.setattr(
-        "fourbar_validation.run.pool.judge_job",
+        "fourbar_validation.run.jobs.judge_job",
         lambda job: Record(
             job.name,
             rows=rows[job.name],

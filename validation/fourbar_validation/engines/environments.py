@@ -21,7 +21,7 @@ from filelock import FileLock
 from fourbar.errors import DependencyError, InputError
 from fourbar.writing import read_text, write_text
 from fourbar_validation.engines.guests import Guest, name_guests, serve_adapter
-from fourbar_validation.engines.processes import Program, run_to_end
+from fourbar_validation.engines.programs import Program, run_to_end
 from fourbar_validation.engines.registry import LAB_FOLDERS, Engine
 
 ENGINES_FILE = "engines.toml"

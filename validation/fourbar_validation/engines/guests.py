@@ -26,7 +26,7 @@ from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.description import name_drive
-from fourbar_validation.engines.processes import Ask, Program, Running
+from fourbar_validation.engines.programs import Ask, Program, Running
 from fourbar_validation.engines.registry import SIMULATED_TO_ERROR, Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 

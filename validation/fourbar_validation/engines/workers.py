@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 from fourbar.errors import DependencyError
-from fourbar_validation.engines.processes import (
+from fourbar_validation.engines.programs import (
     bound_memory,
     end_with_parent,
     hold_interruption,

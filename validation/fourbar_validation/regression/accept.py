@@ -10,7 +10,7 @@ from fourbar.errors import HOLDS, InputError, list_allowed
 from fourbar.writing import write_text
 from fourbar_validation.compare.results_file import CSV_ROWS
 from fourbar_validation.compare.rows import FAILS, Counts
-from fourbar_validation.engines.processes import bound_memory
+from fourbar_validation.engines.programs import bound_memory
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
 from fourbar_validation.regression.history import (

@@ -10,7 +10,7 @@ from typing import Any
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.tables import show_running
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
-from fourbar_validation.engines.processes import (
+from fourbar_validation.engines.programs import (
     WORKER_MEMORY,
     bound_memory,
     bound_processor_time,

@@ -17,7 +17,7 @@ from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
-from fourbar_validation.run import pool
+from fourbar_validation.run.jobs import find_time_limit, judge_tasks, make_jobs
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Suite
 
@@ -179,13 +179,13 @@ class Plan:
         progress.advance(JUDGING, len(kept))
         how = self.engines, self.draw_at_once, self.sketch
         jobs = (
-            (task, pool.make_jobs(self.suite, self.tasks[task], *how))
+            (task, make_jobs(self.suite, self.tasks[task], *how))
             for task in wanted
             if task not in done
         )
         workers = self.options.workers
-        limit = pool.find_time_limit(self.suite, self.engines)
-        for task, records in pool.judge_tasks(jobs, limit, workers):
+        limit = find_time_limit(self.suite, self.engines)
+        for task, records in judge_tasks(jobs, limit, workers):
             store.put(task, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
 

@@ -29,7 +29,7 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import Mask
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.processes import keep_printed
+from fourbar_validation.engines.programs import keep_printed
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.scene_record import Record, Timing
 

@@ -40,7 +40,7 @@ from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.sections import collect_sections
 from fourbar_validation.report.svg import STYLE_NUMBERS
-from fourbar_validation.run import pool
+from fourbar_validation.run.jobs import Job, find_time_limit, judge_tasks, make_jobs
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.plan import (
     COLLECTING,
@@ -126,8 +126,8 @@ def write_outcome(
     ]
     if shown and not plan.draw_at_once:
         jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
-        limit = pool.find_time_limit(suite, engines)
-        for _, records in pool.judge_tasks(jobs, limit, options.workers):
+        limit = find_time_limit(suite, engines)
+        for _, records in judge_tasks(jobs, limit, options.workers):
             summary.picture(*records)
             progress.advance(DRAWING, 1)
     about = describe_run(
@@ -209,7 +209,7 @@ def _redraw(
     scene: int,
     summary: Summary,
     engines: Sequence[Engine],
-) -> pool.Job:
+) -> Job:
     """Return the job of judging a scene once more, now with its pictures.
 
     The scene's answers were not kept. An engine that broke down, or hung, in the scene
@@ -218,7 +218,7 @@ def _redraw(
     name = escape_controls(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
-    (job,) = pool.make_jobs(
+    (job,) = make_jobs(
         suite,
         [scene],
         [one for one in engines if one.name not in broken],

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fourbar_validation.compare.rows import FORMULAS, escape_controls, make_breakdown
 from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
-from fourbar_validation.engines.processes import SECONDS_PER_POSITION
+from fourbar_validation.engines.programs import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.judge import judge_for_report
