@@ -84,10 +84,7 @@ class Workbench:
             line.send(data)
 
     def take(self, line: "_PageLine", asked: dict[str, Any]) -> None:
-        """Put a request in the queue; `check` and `stop` are done at once.
-
-        A later request of the same gesture replaces one that waits.
-        """
+        """Put a request in the queue; `check` and `stop` are done at once."""
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
         if asked.get("do") in ("check", "stop"):
@@ -97,11 +94,6 @@ class Workbench:
                 self.check.stop()
             self.tell({"for": asked.get("id")}, to=line)
             return
-        gesture = asked.get("gesture")
-        if self.waiting and gesture:
-            last_line, last_asked = self.waiting[-1]
-            if last_line == line and last_asked.get("gesture") == gesture:
-                self.waiting.pop()
         self.waiting.append((line, asked))
         if self.following is not None:
             self.following.cancel()
