@@ -345,7 +345,7 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
 
 def write_csv(
     solution: Solution,
-    units: Conversion = SI,
+    units: Conversion,
     decimal: str = ".",
     chosen: Mapping[str, Array] | None = None,
 ) -> str:
@@ -409,7 +409,7 @@ class _ScalarColumn(NamedTuple):
     """Value at each position; None for what was not evaluated."""
 
 
-def _list_scalars(solution: Solution, units: Conversion = SI) -> list[_ScalarColumn]:
+def _list_scalars(solution: Solution, units: Conversion) -> list[_ScalarColumn]:
     """List every quantity as columns of numbers, vectors as `A_x`, `A_y`.
 
     Magnitudes of pin forces are included, and the time where it is known. In other

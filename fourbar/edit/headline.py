@@ -20,7 +20,7 @@ _DRIVE = {"torque": "N m", "drive_force": "N"}
 def write_headline(
     solution: Solution,
     units: Conversion,
-    facts: Facts | None = None,
+    facts: Facts | None,
 ) -> str:
     """Write the drive's peak, the largest pin force and the least transmission angle.
 
@@ -56,9 +56,7 @@ def write_headline(
     return "; ".join(parts)
 
 
-def list_peaks(
-    solution: Solution, facts: Facts | None = None
-) -> dict[str, float | None]:
+def list_peaks(solution: Solution, facts: Facts | None) -> dict[str, float | None]:
     """List the largest magnitudes of drive and pin forces; None: without bound, SI.
 
     `facts`: where they are located between the positions.

@@ -148,7 +148,7 @@ def loads(text: str, name: str = "scene") -> Scene:
     return read_tables(parse_tables(text, name), name)
 
 
-def parse_tables(text: str, name: str = "scene") -> dict[str, Any]:
+def parse_tables(text: str, name: str) -> dict[str, Any]:
     """Parse the TOML text of a scene; InputError where it is none.
 
     `name`: as `loads` has it.

@@ -27,7 +27,7 @@ _RESIDUE = 1e-55
 def exact_half_angle(
     linkage: FourBar,
     theta_2: float,
-    remainder: Any = None,
+    remainder: Any,
     unit: Any = 1.0,
     member: int = 0,
     bar: int = 2,
@@ -133,7 +133,7 @@ def limit_remainder(
     limit: float,
     theta_2: float,
     offset: float,
-    bar: int = 2,
+    bar: int,
 ) -> Any:
     """Compute (limit position + offset) - theta_2 in many digits.
 

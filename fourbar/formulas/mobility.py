@@ -246,7 +246,7 @@ def choose_range(
     return start + margin, stop - margin
 
 
-def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
+def find_limit_angles(linkage: FourBar, bar: int) -> tuple[float, ...]:
     """Find the angles at which a bar reverses, rad, counter-clockwise from theta_1."""
     theta_1 = linkage.ground_angle
     if bar == 2:
@@ -478,7 +478,7 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     )
 
 
-def name_assembly(linkage: FourBar, bar: int = 2, branch: int = 1) -> str:
+def name_assembly(linkage: FourBar, bar: int, branch: int) -> str:
     """Name a linkage in the assembly that a command of a bar and its branch state.
 
     A parallelogram's other assembly, and both that a command of its coupler can have,

@@ -58,9 +58,9 @@ Ends = tuple[RestPosition, RestPosition]
 
 def write_type(
     linkage: FourBar,
-    units: Conversion | None = COMMON,
+    units: Conversion | None,
     *,
-    everything: bool = False,
+    everything: bool,
 ) -> Iterator[str]:
     """Write the type of a linkage and the condition that decides it.
 
@@ -224,7 +224,7 @@ def find_largest(derivatives: Sensitivity, quantity: str) -> float:
     return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
 
 
-def write_sensitivity(derivatives: Sensitivity, width: int | None = None) -> str:
+def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     """Write the numbers that matter most, as lines and a table.
 
     The lines above the table say what each quantity depends on most.

@@ -89,8 +89,8 @@ def find_part_unit(part: str) -> str:
 
 def write_spreads(
     spreads: Tolerances,
-    units: Conversion = DEGREES,
-    width: int | None = None,
+    units: Conversion,
+    width: int | None,
 ) -> str:
     """Write one row for each quantity.
 

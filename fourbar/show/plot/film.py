@@ -32,7 +32,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import View, make_view
 from fourbar.show.tables import show_running
-from fourbar.solution import SI, Conversion
+from fourbar.solution import Conversion
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -72,9 +72,9 @@ def write_film(
     path: Path,
     kind: str,
     seconds: float | None,
-    units: Conversion = SI,
+    units: Conversion,
     *,
-    moving: bool = False,
+    moving: bool,
 ) -> int:
     """Film one sweep, there and back if the input does not turn fully.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, clean_line, expect, needing
 from fourbar.quantities import Array
 from fourbar.show.shown_units import choose_unit
-from fourbar.solution import SI, Conversion
+from fourbar.solution import Conversion
 from fourbar.writing import STANDARD_STREAM, write_bytes
 
 if TYPE_CHECKING:
@@ -267,7 +267,7 @@ def write_number(value: float) -> str:
     )
 
 
-def write_labelled_quantity(value: float, unit: str, units: Conversion = SI) -> str:
+def write_labelled_quantity(value: float, unit: str, units: Conversion) -> str:
     """Write a quantity of an SI unit in a unit, or with the prefix that suits it."""
     factor, name = choose_unit(abs(value), unit, units)
     return f"{write_number(factor * value)} {name}"

@@ -26,7 +26,7 @@ from fourbar.show.plot.style import (
 from fourbar.show.plot.view import axis_of
 from fourbar.show.shown_units import choose_unit
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_drawn_parts
-from fourbar.solution import SI, Conversion
+from fourbar.solution import Conversion
 from fourbar.studies.spread import BAND_PERCENTILES, Tolerances
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ _BELOW = 30.0
 def draw_tolerances(
     spreads: Tolerances,
     path: str | Path,
-    units: Conversion = SI,
+    units: Conversion,
 ) -> None:
     """Draw the deviations from the nominal with their bands into a file.
 

@@ -612,7 +612,7 @@ def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
                 yield f"{text} of torsion", relaxed
 
 
-def find_miscalculated(judge: Judge, wanted: Wanted = always) -> Iterator[Mistake]:
+def find_miscalculated(judge: Judge, wanted: Wanted) -> Iterator[Mistake]:
     """List the mistakes of a calculation, or of a simulation, that a table can show."""
     if judge.stage == "force":
         yield from Calculation(judge.scene, judge.right, wanted).mistakes()

@@ -228,7 +228,7 @@ def wrap_difference(angle: Angle) -> Angle:
     return (angle + math.pi) % TURN - math.pi
 
 
-def count_half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float:
+def count_half_turns(ground_angle: float, theta_2: Array | float) -> float:
     """Give the largest angle in half turns, at least 1.
 
     Many turns away it has fewer digits of its direction.

@@ -187,7 +187,7 @@ def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
     return str(inside)
 
 
-def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
+def prepare_program(entry: Entry, seconds: float | None) -> Program:
     """Make an engine's environment; return the program that answers there."""
     python = make_environment(entry)
     if entry.adapter:

@@ -229,7 +229,7 @@ def number_guests(engines: Iterable[Engine]) -> dict[str, int]:
     return {guest.name: guest.number for guest in engines if isinstance(guest, Guest)}
 
 
-def _make_program(entry: str, seconds: float | None = None) -> Program:
+def _make_program(entry: str, seconds: float | None) -> Program:
     """Make the program of "module:Class" or a command line.
 
     Raises InputError if there is none.
@@ -251,7 +251,7 @@ def _make_program(entry: str, seconds: float | None = None) -> Program:
 
 def serve_adapter(
     entry: str,
-    seconds: float | None = None,
+    seconds: float | None,
     python: str = sys.executable,
 ) -> Program:
     """Make the program that serves one of our adapters, or a class of the user's."""

@@ -17,7 +17,6 @@ from fourbar.errors import LimitError
 from fourbar.quantities import (
     ANGLES,
     LINE_QUANTITIES,
-    PIN_FORCES,
     STAGE_OF,
     STAGES,
     VECTORS,
@@ -188,7 +187,7 @@ def _close_gap(
     q: JointAngles,
     branch: int,
     closed: float,
-    bar: int = 2,
+    bar: int,
 ) -> JointAngles | None:
     """Close the gap with a bar held, never leaving the branch.
 
@@ -371,7 +370,7 @@ MADE = ("theta_2", "omega_2", "alpha_2")
 
 def make_blank(
     n: int,
-    names: Iterable[str] = (*MADE, "torque", *PIN_FORCES),
+    names: Iterable[str],
 ) -> dict[str, Array]:
     """Return NaN for each of n positions, (n,) or (n, 2)."""
     blank = {}

@@ -137,7 +137,7 @@ def _predict_error(
     command: Command,
     quantity: str,
     reach: float,
-    mask: Mask | None = None,
+    mask: Mask | None,
     carried: float = 0.0,
 ) -> Array:
     """Predict the absolute error of a quantity at each position, (n,).

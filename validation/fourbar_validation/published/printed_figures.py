@@ -93,7 +93,7 @@ class PublishedFigure(NamedTuple):
         )
 
 
-def compare_figure(printed: str, value: float, noise: float = 0.0) -> str:
+def compare_figure(printed: str, value: float, noise: float) -> str:
     """Return "rounded", "truncated" or "differs", at the printed decimals."""
     theirs = Decimal(printed)
     ours = Decimal(value)

@@ -387,7 +387,7 @@ def _choose_component(
     return int(np.argmax(np.max(differences, axis=0)))
 
 
-def _take_plain(quantity: str, values: Array, axis: int | None = None) -> Array:
+def _take_plain(quantity: str, values: Array, axis: int | None) -> Array:
     """Take a scalar as it is (angles in degrees).
 
     `axis`: component to take of a vector; left out: its magnitude.
@@ -401,7 +401,7 @@ def _take_plain(quantity: str, values: Array, axis: int | None = None) -> Array:
     return values
 
 
-def _label(quantity: str, solution: Solution, axis: int | None = None) -> str:
+def _label(quantity: str, solution: Solution, axis: int | None) -> str:
     if quantity == LINE.value:
         return "F (N)"
     if quantity == "torque":

@@ -145,7 +145,7 @@ def _make_worst_table(summary: Summary) -> "Table":
 def _make_bare_table(
     words: Sequence[str],
     numbers: Sequence[str],
-    title: str | None = None,
+    title: str | None,
 ) -> "Table":
     from rich.box import SIMPLE_HEAD
 

@@ -12,7 +12,7 @@ import click
 
 from fourbar.errors import InputError
 from fourbar_validation.report.run_summary import Summary
-from fourbar_validation.run.plan import UNHEARD, Plan, Progress, RunPart
+from fourbar_validation.run.plan import Plan, Progress, RunPart
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import (
     Request,
@@ -31,7 +31,7 @@ def judge_part(
     plan: Plan,
     part: RunPart,
     request: Request,
-    progress: Progress = UNHEARD,
+    progress: Progress,
 ) -> None:
     """Judge a part of a run into its folder.
 
@@ -124,7 +124,7 @@ def collect_parts(
     folders: Sequence[Path],
     parts: int,
     out: Path,
-    progress: Progress = UNHEARD,
+    progress: Progress,
 ) -> Summary:
     """Write tables and report of a run into `out` from its parts' folders.
 

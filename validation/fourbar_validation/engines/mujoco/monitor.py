@@ -76,9 +76,7 @@ _OF_THE_DATA = {
 """Limits of the residuals that the data of the simulation state directly."""
 
 
-def list_alarms(
-    evidence: dict[str, float], size: float, factor: float = 1.0
-) -> list[str]:
+def list_alarms(evidence: dict[str, float], size: float, factor: float) -> list[str]:
     """Say what is wrong with a run.
 
     Parameters

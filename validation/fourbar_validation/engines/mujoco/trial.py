@@ -208,7 +208,7 @@ class TrialSetup:
         self,
         settings: Settings,
         timestep: float,
-        edit: Edit | None = None,
+        edit: Edit | None,
     ) -> tuple[ClosedLoop, ClosedLoop | None]:
         """Build the loop that is stepped, and the loop that the drive is read from.
 

@@ -120,7 +120,7 @@ def make_loop_scene(
     compiled: CompiledRobot,
     posed: PosedRobot,
     loop: RobotLoop,
-    speed: float | None = None,
+    speed: float | None,
     title: str = "",
     source: str = "",
 ) -> LoopScene:
