@@ -443,7 +443,7 @@ def _write_positions(
     assert scene is not None
     columns = [] if names is None else choose_columns(scene, solution, names)
     if form == "json":
-        motor = list_duty(scene, solution, units)
+        motor = list_duty(solution, units)
         notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]
         notes += list_torsion_notes(scene, solution, units)
         paths = collect_paths(solution, units)

@@ -347,11 +347,6 @@ class Effect(Placed):
         """Add the effect to an MJCF; LimitError where it has no counterpart."""
         raise LimitError(f"the effect {self.key!r} has no counterpart in MJCF")
 
-    @classmethod
-    def has_mjcf(cls) -> bool:
-        """Return True if the effect has a counterpart in MJCF."""
-        return cls.add_to_mjcf is not Effect.add_to_mjcf
-
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
         """Return the couple that the effect may ask of the drive at a speed, N m.
 

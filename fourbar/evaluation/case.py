@@ -65,9 +65,7 @@ def _condense_branch(branch: NDArray[np.int8]) -> Any:
     The formulas are quicker with one number.
     """
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
-        if branch.ndim:
-            return float(branch.flat[0])
-        return float(branch)
+        return float(branch.flat[0])
     return branch
 
 

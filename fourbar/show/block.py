@@ -884,11 +884,7 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
     ]
 
 
-def list_duty(
-    scene: Scene,
-    solution: Solution,
-    units: Conversion,
-) -> dict[str, Any] | None:
+def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
     """Return the duty and the loads of the pins as the JSON has them.
 
     Numbers have the units of the output, and the keys are those of `motor_duty`.

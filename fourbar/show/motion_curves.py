@@ -165,7 +165,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         extremes = solution
         if solution.with_extremes is not None:
             extremes = solve(scene, "position", at=solution.with_extremes)
-        curves = _list_position_curves(scene, extremes)
+        curves = _list_position_curves(extremes)
         positions = _take_positions(extremes, curves, np.ones(len(extremes)))
         _mark_poles(scene, solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], np.zeros(0))
@@ -178,7 +178,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
 
     def compute_positions(places: Array) -> dict[str, Array]:
         there = solve(scene, "position", at=command_at(scene, places))
-        return _list_position_curves(scene, there)
+        return _list_position_curves(there)
 
     def compute(places: Array) -> dict[str, Array]:
         return _list_curves(scene, solve(scene, stage, at=command_at(scene, places)))
@@ -331,7 +331,7 @@ def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
     return wanted
 
 
-def _list_position_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
+def _list_position_curves(solution: Solution) -> dict[str, Array]:
     """List the curves of the positions alone, by name.
 
     A commanded angle has a value where the linkage does not assemble, too.

@@ -11,8 +11,8 @@ from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.driving import describe_drive
 from fourbar.show.plot import draw_figure
 from fourbar.show.shown_units import write_ends
-from fourbar.show.tables import list_columns, write_with_unit
-from fourbar.solution import SI, Solution
+from fourbar.show.tables import list_columns
+from fourbar.solution import Solution
 from fourbar.writing import describe_extent, make_html
 
 POSITIONS_AT_EITHER_END = 5
@@ -42,16 +42,14 @@ def _list_facts(scene: Scene) -> list[tuple[str, str]]:
     facts = [("type", classify(scene.linkage).name)]
     bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     for number, (name, length) in enumerate(bars, 1):
-        text = write_with_unit(length, "m", SI)
+        text = _write_number(length, "m")
         if number in MOVING_BARS and (mass := scene.linkage.bar(number).mass):
-            text = f"{text}, {write_with_unit(mass, 'kg', SI)}"
+            text = f"{text}, {_write_number(mass, 'kg')}"
         facts.append((name, text))
     speed = "positions only"
     if motion.speed is not None:
-        omega = write_ends(motion.speed, lambda x: write_with_unit(x, "rad/s", SI))
-        alpha = write_ends(
-            motion.acceleration, lambda x: write_with_unit(x, "rad/s^2", SI)
-        )
+        omega = write_ends(motion.speed, lambda x: _write_number(x, "rad/s"))
+        alpha = write_ends(motion.acceleration, lambda x: _write_number(x, "rad/s^2"))
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [
         effect.key for effect in scene.effects
@@ -62,6 +60,10 @@ def _list_facts(scene: Scene) -> list[tuple[str, str]]:
         ("drive", "released" if motion.free is not None else describe_drive(scene)),
         ("acting", ", ".join(acting) or "nothing"),
     ]
+
+
+def _write_number(number: float, unit: str) -> str:
+    return f"{number + 0.0:.6g} {unit}"
 
 
 def show_solution(solution: Solution) -> str:

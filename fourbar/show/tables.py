@@ -31,7 +31,6 @@ from fourbar.solution import (
     Conversion,
     Solution,
     compute_times,
-    find_unit_in,
     has_size,
     is_scalar,
 )
@@ -173,12 +172,6 @@ def _write_ordinal(number: int) -> str:
     if number % 100 in (11, 12, 13):
         return "th"
     return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
-
-
-def write_with_unit(number: float, unit: str, units: Conversion) -> str:
-    """Write a number of an SI unit with six digits and the unit it is shown in."""
-    name, factor = find_unit_in(unit, units)
-    return f"{number * factor + 0.0:.6g} {name}"
 
 
 def list_columns(

@@ -27,6 +27,7 @@ from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.tables import show_table
 from fourbar_validation.cost.work_precision import time_call, time_in_turns
 from fourbar_validation.engines.asking import ask_at
+from fourbar_validation.engines.description import declares
 from fourbar_validation.engines.registry import ENGINES
 
 LENGTHS_TEXT = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
@@ -70,7 +71,8 @@ SIMULATION = "mujoco-simulated"
 NO_COUNTERPART = {
     (SIMULATION, name)
     for name, effect in EFFECTS.items()
-    if name == "load over theta_2" or (effect is not None and not effect.has_mjcf())
+    if name == "load over theta_2"
+    or (effect is not None and not declares(effect, "add_to_mjcf"))
 }
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 _LEFT_ON = "none, {} left on"

@@ -170,7 +170,7 @@ class _SummaryJudge:
     @cached_property
     def motor(self):
         """Return the entry of the JSON."""
-        entry = list_duty(self.scene, self.solution, {})
+        entry = list_duty(self.solution, {})
         assert entry is not None
         return entry
 

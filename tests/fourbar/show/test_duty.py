@@ -111,7 +111,7 @@ def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
 def test_the_json_holds_the_duty():
     s = solve(crank_rocker(motion=LISTED))
     duty = motor_duty(s)
-    entry = list_duty(s.scene, s, units("imperial"))
+    entry = list_duty(s, units("imperial"))
     inch = 0.0254
     pound = 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp"

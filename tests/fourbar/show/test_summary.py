@@ -209,7 +209,7 @@ def check_loads(facts, sizes, weights):
     """Check the loads of pins and drive, and that the JSON has the same numbers."""
     motion = facts.motion
     panels = facts.motion.panels
-    entry = list_duty(facts.scene, facts.solution, {})
+    entry = list_duty(facts.solution, {})
     for pin, force in PIN_FORCE.items():
         peak = panels.find_peak(force)
         rms = sqrt(weights @ sizes[force] ** 2)
@@ -229,7 +229,7 @@ def test_a_list_has_its_own_peaks_and_means():
     scene = crank_rocker(motion=Motion(angles, 10.0))
     solution = solve(scene)
     assert describe_motion(solution).solve_with_peaks() is solution
-    entry = list_duty(scene, solution, {})
+    entry = list_duty(solution, {})
     assert entry["peak_torque"] == np.abs(solution.torque).max()
     rms = sqrt(np.square(solution.torque).mean())
     assert entry["rms_torque"] == approx(rms, rel=EXACT)

@@ -160,7 +160,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
     for quantity in growing:
         poles = panels.list_poles(quantity)
         assert np.abs(np.subtract.outer(poles, places)).min(axis=1).max() < LOCATED
-    entry = list_duty(scene, facts.solution, {})
+    entry = list_duty(facts.solution, {})
     for pin, force in PIN_FORCE.items():
         peaks = facts.pins[pin].peak, facts.pins[pin].rms, entry["pins"][pin]["peak"]
         assert [peak is None for peak in peaks] == [force in growing] * 3

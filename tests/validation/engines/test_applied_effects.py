@@ -11,6 +11,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import (
+    Effect,
     Flywheel,
     Friction,
     Gravity,
@@ -130,7 +131,9 @@ ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 NO_COUNTERPART = {
     "mujoco-simulated": {
-        key for key, kind in list_kinds().items() if not kind.has_mjcf()
+        key
+        for key, kind in list_kinds().items()
+        if kind.add_to_mjcf is Effect.add_to_mjcf
     }
 }
 """What an engine cannot do; it must say so, and the others remain."""

@@ -194,7 +194,7 @@ def make_figure(
     return figure
 
 
-def set_axes(axes: Any, legend_columns: int = 2) -> None:
+def set_axes(axes: Any) -> None:
     """Give logarithmic axes their grid, the size of their texts, and a legend above."""
     axes.set(xscale="log", yscale="log")
     axes.set_facecolor(PAPER)
@@ -209,7 +209,7 @@ def set_axes(axes: Any, legend_columns: int = 2) -> None:
         axes.legend(
             loc="lower left",
             bbox_to_anchor=(-0.13, 1.01),
-            ncols=legend_columns,
+            ncols=2,
             fontsize=TEXT,
             labelcolor=INK,
             handlelength=2.4,

@@ -418,7 +418,7 @@ def answer_from_json(
         },
         shared=require_text("shared", data.get("shared", "")) or "not stated",
         own=require_text("own", data.get("own", "")) or "not stated",
-        seconds=_read_seconds("seconds", data.get("seconds", 0.0)),
+        seconds=_read_seconds(data.get("seconds", 0.0)),
     )
 
 
@@ -450,10 +450,10 @@ def require_text(name: str, value: Any) -> str:
     return write_one_line(value)
 
 
-def _read_seconds(name: str, value: Any) -> float:
+def _read_seconds(value: Any) -> float:
     seconds = _make_array([value])
     if seconds is None or not seconds[0] >= 0.0:
-        raise InputError(name, value, "must be a number of 0 or more")
+        raise InputError("seconds", value, "must be a number of 0 or more")
     return float(seconds[0])
 
 

@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -113,9 +114,9 @@ class Engine:
         return None
 
 
-EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "validation"}
-"""Extra that brings the module of an engine. Others are installed by the name of their
-package.
+IN_EXTRA = ("mujoco", "pinocchio", "flint")
+"""Modules of engines that the extra "validation" brings. Others are installed by the
+name of their package.
 """
 _PACKAGE_OF = {"pydrake": "drake"}
 """Module of an engine: its package, where that has another name."""
@@ -128,10 +129,8 @@ def find_missing(library: str) -> str | None:
     except ModuleNotFoundError as error:
         if error.name == library:
             package = f"pip install {_PACKAGE_OF.get(library, library)}"
-            return (
-                f"{library} is not installed:"
-                f" {say_install(EXTRA[library]) if library in EXTRA else package}"
-            )
+            how = say_install("validation") if library in IN_EXTRA else package
+            return f"{library} is not installed: {how}"
         return _find_broken(library, error)
     except (
         Exception,
@@ -206,8 +205,7 @@ class Later:
 
     def __call__(self, *arguments: Any) -> Any:
         """Import and call it."""
-        module, _, name = self.name.partition(":")
-        return getattr(import_module(module), name)(*arguments)
+        return resolve_name(self.name)(*arguments)
 
 
 ENGINES_PACKAGE = "fourbar_validation.engines"

@@ -200,9 +200,7 @@ def _select_needed(engines: Iterable[Engine], question: Question) -> Iterator[En
     for engine in engines:
         reason = None
         if command.speed is None:
-            if engine.positions:
-                reason = None
-            else:
+            if not engine.positions:
                 reason = (
                     "the scene states positions only, and this engine computes only"
                     " forces"

@@ -63,7 +63,7 @@ class _Gathered:
     def _add(self, folder: Path) -> None:
         """Add the tasks of a folder; InputError if they are of another run."""
         store = Store(folder, self._plan.identity)
-        store.require_same("DIR")
+        store.require_same()
         for path, damage in store.examine():
             if damage:
                 self._damaged.append(f"{path} {damage}")

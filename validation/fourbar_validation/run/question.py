@@ -247,17 +247,9 @@ class Question:
             yield make_breakdown(self.name, engine, error, setting)
 
 
-def spread_evenly(
-    indices: NDArray[np.intp],
-    count: int,
-    *,
-    inside: bool = False,
-) -> NDArray[np.intp]:
-    """Choose some of many positions evenly, with both ends or between them."""
-    last = len(indices) - 1
-    places = np.linspace(0, last, count)
-    if inside:
-        places = np.linspace(0, last, count + 2)[1:-1]
+def spread_evenly(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Choose some of many positions evenly, with both ends."""
+    places = np.linspace(0, len(indices) - 1, count)
     return np.asarray(indices[np.unique(places.astype(int))])
 
 

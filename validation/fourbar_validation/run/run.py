@@ -138,8 +138,6 @@ def write_outcome(
     summary.commit = about.commit
     if len(suite) == 1:
         summary.asked = escape_controls(suite.name(0))
-    else:
-        summary.asked = ""
     if options.against is not None:
         before = open_run(options.against, "--against")
         overview = summary.overview

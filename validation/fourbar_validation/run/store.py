@@ -110,15 +110,15 @@ class Store:
         except (AttributeError, TypeError, ValueError):
             return "its run.json is damaged"
 
-    def require_same(self, key: str) -> None:
+    def require_same(self) -> None:
         """Raise InputError unless the folder holds tasks of this run."""
         marker = self.folder / UNFINISHED
         if not marker.is_file() or not self.parts.is_dir():
             why = "must hold a run.json and the parts that `run --part` wrote"
-            raise InputError(key, str(self.folder), why)
+            raise InputError("DIR", str(self.folder), why)
         if difference := self._name_difference(marker):
             why = f"is of another run: it differs in {difference}"
-            raise InputError(key, str(self.folder), why)
+            raise InputError("DIR", str(self.folder), why)
 
     def done(self) -> set[int]:
         """List the tasks whose files are complete and of this run.
