@@ -49,24 +49,21 @@ WARNINGS = (
 )
 
 
-def load_force(
+def find_load(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     actuator: int,
-) -> Array:
-    """Return the world force of an actuator on a site, (3,).
+) -> Callable[[], Array]:
+    """Return a function that reads the world force of an actuator on a site, (3,).
 
-    MuJoCo counts it into the force of the parent.
+    MuJoCo counts it into the force of the parent. The function reads MuJoCo's own
+    memory: to look a row up anew costs more than to read it.
     """
-    axes = data.site_xmat[_find_frame(model, actuator)].reshape(3, 3)
-    gear = model.actuator_gear[actuator, :3]
-    return np.asarray(axes @ gear * data.actuator_force[actuator])
-
-
-def _find_frame(model: mujoco.MjModel, actuator: int) -> int:
-    """Find the site in whose axes an actuator on a site acts."""
     site, frame = model.actuator_trnid[actuator]
-    return int(frame if frame >= 0 else site)
+    axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
+    gear = model.actuator_gear[actuator, :3]
+    forces = data.actuator_force
+    return lambda: axes @ gear * forces[actuator]
 
 
 def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -97,14 +94,13 @@ class ClosedLoop(Assembled):
         actuators = {model.actuator(i).name: i for i in range(model.nu)}
         self.drive = actuators.get("drive")
         self.ram = actuators.get(CYLINDER)
-        self._borne = []
+        self._loads = []
         for name, load in actuators.items():
             if name.startswith("load_"):
                 body = model.site_bodyid[model.actuator_trnid[load, 0]]
                 bearers = _CARRIED_BY[model.body(body).name]
-                force = tuple(model.actuator_gear[load, :2].tolist())
-                self._borne.append((load, _find_frame(model, load), force, bearers))
-        # MuJoCo's own memory: to look a row up anew costs more than to copy it
+                self._loads.append((find_load(model, self.data, load), bearers))
+        # MuJoCo's own memory, as that of the loads
         self._carried = {}
         for name, body in self.body.items():
             self._carried[name] = self.data.cfrc_int[body, 3:5]
@@ -196,15 +192,10 @@ class ClosedLoop(Assembled):
         actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
         on = {name: force.copy() for name, force in self._carried.items()}
-        for actuator, site, (along, across), names in self._borne:
-            size = float(self.data.actuator_force[actuator])
-            if along == across == 0.0:
-                continue
-            cosine, _, _, sine = self.data.site_xmat[site, :4].tolist()
-            x = size * (cosine * along - sine * across)
-            y = size * (sine * along + cosine * across)
+        for read, names in self._loads:
+            load = read()[:2]
             for name in names:
-                on[name] -= (x, y)
+                on[name] -= load
         return on
 
     def given(self) -> float:
