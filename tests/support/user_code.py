@@ -7,9 +7,7 @@ import fourbar
 scene = fourbar.load("models/crank_rocker.toml")
 solution = fourbar.solve(scene)
 print(fourbar.solve(scene).torque.max())
-largest_pin_force = float(np.hypot(*solution.F12.T).max())
 energy = np.trapezoid(solution.torque, solution.theta_2)
-at_the_limit = solution.torque[solution.condition < 0.1]
 table = solution.to_csv(degrees=True)
 
 study = fourbar.vary(scene, {"lengths.input": np.linspace(0.09, 0.11, 5)})

@@ -10,7 +10,6 @@ import shlex
 import stat
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from math import acos, degrees, pi, tau
@@ -29,10 +28,10 @@ from fourbar.files import load, save
 from fourbar.mjcf import list_defaults, make_scene
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.document import write_mjcf_for
-from fourbar.quantities import UNITS, VECTORS
+from fourbar.quantities import VECTORS
 from fourbar.show import tables
 from tests.support.rows import read_rows
-from tests.support.scenes import balance, crank_rocker, thesis
+from tests.support.scenes import balance, crank_rocker
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
@@ -47,9 +46,6 @@ CRANK_ROCKER = MODELS / "crank_rocker.toml"
 THESIS = MODELS / "thesis.toml"
 
 
-STROKE = MODELS / "capabilities" / "stroke_input.toml"
-
-
 KEYS = """
 schema title status branch theta_2 theta_3 theta_4 omega_2 omega_3 omega_4 alpha_2
 alpha_3 alpha_4 A B G2 G3 G4 a_A a_B a_G2 a_G3 a_G4 F12 F32 F43 F14 torque drive_bar
@@ -61,9 +57,6 @@ CONTRACT = KEYS.split()
 """The keys that programs which read the JSON rely on."""
 
 
-OF_THE_INPUT = {"theta_2", "omega_2", "alpha_2", "A", "G2", "a_A", "a_G2"}
-
-
 LENGTHS = ("0.3", "0.1", "0.25", "0.22")
 
 
@@ -71,12 +64,6 @@ BARE = ("--lengths", "300 mm", "10 cm", "0.25", "0.22", "--omega", "60 rpm")
 
 
 MADE = make_scene(0.3, 0.1, 0.25, 0.22, omega=tau)
-
-
-Ended = tuple[int, str, str]
-
-
-Fourbar = Callable[..., Ended]
 
 
 @pytest.fixture
@@ -129,18 +116,6 @@ def test_json_and_csv_have_every_key_and_every_digit(name, run):
     assert "time" not in document
 
 
-def test_null_where_there_is_no_value(run):
-    sweep = Motion(np.radians([10.0, 135.0]), 0.2244)
-    save(crank_rocker(linkage=thesis().linkage, motion=sweep), "scene.toml")
-    document = strict(run("analyze", "scene.toml", "--json"))
-    assert document["status"] == ["not_assembled", "ok"]
-    assert document["assembled"] == [False, True]
-    for quantity in set(UNITS) & set(CONTRACT) - OF_THE_INPUT:
-        first, second = document[quantity]
-        nothing = [None, None] if quantity in VECTORS else None
-        assert first == nothing and second not in (None, [None, None]), quantity
-
-
 def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
     save(crank_rocker(motion=Motion(1.0)), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
@@ -172,13 +147,6 @@ def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(endin
         for options in ((named,), (asked, *form)):
             assert run(*command, "-o", *options) == (HOLDS, "", "")
             assert options[0].read_text() == printed
-
-
-def test_every_command_can_write_what_it_prints():
-    """The workbench writes what its page asks for."""
-    for name, command in group.commands.items():
-        wanted = "--exports" if name == "edit" else "--out"
-        assert any(wanted in option.opts for option in command.params), name
 
 
 @pytest.mark.parametrize("command, write", [("sdf", write_sdf), ("usd", write_usd)])
@@ -215,15 +183,6 @@ def test_what_rests_at_every_angle_is_no_range_of_one(run):
     code, out, _ = run("equilibrium", "balanced.toml")
     assert code == 0
     assert "indifferent (Q = 0 throughout): everywhere on its circuit" in out
-
-
-@pytest.mark.parametrize("name", ["=cmd|'calc'!A0", "+1", "-A1", "@SUM(A1)", "P\n=1+1"])
-def test_a_heading_of_csv_is_a_word_and_no_formula(name, run):
-    """A spreadsheet calculates a cell that begins with =, and a point heads columns."""
-    file = Path("scene.toml")
-    save(crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)), file)
-    file.write_text(file.read_text().replace("P = ", f"{json.dumps(name)} = ", 1))
-    refuses(run("analyze", file, "--csv"), "must be a word of letters")
 
 
 @pytest.mark.slow
@@ -669,19 +628,6 @@ def test_arguments_are_refused_in_one_line_and_nothing_is_written(
 ):
     refuses(run(*shlex.split(line.replace("@", f"{MODELS}/"))), words)
     assert not [*tmp_path.iterdir()]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("mjcf", "a.toml", "b.toml", "-o", "f.xml"),
-        ("mjcf", "a.toml", *BARE[:5], "-o", "f.xml"),
-        ("analyze", CRANK_ROCKER, "--columns", "theta_44"),
-    ],
-)
-def test_what_is_no_other_mechanism_does_not_point_on(arguments, run):
-    code, _, err = run(*arguments)
-    assert code == BAD_INPUT and "PMKS+" not in err
 
 
 @pytest.mark.parametrize(

@@ -22,13 +22,11 @@ import fourbar
 from fourbar import InputError, solve
 from fourbar.files import loads
 from fourbar.files.scene_text import write_new_scene
-from fourbar.quantities.units import find_unit
 
 pytest.importorskip(
     "tomlkit",
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
-from fourbar.edit.dragging import write_rounded
 from fourbar.edit.exports import evaluate_scene, pack_frame
 from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.edit.session import (
@@ -40,9 +38,6 @@ from tests.support.rows import read_rows
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
-
-
-STROKE_INPUT = ROOT / "models" / "capabilities" / "stroke_input.toml"
 
 
 CRANK_ROCKER = ROOT / "models" / "crank_rocker.toml"
@@ -201,16 +196,6 @@ def test_each_field_that_is_offered_is_one_that_the_file_takes(stated):
         expected = 0.2 if per_metre is None else per_metre * bar.length
         assert bar.inertia == approx(2e-4)
         assert bar.mass == approx(expected)
-
-
-def test_what_a_pair_consists_of_is_read_from_the_declarations():
-    places = ("centre", "from_pin", "from_centre", "arm")
-    assert list_offers()["pairs"] == {
-        **{key: ["distance", "angle"] for key in places},
-        "force": ["size", "angle"],
-        "section": ["height", "thickness"],
-        "gravity": ["magnitude", "angle"],
-    }
 
 
 NO_PICTURE = "must be a PNG, JPEG or SVG picture"
@@ -398,11 +383,6 @@ def test_a_ground_by_coordinates_is_dragged_by_them(session):
     assert "ground_angle" not in session.now.plain["lengths"]
 
 
-def test_pin_A_goes_along_its_bar_whose_angle_is_commanded(session):
-    length = abs(complex(*drag(session, "A", 0.08 + 0.09j).A[0]))
-    assert length == approx(abs(0.08 + 0.09j), abs=PIXEL)
-
-
 @pytest.mark.parametrize("frame", ["world", "bar"])
 @pytest.mark.parametrize("size", ["5 N", "-5 N"])
 def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays(
@@ -466,18 +446,6 @@ def test_what_does_not_move_cannot_be_commanded(session):
     assert "does not move" in refused
 
 
-def test_a_stroke_out_of_range_is_refused_in_the_units_of_the_file(tmp_path):
-    """The range shows on solving, when the file has been read."""
-    session = start(tmp_path, STROKE_INPUT)
-    refused = session.do(set_to("motion/stroke", "7000 mm"))["refused"]
-    words = r"motion\.stroke: this cylinder can have \S+ to \S+ mm"
-    assert re.fullmatch(words, refused), refused
-    far = session.now.scene.motion.replace(angle=7.0)
-    state = session.now._replace(scene=replace(session.now.scene, motion=far))
-    with raises(InputError, match=r"stroke = 7000 mm: .* mm$"):
-        state.evaluate(session.now.units, settled=True)
-
-
 def test_a_state_that_assembles_nowhere_names_what_it_commands(session):
     """The output of this linkage rocks, and does not come to 0 deg."""
     scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))
@@ -512,39 +480,6 @@ def test_what_was_typed_stays_when_another_linkage_is_drawn(new):
     assert new.now.plain["bars"]["coupler"]["mass"] == "3 lb"
     coupler = new.now.scene.linkage.coupler
     assert coupler.length == approx(INCH * math.hypot(11, 8), abs=INCH * 0.01)
-
-
-UNITS = read_rows("""
-12 in | lbf
-12 1/2" | lbf
-1' 6" | lbf
-1 ft | lbf
-300 mm | N
-""")
-
-
-@pytest.mark.parametrize("length, force", UNITS)
-def test_results_have_the_units_of_the_file_until_others_are_chosen(
-    session, length, force
-):
-    text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
-    ask(session, "text", text=text)
-    of_the_file = session.units
-    assert of_the_file.get("N", ("N", 1.0))[0] == force
-    ask(session, "units", units="mm N N.mm deg")
-    assert session.units["m"][0] == "mm"
-    assert session.answer()["units"] == "mm N N.mm deg"
-    ask(session, "units", units="as the file")
-    assert session.units == of_the_file
-
-
-def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit():
-    assert write_rounded(0.123456, 0.003, "m") == "0.123 m"
-    assert write_rounded(123.456, 3.0, "mm") == "123 mm"
-    assert write_rounded(1234.0, 300.0, "mm") == "1200 mm"
-    assert find_unit("12 1/2 in", "m") == find_unit("1'6 1/2\"", "m") == "in"
-    assert find_unit("3e-2 kg m^2", "") == "kg m^2"
-    assert find_unit(None, "deg") == "deg"
 
 
 def unpacked(data):
@@ -712,12 +647,6 @@ def test_exports_go_into_their_folder_under_their_own_names(session):
     for name, ending in (("csv", "csv"), ("mjcf", "xml"), ("page", "html")):
         ask(session, "export", format=name)
         assert (session.exports.folder / f"scene.{ending}").stat().st_size > 1000
-
-
-def test_a_new_scene_begins_where_there_is_no_file(new):
-    assert not new.saved and new.answer()["undo"] is False
-    ask(new, "save")
-    assert fourbar.load(new.path).linkage.ground == 0.3
 
 
 @pytest.mark.slow

@@ -158,12 +158,3 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     rest = solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))
     width = rest.drive_force_high - rest.drive_force_low
     assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)
-
-
-def test_a_released_linkage_has_a_stroke_and_no_force():
-    motion = Motion(1.0, 0.0, free=fourbar.Free(0.05, 50))
-    s = solve(driven(1, 4, loads=(), motion=motion), "error")
-    assert not s.drive_force.any() and not s.power.any()
-    assert np.isfinite(s.stroke_speed).all() and s.torque is None
-    missed = np.abs(np.gradient(s.stroke, s.time) - s.stroke_speed)[1:-1]
-    assert missed.max() < 1e-3 * np.abs(s.stroke_speed).max()

@@ -4,12 +4,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from pytest import approx, raises
+from pytest import approx
 
 import fourbar
 from fourbar import Motion, Point, solve
 from fourbar.effects import Place, PointDrive
-from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from tests.support.scenes import crank_rocker
 from tests.support.texts import HELD
@@ -48,9 +47,3 @@ def test_a_study_and_a_file_carry_it():
             points=(handle, scene.points[1]),
         )
         assert varied.drive_force[k] == solve(one).drive_force
-
-
-def test_a_stroke_is_of_a_cylinder_alone():
-    motion = Motion(stroke=0.3, stroke_speed=0.1, side="left")
-    with raises(InputError, match="no cylinder"):
-        crank_rocker(drive=PointDrive(Place(2, (0.1, 0.0)), 1.0), motion=motion)

@@ -51,24 +51,6 @@ def test_a_spring_whose_ends_meet_once_loses_that_position_alone():
         assert list(np.isnan(solution.torque)) == [False, True, False, False]
 
 
-@pytest.mark.parametrize(
-    "ends",
-    [
-        (Place(2, (0.1, 0.0)), Place(3, (0.0, 0.0))),
-        (Place(3, (0.25, 0.0)), Place(4, (0.22, 0.0))),
-    ],
-)
-def test_a_spring_with_both_ends_in_one_pin_has_no_direction(ends):
-    effects = (Springs((Spring(*ends, 150.0, 0.05),)),)
-    scene = Scene(linkage("crank-rocker"), Motion([0.3, 4.0], 8.0), effects=effects)
-    solution = solve(scene, "error")
-    assert solution.status == ["no_direction"] * 2
-    for name in ("F12", "F32", "F43", "F14", "torque", "torque_error", "force_error"):
-        assert np.isnan(solution[name]).all(), name
-    assert np.isfinite(solution.omega_4).all()
-    assert solve(scene, "velocity").status == ["ok"] * 2  # the spring plays no part
-
-
 def continuous(scene, pin):
     """theta_j - theta_i along a sweep, each position from the one before."""
     solution = solve(scene, "position")

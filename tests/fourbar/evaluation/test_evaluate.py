@@ -155,21 +155,6 @@ def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     assert not any(tally.too_large.values()) and not tally.warned
 
 
-def test_a_bar_is_of_the_motion_that_begins_to_one_side():
-    """The bar of a linkage about to move was the friction itself.
-
-    The other evaluation did not have it.
-    """
-    still = replace(
-        sized(),
-        motion=Motion(np.array([1.0, 2.0]), 0.0),
-        effects=(fourbar.Friction.at(A=0.5, O4=2.0),),
-    )
-    for side in (-1, 1):
-        torque_error = solve(still, "error", side=side).torque_error
-        assert torque_error.max() < 1e-13
-
-
 def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     """Compare a heavy crank beside its equilibrium with balls.
 

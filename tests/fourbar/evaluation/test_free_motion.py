@@ -45,8 +45,6 @@ HANGING = FourBar(
     Bar(0.22, 0.4),
 )
 DOWN = Gravity()
-NO_TORQUE = 1e-12 * 9.81 * 1.1
-"""N m: of all the weights of HANGING at one metre."""
 
 
 def let_go(theta_2, omega_2, duration, steps, *effects, linkage=HANGING):
@@ -104,13 +102,6 @@ def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar):
     angle, speed = {2: (s.theta_2, 1.0), 4: (s.theta_4, start.omega_4[0])}[bar]
     turned = speed * times + 0.2 * times**2
     assert angle - angle[0] == approx(turned, abs=1e-11)
-
-
-def test_dry_friction_holds():
-    terms = DOWN, Friction.at(O2=0.3)
-    m = integrate(HANGING, terms, 0.3, 1.0, np.linspace(0.0, 5.0, 51)).command
-    assert m.omega_2[-1] == m.alpha_2[-1] == 0.0
-    assert m.theta_2[-1] == m.theta_2[-2]
 
 
 def test_a_motion_that_has_stopped_is_handed_to_another_process():
@@ -278,21 +269,6 @@ def test_rates_add_up_to_a_motion_that_needs_no_drive(name):
         summed = np.cumsum(half * rates[at_nodes] @ WEIGHTS)
         assert np.abs(changed - summed).max() <= ADDED * np.abs(rates).max()
     assert bool(released.change_points) == (name in CHANGING)
-
-
-@pytest.mark.parametrize("pin, bar", [("O2", 2), ("O4", 4)])
-def test_friction_that_holds_at_the_ground_loads_the_pins_as_a_drive_there(pin, bar):
-    """The ground's couple on a bar is that of a drive on it.
-
-    A drive holds a linkage still just as well.
-    """
-    s = solve(let_go(0.3, 0.0, 0.2, 4, DOWN, Friction.at(**{pin: 9.0})))
-    still = Motion(0.3, 0.0)
-    driven = solve(Scene(HANGING, still, bar, effects=(DOWN,)))
-    assert not s.alpha_2.any()
-    for force in PINS:
-        held = np.broadcast_to(getattr(driven, force), (5, 2))
-        assert getattr(s, force) == approx(held, rel=0.0, abs=1e-12)
 
 
 def test_what_begins_to_move_against_friction_does_so_at_once():

@@ -1,7 +1,6 @@
 """An effect of one file is read, written, varied, drawn and dragged by its fields."""
 
 import cmath
-import math
 import sys
 from dataclasses import replace
 
@@ -10,8 +9,8 @@ from pytest import approx
 
 import fourbar
 from fourbar import Place, effects, solve
-from fourbar.edit.dragging import Dragged, drag, list_handles
-from fourbar.edit.scene_entries import SceneDocument, list_offers
+from fourbar.edit.dragging import list_handles
+from fourbar.edit.scene_entries import list_offers
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.scene.numbers import find_unit_of_key
@@ -207,17 +206,3 @@ def test_its_places_are_handles_and_symbols(scene):
     ]
     assert (acting[1].bar, acting[1].at) == (3, cmath.rect(0.05, 0.5))
     assert acting[2].end == (1, 0.0)
-
-
-def test_a_drag_changes_the_numbers_of_an_entry(scene):
-    document = SceneDocument(TEXT)
-    theta_2 = math.radians(60.0)
-    (end,) = (h for h in list_handles(scene) if h.name == "to of magnets rows 2")
-    shown = solve(scene)
-    along = cmath.rect(1.0, float(shown.theta_3[0]))
-    wanted = 0.03 + 0.01j
-    to = complex(*shown.A[0]) + along * (scene.linkage.coupler.to_centre + wanted)
-    dragged = Dragged([*end.path], to, 1e-6, theta_2, 1)
-    drag(document, scene, {}, dragged)
-    second = loads(document.text()).effects[0].rows[1]
-    assert cmath.rect(*second.end.from_centre) == approx(wanted, abs=1e-6)

@@ -12,10 +12,8 @@ import fourbar
 from fourbar import Motion, Scene, from_pins, solve
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
-from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
-from fourbar.scene.motion import COMMAND_NAMES
 from tests.support.texts import LENGTHS
 
 EPS = 2.0**-52
@@ -94,24 +92,6 @@ def test_thousands_of_drawings_come_back():
     assert len(gaps) == DRAWINGS and gaps.max() < K
 
 
-def test_lengths_angles_and_assembly_are_those_of_the_pins():
-    scene = loads(DRAWN + '[motion]\ntheta_2 = "drawn"\n')
-    d, a, b, c = scene.linkage.lengths
-    assert (d, a) == (hypot(0.25, 0.05), 0.1)
-    assert b == approx(hypot(0.175, 0.05), rel=4 * EPS)
-    assert c == approx(0.075, rel=4 * EPS)
-    assert scene.linkage.ground_angle == math.atan2(0.05, 0.25)
-    assert scene.motion.theta_2 == approx(0.5 * pi, abs=4 * EPS)
-
-
-@pytest.mark.parametrize("bar", (2, 3, 4))
-def test_every_command_is_on_the_assembly_that_is_drawn(bar):
-    scene = loads(f'{DRAWN}[motion]\n{COMMAND_NAMES[bar][0]} = "drawn"\n')
-    here = solve(scene)
-    assert here.A[0] == approx([0.0, 0.1], abs=1e-15)
-    assert here.B[0] == approx([0.175, 0.05], abs=1e-14)
-
-
 def test_places_of_the_drawing_are_where_they_are_drawn():
     """Away from the origin.
 
@@ -180,12 +160,6 @@ def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
     assert scene.motion.stroke == approx(hypot(0.09, 0.11), rel=4 * EPS)
     assert here.A[0] == approx([0.0, 0.1], abs=1e-14)
     assert here.B[0] == approx([0.175, 0.05], abs=1e-13)
-
-
-def test_a_side_that_is_left_out_is_the_drawn_one():
-    text = (DRAWN + CYLINDER).replace('side = "drawn"\n', "")
-    assert "side" not in text
-    assert loads(text).motion.side == loads(DRAWN + CYLINDER).motion.side
 
 
 @pytest.mark.parametrize(
@@ -321,22 +295,6 @@ def test_a_drawing_on_a_change_point_is_refused():
 def test_the_word_needs_a_drawing():
     with raises(InputError, match=r"the scene has no \[pins\]"):
         loads(LENGTHS + '[motion]\ntheta_2 = "drawn"\n')
-
-
-def test_mjcf_stands_where_the_drawing_has_it():
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is optional")
-    bars = ("input", "coupler", "output")
-    masses = "".join(f'[bars.{bar}]\nmass = "1 kg"\n' for bar in bars)
-    pins = DRAWN.replace('"0 mm", "0 mm"', '"-20 mm", "7 mm"')
-    motion = '[motion]\ntheta_2 = "drawn"\nomega_2 = "1 rad/s"\n'
-    text = write_mjcf_for(loads(pins + masses + motion))
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    places = {"O2": (-0.02, 0.007), "A": (0.0, 0.1), "O4": (0.25, 0.05)}
-    for name, place in places.items():
-        assert data.site(name).xpos[:2] == approx(place, abs=1e-9)
 
 
 @pytest.mark.slow

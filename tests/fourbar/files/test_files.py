@@ -20,21 +20,16 @@ from fourbar import (
     Bar,
     FourBar,
     Free,
-    Friction,
     FromLimit,
     Gravity,
-    Load,
     Spring,
-    Springs,
     Sweep,
     Tolerance,
-    Viscous,
 )
 from fourbar.effects import Place
 from fourbar.errors import InputError
-from fourbar.files import dump, load, loads, save
+from fourbar.files import dump, load, loads
 from fourbar.files.scene_text import NEW_POSITIONS, write_new_scene
-from fourbar.quantities.units import to_si
 from tests.fourbar.test_solving import scenes
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -98,47 +93,6 @@ def test_every_form_of_theta_2():
     assert np.array_equal(motion('["0 deg", "180 deg"]').theta_2, [0.0, pi])
 
 
-def test_free_motion_and_frames_are_read():
-    text = (
-        LENGTHS
-        + """
-[motion]
-theta_2 = "10 deg"
-omega_2 = "0 rad/s"
-free = { duration = "5 s", steps = 500 }
-[[loads]]
-bar = 3
-force = ["2 N", "90 deg"]
-from_centre = ["1 cm", "0 deg"]
-frame = "bar"
-[effects]
-viscous = { O2 = "0.01 N m s/rad", B = "1 N m s/rad" }
-friction = { A = "5 N cm" }
-[[effects.springs]]
-from = { bar = 1 }
-to = { bar = 4, from_pin = ["20 cm", "0 deg"] }
-[effects.springs.gas]
-extended = "50 cm"
-stroke = "20 cm"
-extended_force = "400 N"
-compressed_force = "520 N"
-"""
-    )
-    scene = loads(text)
-    assert scene.motion.free == Free(5.0, 500)
-    assert scene.loads == (
-        Load(3, (2.0, pi / 2), from_centre=(0.01, 0.0), frame="bar"),
-    )
-    gas = Spring.gas(Place(1, (0.0, 0.0)), Place(4, (0.2, 0.0)), 0.5, 0.2, 400.0, 520.0)
-    springs = Springs((gas,))
-    assert scene.effects == (
-        Viscous.at(O2=0.01, B=1.0),
-        Friction.at(A=0.05),
-        springs,
-    )
-    assert facts(loads(dump(scene))) == facts(scene)
-
-
 FINITE = st.floats(-1e300, 1e300, allow_nan=False)
 STEPS = st.integers(1, 10**8)
 SWEPT = st.builds(Sweep, FINITE, FINITE, STEPS) | st.builds(
@@ -167,71 +121,9 @@ def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
     assert facts(loads(dump(scene))) == facts(scene)
 
 
-PLACES = {
-    "bars.coupler.centre": '[bars.coupler]\nmass = "1 kg"\ncentre = {}\n',
-    "points.P.from_pin": "[points]\nP = {{ bar = 3, from_pin = {} }}\n",
-    "loads[0].from_pin": "[[loads]]\nbar = 4\n"
-    'force = ["1 N", "0 deg"]\nfrom_pin = {}\n',
-    "drive.from.from_pin": "[drive]\nfrom = {{ bar = 1, from_pin = {} }}\n"
-    'to = {{ bar = 2, from_pin = ["90 mm", "0 deg"] }}\n',
-    "effects.springs[0].to.from_pin": "[effects]\n"
-    "springs = [{{ from = {{ bar = 1 }}, to = {{ bar = 4, from_pin = {} }}, "
-    'stiffness = "9 N/m", length = "1 mm" }}]\n',
-}
-
-
-@pytest.mark.parametrize("key", PLACES)
-def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_read(
-    key,
-):
-    x, y = "3 in", "-5 in"
-    by_coordinates = loads(LENGTHS + PLACES[key].format(f'{{ x = "{x}", y = "{y}" }}'))
-    distance = math.hypot(to_si(x, "m"), to_si(y, "m"))
-    angle = math.atan2(to_si(y, "m"), to_si(x, "m"))
-    polar = loads(LENGTHS + PLACES[key].format(f'["{distance!r} m", "{angle!r} rad"]'))
-    assert by_coordinates == polar and facts(by_coordinates) == facts(polar)
-    text = dump(by_coordinates)
-    stated = f'{{ x = "{to_si(x, "m")!r} m", y = "{to_si(y, "m")!r} m" }}'
-    assert stated in text and stated not in dump(polar)
-    again = loads(text)
-    assert facts(again) == facts(by_coordinates) and dump(again) == text
-    if key.startswith("bars"):  # another centre is written as what it is
-        bars = replace(
-            again.linkage,
-            coupler=replace(again.linkage.coupler, centre=(0.1, 0.2)),
-        )
-        assert "{ x =" not in dump(replace(again, linkage=bars))
-    for wrong, words in (
-        ('{ x = "1 mm" }', "y' = None: is missing"),
-        ('{ x = "1 mm", y = "2 kg" }', "does not convert to m"),
-        ('{ x = "1 mm", y = "2 mm", z = "0 mm" }', "unknown key"),
-        ('"1 mm"', 'or { x = "1 m", y = "0 m" }'),
-    ):
-        with raises(InputError) as caught:
-            loads(LENGTHS + PLACES[key].format(wrong))
-        assert words.replace("y' = None: ", "") in str(caught.value)
-        assert key in str(caught.value)
-
-
 def test_every_letter_of_a_title_reads_back():
     title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
     assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
-
-
-def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
-    scene = load(MODELS[0])
-    target = tmp_path / "scene.toml"
-    save(scene, target)
-    before = target.read_bytes()
-    assert facts(load(target)) == facts(scene)
-
-    def full(_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with raises(OSError, match="No space"):
-        save(replace(scene, title="other"), target)
-    assert target.read_bytes() == before and list(tmp_path.iterdir()) == [target]
 
 
 def test_what_a_file_cannot_hold_is_refused():
@@ -240,29 +132,6 @@ def test_what_a_file_cannot_hold_is_refused():
         dump(replace(scene, effects=(Gravity(), Gravity())))
     with raises(InputError, match="Unicode"):
         dump(replace(scene, title="\ud800"))
-
-
-WIDTHS = {
-    "loads.0.force.0": 0.1,
-    "lengths.input": 5e-5,
-    "bars.coupler.mass": 0.01,
-    "loads.1.moment": 1e-3,
-    "lengths.ground": 1e-5,
-    "effects.gravity.1": 1e-3,
-    "bars.input.mass": 0.002,
-    "lengths.ground_angle": 1e-4,
-}
-"""Tolerances whose tables in the file alternate."""
-
-
-@given(st.permutations(list(WIDTHS)))
-@settings(max_examples=10, deadline=None, database=None)
-def test_tolerances_read_back_in_their_order(keys):
-    tolerances = tuple(
-        Tolerance(key, WIDTHS[key], key.endswith("mass")) for key in keys
-    )
-    scene = crank_rocker(tolerances=tolerances)
-    assert loads(dump(scene)) == scene
 
 
 @pytest.mark.parametrize(

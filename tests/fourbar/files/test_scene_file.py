@@ -12,9 +12,8 @@ import fourbar
 from fourbar import solve
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
-from fourbar.files import load, loads, read_scene_text
+from fourbar.files import load, loads
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
-from fourbar.files.scene_text import write_new_scene
 
 GOOD = """title = "good"
 [lengths]
@@ -289,38 +288,10 @@ def test_hostile_names(name, tmp_path, capsys):
     refused(["analyze", str(tmp_path / name)], [], tmp_path, capsys)
 
 
-def test_a_name_that_no_file_can_have():
-    with raises(InputError, match="cannot be read"):
-        read_scene_text("nul\0.toml")
-
-
 def rocker(theta_2):
     """A linkage that closes for theta_2 between 22.3 and 71.7 deg."""
     text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
     return text.replace('"60 deg"', theta_2)
-
-
-BEYOND = '{ from = "0 deg", to = "9 deg", steps = 99999999 }'
-
-
-@pytest.mark.parametrize(
-    "content, words",
-    [
-        (None, ["directory"]),
-        (b"\xff\xfe\x00", ["UTF-8"]),
-        (GOOD.encode() + b"\n# \xe9\n", ["UTF-8"]),
-        (b"\x89PNG\r\n\x1a\n" + bytes(100), ["UTF-8"]),
-        (rocker('"180 deg"').encode(), ["theta_2", "assembles at none"]),
-        (rocker(BEYOND).encode(), ["theta_2.steps"]),
-    ],
-)
-def test_a_file_that_cannot_be_analysed(content, words, tmp_path, capsys):
-    file = tmp_path / "scene.toml"
-    if content is None:
-        file.mkdir()
-    else:
-        file.write_bytes(content)
-    refused(["analyze", str(file)], [str(file), *words], tmp_path, capsys)
 
 
 @pytest.mark.slow
@@ -475,8 +446,3 @@ def test_a_number_without_a_unit_is_suggested_in_that_of_its_neighbours(
     with raises(InputError) as caught:
         loads(IN_OTHER_UNITS.replace(old, new))
     assert f'the unit is missing; did you mean "{meant}"?' in str(caught.value)
-
-
-def test_lengths_of_a_new_scene_without_a_unit_are_suggested_alike():
-    with raises(InputError, match='did you mean "4 in"'):
-        write_new_scene(["12 in", "4", "10 in", "9 in"])

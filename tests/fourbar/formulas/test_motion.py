@@ -17,8 +17,6 @@ from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
 from tests.support.scenes import bare
 
 EPS = 2.0**-52
-CLOSURE = 8 * EPS
-"""Of the sum of the lengths: eight roundings of unit vectors and their sum."""
 
 
 def find_singular(position):

@@ -465,27 +465,6 @@ def test_every_sentence_of_the_table_is_said_somewhere():
         assert any(line.startswith(start) for line in said), start
 
 
-FOLLOWED = 1e-6
-"""Of the torque of a controller, by the greatest in a turn; measured 5e-8."""
-
-
-def test_a_controller_of_ones_own_finds_the_torque():
-    """PD control about omega_2 t; its torque is the formulas' at what then happens."""
-    file = Opened(crank_rocker(motion=Motion(Sweep(0.4, 6.0, 60), 10.0)), "motor")
-    m, d = file.model, file.data
-    assert m.dof_armature[0] == 0.0
-    worst = 0.0
-    for step in range(1000):
-        wanted = 0.4 + 10.0 * d.time
-        d.ctrl[0] = 400.0 * (wanted - d.qpos[0]) + 4.0 * (10.0 - d.qvel[0])
-        # from ten time constants of the closure after the start
-        if step >= 200 and step % 100 == 0:
-            file.forward()
-            worst = max(worst, file.error("torque", d.ctrl[0]))
-        file.step(1)
-    assert worst < FOLLOWED and abs(d.qpos[0] - 0.4 - 10.0 * d.time) < 0.05
-
-
 def test_a_motor_for_one_that_takes_none_is_refused():
     for wrong in (
         {"simulator": "newton", "drive": "motor"},

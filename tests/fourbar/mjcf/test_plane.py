@@ -4,7 +4,6 @@ The same motion and forces, turned, in each form of file.
 """
 
 import re
-from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -50,22 +49,6 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
     assert np.allclose(rotation(half), turn @ about_z, atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    "axis, at, expected",
-    [
-        ((0, -1, 0), (0, -9.81), [0, 0, -9.81]),  # x-z, gravity down
-        ((1, 0, 0), (9.81, 0), [0, 0, -9.81]),  # x points down, y stays
-        ((-1, 1, 0), (5, 5), [5, 5, 0]),
-        ((1e-5, 0, -1), (1, 0), [-1, 0, -1e-5]),
-    ],
-)
-def test_a_turned_vector_has_zeros_where_it_has_no_component(axis, at, expected):
-    plane = Plane(axis)
-    turned = plane.turn(*at)
-    assert turned == approx(expected, rel=1e-10, abs=0.0)
-    assert np.linalg.norm(plane.quaternion) == approx(1.0, abs=1e-15)
-
-
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
 def test_what_is_no_direction_is_refused(axis):
     with pytest.raises(InputError, match="axis"):
@@ -93,26 +76,6 @@ def test_mujoco_moves_and_loads_a_tilted_linkage_alike(axis):
     for level, tilted in zip(*answers, strict=True):
         size = np.abs(level).max()
         assert np.allclose(tilted, level, rtol=0.0, atol=1e-7 * size)
-
-
-@pytest.mark.parametrize("axis", AXES)
-def test_an_sdf_has_its_model_and_gravity_turned(axis):
-    plane = Plane(axis, ORIGIN)
-    trees = [
-        ET.fromstring(write_sdf(scene(), without_loads=True, plane=place))
-        for place in (Plane(), plane)
-    ]
-    level, tilted = trees
-    assert level.find("world/model/pose") is None
-    numbers = list(map(float, tilted.findtext("world/model/pose", "").split()))
-    assert numbers == [*ORIGIN, *plane.roll_pitch_yaw]
-    gravity = [
-        np.array(list(map(float, tree.findtext("world/gravity", "").split())))
-        for tree in trees
-    ]
-    assert np.allclose(gravity[1], plane.rotation @ gravity[0], atol=1e-15)
-    poses = [[link.findtext("pose") for link in tree.iter("link")] for tree in trees]
-    assert poses[0] == poses[1]
 
 
 def test_only_a_plane_that_is_tilted_is_called_so():

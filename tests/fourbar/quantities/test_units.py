@@ -14,8 +14,7 @@ import fourbar
 from fourbar import Motion, PinFriction, Spring, uniform
 from fourbar.effects import Place, Table
 from fourbar.errors import InputError
-from fourbar.files import loads
-from fourbar.quantities.units import DEFINITIONS, UnitError, half_unit_of_text, to_si
+from fourbar.quantities.units import UnitError, half_unit_of_text, to_si
 
 ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
 SAME = [
@@ -74,22 +73,6 @@ SAME = [
 @pytest.mark.parametrize("make, texts, numbers", SAME)
 def test_a_text_with_a_unit_is_its_number(make, texts, numbers):
     assert make(*texts) == make(*numbers)
-
-
-def test_a_motion_is_written_as_in_the_file():
-    stated = Motion(["10 deg", 1.0], "60 rpm", "30 deg/s^2", branch="crossed")
-    read = loads(
-        '[lengths]\nground = "6 in"\ninput = "2 in"\n'
-        'coupler = "5 in"\noutput = "4 in"\n'
-        '[motion]\ntheta_2 = ["10 deg", "1 rad"]\nomega_2 = "60 rpm"\n'
-        'alpha_2 = "30 deg/s^2"\nbranch = "crossed"\n'
-    ).motion
-    assert np.array_equal(stated.theta_2, read.theta_2)
-    assert (stated.omega_2, stated.alpha_2, stated.branch) == (
-        read.omega_2,
-        read.alpha_2,
-        read.branch,
-    )
 
 
 @pytest.mark.parametrize(
@@ -327,18 +310,6 @@ def test_half_a_unit_of_the_last_decimal(text, half):
 @pytest.mark.parametrize("prefix", PREFIXES)
 def test_every_prefix_is_its_power_of_ten(prefix):
     assert to_si(f"3 {prefix}N", "N") == float(3 * Fraction(10) ** PREFIXES[prefix])
-
-
-def test_the_tables_name_every_unit_and_prefix():
-    lines = [
-        line.split(" = ")
-        for line in DEFINITIONS.strip().splitlines()
-        if not line.startswith(("#", "pi = "))
-    ]
-    names = {name for name, _, *others in lines for name in (name, *others)}
-    prefixes = {name for name in names if name.endswith("-")}
-    assert names - prefixes == set(UNITS)
-    assert prefixes == {f"{prefix}-" for prefix in PREFIXES}
 
 
 @pytest.mark.parametrize(

@@ -34,13 +34,6 @@ def test_arrays_of_angles_are_converted():
     assert motion.omega_2 == 2.0 * math.pi
 
 
-def test_effects_and_loads_take_them():
-    gravity = fourbar.Gravity(386.08858267716535 * ureg.inch / ureg.second**2)
-    assert gravity.magnitude == pytest.approx(9.80665, rel=1e-15)
-    damper = fourbar.Viscous((("O2", 1.0 * ureg.N * ureg.m * ureg.s / ureg.rad),))
-    assert damper.coefficients[0][1] == 1.0
-
-
 @pytest.mark.parametrize(
     "quantity, sentence",
     [

@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pytest import raises
 
-from fourbar import InputError, Motion, Point, load, solve, vary
+from fourbar import InputError, Point, solve, vary
 from fourbar.files import dump, loads
 from fourbar.solution import write_json
 from tests.support.scenes import crank_rocker
@@ -25,17 +25,6 @@ POINTS = (
 
 def scene(*points, **changes):
     return crank_rocker(points=points, **changes)
-
-
-def test_positions_alone_have_no_velocities_of_points():
-    posed = scene(*POINTS, motion=Motion(1.0))
-    s = solve(posed)
-    assert list(s.points) == [point.name for point in POINTS]
-    assert s.velocity == {} == s.acceleration
-    assert json.loads(write_json(s))["v_P"] is None
-    out = {"a_P": np.zeros((1, 2))}
-    s = solve(scene(*POINTS, motion=Motion(1.0, 2.0)), out=out)
-    assert s.points == {} and s.acceleration["P"] is out["a_P"] and out["a_P"].all()
 
 
 def test_a_study_varies_them_and_lists_its_members():
@@ -56,12 +45,6 @@ def test_a_study_varies_them_and_lists_its_members():
     assert np.array_equal(frame["a_P_x"].to_numpy()[61:], alone.acceleration["P"][:, 0])
     assert np.shape(json.loads(write_json(s))["torque"]) == (2, 61)
     assert "2 linkages" in s._repr_html_()
-
-
-def test_a_file_holds_them(tmp_path):
-    file = tmp_path / "scene.toml"
-    file.write_text(dump(scene(*POINTS)))
-    assert load(file).points == POINTS
 
 
 WRONG = {

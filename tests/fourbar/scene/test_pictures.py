@@ -28,22 +28,6 @@ def scene_file(folder, name, bar="coupler"):
     return file
 
 
-@pytest.mark.parametrize("name", ("bar.png", "parts/bar.png"))
-def test_the_picture_of_a_scene_file_is_shown_and_saved(tmp_path, monkeypatch, name):
-    (tmp_path / "parts").mkdir()
-    (tmp_path / name).write_bytes(PNG)
-    monkeypatch.chdir("/")  # the name is relative to the scene file
-    scene = load(scene_file(tmp_path, name))
-    assert embedded(animate.write_page(scene))["pictures"] == {"3": EMBEDDED}
-    save(scene, tmp_path / "again.toml")
-    again = load(tmp_path / "again.toml")
-    assert again.pictures == scene.pictures
-    assert dump(loads(dump(scene), str(tmp_path / "x.toml"))) == dump(scene)
-    assert (
-        again.linkage == scene.linkage
-    )  # a massless bar with a picture stays massless
-
-
 def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path):
     inner = tmp_path / "inner"
     inner.mkdir()
@@ -98,11 +82,6 @@ def test_one_given_with_the_command_takes_its_place(tmp_path):
 def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(name):
     with raises(InputError, match=r"^s.toml: bars\.coupler\.picture .*PNG or JPEG"):
         loads(f'{LENGTHS}[bars.coupler]\npicture = "{name}"\n', "s.toml")
-
-
-def test_a_picture_that_is_no_text_is_refused():
-    with raises(InputError, match=r"bars\.input\.picture.*text"):
-        loads(LENGTHS + "[bars.input]\npicture = 3\n")
 
 
 def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path):

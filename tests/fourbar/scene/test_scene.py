@@ -23,7 +23,6 @@ from fourbar import (
     Sweep,
     command,
     dump,
-    sensitivity,
     solve,
     uniform,
     vary,
@@ -38,8 +37,6 @@ from tests.support.scenes import bare
 from tests.support.shares import slow_but
 
 U = 2.0**-53
-DIFFERENCE = 1e-6
-"""Relative, of a central difference over 1e-5."""
 BARS = [Bar(0.1, 0.2), Bar(0.25, 0.5, 0.01, (0.12, 0.2)), Bar(0.22, 0.4)]
 LOADED = Scene(
     FourBar(0.3, *BARS, 0.4),
@@ -47,14 +44,6 @@ LOADED = Scene(
     effects=(Gravity(9.81, -1.5),),
 )
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
-
-
-ROCKER = FourBar(
-    0.5,
-    replace(BARS[0], length=0.4),
-    replace(BARS[1], length=0.3),
-    replace(BARS[2], length=0.25),
-)
 
 
 def sine(solution, bar):
@@ -121,47 +110,6 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
         Motion(law=law, theta_2=1.0)
     with raises(InputError, match="one bar is commanded"):
         Law((0.0, 1.0), (0.0, 1.0), ends="rest", theta_4=(0.0, 1.0))
-
-
-AT_TWO = Motion(theta_4=np.array([4.2, 4.7]), omega_4=2.0, alpha_4=-3.0)
-"""Two angles of the output, which swings."""
-
-
-@pytest.mark.parametrize(
-    "key, values, step",
-    [
-        ("lengths.input", np.array([0.1]), 1e-6),
-        ("motion.theta_4", AT_TWO.theta_4, 1e-6),
-        ("motion.omega_4", np.array([2.0]), 1e-5),
-    ],
-)
-def test_a_study_and_sensitivities_take_the_keys_of_the_commanded_bar(
-    key, values, step
-):
-    scene = replace(LOADED, motion=AT_TWO)
-    slopes = sensitivity(scene)
-    ends = np.squeeze([values - step, values + step])
-    solved = solve(vary(scene, {key: ends}))
-    assert solved.theta_2.shape == (2, 2) and (np.abs(solved.branch) == 1).all()
-    for name in ("theta_2", "omega_2", "torque", "F43"):
-        low, high = getattr(solved, name)
-        slope = (high - low) / (2 * step)
-        missed = DIFFERENCE * np.abs(slope).max()
-        of_key = slopes.of(name, key)
-        assert of_key == approx(slope, rel=DIFFERENCE, abs=missed)
-
-
-def test_the_commanded_angle_follows_its_key_alone_and_may_have_a_tolerance():
-    loose = (fourbar.Tolerance("motion.omega_4", 0.01),)
-    scene = replace(LOADED, motion=AT_TWO, tolerances=loose)
-    slopes = sensitivity(scene)
-    assert np.array_equal(slopes.of("theta_4", "motion.theta_4"), [1.0, 1.0])
-    assert not slopes.of("theta_4", "lengths.input").any()
-    with raises(InputError, match=r"motion\.theta_4"):
-        vary(scene, {"motion.theta_2": [1.0]})
-    spread = fourbar.tolerances(scene, 64).spreads["omega_2"]
-    largest = np.abs(slopes.value("omega_2")) * 0.005
-    assert spread.worst == approx(largest, rel=1e-9)
 
 
 @pytest.mark.parametrize("bar", slow_but({3}, [3, 4]))
@@ -234,16 +182,6 @@ def test_a_motion_is_replaced_by_what_it_commands(motion, changes, same):
         match="no field 'theta_2' to replace; it has angle, speed, acceleration",
     ):
         motion.replace(theta_2=1.0)
-
-
-def test_a_motion_reads_by_the_name_of_what_it_commands():
-    rates = STROKE.stroke, STROKE.stroke_speed, STROKE.stroke_acceleration
-    assert (*rates, STROKE.theta_2) == (0.3, 0.1, 0.2, None)
-    output = Motion(theta_4=1.0, omega_4=2.0, alpha_4=3.0)
-    own = output.theta_4, output.omega_4, output.alpha_4, output.bar
-    assert own == (1.0, 2.0, 3.0, 4)
-    others = output.theta_2, output.omega_2, output.alpha_2, output.stroke
-    assert others == (None, None, 0.0, None)
 
 
 def make_motion_of_a_law(law):

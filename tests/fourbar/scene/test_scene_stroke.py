@@ -15,8 +15,6 @@ import fourbar
 from fourbar import Motion, solve, vary
 from fourbar.effects import LinearDrive, Place
 from fourbar.errors import FourBarError, InputError
-from fourbar.files.scene_file import loads
-from fourbar.files.scene_text import dump
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Sweep
 from fourbar_validation.engines.prediction import compute_reference
@@ -91,18 +89,6 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
     assert np.isnan(s.omega_3[0]) and s.condition[0] < 1e-7
 
 
-def test_it_reads_back_as_it_was_written():
-    by_stroke = scene(
-        4,
-        Sweep(0.4, 0.5, 5),
-        "right",
-        stroke_speed=0.2,
-        stroke_acceleration=-0.1,
-    )
-    again = loads(dump(by_stroke))
-    assert again == by_stroke and again.motion.bar == 4
-
-
 @pytest.mark.parametrize(
     "motion, says",
     [
@@ -129,14 +115,6 @@ def test_who_does_not_take_it_says_so():
     with raises(FourBarError, match=r"motion\.stroke"):
         write_mjcf(by_stroke)
     assert replace(by_stroke, title="b") != by_stroke
-
-
-def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble():
-    solution = solve(
-        vary(scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]})
-    )
-    assert solution.status == [["not_assembled", "ok", "not_assembled"]]
-    assert np.isnan(solution.theta_2[0, ::2]).all()
 
 
 @pytest.mark.parametrize(

@@ -135,15 +135,6 @@ def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rat
     assert len(data["branches"]["1"]["torque"]) == 361
 
 
-def test_positions_that_do_not_assemble_are_null():
-    data = embedded(animate.write_page(thesis(Sweep(0.0, 2 * pi, 360))))
-    solution = solve(thesis(np.array(data["theta_2"])))
-    columns = data["branches"]["1"]
-    lost = [value is None for value in columns["torque"]]
-    assert lost == np.isnan(solution.torque).tolist()
-    assert columns["F12"][30] == [None, None]
-
-
 def test_a_fine_sweep_is_thinned_evenly_and_says_so():
     scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36_000), 1.0))
     data = embedded(animate.write_page(scene))

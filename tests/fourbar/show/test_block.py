@@ -24,7 +24,6 @@ from fourbar import (
     solve,
     uniform,
 )
-from fourbar.files import loads
 from fourbar.files.scene_file import read_tables
 from fourbar.scene import command_at
 from fourbar.scene.motion import Law
@@ -54,13 +53,6 @@ def move(lengths, effects=(), **motion):
     return Scene(uniform(*lengths), Motion(**motion), effects=effects)
 
 
-def state(ground, coupler, output="100 mm", more=""):
-    return loads(
-        f'[lengths]\nground = "{ground}"\ninput = "{more or "100 mm"}"\n'
-        f'coupler = "{coupler}"\noutput = "{output}"\n'
-    )
-
-
 def turn(steps=36, turns=1, **motion):
     return Motion(Sweep(0.0, turns * tau, steps), 10.0, **motion)
 
@@ -74,15 +66,11 @@ def opposite(side, first, second):
 
 
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
-CRANK_ROCKER = (0.3, 0.1, 0.25, 0.22)
-ONE_CHANGE_POINT = (4.0, 1.0, 2.0, 3.0)
 STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
 LIMITED = (0.3, 0.4, 0.2, 0.25)
 LIMIT = opposite(0.45, 0.3, 0.4)
 OF_THESIS = fourbar.limit_positions(thesis().linkage)
 FIRST, SECOND = (write(x) for x in sorted(x.theta_2 % tau for x in OF_THESIS))
-MISSES = state("22.3607 mm", "22.3605 mm", "45.0002 mm", "44.9998 mm")
-"""Opposite bars differ by 2e-4 mm both: a + d = b + c is within the rounding."""
 FILES = tomllib.loads("""
 ["positions alone"]
 motion.theta_2 = { from = "0 deg", to = "360 deg", steps = 36 }

@@ -12,7 +12,7 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, uniform, vary
+from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, vary
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import Law
 from fourbar.show.block import list_duty
@@ -41,23 +41,6 @@ def test_shaking_is_the_momentum_that_the_bars_lose(drive):
         moment -= bar.moment_of_inertia * getattr(s, f"alpha_{number}")
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
-
-
-LIGHT = FourBar(0.3, *(Bar(length, 1e-3) for length in (0.25, 0.1, 0.22)))
-"""Does not assemble at first; its loads are below 1 N."""
-
-
-@pytest.mark.parametrize("linkage", [crank_rocker().linkage, LIGHT], ids=("", "light"))
-def test_the_load_of_a_bearing_is_that_of_the_positions(linkage):
-    s = solve(crank_rocker(motion=LISTED, linkage=linkage, loads=()))
-    load = np.hypot(*s.F43.T)
-    bearing = bearing_load(s, "B")
-    assert s.assembled.all() == (linkage is not LIGHT)
-    assert bearing.largest == np.nanmax(load)
-    assert bearing.where == s.theta_2[np.nanargmax(load)]
-    if linkage is not LIGHT:  # the last position is the first one again
-        rms = np.sqrt(np.mean(load[:-1] ** 2))
-        assert bearing.rms == approx(rms, rel=60e-14)
 
 
 @pytest.mark.parametrize("second", [1.2, -1.2])
@@ -96,16 +79,6 @@ def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, sp
     if duty.closed:
         assert duty.mean_torque == approx(0.7, rel=INTEGRATED)
         assert duty.energy_swing == approx(2.0 * 2.0 * 9.81 * 0.1, rel=INTEGRATED)
-
-
-def test_a_drive_at_rest_has_no_energies_and_positions_alone_have_no_duty():
-    still = motor_duty(solve(crank_rocker(motion=Motion(1.0, 0.0))))
-    assert still.peak_power == 0.0 and not still.closed
-    assert still.energy_in is still.mean_torque is still.energy_swing is None
-    assert motor_duty(solve(crank_rocker(), "position")) is None
-    speeds = {"motion.omega_2": [0.0, 3.0], "motion.theta_2": LISTED.angle}
-    duty = motor_duty(solve(vary(crank_rocker(loads=()), speeds)))
-    assert np.isfinite(duty.energy_in).tolist() == [False, True]
 
 
 def test_the_json_holds_the_duty():
@@ -165,30 +138,6 @@ def test_a_study_of_a_motion_law_keeps_its_time():
     assert motor_duty(study).energy_in == approx([by_hand] * 2, rel=1e-12)
     heading, *rows = study.to_csv().splitlines()
     assert heading.split(",").count("time") == 1 and len(rows) == 2 * 21
-
-
-TURNING = uniform(0.3, 0.1, 0.25, 0.22)
-TWO_TURNS = uniform(4.0, 1.0, 2.0, 3.0)
-"""A linkage with one change point, whose assembly repeats after two turns."""
-
-
-@pytest.mark.parametrize(
-    "linkage, turns, ends, closed",
-    [
-        (TURNING, 1, "free", False),
-        (TURNING, 1, "rest", False),
-        (TURNING, 1, "periodic", True),
-        pytest.param(TWO_TURNS, 1, "periodic", False, marks=pytest.mark.slow),
-        pytest.param(TWO_TURNS, 2, "periodic", True, marks=pytest.mark.slow),
-    ],
-)
-def test_a_law_is_closed_where_angle_speed_and_acceleration_repeat(
-    linkage, turns, ends, closed
-):
-    angles = tuple(turns * angle for angle in (0.0, 1.5, 5.0, tau))
-    motion = Motion(law=Law((0.0, 0.3, 0.7, 1.0), angles, 24, ends))
-    solution = solve(Scene(linkage, motion, effects=(Gravity(),)))
-    assert motor_duty(solution).closed == closed
 
 
 @pytest.mark.slow

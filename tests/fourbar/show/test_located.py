@@ -2,7 +2,6 @@
 
 import math
 from math import acos, pi, radians
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from fourbar.show.located import list_positions, locate
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
-MODELS = Path(__file__).parents[3] / "models"
 LOCATED = 1e-11
 """rad or s: a place is located to round-off, times the slope of what is asked for."""
 TOUCHED = 1e-6

@@ -15,8 +15,6 @@ import fourbar
 from fourbar import Tolerance, sensitivity, solve, tolerances, vary
 from fourbar.cli import status
 from fourbar.errors import DependencyError, InputError
-from fourbar.files.scene_text import write_new_scene
-from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker, thesis
 
 LENGTH_NAMES = ("ground", "input", "coupler", "output")
@@ -55,14 +53,6 @@ def test_a_solution_shows_its_ends_and_says_what_is_between():
     assert short.count("<tr>") == 2 and "more" not in short
 
 
-def test_a_solution_as_pandas_has_every_number_bit_for_bit():
-    solution = solve(crank_rocker())
-    table = solution.to_pandas()
-    assert_array_equal(table["torque"], solution.torque)
-    assert_array_equal(table[["F12_x", "F12_y"]], solution.F12)
-    assert "torque" not in solve(crank_rocker(), "position").to_pandas()
-
-
 def test_without_pandas_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with raises(DependencyError, match="pip install pandas"):
@@ -81,20 +71,6 @@ def test_showing_needs_numpy_alone():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
-
-
-BAD = read_rows("""
-1 m, 2 m, 3 m, 40 m | never close
-1 kg, 2 m, 3 m, 4 m | ground
-1 m, 2 m, -3 m, 4 m | coupler
-1 m, 2 m, 3 m, 4 | output.*unit is missing
-""")
-
-
-@pytest.mark.parametrize("lengths, words", BAD)
-def test_a_new_scene_of_bad_lengths_is_refused(lengths, words):
-    with raises(InputError, match=words):
-        write_new_scene(lengths.split(", "))
 
 
 def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):

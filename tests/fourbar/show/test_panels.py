@@ -5,10 +5,8 @@ from math import pi
 
 import numpy as np
 import pytest
-from numpy.polynomial.legendre import legval
 from pytest import approx
 
-from fourbar.show import panels as of_panels
 from fourbar.show.panels import Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
@@ -130,16 +128,6 @@ def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(edge
     assert peak.place == approx(POLE, abs=2e-6)
 
 
-def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
-    forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
-    for panels in (forwards, backwards):
-        assert panels.find_peak("curve", 1).place == approx(0.5 * pi, abs=1e-5)
-        assert panels.find_peak("curve", -1).value == approx(0.0, abs=1e-8)
-    level = [fit(lambda x: 1.0 + 0.0 * x, edges) for edges in (EDGES, EDGES[::-1])]
-    places = [panels.find_peak("curve").place for panels in level]
-    assert places == approx([0.0, 2.0], abs=1e-8)
-
-
 ZEROS = [0.3, 0.8, 1.7]
 
 
@@ -158,25 +146,3 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, e
 
     panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
     assert panels.find_zeros("curve") == approx(zeros, abs=1e-9)
-
-
-def test_rounding_need_not_settle():
-    def draw_noise(places):
-        return 1e-13 * np.random.default_rng(len(places)).normal(size=len(places))
-
-    assert fit(draw_noise, rounding=1e-12).find_rms("curve") < 1e-12
-
-
-def test_the_panels_of_many_waves_are_searched_at_once(monkeypatch):
-    """200 waves are some hundred panels, each of which may have the first peak."""
-    fitted = fit(lambda x: np.sin(200.0 * np.pi * x), np.linspace(0.0, 2.0, 97))
-    searched = []
-
-    def evaluate(x, *series, **options):
-        searched.append(len(x))
-        return legval(x, *series, **options)
-
-    monkeypatch.setattr(of_panels, "legval", evaluate)
-    peak = fitted.find_peak("curve", 1)
-    assert peak == approx((1.0, 0.0025), rel=1e-6)
-    assert len(searched) < 10 < min(searched)

@@ -114,11 +114,6 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     assert told in " ".join(write_block(scene, there))
 
 
-def test_a_parallelogram_whose_coupler_does_not_turn_is_at_no_limit():
-    scene = Scene(bare(0.3, 0.1, 0.3, 0.1), Motion(0.7))
-    assert "limit" not in " ".join(write_block(scene, solve(scene)))
-
-
 STILL = crank_rocker(motion=Motion(SWEPT))
 REFUSED = [
     (thesis(), "theta_2", radians(30.0), r"theta_2 goes from 84\.6\d* to 365"),

@@ -141,16 +141,3 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
         sensitivity(refused)
     with raises(LimitError, match=r"cannot follow numpy\.maximum"):
         fourbar.equilibrium(refused)
-
-
-def test_one_side_of_a_comparison_is_taken_with_its_slopes():
-    x = Sloped(np.array([-0.5, 0.5]), np.array([[1.0, 1.0]]))
-    chosen = np.where(x > 0.0, 2.0 * x, 3.0)
-    assert chosen.values.tolist() == [3.0, 1.0]
-    assert chosen.slopes.tolist() == [[0.0, 2.0]]
-
-
-def test_a_number_is_zero_only_where_its_slopes_are_too():
-    x = Sloped(np.array([0.0, 0.0, 1.0]), np.array([[0.0, 1.0, 0.0]]))
-    assert (x == 0.0).tolist() == [True, False, False]
-    assert (x != 0.0).tolist() == [False, True, True]

@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
 from fourbar.cli import status
-from fourbar.files import dump, loads
+from fourbar.files import loads
 from fourbar.formulas.mobility import choose_range, limit_positions
 from fourbar.show.tolerances import describe_parted, list_shown_parts
 from fourbar.studies import spread as studied
@@ -113,15 +113,6 @@ def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_ther
     study = tolerances(Scene(linkage, motion, tolerances=loose), 256)
     assert 0 < study.apart == study.without[0] < 256 and study.without[1] == 0
     assert study.spreads["torque"].parted.tolist() == [True, False]
-
-
-def test_tolerances_of_a_file_come_back_as_they_were():
-    scene = loads(MODEL + TABLE)
-    assert scene.tolerances == (
-        Tolerance("lengths.input", 5e-5),
-        Tolerance("lengths.coupler", 2e-5, True),
-    )
-    assert loads(dump(scene)).tolerances == scene.tolerances
 
 
 BAD = read_rows("""

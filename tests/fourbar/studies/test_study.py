@@ -29,12 +29,10 @@ from fourbar.effects import (
     LinearDrive,
     PinFriction,
     Place,
-    Torsion,
 )
 from fourbar.files import loads
-from fourbar.formulas.mobility import choose_range
 from fourbar.scene import command
-from fourbar.scene.motion import Free, FromLimit, Law
+from fourbar.scene.motion import Free, FromLimit
 from fourbar.scene.numbers import Point
 from fourbar.studies.keys import list_entries, read_place, replace_place
 from fourbar.studies.study import vary
@@ -170,15 +168,6 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
         assert_array_equal(out["a_G3"][member], single.a_G3)
 
 
-def test_what_the_scene_leaves_out_follows_the_length():
-    plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 5.0), effects=(Gravity(),))
-    values = {"lengths.coupler": [0.25, 0.28], "bars.coupler.mass": 0.5}
-    solution = solve(vary(plain, values))
-    longer = FourBar(0.3, Bar(0.1, 0.1), Bar(0.28, 0.5), Bar(0.22, 0.22))
-    single = solve(replace(plain, linkage=longer))
-    assert solution.torque[1, 0] == pytest.approx(single.torque[0], rel=1e-14)
-
-
 def test_a_bad_member_has_a_status_and_disturbs_no_other():
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 6.0, 3), 5.0))
     values = {
@@ -194,35 +183,6 @@ def test_a_bad_member_has_a_status_and_disturbs_no_other():
             assert np.isnan(getattr(solution, name)[[1, 2, 3, 5]]).all(), name
     single = solve(vary(plain, {"bars.coupler.mass": 1.0}))
     assert_array_equal(solution.torque[0], single.torque[0])
-
-
-THROUGH_CHANGE_POINTS = Scene(
-    uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0)
-)
-
-
-@pytest.mark.parametrize(
-    "case, key, numbers",
-    [
-        (
-            Scene(LINK, Motion(law=Law((0.0, 0.5, 1.0), (0.0, 2.0, 6.0), 6, "rest"))),
-            "lengths.input",
-            [0.1, 0.11],
-        ),
-        (THROUGH_CHANGE_POINTS, "lengths.input", [0.1, 0.09]),
-        (THROUGH_CHANGE_POINTS, "bars.coupler.mass", [1.0, 2.0]),
-    ],
-)
-def test_a_law_and_a_path_through_change_points(case, key, numbers):
-    values = {key: np.array(numbers)}
-    study = vary(case, values)
-    solution = solve(study)
-    assert (-1 in solution.branch[0]) == (case is THROUGH_CHANGE_POINTS)
-    for member in (0, 1):
-        single = solve(alone(study, values, member))
-        for name in ("branch", "theta_4", "torque"):
-            expected = getattr(single, name)
-            assert_array_equal(getattr(solution, name)[member], expected)
 
 
 REFUSED = read_rows("""
@@ -309,19 +269,3 @@ def test_a_study_is_given_no_other_positions():
     study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
     with raises(InputError, match="states its own positions"):
         solve(study, at=command(scene()))
-
-
-def test_springs_of_members_count_their_turns_from_where_each_assembles():
-    """The sweep begins where the members do not assemble; each is what it is alone."""
-    linkage = uniform(0.2, 0.25, 0.21, 0.22)
-    low, high = choose_range(linkage)
-    motion = Motion(Sweep(low - 0.5, high + 0.2, 40), 1.0)
-    for springs in (
-        {"O2": (2.0, low - 2.5, 0.1)},
-        {"B": (2.0, 3.0, 0.1), "O2": (1.0, high + 2.5, 0.0)},
-    ):
-        case = Scene(linkage, motion, effects=(Torsion.at(**springs),))
-        together = solve(vary(case, {"bars.coupler.mass": [0.1, 0.1]}))
-        single = solve(case)
-        assert not single.assembled[0] and {"ok", "wound"} <= set(single.status)
-        assert together.status == [single.status, single.status]

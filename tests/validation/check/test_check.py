@@ -22,10 +22,8 @@ from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.csv_columns import MADE_OF, list_names_of_points
 from fourbar_validation.check.judge_table import Allowance, Judge
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
-from fourbar_validation.check.theirs import LARGEST_TABLE_FILE, NOT_JUDGED, read_table
+from fourbar_validation.check.theirs import NOT_JUDGED, read_table
 from fourbar_validation.cli import status
-from fourbar_validation.compare.scales import TERMS_OF_UNIT, scale_of
-from fourbar_validation.compare.tolerance import POWER
 from fourbar_validation.places import MODELS
 from tests.support.scenes import bare
 from tests.support.shares import slow_but
@@ -645,33 +643,6 @@ def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     assert "in radians where degrees" in first.text
 
 
-def test_a_mistake_that_two_texts_describe_alike_is_named_once(check):
-    """The torques are those of linkage_sim's fourbar_inverse_dynamics.json on GitHub.
-
-    Nine equations of the free bodies without -omega^2 r in a_G have the same digits.
-    """
-    bars = [(1.0, 2.0, 0.01), (3.0, 3.0, 0.05), (2.0, 2.0, 0.02)]
-    scene = Scene(
-        fourbar.FourBar(4.0, *(fourbar.Bar(*numbers) for numbers in bars)),
-        fourbar.Motion("30 deg", 1.0),
-        effects=(fourbar.effects.Gravity(),),
-    )
-    text = "theta_2 [deg],torque\n30,21.407471\n60,8.201942\n90,-12.569902\n"
-    code, out, _ = check(scene, text)
-    assert code == FAILED
-    missing = "-omega^2 r is missing in a_G of every bar, r from its first pin to G"
-    assert out.count("looks like: ") == 1 and f"{missing} (explains" in out
-
-
-def test_two_mistakes_in_two_columns_are_both_named(judged):
-    numbers = right(OURS)
-    numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
-    causes = {one.text[:14]: one for one in judged(OURS, numbers).explanations}
-    assert causes["units: numbers"].quantities == ("torque",)
-    assert causes["sign reversed,"].quantities == ("F43",)
-    assert not any(one.complete for one in causes.values())
-
-
 def test_the_other_branch_is_named_where_the_torque_has_a_slip_besides(check):
     numbers = right(OURS, branch=np.full(12, -1, np.int8))
     numbers["torque"] *= 1.0 + 0.1 * np.sin(np.arange(12))
@@ -698,20 +669,6 @@ def test_every_quantity_is_judged_at_its_own_scale(scene, differing):
     for name in names:
         numbers[name] += OFF * (np.abs(numbers[name]).max() or 1.0)
     assert differing(scene, numbers, names) == set(names)
-
-
-def test_a_quantity_of_no_known_scale_is_not_judged_by_another():
-    """Every unit that is judged has its sum of terms."""
-    judged = {UNITS[name] for name in EVERY_QUANTITY}
-    assert judged == TERMS_OF_UNIT.keys() == POWER.keys()
-    for quantity in ("time", "wheel"):
-        with pytest.raises(KeyError):
-            scale_of(
-                quantity,
-                OURS,
-                solve(OURS),
-                np.ones(1),
-            )
 
 
 @pytest.mark.parametrize("letter", "xy")
@@ -853,17 +810,6 @@ def test_a_bad_table_is_one_line(text, words, check):
     assert len(error.splitlines()) == 1 and "\x1b" not in error
 
 
-def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path, check):
-    path = tmp_path / "theirs.csv"
-    assert "file not found" in check(THESIS, None)[2]
-    with path.open("wb") as file:
-        file.truncate(LARGEST_TABLE_FILE + 1)
-    assert "must not exceed" in check(THESIS, None)[2]
-    path.unlink()
-    path.mkdir()
-    assert "directory" in check(THESIS, None)[2]
-
-
 ANGLES = ("theta_2", "theta_3")
 
 
@@ -929,14 +875,6 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
             rounding=exact,
         )
         assert list_differing(scene, theirs) == {key}
-
-
-def test_ratios_and_differences_that_analyze_writes_are_no_unknown_columns(tmp_path):
-    path = tmp_path / "theirs.csv"
-    columns = "theta_2,theta_3,theta_4-theta_3,omega_4/omega_2,torque"
-    line = ["analyze", str(MODELS / "crank_rocker.toml"), "--columns", columns]
-    assert fourbar_status([*line, "--csv", "-o", str(path)]) == HOLDS
-    assert "not a known column" not in read_table(path).left_out.values()
 
 
 @pytest.mark.parametrize("wrong", [False, True])

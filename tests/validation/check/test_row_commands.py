@@ -18,7 +18,6 @@ from fourbar_validation.check.row_commands import find_row_commands
 from fourbar_validation.check.theirs import read_table
 from tests.support.scenes import CYLINDER, crank_rocker
 
-ROCKER = {4: "theta_4", 2: "theta_2", 3: "theta_3"}
 SAME_PLACE = 1e-9
 """rad: a position by two circles and one by the formulas, 0.1 rad off a limit."""
 
@@ -204,19 +203,6 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
     both = np.degrees(find_crank(scene, theta_4[:1], 1.0)) % 360.0
     assert f"{both[0]:.6g}" in error and "add a column theta_2" in error
     assert "line 2, theta_4" in error and "120 deg" in error
-
-
-def test_an_angle_of_the_crank_is_a_position_of_a_driven_rocker(read, judged):
-    scene = commanding(4, 115.0, 155.0)
-    right = fourbar.solve(scene)
-    middle = 0.5 * (right.theta_2[1:] + right.theta_2[:-1])
-    table = read(tabulate("theta_2", middle, middle), "theta_4")
-    at = find_row_commands(scene, table).at
-    there = fourbar.solve(scene, at=at)
-    apart = np.angle(np.exp(1j * (there.theta_2 - middle)))
-    np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
-    assert (np.diff(at.angle) > 0.0).all()
-    assert judged(scene, "theta_2", middle, there.torque).status == HOLDS
 
 
 def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):

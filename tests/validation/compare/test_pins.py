@@ -3,11 +3,9 @@ conversion of them.
 """
 
 import numpy as np
-import pytest
 
 import fourbar
 from fourbar.effects import Place
-from fourbar_validation.compare.pins import find_centre, state_from_pins
 from fourbar_validation.compare.scales import TermSizes
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import _take_plain_positions
@@ -20,15 +18,6 @@ LOADED = crank_rocker(
     ),
     points=(fourbar.Point("P", 3, from_centre=(0.04, -2.0)),),
 )
-
-
-def test_places_are_sums_of_vectors_along_and_across_the_bar():
-    stated = state_from_pins(LOADED)
-    polar = ((0.05, 1.0), (0.04, -2.0))
-    for load, (distance, angle) in zip(stated.loads, polar, strict=True):
-        r, phi = find_centre(LOADED.linkage.bar(load.bar))
-        z = r * np.exp(1j * phi) + distance * np.exp(1j * angle)
-        assert load.place.from_pin == pytest.approx((abs(z), np.angle(z)))
 
 
 def test_a_place_that_the_formulas_misread_widens_nothing(monkeypatch):

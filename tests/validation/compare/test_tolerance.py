@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import LinearDrive, Place
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     FULL_ACCURACY,
@@ -17,7 +16,6 @@ from fourbar_validation.compare.tolerance import (
     SIMULATED,
     compute_difference,
     divide,
-    find_condition,
     find_conditions,
     find_error,
     find_lever,
@@ -99,30 +97,6 @@ def test_conditions_of_several_quantities_are_those_of_their_units():
     found = find_conditions([*wanted], scene.linkage, s)
     assert np.ptp(s.drive_condition) > 0.0 and np.ptp(s.condition) > 0.0
     np.testing.assert_allclose(found, [*wanted.values()], rtol=1e-15)
-
-
-def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever():
-    """From O2 to the line over the longer of both arms.
-
-    What follows by |sin(theta_4 - theta_3)| too.
-    """
-    r, arm = 0.25, 0.09
-    drive = LinearDrive(Place(1, (r, 2.5)), Place(2, (arm, 0.3)))
-    strokes = np.array([0.2, 0.3, 0.339])
-    motion = fourbar.Motion(stroke=strokes, side="left", stroke_speed=0.1)
-    s = fourbar.solve(crank_rocker(motion=motion, drive=drive))
-    turned = np.arccos((arm * arm + r * r - strokes**2) / (2.0 * arm * r))
-    share = arm * np.sin(turned) / strokes
-    linkage = crank_rocker().linkage
-    assert s.condition == pytest.approx(np.abs(np.sin(s.theta_4 - s.theta_3)) * share)
-    for name, wanted in (
-        ("theta_2", share),
-        ("omega_2", share**2),
-        ("theta_4", find_lever(linkage) * s.condition),
-    ):
-        assert find_condition(name, linkage, s) == pytest.approx(wanted)
-    at_angles = crank_rocker(motion=fourbar.Motion(s.theta_2, 1.0), drive=drive)
-    assert (find_condition("theta_2", linkage, fourbar.solve(at_angles)) == 1.0).all()
 
 
 @pytest.mark.parametrize(

@@ -114,18 +114,6 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     assert fine.force == pytest.approx(7e-3, rel=0.3)
 
 
-def test_pads_stiffen_the_closure():
-    error = tried(turning())
-    padded, soft = (error(replace(BEST, pad=pad)).worst for pad in (1e-4, None))
-    assert padded < soft / 30.0
-
-
-def test_only_tolerance_0_is_tight_with_a_heavy_flywheel():
-    error = tried(turning())
-    heavy = replace(BEST, flywheel=1e8)
-    assert error(replace(heavy, tolerance=1e-8)).worst > 10.0 * error(heavy).worst
-
-
 @pytest.mark.slow
 def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
@@ -332,24 +320,6 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported():
     assert laws.list_warnings(curves) == [warning]
     jumps = "No timestep brings F12 below 0.1\nwith Euler"
     assert charts.state_jumps(curves) == jumps
-
-
-def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump():
-    """Where two sources cancel the error dips.
-
-    The softest closures, and the fewest steps, carry no motion at all.
-    """
-    ladder = [
-        point(20.0 * 2**k, error)
-        for k, error in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))
-    ]
-    assert not any(laws.find_jumps(ladder, quantity) for quantity in ERROR_NAMES)
-
-
-def test_the_front_holds_what_nothing_beats():
-    errors = (1e-2, 1e-3, 5e-3, 1e-5, math.inf)
-    points = [point(10 * k, error) for k, error in enumerate(errors, 1)]
-    assert [p.steps for p in laws.find_pareto(points, "torque")] == [10, 20, 40]
 
 
 def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):

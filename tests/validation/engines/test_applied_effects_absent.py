@@ -11,7 +11,7 @@ import mujoco
 import pytest
 
 import fourbar
-from fourbar.effects import Friction, Viscous, list_kinds
+from fourbar.effects import Viscous, list_kinds
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -106,17 +106,6 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, actuators, 0)
     assert disabled == BARE - enabled and rows == 3 + more_rows
     assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring
-
-
-def test_an_effect_of_zero_size_is_still_named():
-    """A torque of 0 that the scene writes down is the scene's.
-
-    What it leaves out is not there at all.
-    """
-    mjcf = write_mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
-    assert "frictionloss=" in mjcf and 'frictionloss="0.0"' not in write_mjcf(
-        crank_rocker(loads=(), effects=())
-    )
 
 
 POSITIONS_ONLY = """

@@ -266,24 +266,6 @@ def test_assembles_up_to_a_limit_and_not_beyond(name, offset, branch):
         assert np.isnan(answer.quantities["torque"][0]) == (not assembled)
 
 
-@each_engine
-def test_positions_only(name):
-    posed = Scene(CRANK_ROCKER, Motion(np.array([0.5, 1.0])))
-    quantities = answered(name, posed).quantities
-    assert "theta_3" in quantities
-    assert not {"omega_3", "torque"} & {*quantities}
-
-
-@each_tree
-def test_angles_are_continuous(name):
-    motion = Motion(np.linspace(0.0, 12.0, 240), 1.0)
-    turning = Scene(bars(MECHANISMS["drag link"]), motion)
-    theta_4 = answered(name, turning).quantities["theta_4"]
-    assert -math.pi < theta_4[0] <= math.pi
-    assert np.abs(np.diff(theta_4)).max() < 1.0
-    assert np.ptp(theta_4) > math.tau
-
-
 def with_bar(number, **values):
     """A crank-rocker with another mass, inertia or mass centre of one bar."""
     bars = {2: Bar(0.1, 0.2), 3: Bar(0.25, 0.5), 4: Bar(0.22, 0.4)}

@@ -225,10 +225,3 @@ def test_a_singular_position_costs_no_other():
     x, residual = free_body.solve_system(matrix, np.ones((3, 2, 1)))
     assert np.isnan(x[[0, 2]]).all() and residual == 0.0
     np.testing.assert_array_equal(x[1, :, 0], [0.5, 0.25])
-
-
-def test_blocks_of_positions_make_no_difference(monkeypatch):
-    full_answer = answered(crank_rocker())
-    monkeypatch.setattr(free_body, "POSITIONS_SOLVED_AT_ONCE", 7)
-    for name, values in answered(crank_rocker()).items():
-        assert np.array_equal(values, full_answer[name]), name

@@ -27,10 +27,3 @@ def test_what_few_equations_fix_keeps_its_digits_beside_unknowns_that_are_large(
         assert np.abs(x[1:] / exact[1:] - 1.0).max() <= K * EPS * condition
         lost = max(lost, abs(np.linalg.solve(matrix, right)[0] - steady))
     assert lost > 1e-12  # the scene shows what the step is for
-
-
-def test_many_systems_are_solved_at_once():
-    rng = np.random.default_rng(1)
-    matrices, right = rng.normal(size=(4, 3, 3)), rng.normal(size=(4, 3, 2))
-    solved = solve_refined(matrices, right)
-    np.testing.assert_allclose(matrices @ solved, right, rtol=0.0, atol=1e-13)

@@ -59,13 +59,6 @@ def test_each_suite_and_the_document_count_their_cases():
     assert counted == {"run": (6, 2, 2), "a": (4, 2, 1), "b": (2, 0, 1)}
 
 
-def test_every_failure_is_a_case_after_many_that_hold():
-    bad = replace(ROW, verdict=FAILS)
-    cases = list(list_cases([*[ROW] * 60, bad, *[ROW] * 60, bad]))
-    assert len(cases) == 122
-    assert [case.outcome for case in cases].count("failure") == 2
-
-
 def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance():
     shares = {
         "F12": 0.2,

@@ -96,22 +96,6 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     assert abs(best.coefficients[0]) <= best.angle + ROUND_OFF
 
 
-def test_a_parallelogram_loses_nothing_and_its_crossed_form_much(
-    tmp_path,
-):
-    path = write_upright(tmp_path)
-    report = measure_mimic(path, "rocker_j", PARALLELOGRAM)
-    assert report.file.angle <= ROUND_OFF
-    assert report.file.ratio <= ROUND_OFF
-    # of the crossed form tan(theta_4/2) = (a + d)/(a - d) tan(theta_2/2), here 7 times
-    theta_2 = np.radians(np.linspace(60.0, 120.0, 61))
-    theta_4 = 2.0 * np.arctan(7.0 * np.tan(theta_2 / 2.0))
-    missed = (theta_2 - 0.5 * math.pi) - (theta_4 - 2.0 * math.atan(7.0))
-    motion = PARALLELOGRAM.motion.replace(branch=-1)
-    crossed = measure_mimic(path, "rocker_j", replace(PARALLELOGRAM, motion=motion))
-    assert crossed.file.angle == pytest.approx(np.abs(missed).max(), rel=1e-9)
-
-
 def test_a_motion_through_a_change_point_is_refused(tmp_path):
     angles = np.radians(np.linspace(-30.0, 30.0, 61))
     motion = PARALLELOGRAM.motion.replace(angle=angles)

@@ -122,7 +122,6 @@ def times_the_step(numbers, at):
 
 
 LOOP_FORCE = "F43 = (moments[2] * r3 + moments[1] * r4) / det"
-FIRST = "    d, a, b, c = ("
 IN_ARM = "(1j * turning - w * w) * arm"
 OF_INERTIA = 'bar.get("inertia"'
 TREE = (

@@ -3,13 +3,11 @@
 Silence, NaN and breakdowns must cost the run.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar import Bar, FourBar, Friction, Motion, Sweep, uniform
+from fourbar import Bar, FourBar, Friction, Motion, uniform
 from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene, command, with_signs
@@ -184,12 +182,6 @@ def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it(
         answers_nearby=True,
     )
     assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
-
-
-def test_positions_alone_need_no_forces():
-    scene = replace(crank_rocker(), motion=Motion(Sweep(0.0, 6.0, 10)))
-    rows = judge("scene", scene, []).rows
-    assert {row.quantity for row in rows} == {"closure"}
 
 
 def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own():

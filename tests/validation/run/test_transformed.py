@@ -28,9 +28,7 @@ from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import (
-    SCALE,
     TRANSFORMATIONS,
-    _SceneConversion,
     check_transformed,
 )
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -88,25 +86,6 @@ def list_held(scene):
     _, rows = ask(scene)
     assert not [row for row in rows.values() if row.failed]
     return rows.keys()
-
-
-@pytest.mark.parametrize(("first", "fit"), [(0.8 + 1e-5, 2), (3.0, 3)])
-def test_a_spring_whose_ends_nearly_meet_is_not_judged_there(first, fit):
-    """The rounding of its ends turns its line; at the other positions it is judged."""
-    spring = Spring(
-        Place(1, (0.1, 0.8)),
-        Place(2, (0.1, 0.0)),
-        80.0,
-        0.05,
-    )
-    scene = crank_rocker(
-        motion=Motion([first, 2.0, 2.5], 10.0),
-        loads=(),
-        effects=(Springs((spring,)),),
-    )
-    few = transformed._take_plain_positions(make_question("scene", scene, ()))
-    assert few.fit.sum() == fit
-    assert list_held(scene)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -261,16 +240,6 @@ def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
     monkeypatch.setattr(Gravity, "field", property(turn))
     _, rows = ask(crank_rocker())
     assert rows["turned"].failed and rows["mirrored"].failed
-
-
-def test_a_place_of_the_coupler_is_read_from_its_other_pin():
-    linkage = make_linkage(0.3, 0.1, 0.25, 0.22)
-    to = _SceneConversion(linkage, exchanged=True)
-    twice = to.place(to.place(Place(3, (0.07, 0.4))))
-    assert twice.from_pin == pytest.approx((0.07, 0.4))
-    assert to.place(Place(2, (0.07, 0.4))) == Place(4, (0.07, 0.4))
-    assert to.place(Place(1, (0.3, 0.0))).from_pin == pytest.approx((0.0, 0.0))
-    assert SCALE == 128.0
 
 
 def test_every_effect_of_the_package_can_be_stated_otherwise():

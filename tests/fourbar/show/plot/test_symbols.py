@@ -16,7 +16,6 @@ from fourbar import Point, solve
 from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import Table
 from fourbar.files import loads
-from fourbar.show import animate
 from fourbar.show.animate import collect_page_data
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import symbols
@@ -26,7 +25,6 @@ from fourbar.show.plot.linkage_figure import choose_drawing_scale, draw_mechanis
 from fourbar.show.plot.symbols import list_acting
 from fourbar.show.plot.view import make_view
 from tests.fourbar.show.plot.test_plot import GALLERY, clashes, composed
-from tests.fourbar.show.test_animate import embedded
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
@@ -135,14 +133,6 @@ def test_what_lies_off_a_bar_is_joined_to_it(crowded):
     for point in (here.points["P"][0], load):
         corners = factor * np.array([here.A[0], point, here.B[0]])
         assert any(np.allclose(plate, corners) for plate in plates)
-
-
-def test_the_page_is_given_the_same_symbols(everything):
-    data = embedded(animate.write_page(everything))
-    kinds = [symbol.kind for symbol in list_acting(everything)]
-    assert [one["kind"] for one in data["acting"]] == kinds
-    (factors,) = (one["factor"] for one in data["acting"] if one["name"] == "load 2")
-    assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)
 
 
 @pytest.mark.slow

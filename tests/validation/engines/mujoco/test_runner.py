@@ -5,7 +5,6 @@ Motion laws and loads over theta_2.
 
 import math
 from dataclasses import replace
-from itertools import product
 
 import mujoco
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 
 import fourbar
 from fourbar.effects import Friction, Gravity, Load, Table
-from fourbar.quantities import PIN_FORCES
 from fourbar.scene.motion import Law, Rise
 from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
@@ -142,26 +140,3 @@ def test_the_callback_ends_with_the_run():
         )
     )
     assert mujoco.get_mjcb_act_bias() is None
-
-
-@pytest.mark.parametrize(
-    ("omega", "torque"),
-    slow_but({(10.0, 0.05), (0.01, 5.0)}, product([10.0, 0.01], [0.05, 5.0])),
-)
-def test_dry_friction_is_simulated_at_any_speed(omega, torque):
-    """Slow slip and large torques.
-
-    The friction reaches its full size within the last digits of the slip.
-    """
-    motion = fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * math.pi, 12), omega)
-    effects = (
-        Friction.at(
-            O2=torque,
-            A=torque,
-            B=torque,
-            O4=torque,
-        ),
-    )
-    rows = simulated(crank_rocker(motion=motion, loads=(), effects=effects))
-    forces = [row for row in rows if row.quantity in ("torque", *PIN_FORCES)]
-    assert len(forces) == 5 and all(row.error < 1e-6 for row in forces), forces

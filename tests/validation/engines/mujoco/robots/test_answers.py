@@ -6,48 +6,14 @@ import numpy as np
 import pytest
 
 from fourbar_validation.engines.mujoco.robots.answers import (
-    BarMotion,
-    InsideAnswer,
-    InsideRow,
-    LoopMotion,
-    PinsAndTorque,
     RobotSettings,
     divide,
     find_scales,
 )
 
-PINS = ("F12", "F32", "F43", "F14")
 OWN = RobotSettings(
     (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.002, "Euler", "Newton", 100, 1e-8
 )
-AT_REST = BarMotion(*[0.0] * 6)
-
-
-def make_row(torque, off, condition=0.5):
-    rigid = PinsAndTorque(torque, {name: np.array([3.0, 4.0]) for name in PINS})
-    soft = PinsAndTorque(
-        torque + off, {name: np.array([3.0, 4.0 + off]) for name in PINS}
-    )
-    return InsideRow(
-        0.1,
-        1.0,
-        0.0,
-        0.2,
-        soft,
-        rigid,
-        1e-4,
-        AT_REST,
-        condition,
-    )
-
-
-def test_errors_are_sizes_of_differences_and_scales_those_of_rigid_pins():
-    answer = InsideAnswer([make_row(2.0, 0.5), make_row(-4.0, -0.25)])
-    assert answer.errors()["torque"] == pytest.approx([0.5, 0.25])
-    assert answer.errors()["F43"] == pytest.approx([0.5, 0.25])
-    assert answer.sizes()["torque"] == pytest.approx([2.0, 4.0])
-    assert answer.scales(0.5)["torque"] == pytest.approx(4.0)
-    assert answer.scales(0.5)["F12"] == pytest.approx(5.0)
 
 
 FORCES = {
@@ -90,16 +56,6 @@ def test_an_error_is_over_its_scale():
     assert divide(1.0, 4.0) == 0.25
     assert divide(0.0, 0.0) == 0.0
     assert divide(1.0, 0.0) == divide(np.inf, 4.0) == np.inf
-
-
-def test_fewer_positions_keep_both_ends():
-    motion = LoopMotion(
-        tuple(np.linspace(0.0, 1.0, 101).tolist()),
-        1.0,
-        0.0,
-    )
-    assert motion.thin_out(3).angle == (0.0, 0.5, 1.0)
-    assert motion.thin_out(500) == motion
 
 
 def test_changes_are_written_as_attributes():

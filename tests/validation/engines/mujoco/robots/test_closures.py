@@ -11,9 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-import fourbar
 from fourbar.errors import InputError
-from fourbar.mjcf import write_mjcf
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     list_closures,
@@ -21,9 +19,6 @@ from fourbar_validation.engines.mujoco.robots.closures import (
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, file_of, rotation
-from tests.whole.test_imports import ROOT
-
-MODELS = ROOT / "models" / "robots"
 
 
 def report_of(text, **options):
@@ -211,15 +206,6 @@ def test_a_weld_of_three_hinges_leaves_no_freedom():
     )
 
 
-def test_axes_that_a_file_rounds_are_parallel_and_measured():
-    angle = math.radians(0.05)
-    planar = Planar(axes={"A": f"0 {math.tan(angle)!r} 1"})
-    closure = closure_of(planar.text())
-    assert closure.loop is not None
-    assert closure.misaligned == pytest.approx(angle, rel=1e-9)
-    assert np.allclose(closure.loop.lengths, planar.lengths(), rtol=1e-6)
-
-
 @pytest.mark.parametrize("limited", ["", 'limited="true" range="0 3"'])
 def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(limited):
     """The frame of the ball's body is tilted: its axis is not that of the others.
@@ -371,21 +357,6 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one():
         loop_of(planar.text(), drive="wheel")
 
 
-def test_where_no_motor_acts_the_first_hinge_of_the_file_is_driven():
-    for cut in ("A", "B"):
-        planar = Planar(cut=cut, drive="")
-        loop = loop_of(planar.text())
-        first = min(loop.hinges[pin] for pin in ("O2", "O4") if pin in loop.hinges)
-        assert loop.joint == first
-        assert "no motor acts on it" in loop.remarks[0]
-
-
-def test_what_keeps_a_speed_without_a_control_drives():
-    scene = fourbar.load(ROOT / "models" / "crank_rocker.toml")
-    loop = loop_of(write_mjcf(scene, drive="flywheel"))
-    assert not loop.remarks
-
-
 def test_a_hinge_that_another_loop_moves_is_the_driven_one():
     model = mujoco.MjModel.from_xml_string(EXCAVATOR)
     loop = loop_of(EXCAVATOR)
@@ -413,24 +384,6 @@ def test_a_loop_is_chosen_by_its_name():
         require_loops(spatial)
     with pytest.raises(InputError, match="loops says why of its 2 equalities"):
         require_loops(spatial * 2)
-
-
-def test_our_robots_have_the_loops_that_they_were_made_with():
-    gripper = report_of((MODELS / "gripper.xml").read_text())
-    for closure in gripper.closures:
-        assert closure.loop is not None
-        assert closure.loop.lengths == pytest.approx((0.02, 0.06, 0.02, 0.06))
-    foot = closure_of((MODELS / "biped_foot.xml").read_text())
-    assert foot.loop is not None
-    # crank (-0.02, 0.31) on the ground, ankle at the origin, heel (-0.064, -0.006)
-    assert foot.loop.lengths == pytest.approx(
-        (
-            math.hypot(0.02, 0.31),
-            0.045,
-            math.hypot(0.001, 0.316),
-            math.hypot(0.064, 0.006),
-        )
-    )
 
 
 TWO_LOOPS = """

@@ -230,17 +230,6 @@ def test_the_start_of_a_simulation_is_not_judged():
         assert single.errors()[quantity].max() / scale > 10.0 * settled
 
 
-def test_what_ties_the_loop_to_held_joints_is_off_and_the_rest_is_not():
-    inside, _ = open_loop("finger")
-    names = [inside.model.equality(i).name for i in range(inside.model.neq)]
-    active = inside.model.eq_active0.tolist()
-    assert dict(zip(names, active, strict=True)) == {"dip_loop": 0, "": 1}
-    inside, _ = open_loop("adaptive")
-    assert inside.model.eq_active0.tolist() == [1, 0]
-    foot, _ = open_loop("biped_foot")
-    assert foot.model.eq_active0.all()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_what_holds_the_other_joints_hardly_matters(name):

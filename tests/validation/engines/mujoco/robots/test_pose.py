@@ -14,7 +14,6 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from tests.support.robots import Planar
 from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
@@ -32,13 +31,6 @@ def gap(model, qpos):
     mujoco.mj_kinematics(model, data)
     one, two = (data.site_xpos[i[0]] for i in (model.eq_obj1id, model.eq_obj2id))
     return float(np.linalg.norm(one - two))
-
-
-def test_the_rest_pose_of_a_closed_file_stays():
-    model = compiled(Planar(by="site").text())
-    posed = pose_robot(model, PoseOptions())
-    assert np.array_equal(posed.data.qpos, model.qpos0)
-    assert not posed.notes
 
 
 CLAMP = """
@@ -127,17 +119,6 @@ def test_a_rest_pose_outside_the_ranges_is_closed_inside_them():
     assert posed.notes[0] == "outside their ranges in the rest pose of the file: crank"
 
 
-def test_a_file_without_joints_or_equalities_has_a_pose():
-    for inside in (
-        "<body><geom size='1'/></body>",
-        "<body><joint/><geom size='1'/></body>",
-    ):
-        model = compiled(f"<mujoco><worldbody>{inside}</worldbody></mujoco>")
-        posed = pose_robot(model, PoseOptions())
-        assert np.array_equal(posed.data.qpos, model.qpos0)
-        assert not posed.notes
-
-
 @pytest.mark.slow
 def test_closing_does_not_leave_the_range_of_a_joint():
     joints = {"crank": "20deg"}
@@ -186,14 +167,6 @@ def test_what_is_no_position_is_refused(joints, words):
     model = compiled(FOOT.read_text())
     with pytest.raises(InputError, match=words):
         pose_robot(model, PoseOptions(joints=joints))
-
-
-def test_held_joints_do_not_close_the_loop():
-    model = compiled(FOOT.read_text())
-    options = PoseOptions(joints={"crank": "10deg"}, held=("ankle", "rod"))
-    posed = pose_robot(model, options)
-    rod = model.joint("rod").qposadr[0]
-    assert posed.data.qpos[rod] == model.qpos0[rod]
 
 
 BOOM = """
@@ -251,19 +224,3 @@ def test_zero_needs_no_unit():
     model = compiled(FOOT.read_text())
     posed = pose_robot(model, PoseOptions(joints={"crank": "0"}))
     assert posed.data.qpos[model.joint("crank").qposadr[0]] == 0.0
-
-
-def test_a_floating_body_that_is_tied_to_the_ground_moves_there():
-    """A metre along x and a turn of 30 deg about z, by half angles."""
-    model = compiled(
-        """<mujoco><worldbody><body name="part"><freejoint name="free"/>
-        <geom size="0.1"/></body></worldbody><equality><weld body1="part"
-        relpose="-1 0 0 0.9659258262890683 0 0 0.25881904510252074"/></equality>
-        </mujoco>"""
-    )
-    posed = pose_robot(model, PoseOptions())
-    assert posed.notes == (
-        "the loops are closed again by least squares: free by 1000 mm and 30 deg",
-    )
-    turned = [math.cos(math.radians(15.0)), 0.0, 0.0, -math.sin(math.radians(15.0))]
-    assert posed.data.qpos[3:] == pytest.approx(turned, abs=1e-9)
