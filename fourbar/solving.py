@@ -478,8 +478,8 @@ def _list_foreign(scene: Scene) -> tuple[str, ...]:
 def _list_absent(scene: Scene) -> tuple[str, ...]:
     """List the quantities that a solution of the scene lacks.
 
-    Quantities of the other kind of drive are always absent, and those of dry or
-    load-dependent friction if the scene has none.
+    Quantities of other drives are always absent, those of dry friction and of pin loads
+    if no effect has dry friction or depends on the loads.
     """
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):

@@ -285,7 +285,7 @@ class Case(NamedTuple):
     def begin_at(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position.
 
-        The copy may hold many linkages.
+        A study has a position for each linkage.
         """
         state = self.at(start)
         return self._replace(

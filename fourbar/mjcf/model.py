@@ -218,9 +218,9 @@ def make_constant_motor(force: float) -> dict[str, str]:
 
 
 def make_servo(gain: float, omega: float) -> dict[str, str]:
-    """Make the drive a speed servo, gain (omega - speed).
+    """Return the attributes of a drive that exerts the couple gain (omega - speed).
 
-    Without a control it turns at omega, and there it is idle.
+    It needs no control.
     """
     return {
         **_UNCONTROLLED,
@@ -341,9 +341,9 @@ class Model:
         return any(attribute in attributes for attributes in self.pin.values())
 
     def add_option(self, root: ET.Element) -> None:
-        """Add integrator, solver, and flags that switch off the superfluous.
+        """Add the timestep, integrator, solver and what effects state, as gravity.
 
-        A closed loop does not need what they switch off.
+        Flags switch off what a closed loop and this model do not need.
         """
         settings = self.settings
         options = {

@@ -1,8 +1,8 @@
 """Bodies of a linkage in Exudyn, and its own springs and dampers upon them.
 
 No other engine brings force laws of its own that hold to round-off. MuJoCo's hold to
-the error of its steps; every other engine is given the wrenches of `effects.TERM_OF`,
-as Exudyn is of all the rest.
+the error of its steps; every other engine is given the wrenches of
+`applied_effects.TERM_OF`, as Exudyn is of all the rest.
 """
 
 import math
