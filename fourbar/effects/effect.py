@@ -34,7 +34,7 @@ def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> MovingBodies:
         for bar in linkage.moving
     ]
     for effect in effects:
-        for number, inertia in effect.carried.items():
+        for number, inertia in effect.added_inertia.items():
             body = bodies[number - 2]
             bodies[number - 2] = body._replace(I=body.I + inertia)
     two, three, four = bodies
@@ -70,15 +70,17 @@ class Actions:
     ----------
     state : positions and motion.
     bodies : of bars 2, 3, 4.
-    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as
-        it falls, 0 neither; between them the part of its torque that dry friction holds
-        them with.
+    impending : the sense in which pins at rest are about to turn: +1 as theta_2 grows,
+        -1 as it falls, 0 neither; between them the part of its torque that dry friction
+        holds them with.
     """
 
-    def __init__(self, state: State, bodies: MovingBodies, side: Number = 0) -> None:
+    def __init__(
+        self, state: State, bodies: MovingBodies, impending: Number = 0
+    ) -> None:
         self.state: State = state
         self.bodies: MovingBodies = bodies
-        self.side: Number = side
+        self.impending: Number = impending
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
@@ -187,7 +189,7 @@ class Actions:
 
         `unit`: actions of 1 N of the drive.
         """
-        total = Actions(self.state, self.bodies, self.side)
+        total = Actions(self.state, self.bodies, self.impending)
         for name in ("forces", "moments", "couples", "through"):
             sums = dict(getattr(self, name))
             for key, per_newton in getattr(unit, name).items():
@@ -243,18 +245,18 @@ class Actions:
     def sense(self, pin: str) -> Number:
         """Return the sign of omega_j - omega_i at a pin.
 
-        At rest it is the sign that a motion beginning to `side` would have. A linkage
-        at rest begins to move as theta_2 grows or falls; a pin that is at rest in a
-        linkage that moves turns in either sense.
+        At rest it is the sign of the impending motion. A linkage at rest begins to move
+        as theta_2 grows or falls; a pin that is at rest in a linkage that moves turns
+        in either sense.
         """
         slip = self.state.slip(pin)
         speed = self.state.speed
         turning = self.turning(pin)
         in_motion = np.sign(slip * speed)
-        if not is_any(self.side != 0):
+        if not is_any(self.impending != 0):
             return turning * in_motion
-        in_motion = np.where(turning, in_motion, self.side)
-        at_rest = self.side * turning * np.sign(slip)
+        in_motion = np.where(turning, in_motion, self.impending)
+        at_rest = self.impending * turning * np.sign(slip)
         return np.where(np.equal(speed, 0.0), at_rest, in_motion)
 
     def turning(self, pin: str) -> Number:
@@ -392,7 +394,7 @@ class Effect(Placed):
         return ()
 
     @property
-    def carried(self) -> Mapping[int, Number]:
+    def added_inertia(self) -> Mapping[int, Number]:
         """Inertia that turns with bar 2, 3 or 4, kg m^2, by its number."""
         return {}
 

@@ -25,7 +25,7 @@ class Flywheel(Effect):
     example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
 
     @property
-    def carried(self) -> Mapping[int, float]:
+    def added_inertia(self) -> Mapping[int, float]:
         """The wheel's inertia on its bar: a rotation has no other."""
         return {self.bar: self.inertia}
 

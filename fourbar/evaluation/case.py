@@ -116,7 +116,7 @@ class Case(NamedTuple):
     """Points of the scene: name, bar, and place in the bar's frame, complex, m. The
     frame begins at the bar's first pin.
     """
-    side: Any = 0
+    impending: Any = 0
     """Impending direction of rotation at pins at rest. Or the fraction of its torque
     with which friction holds them.
     """
@@ -124,7 +124,7 @@ class Case(NamedTuple):
     """Drive that exerts a force in place of the couple on the driven bar."""
 
     @classmethod
-    def of(cls, scene: Scene, bar: int = 2, side: Any = 0) -> "Case":
+    def of(cls, scene: Scene, bar: int = 2, impending: Any = 0) -> "Case":
         """Collect the numbers that stay the same over the positions of a command.
 
         The command is that of bar 2, 3 or 4.
@@ -146,7 +146,7 @@ class Case(NamedTuple):
             scene.drive_bar,
             path,
             points,
-            side,
+            impending,
             scene.drive,
         )
 
@@ -275,12 +275,12 @@ class Case(NamedTuple):
         return self.assemble(at, half, moving=moving)
 
     @classmethod
-    def of_released(cls, scene: Scene, bar: int, side: Any) -> "Case":
+    def of_released(cls, scene: Scene, bar: int, impending: Any) -> "Case":
         """Collect the numbers of a released linkage, read in the angle of bar 2 or 4.
 
         No couple drives a released linkage.
         """
-        return cls.of(scene, bar, side)._replace(drive_bar=bar, drive=None)
+        return cls.of(scene, bar, impending)._replace(drive_bar=bar, drive=None)
 
     def begin_at(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position.
@@ -373,12 +373,12 @@ class Case(NamedTuple):
             )
         return _InertialForces(inertial, others, wrenches, mass_at_A, about_B)
 
-    def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
+    def dynamics(self, state: State, acceleration: Any, impending: Any = 0) -> Dynamics:
         """Compute pin forces and the drive under everything that acts.
 
         For the parameters see `Actions`.
         """
-        actions = Actions(state, self.bodies, side).add(self.terms)
+        actions = Actions(state, self.bodies, impending).add(self.terms)
         if self.drive is None:
             may_be_left_out: tuple[int, ...] = (self.drive_bar,)
             per_newton = None

@@ -103,7 +103,7 @@ def evaluate(
         _withhold_unassembled(codes, values, command)
     if last_stage < FORCE:
         return Evaluated(codes, values, state)
-    dynamics = case.dynamics(state, command.acceleration, case.side)
+    dynamics = case.dynamics(state, command.acceleration, case.impending)
     forces, jammed = _list_forces(case, command, state, dynamics, wanted)
     if last_stage == ERROR:
         forces |= _list_error_bars(case, command, state, dynamics, refined_rows)
@@ -255,7 +255,7 @@ def _list_error_bars(
         )
     motion = command._replace(angle=q, speed=speed, acceleration=acceleration)
     near = longer.assemble(motion, half)
-    longer_dynamics = longer.dynamics(near, acceleration, case.side)
+    longer_dynamics = longer.dynamics(near, acceleration, case.impending)
     gap, drive_gap = _compute_gaps(dynamics, longer_dynamics)
     if longer_numbers.HAS_LONG_DOUBLES and command.remainder is None:
         unresolved, drive_unresolved = _compute_unresolved(
@@ -314,7 +314,7 @@ def _compute_unresolved(
         case.path.half_angle(moved),
     )
     try:
-        there = case.dynamics(shifted, command.acceleration, case.side)
+        there = case.dynamics(shifted, command.acceleration, case.impending)
     except InputError:  # a load's table ends here
         return np.nan, np.nan
     with np.errstate(all="ignore"):

@@ -139,7 +139,9 @@ def print_positions(
     notes = [line for note in told for line in wrap_line(note)]
     if step > 1:
         more = "; --all shows each" if every is None else ""
-        which = f"every {step}{_write_ordinal(step)} of the {len(rows)} positions"
+        which = (
+            f"every {step}{_choose_ordinal_suffix(step)} of the {len(rows)} positions"
+        )
         notes.append(f"shown: {which}{more}")
     if left_out := [name.split("\n")[0] for name in cells if name not in kept]:
         notes.append(
@@ -168,7 +170,7 @@ def _choose_step(count: int) -> int:
     return next((step for step in ROW_STEPS if step >= wanted), multiple)
 
 
-def _write_ordinal(number: int) -> str:
+def _choose_ordinal_suffix(number: int) -> str:
     if number % 100 in (11, 12, 13):
         return "th"
     return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")

@@ -222,7 +222,7 @@ class CircuitCurve:
                 tau
             )
             sign = np.where(tau <= math.pi, 1.0, -1.0)
-        return np.stack([psi, sign * transmission(self.ratios, psi)], axis=1)
+        return np.stack([psi, sign * transmission_angle(self.ratios, psi)], axis=1)
 
     def tau(self, points: Array) -> Array:
         """Return the places of points in the row, (n,), rad."""
@@ -262,7 +262,7 @@ class CircuitCurve:
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
             return np.empty((0, 2))
         psi = np.array(self.sweep) - self.theta_1
-        mu = transmission(self.ratios, psi)
+        mu = transmission_angle(self.ratios, psi)
         on_circuit = np.remainder(psi - self.low, TURN) < self.high - self.low
         on_circuit &= np.abs(np.sin(mu)) > AT_END_OF_SWEEP
         psi = psi[on_circuit]
@@ -287,7 +287,7 @@ class CircuitCurve:
         actions = Actions(state, self.case.bodies).add(self.case.terms)
         return actions.generalized_forces()[0]
 
-    def force(self, points: Array) -> Array:
+    def generalized_force(self, points: Array) -> Array:
         """Compute Q of all but dry friction, by the curve's parameter."""
         return np.broadcast_to(self._force_of(self.state(points)), len(points))
 
@@ -308,7 +308,7 @@ class CircuitCurve:
     def level(self, points: Array) -> NDArray[np.bool_]:
         """Mark points where Q is zero within round-off."""
         return np.asarray(
-            np.abs(self.force(points)) <= ROUND_OFF_OF_Q * self.size(points)
+            np.abs(self.generalized_force(points)) <= ROUND_OFF_OF_Q * self.size(points)
         )
 
     def count(self, psi: Array) -> Array:
@@ -357,7 +357,8 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     >>> from math import pi
     >>> from fourbar.formulas.position import loop
     >>> lengths = loop(100, 40, 120, 80)  # mm; Norton, example 4-1, as in `close_loop`
-    >>> s = on_curve(lengths, 0.0, 40 * pi / 180, transmission(lengths, 40 * pi / 180))
+    >>> psi = 40 * pi / 180
+    >>> s = on_curve(lengths, 0.0, psi, transmission_angle(lengths, psi))
     >>> [f"{np.angle(u, deg=True):.3f}" for u in (s.position.u3, s.position.u4)]
     ['20.298', '57.325']
     """
@@ -384,7 +385,7 @@ def _less_turned(p: Number, q: Number, angle: Number) -> Number:
     return (p - q) - (2j * q) * (np.sin(half) * polar(1.0, half))
 
 
-def transmission(lengths: Loop, psi: Number) -> Number:
+def transmission_angle(lengths: Loop, psi: Number) -> Number:
     """Compute theta_4 - theta_3 on the open branch, in [0, pi].
 
     Where the loop does not close, it is the nearest end.

@@ -49,7 +49,7 @@ from fourbar.studies.circuit_curve import (
     CircuitCurve,
     RestPosition,
     of_input,
-    transmission,
+    transmission_angle,
 )
 from fourbar.studies.course import bisect
 
@@ -184,7 +184,9 @@ def equilibrium(scene: Scene) -> Equilibria:
         psi = positions.theta_2 - curve.theta_1
         sense = _moves(
             curve,
-            np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1),
+            np.stack(
+                [psi, positions.branch * transmission_angle(curve.ratios, psi)], axis=1
+            ),
         )
         undecided = (NOT_ASSEMBLED, SINGULAR, WOUND, CHANGE_POINT)
         sense[np.isin(positions.status_code, undecided)] = 0
@@ -331,7 +333,7 @@ class _Grid(NamedTuple):
         around = size.copy()
         around[first] = np.maximum(around[first], size[second])
         around[second] = np.maximum(around[second], size[first])
-        Q = curve.force(points)
+        Q = curve.generalized_force(points)
         idle = np.abs(Q) <= ROUND_OFF_OF_Q * around
         return cls(curve, points, Q, around, idle, first, second, tau[first], gap[near])
 
@@ -401,7 +403,7 @@ def _find_least_sizes(grid: _Grid) -> tuple[_Zeros, Array]:
     curve = grid.curve
     one_sign = grid.Q[grid.first] * grid.Q[grid.second] > 0.0
     least, first = grid.locate(curve.slope(grid.points), curve.slope, one_sign)
-    Q = curve.force(least)
+    Q = curve.generalized_force(least)
     size = grid.size[first]
     touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
     passed = Q * grid.Q[first] < 0.0
@@ -411,13 +413,13 @@ def _find_least_sizes(grid: _Grid) -> tuple[_Zeros, Array]:
 def _find_sign_changes(grid: _Grid) -> _Zeros:
     """Find the zeros between points at which Q has two signs; a jump is none."""
     everywhere = np.ones(len(grid.first), dtype=bool)
-    zeros, first = grid.locate(grid.Q, grid.curve.force, everywhere)
+    zeros, first = grid.locate(grid.Q, grid.curve.generalized_force, everywhere)
     size = grid.size[first]
-    continuous = np.abs(grid.curve.force(zeros)) <= _A_JUMP * size
+    continuous = np.abs(grid.curve.generalized_force(zeros)) <= _A_JUMP * size
     return _Zeros(zeros[continuous], size[continuous])
 
 
-def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
+def _add_friction(curve: CircuitCurve, points: Array, impending: int) -> Array:
     """Compute Q with the friction that opposes impending motion to one side.
 
     Positions where friction jams have an infinite Q.
@@ -431,12 +433,12 @@ def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
         if chosen.any():
             part = curve.state(points[chosen])
             case = curve.case._replace(drive_bar=bar, drive=None)
-            dynamics = case.dynamics(part, 0.0, side)
+            dynamics = case.dynamics(part, 0.0, impending)
             Q = -dynamics.effort * part.k[bar - 2]
             force[chosen] = (
                 Q
                 if dynamics.status is None
-                else np.where(dynamics.status == JAMMED, -side * np.inf, Q)
+                else np.where(dynamics.status == JAMMED, -impending * np.inf, Q)
             )
     return force
 

@@ -289,7 +289,7 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
         for term in terms:  # a flywheel turns about the bar's ground pin
             recorder.items += [
                 (0.0j, 0.0j, -inertia * alpha)
-                for on, inertia in term.carried.items()
+                for on, inertia in term.added_inertia.items()
                 if on == bar
             ]
         a_G = getattr(solution, f"a_G{bar}")

@@ -48,7 +48,7 @@ COMMANDS = {
         "Judge your own torques and forces.",
     ),
     "loops": LazyCommand(
-        "fourbar_validation.robots.loops:robot_command",
+        "fourbar_validation.robots.loops:loops_command",
         "List the closed loops of a robot's MJCF or SDF.",
     ),
     "check-mjcf": LazyCommand(

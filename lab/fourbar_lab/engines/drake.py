@@ -174,7 +174,7 @@ class _DrakeTree(Tree):
         torques: list[float] = self.balancing.tolist()
         return torques
 
-    def carried(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, Components]:
         """Return the force at each bar's first pin from Drake's reaction port, N.
 
         Drake finds the accelerations once more for it, from the applied wrenches and

@@ -10,7 +10,7 @@ import fourbar
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.advise.advise import advise_command as advise
 from fourbar_validation.robots.check_mjcf import check_mjcf_command as check_mjcf
-from fourbar_validation.robots.loops import robot_command as loops
+from fourbar_validation.robots.loops import loops_command as loops
 from tests.support.robots import FOOT_PARALLELOGRAM, make_parallelogram
 
 pytestmark = pytest.mark.usefixtures("in_this_process")

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar_validation.robots.loops import robot_command
+from fourbar_validation.robots.loops import loops_command
 from fourbar_validation.robots.options import read_pose
 from tests.whole.test_imports import ROOT
 
@@ -24,7 +24,7 @@ def unfold(printed):
 @pytest.mark.slow
 def test_a_line_for_each_closure():
     arguments = [str(MODELS / "gripper.xml")]
-    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
     assert result.exception is None
     assert max(map(len, result.output.splitlines())) <= 80
     right, left = unfold(result.output)
@@ -40,7 +40,7 @@ def test_a_line_for_each_closure():
 @pytest.mark.slow
 def test_the_gap_is_that_of_the_stated_pose():
     arguments = [str(MODELS / "biped_foot.xml"), "--pose", "crank=20deg,knee=30deg"]
-    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
     line, note = unfold(result.output)
     assert line.startswith("rod: connect; ground ankle_frame; hinges rod, crank, ankle")
     # the crank turned by 20 deg carries the rod's end along: 2 . 0.31905 m sin(10 deg)
@@ -65,7 +65,7 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path):
     loop = "right_finger-right_follower"
     arguments = [str(MODELS / "gripper.xml"), "--loop", loop, "-o", str(out)]
     arguments += ["--speed", "60 rpm"]
-    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
     assert result.exception is None
     assert result.output.splitlines()[-1] == f"written to {out}"
     text = out.read_text()
@@ -87,7 +87,7 @@ def test_a_scene_is_read_again_however_many_meshes_are_missing(tmp_path):
     robot.write_text(text, encoding="utf-8")
     out = tmp_path / "foot.toml"
     arguments = [str(robot), "-o", str(out)]
-    result = CliRunner().invoke(robot_command, arguments, standalone_mode=False)
+    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
     assert result.exception is None, result.output
     assert "m149.stl" in out.read_text(encoding="utf-8")
     assert fourbar.load(out).linkage.ground > 0.0
@@ -97,7 +97,7 @@ def test_a_speed_without_a_scene_is_refused():
     arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
     with pytest.raises(UsageError, match="--speed goes with -o"):
         CliRunner().invoke(
-            robot_command,
+            loops_command,
             arguments,
             standalone_mode=False,
             catch_exceptions=False,

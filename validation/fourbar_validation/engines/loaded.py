@@ -113,7 +113,7 @@ class EngineBars(Assembled, Protocol):
 
 
 class Loaded(EngineBars, Protocol):
-    """Bars on which loads and effects act, each by its row of `applied_effects.TERM_OF`.
+    """Bars on which loads and effects act, by their rows of `applied_effects.TERM_OF`.
 
     The ground (bar 1) does not move; its line points from O2 to O4.
     """

@@ -170,7 +170,7 @@ class PinocchioTree(KeptTree):
         torques = pin.rnea(*motion, self.external).tolist()
         return torques
 
-    def carried(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, Components]:
         """Read what each joint transmits, which the last pass left in its own axes."""
         return {
             bar: rotate_by(self.turned_to[bar].tolist(), *force.tolist())

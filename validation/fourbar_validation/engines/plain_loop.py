@@ -69,7 +69,7 @@ class PlainLoop:
             needed = self.inverse(q, v, a)
             x, y, torque[row] = solve_multipliers(jacobian, self.drive, needed)
             forces["F43"][row] = x, y
-            pins = put_back(self.tree.carried(), x, y)
+            pins = put_back(self.tree.joint_forces(), x, y)
             for name, force in pins.items():
                 forces[name][row] = force
         return {"torque": torque, **forces}

@@ -107,7 +107,7 @@ class Tree(Loaded, Protocol):
         Gravity and what acts are taken off.
         """
 
-    def carried(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, Components]:
         """Return the force on each moving bar at its first pin, N.
 
         Motion and wrenches are those last asked for.
@@ -183,7 +183,7 @@ class Tree(Loaded, Protocol):
         bar 4 and the force of a drive are carried on to the ground; a couple asks
         nothing of the pins.
         """
-        on = self.carried()
+        on = self.joint_forces()
         if self.force_drive is not None:
             ends, along = self.line()
             for sense, bar, _ in ends:

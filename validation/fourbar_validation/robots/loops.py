@@ -115,7 +115,7 @@ def _write_scene(made: LoopScene) -> str:
     metavar="SCENE.toml",
     help="Write the loop as a scene: what it carries, its range, and what acts on it.",
 )
-def robot_command(
+def loops_command(
     robot: Path,
     assets: Path | None,
     loop: str | None,

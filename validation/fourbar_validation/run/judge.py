@@ -21,9 +21,9 @@ from fourbar_validation.report.svg import STYLE_NUMBERS
 from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.run.identities import check_identities, check_status
 from fourbar_validation.run.judge_engines import (
-    check_mjcf,
     compare_answers,
     compare_inertia,
+    compare_shipped_mjcf,
 )
 from fourbar_validation.run.law import check_law
 from fourbar_validation.run.question import Question, select_positions
@@ -84,7 +84,7 @@ CHECKS = (
     Check(check_transformed),
     Check(compare_answers, compares=True),
     Check(
-        check_mjcf,
+        compare_shipped_mjcf,
         compares=True,
         what="MJCF as shipped",
         needs_theta_2="it drives bar 2",

@@ -241,7 +241,7 @@ def _take_inertia(answer: Answer, drive: str) -> Answer:
     return replace(answer, quantities=alone, evidence={}, alarms=[])
 
 
-def check_mjcf(question: Question) -> Iterator[Row]:
+def compare_shipped_mjcf(question: Question) -> Iterator[Row]:
     """Check the generated MJCF as it is shipped, if the engine that runs it is in."""
     for engine in question.engines:
         if engine.generated:

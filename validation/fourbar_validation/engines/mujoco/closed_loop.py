@@ -176,7 +176,7 @@ class ClosedLoop(Assembled):
 
     def forces(self) -> dict[str, Array]:
         """Read the pin forces of the state that was last forwarded, world axes, N."""
-        on = self.carried()
+        on = self.joint_forces()
         closure = self.data.efc_force[:2].copy()
         return {
             "F12": on["input"],
@@ -185,7 +185,7 @@ class ClosedLoop(Assembled):
             "F14": on["output"],
         }
 
-    def carried(self) -> dict[str, Array]:
+    def joint_forces(self) -> dict[str, Array]:
         """Return the force of the parent on each bar in world axes, N.
 
         Read is cfrc_int, which includes all that the bar carries, without the forces of

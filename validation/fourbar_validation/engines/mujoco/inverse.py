@@ -217,7 +217,7 @@ class MujocoTree(KeptTree):
         torques: list[float] = (self.qfrc_inverse - applied).tolist()
         return torques
 
-    def carried(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, Components]:
         """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, _) in self.wrenches.items():
             # the couples about the mass centres, at which these forces act, ask nothing

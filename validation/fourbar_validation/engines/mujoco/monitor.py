@@ -247,7 +247,7 @@ class ResidualMonitor:
             mujoco.mj_fwdActuation(bars.model, d)
             d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
-        on = bars.carried()
+        on = bars.joint_forces()
         x, y = loop_force.tolist()
         pins = put_back({bar: on[BAR_NAMES[bar]].tolist() for bar in MOVING_BARS}, x, y)
         return {name: np.array(force) for name, force in pins.items()}
