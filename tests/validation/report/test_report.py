@@ -610,13 +610,18 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     """Only engines that declare few errors are independent."""
     overview = Overview()
     overview.declared = {"one": 1e-14, "two": declared}
+    overview.listed = {"two": dict.fromkeys(["friction", "gravity", "torque", "F12"])}
     for name, counts in (("a", (5, 5)), ("b", (5, 4)), ("c", (5, 0))):
         rows = [
             replace(OF_MINE, scene=name, engine=engine, quantity=quantity)
             for engine, count in zip(("one", "two"), counts, strict=True)
             for quantity in ("torque", *PIN_FORCES)[:count]
         ]
-        overview.add(record_of(name, rows))
+        overview.add(replace(record_of(name, rows), needs=["gravity"]))
+    needs = ["friction"]  # inertia alone is asked without it
+    bare = replace(OF_MINE, scene="d", engine="two", quantity="torque_inertia")
+    overview.add(replace(record_of("d", [bare]), needs=needs))
+    assert "two lists friction: compared in no scene" in overview.notes
     assert overview.checked_twice == confirmed
     words = f"Torque and pin forces of {confirmed} of 3 scenes:"
     assert any(note.startswith(words) for note in overview.notes)

@@ -10,6 +10,7 @@ import pytest
 
 from fourbar.scene.motion import Law
 from fourbar_validation.engines.applied_effects import TERM_OF
+from fourbar_validation.engines.guests import list_needs
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.question import FREE_BODY
@@ -90,6 +91,11 @@ def test_the_default_suite_uses_every_capability():
         "spring with pull",
     }
     assert wanted <= used
+    needs = [{*list_needs(SUITE.scene(i))} - {"gravity"} for i in range(len(SUITE))]
+    alone = set().union(*(words for words in needs if len(words) == 1))
+    together = set().union(*needs)
+    assert together - alone == {"one_sided"}
+    assert {"springs", "one_sided"} in needs
 
 
 @pytest.mark.parametrize(

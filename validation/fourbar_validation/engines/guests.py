@@ -75,8 +75,8 @@ class Guest(Engine):
     """Number of the engine, so that it is drawn with the same mark in every process."""
     seconds: float | None = None
     """Time limit for each question."""
-    releases: bool = False
-    """True if it integrates released motions."""
+    effects: tuple[str, ...] = ()
+    """Words of the hello's `effects`."""
     setting: str = ""
     """Name of the setting with which it is asked, one of those that its hello lists."""
 
@@ -163,7 +163,7 @@ def name_guests(
             version=" on ".join(filter(None, (hello.version, hello.device))),
             stated_name=_leave_out_version(chosen or hello.name, hello.version),
             seconds=program.seconds,
-            releases="release" in hello.effects,
+            effects=hello.effects,
         )
         guests.append(guest)
     return tuple(guests)
@@ -377,9 +377,10 @@ def _read_tolerance(stated: Any) -> ErrorBound:
     return ErrorBound(STATED_BY_THE_ENGINE, reason, error, conditioned=False)
 
 
-def _find_needs(scene: Scene) -> list[str]:
+def list_needs(scene: Scene) -> list[str]:
     """List what a scene asks of an engine, in the words of hello's `effects`."""
-    needs = [effect.key for effect in scene.effects]
+    needs = ["release"] * (scene.motion.free is not None)
+    needs += [effect.key for effect in scene.effects]
     needs += ["loads"] * bool(scene.loads)
     for effect in scene.effects:
         if isinstance(effect, Springs) and any(one.acts for one in effect.springs):
@@ -417,7 +418,7 @@ class GuestClient:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Return the answer of the guest; EngineError where it fails."""
-        if refusal := self._explain_refusal(_find_needs(scene)):
+        if refusal := self._explain_refusal(list_needs(scene)):
             return Answer(self.name, "exact", refusal=refusal)
         data = {
             "ask": "answer",
@@ -436,7 +437,7 @@ class GuestClient:
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Return the released motion as the guest integrates it."""
-        if refusal := self._explain_refusal(["release", *_find_needs(scene)]):
+        if refusal := self._explain_refusal(list_needs(scene)):
             return ReleasedAnswer.refused(self.name, "-", refusal)
         data = {
             "ask": "release",

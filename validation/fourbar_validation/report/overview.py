@@ -184,6 +184,10 @@ class Overview:
         """That run in words."""
         self.declared: dict[str, float] = {}
         """Error that each engine declares, relative to the scale."""
+        self.listed: dict[str, dict[str, None]] = {}
+        """Effects and quantities that the hello of each guest lists, without those that
+        were compared.
+        """
         self._lines: dict[str, OverviewLine] = {}
         self._kinds: dict[tuple[str, tuple[str, ...]], _SimilarScenes] = {}
 
@@ -196,6 +200,10 @@ class Overview:
                 self.not_compared[_DOES_NOT_APPLY] += 1
         for row in scene.rows:
             self._add_row(row)
+            listed = self.listed.get(row.engine, {})
+            if row.compared and row.quantity == _name_whole(row):
+                for name in (row.quantity, *scene.needs):
+                    listed.pop(name, None)
         self._add_agreement(scene.rows)
         self._add_causes(scene)
         for engine, reason in _list_reasons(scene):
@@ -367,6 +375,11 @@ class Overview:
             )
         if self.released:
             notes.append("released: angles, energy and speeds alone (no torque acts)")
+        notes += [
+            f"{engine} lists {', '.join(listed)}: compared in no scene"
+            for engine, listed in self.listed.items()
+            if listed and self._line(engine).compared
+        ]
         notes += self.silent
         if self.not_compared:
             total = sum(self.not_compared.values())

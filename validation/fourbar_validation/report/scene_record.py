@@ -35,6 +35,8 @@ class Record:
     scene: Scene | None = None
     title: str = ""
     source: str = ""
+    needs: list[str] = field(default_factory=list)
+    """What it asks of an engine, in the words of hello's `effects`."""
     rows: list[Row] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)

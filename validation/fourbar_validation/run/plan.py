@@ -208,10 +208,11 @@ class Plan:
         summary.overview.declared = {
             engine.name: engine.tolerance.factor for engine in self.engines
         }
-        summary.stated = {
-            engine.name: engine.version
-            for engine in self.engines
-            if isinstance(engine, Guest)
+        guests = [engine for engine in self.engines if isinstance(engine, Guest)]
+        summary.stated = {guest.name: guest.version for guest in guests}
+        summary.overview.listed = {
+            guest.name: dict.fromkeys((*guest.effects, *guest.answers))
+            for guest in guests
         }
         return summary
 

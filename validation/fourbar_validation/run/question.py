@@ -29,6 +29,7 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import Mask
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.guests import list_needs
 from fourbar_validation.engines.programs import keep_printed
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.scene_record import Record, Timing
@@ -217,6 +218,7 @@ class Question:
             self.scene,
             escape_controls(self.scene.title),
             escape_controls(self.scene.source),
+            list_needs(self.scene),
             rows,
             timings,
             self.left_out,

@@ -206,7 +206,7 @@ def check_released(question: Question) -> Iterator[Row]:
         return _make_rows(question, fine, coarse, truth)
 
     for engine in question.engines:
-        if isinstance(engine, Guest) and engine.releases:
+        if isinstance(engine, Guest) and "release" in engine.effects:
             yield from question.attempt(
                 partial(rows, engine.at_step, LONGEST_TIMESTEP), engine.name
             )
