@@ -50,7 +50,11 @@ from fourbar_validation.robots.options import (
     range_option,
     speed_option,
 )
-from fourbar_validation.robots.report import describe_advice, show_block
+from fourbar_validation.robots.report import (
+    describe_advice,
+    show_block,
+    write_range,
+)
 
 PART_OF_THE_ERROR = 0.7
 """Part of the required error within which the run must stay. Elsewhere the error may be
@@ -461,7 +465,7 @@ def _advise_robot(
     measurement = measure_robot(files[-1], options, scene, assets)
     reached = True
     for measured in measurement.loops:
-        print_sentence(f"{measured.name}, driven by {measured.joint}")
+        print_sentence(f"{measured.name}, driven by {write_range(measured)}")
         assert measured.advice is not None
         for block in describe_advice(measured, measured.advice):
             show_block(block)

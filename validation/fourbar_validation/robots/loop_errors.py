@@ -13,8 +13,8 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.quantities import COUPLE, OK, UNITS, Array
-from fourbar.scene import Scene
+from fourbar.quantities import COUPLE, OK, STATUS_NAMES, UNITS, Array
+from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
@@ -67,8 +67,8 @@ class InsideError:
     angle: float
     """Angle of the commanded bar there in the same axes, rad."""
     median: float
-    """Median of the errors over the states, over the same scale; infinite without an
-    answer.
+    """Median of the errors over the judged states, over the same scale; infinite
+    without an answer.
     """
 
     @property
@@ -148,27 +148,26 @@ def _compare(
     """Compare an answer at its own theta_2, omega_2 and alpha_2, as its method says.
 
     Where dry friction reverses the forces on both sides of the jump are right, and
-    nothing is judged.
+    nothing is judged. Neither are rigid pins where the formulas have no value.
     """
     rows = answer.rows
-    commanded = loop.command(replace(answer, open=[]))
-    formulas = solve(loop.scene, "force", at=commanded)
-    reversing = mark_reversing(loop.scene, formulas, _SLIP)
+    commanded, formulas = _solve_formulas(loop, answer)
+    judged = ~mark_reversing(loop.scene, formulas, _SLIP)
+    errors = answer.errors()
     if method == RIGID:
         errors = _subtract_formulas(answer, formulas, loop)
-    else:
-        errors = answer.errors()
+        judged &= formulas.status_code == OK
     for name in FORCE_QUANTITIES:
         quantity = name_driving(loop.scene) if name == COUPLE.value else name
         sizes = np.where(np.isfinite(errors[name]), errors[name], math.inf)
-        sizes = np.where(reversing, 0.0, sizes)
-        worst = int(np.argmax(sizes))
+        worst = int(np.argmax(np.where(judged, sizes, -1.0)))
         error = float(sizes[worst])
         scale = loop.scales[name]
-        median = divide(float(np.median(sizes)), scale)
-        if answer.lost:
+        if answer.lost or not judged.any():
             error = math.inf
             median = math.inf
+        else:
+            median = divide(float(np.median(sizes[judged])), scale)
         yield InsideError(
             method,
             quantity,
@@ -182,6 +181,14 @@ def _compare(
         )
 
 
+def _solve_formulas(
+    loop: LoopMeasurement, answer: InsideAnswer
+) -> tuple[Command, Solution]:
+    """Return the command of an answer's states, and what the formulas have there."""
+    commanded = loop.command(replace(answer, open=[]))
+    return commanded, solve(loop.scene, "force", at=commanded)
+
+
 def _subtract_formulas(
     answer: InsideAnswer,
     formulas: Solution,
@@ -189,19 +196,26 @@ def _subtract_formulas(
 ) -> dict[str, Array]:
     """Return how far torque and pin forces of rigid pins are from the formulas, (n,).
 
-    Differences are sizes at each state, N m and N; infinite where the formulas have no
-    value.
+    Differences are sizes at each state, N m and N.
     """
-    judged = formulas.status_code == OK
     rigid = loop.collect(answer, "rigid").items()
     return {
-        name: np.where(
-            judged,
-            measure_sizes(force - np.asarray(getattr(formulas, quantity))),
-            math.inf,
-        )
+        name: measure_sizes(force - np.asarray(getattr(formulas, quantity)))
         for name, (quantity, force) in zip(FORCE_QUANTITIES, rigid, strict=True)
     }
+
+
+def list_without_value(loop: LoopMeasurement) -> dict[str, list[float]]:
+    """List the positions of the driven joint without a value of the formulas, rad.
+
+    They are listed by the status of the formulas there.
+    """
+    _, formulas = _solve_formulas(loop, loop.states)
+    places: dict[str, list[float]] = {}
+    for row, code in zip(loop.states.rows, formulas.status_code, strict=True):
+        if code != OK:
+            places.setdefault(STATUS_NAMES[code], []).append(row.joint)
+    return places
 
 
 def find_worst_of_loop(loop: LoopMeasurement) -> float:

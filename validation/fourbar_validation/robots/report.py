@@ -49,6 +49,7 @@ from fourbar_validation.robots.loop_errors import (
     find_left_out,
     find_worst_of_loop,
     list_errors_by_method,
+    list_without_value,
     write_degrees,
 )
 
@@ -165,9 +166,14 @@ def _describe_differences(judgement: LoopJudgement) -> Iterator[ReportBlock]:
         yield TextTable(JUDGED_HEADINGS, errors)
 
 
-def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
+def write_range(loop: LoopMeasurement) -> str:
+    """Write the driven joint of a loop and the range in which it is measured."""
     joints = [row.joint for row in loop.states.rows]
     first, last = (write_degrees(end) for end in (min(joints), max(joints)))
+    return f"{loop.joint} from {first} to {last} deg"
+
+
+def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
     speeds = [row.speed for row in loop.states.rows]
     speed = " to ".join(
         f"{end:.4g}" for end in dict.fromkeys((min(speeds), max(speeds)))
@@ -178,10 +184,7 @@ def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
         if loop.as_it_is:
             how = "with the file as it is against the formulas"
     given = f" (stated by {stated})" if stated else ""
-    return (
-        f"{loop.name}: {loop.joint} from {first} to {last} deg at {speed}"
-        f" rad/s{given}, MuJoCo {how}"
-    )
+    return f"{loop.name}: {write_range(loop)} at {speed} rad/s{given}, MuJoCo {how}"
 
 
 def _describe_loop(
@@ -207,6 +210,13 @@ def _describe_loop(
             f"left out: {count} of {count + len(loop.states.rows)} states, with"
             f" {name_following(command(loop.scene).bar)} in line{within_digits}"
             f" ({loop.joint} = {places} deg), where the loop may go on in two ways"
+        )
+    for status, joints in list_without_value(loop).items():
+        ends = " to ".join(map(write_degrees, (min(joints), max(joints))))
+        yield (
+            f"the formulas have no forces at {len(joints)} of {len(loop.states.rows)}"
+            f" states ({loop.joint} = {ends} deg, status {status}): rigid pins are"
+            " compared at the others"
         )
     errors = list_errors_by_method(loop)
     if left_out <= LEAST_LEFT_OUT:

@@ -33,6 +33,7 @@ from fourbar_validation.robots.loop_errors import (
     find_left_out,
     find_worst_of_loop,
     list_errors_by_method,
+    list_without_value,
 )
 from fourbar_validation.robots.report import describe_measurement
 from tests.support.robots import (
@@ -156,6 +157,30 @@ def test_rigid_pins_are_the_formulas_of_the_scene(case):
     loop = measure(file, scene, pose)
     assert find_left_out(loop) < LEFT_OUT
     assert loop.joint == driven
+
+
+@pytest.mark.slow
+def test_states_without_a_value_of_the_formulas_are_named_and_not_judged():
+    """A spring that is at rest where the turn begins is wound from half of it on."""
+    spring = fourbar.Torsion((("O2", 2.0, 0.0, 0.1),))
+    wound = replace(BARE, effects=(spring,))
+    loop = measure(driven_by_a_motor(wound), wound)
+    assert find_left_out(loop) < LEFT_OUT
+    half_and_beyond = [10.0 * step for step in range(18, 37)]
+    assert np.degrees(list_without_value(loop)["wound"]) == pytest.approx(
+        half_and_beyond
+    )
+    blocks = map(str, describe_measurement(RobotMeasurement((loop,), ())))
+    assert any("at 19 of 37 states (O2 = 180 to 360 deg" in text for text in blocks)
+
+
+@pytest.mark.slow
+def test_a_hinge_that_turns_fully_is_measured_in_any_range():
+    span = (-7.0, -5.5)
+    loop = measure(driven_by_a_motor(ROCKER), ROCKER, span=span)
+    joints = [row.joint for row in loop.states.rows]
+    assert (min(joints), max(joints)) == pytest.approx(span, abs=1e-9)
+    assert find_left_out(loop) < LEFT_OUT
 
 
 @pytest.mark.slow

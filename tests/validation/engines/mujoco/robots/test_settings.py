@@ -29,6 +29,7 @@ from fourbar_validation.robots.loop_errors import (
     list_errors_by_method,
     read_measure_options,
 )
+from tests.support.robots import measure
 from tests.support.shares import slow_but
 
 FOOT = Path(__file__).parents[5] / "models" / "robots" / "biped_foot.xml"
@@ -239,6 +240,8 @@ def test_a_range_is_that_of_the_driven_joint(sense):
     far = [error.joint for error in list_errors_by_method(measurement.loops[0])]
     low, high = (span[0] - ONE_STEP, span[1] + ONE_STEP)
     assert all(low <= joint <= high for joint in far)
+    loop = measure(write_leg(sense), span=(-9.0, 9.0))
+    assert any("--range is cut to the motion of knee, " in one for one in loop.remarks)
     with pytest.raises(InputError, match="must overlap the motion of knee, "):
         measure_loops(
             write_leg(sense),

@@ -71,6 +71,8 @@ _CONSTANTS = 10.0
 """Time constants of the closure during which the torque acts. The loop has then yielded
 as far as it does.
 """
+_WHOLE_TURN = math.tau * (1.0 - 1e-9)
+"""rad; motions state their ends with twelve digits."""
 _LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
 
@@ -192,8 +194,9 @@ def _measure_loop(
 ) -> LoopMeasurement:
     """Measure one loop; `share`: part of the time in which settings are looked for."""
     loop = inside.loop
+    cut = ""
     if options.span is not None:
-        motion = _take_span(motion, inside, options.span)
+        motion, cut = _take_span(motion, inside, options.span)
     motion = motion.thin_out(POSITIONS_OF_A_LOOP)
     states = inside.answer_states(motion)
     if not states.rows and states.in_line:
@@ -241,6 +244,7 @@ def _measure_loop(
         scene,
         turned,
         (
+            *([cut] if cut else []),
             *_describe_noslip(inside, motion, states, scales),
             *_describe_other_circuit(inside, scene, states),
             *_describe_findings(inside, states, through),
@@ -389,31 +393,40 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
 
 def _take_span(
     motion: LoopMotion, inside: LoopInside, span: tuple[float, float]
-) -> LoopMotion:
-    """Return a motion evenly over a range of the driven joint, rad, as far as it goes.
+) -> tuple[LoopMotion, str]:
+    """Return a motion evenly over a range of the driven joint, and what was cut of it.
+
+    A motion of a whole turn goes on in any range of a joint without limits; another
+    one cuts the range, rad.
 
     Raises
     ------
     InputError : a range that the motion does not reach.
     """
     joints = [inside.position(angle) for angle in motion.angle]
-    low, high = max(span[0], min(joints)), min(span[1], max(joints))
-    if low >= high:
+    low, high = span
+    cut = ""
+    limited = inside.joint is not None and inside.model.jnt_limited[inside.joint]
+    if limited or np.ptp(motion.angle) < _WHOLE_TURN:
+        low, high = max(low, min(joints)), min(high, max(joints))
         moved, wanted = (
             " to ".join(f"{math.degrees(end):.6g}" for end in ends)
             for ends in ((min(joints), max(joints)), span)
         )
-        raise InputError(
-            "--range",
-            f"{wanted} deg",
-            f"must overlap the motion of {inside.name}, {moved} deg",
-        )
+        if low >= high:
+            raise InputError(
+                "--range",
+                f"{wanted} deg",
+                f"must overlap the motion of {inside.name}, {moved} deg",
+            )
+        if (low, high) != span:
+            cut = f"--range is cut to the motion of {inside.name}, {moved} deg"
     if motion.varies:
         raise InputError("--range", None, "needs a motion of one speed")
     sense = inside.position(motion.angle[0] + 1.0) - joints[0]
     places = np.linspace(low, high, POSITIONS_OF_A_LOOP) - joints[0]
     angles = np.sort(motion.angle[0] + sense * places)
-    return motion._replace(angle=tuple(angles.tolist()))
+    return motion._replace(angle=tuple(angles.tolist())), cut
 
 
 def _compare_at_same_angles(
