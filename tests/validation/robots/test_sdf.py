@@ -16,9 +16,13 @@ from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    SETTINGS_OF_AN_SDF,
+    PoseOptions,
+)
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.robots.files import read_robot
+from tests.support.robots import judge_path
 from tests.validation.robots.test_files import TETRAHEDRON
 
 AGREES = 1e-9
@@ -623,6 +627,18 @@ def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, tmp_p
         return
     with pytest.raises(InputError, match=message):
         compile_text(tmp_path, text)
+
+
+@pytest.mark.slow
+def test_settings_are_not_asked_of_a_file_that_cannot_state_them(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text(PLAIN, encoding="utf-8")
+    judgement = judge_path("linkage", SCENE, path)
+    written = {one.key: one.write() for one in judgement.differences}
+    assert "in the file" not in written["closure.solimp"]
+    assert SETTINGS_OF_AN_SDF in judgement.notes
+    said = " ".join(judgement.sentences())
+    assert "is off by" in said and "What to type" not in said
 
 
 URDF = """<robot name="r"><link name="base"/>

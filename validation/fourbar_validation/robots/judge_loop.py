@@ -35,7 +35,11 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
     measure_sizes,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    SETTINGS_OF_AN_SDF,
+    PoseOptions,
+    RobotFile,
+)
 from fourbar_validation.report.templating import write_error
 from fourbar_validation.robots.differences import (
     Difference,
@@ -154,7 +158,9 @@ class LoopJudgement:
             )
         if self.is_of_another_linkage:
             yield _LENGTHS_FIRST
-        elif self.counts[FAILS] and any(is_setting(d.key) for d in self.differences):
+        elif self.counts[FAILS] and any(
+            is_setting(one.key) and one.written for one in self.differences
+        ):
             yield _ADVICE
 
     @property
@@ -209,16 +215,19 @@ def judge_file(
                 lambda changes: examined(_CHANGED, scene, changes, plain),
                 lambda changes: examined(_MENDED, scene, file, held, changes),
             )
+    notes = [*theirs.notes]
     if parts := list_unread(file.text):
-        unread = [f"not looked at: {', '.join(parts)}"]
-    else:
-        unread = []
+        notes.append(f"not looked at: {', '.join(parts)}")
+    if file.kind == "SDF":
+        differences = [
+            replace(one, written="") if is_setting(one.key) else one
+            for one in differences
+        ]
+        notes.append(SETTINGS_OF_AN_SDF)
     errors = [
         JudgedError(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows
     ]
-    return LoopJudgement(
-        theirs.measured, order(differences), errors, [*theirs.notes, *unread]
-    )
+    return LoopJudgement(theirs.measured, order(differences), errors, notes)
 
 
 Remeasure = Callable[[Sequence[Any]], list[LoopMeasurement | None]]

@@ -26,6 +26,10 @@ FLAT = 2e-3
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
 in line.
 """
+SETTINGS_OF_AN_SDF = (
+    "an SDF states neither softness nor solver: MuJoCo's defaults act, and only an MJCF"
+    " of the robot can state others"
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,11 @@ from fourbar_validation.engines.mujoco.robots.inside import (
     HEAVY,
     LoopInside,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, RobotLoop
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    SETTINGS_OF_AN_SDF,
+    RobotFile,
+    RobotLoop,
+)
 from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
@@ -119,6 +123,8 @@ def measure_loops(
                 remarks = (*made.remarks, *one.remarks)
                 measured.append(replace(one, remarks=remarks))
             notes = [*compiled.notes, *posed.notes]
+    if file.kind == "SDF" and options.error is not None:
+        notes.append(SETTINGS_OF_AN_SDF)
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(tuple(measured), tuple(notes))
 
