@@ -116,6 +116,11 @@ def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
     other = read_loop_scene(FILE, PoseOptions(read_advice(remark)), None, 4.0)
     assert other.scene.motion.branch == OPEN
     assert not [text for text in other.remarks if "in line" in text]
+    # the rocker is at -100 deg there, in the other assembly at 100 deg
+    limited = TEXT.replace('name="j_rocker"', 'name="j_rocker" range="-170 0"')
+    made = read_loop_scene(file_of(limited), PoseOptions(), None, 4.0)
+    (remark,) = [text for text in made.remarks if "in line" in text]
+    assert remark.endswith("closed to the crossed one")
 
 
 def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():

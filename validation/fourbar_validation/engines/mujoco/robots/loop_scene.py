@@ -59,6 +59,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
 from fourbar_validation.engines.mujoco.robots.pose import (
     OUTSIDE_A_RANGE,
     PosedRobot,
+    find_outside,
     pose_robot,
 )
 from fourbar_validation.engines.mujoco.robots.seen import Lump, SeenLoop
@@ -159,10 +160,14 @@ def write_pose(
 ) -> str:
     """Write the hinges of a loop in a pose as the value of --pose.
 
-    The digits close the loop to 1e-8 of its bars.
+    The digits close the loop to 1e-8 of its bars. The text is empty where a hinge would
+    be outside its range.
     """
+    hinges = sorted(loop.hinges.values())
+    if not {*hinges}.isdisjoint(find_outside(model, qpos)):
+        return ""
     parts = []
-    for joint in sorted(loop.hinges.values()):
+    for joint in hinges:
         angle = math.degrees(qpos[model.jnt_qposadr[joint]])
         parts.append(f"{name_joint(model, joint)}={round(angle, 6):.10g}deg")
     return ",".join(parts)
@@ -497,8 +502,9 @@ class SceneOfLoop:
                 f" not tell the assembly: it closed to the {BRANCH_NAMES[branch]} one"
             )
             reflected = reflect(self.model, self.loop)
-            if reflected is not None:
-                pose = write_pose(self.model, self.loop, reflected)
+            if reflected is not None and (
+                pose := write_pose(self.model, self.loop, reflected)
+            ):
                 text += f"; --pose {pose} closes to the other"
             self._remark(text)
         return branch

@@ -309,7 +309,8 @@ def _move_over(
         if before == after:
             remark = f"{text}: it is moved there"
             return replace(moved, remarks=(*moved.remarks, remark)), there
-        advice = f"give --pose {write_pose(posed.model, seen, reflected)}"
+        if other_pose := write_pose(posed.model, seen, reflected):
+            advice = f"give --pose {other_pose}"
     raise InputError("--pose", None, f"{text}: {advice}")
 
 

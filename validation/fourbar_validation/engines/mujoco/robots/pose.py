@@ -85,11 +85,13 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         fixed.add(joint)
     closing = _Closing(model, fixed, held)
     tied = {*closing.joints, *fixed}
-    outside = [joint for joint in _find_outside(model, stated) if joint in tied]
+    outside = [joint for joint in find_outside(model, stated) if joint in tied]
     notes: list[str] = []
-    if outside:
-        names = _list_some([name_joint(model, joint) for joint in outside])
-        notes.append(f"outside their ranges {origin}: {names}")
+    for where, is_stated in ((origin, False), ("as --pose states them", True)):
+        names = [name_joint(model, joint) for joint in outside]
+        names = [name for name in names if (name in options.joints) == is_stated]
+        if names:
+            notes.append(f"outside their ranges {where}: {_list_some(names)}")
     before = closing.size(stated)
     if before <= CLOSED_IN_THE_FILE and not set(outside) - fixed:
         data = _evaluate_kinematics(model, stated)
@@ -187,7 +189,7 @@ def find_joint(
     return names.index(name)
 
 
-def _find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
+def find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
     """List the hinges and slides that are outside their ranges."""
     low, high = _list_bounds(model)
     outside = (qpos < low - OUTSIDE_A_RANGE) | (qpos > high + OUTSIDE_A_RANGE)
