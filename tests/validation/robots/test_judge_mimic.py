@@ -104,6 +104,21 @@ def test_a_motion_through_a_change_point_is_refused(tmp_path):
         measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
 
+def test_the_range_of_the_file_is_the_motion_of_a_scene_over_a_whole_turn(tmp_path):
+    motion = PARALLELOGRAM.motion.replace(angle=np.linspace(0.0, math.tau, 73))
+    turn = replace(PARALLELOGRAM, motion=motion)
+    path = write_upright(tmp_path, pad="")
+    limited = path.read_text().replace('name="drive"', 'name="drive" range="-40 20"')
+    path.write_text(limited)
+    report = measure_mimic(path, "rocker_j", turn)
+    # the crank stands at 90 deg
+    assert np.degrees(report.swing) == pytest.approx((50.0, 110.0))
+    assert report.file.angle <= ROUND_OFF
+    path.write_text(limited.replace("0 0.04 0", "0 0.03 0"))  # no end of a bar
+    with pytest.raises(InputError, match=r"change point.*from -40 to 20 deg"):
+        measure_mimic(path, "rocker_j", turn)
+
+
 def write(folder, polycoef="0 0.8842 0 0 0", axis=1):
     path = folder / "mimic.xml"
     path.write_text(FILE.format(polycoef=polycoef, axis=axis))

@@ -33,6 +33,8 @@ FEWEST_POSITIONS = 6
 squares with an error to tell.
 """
 FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio")
+_WHOLE_TURN = math.tau * (1.0 - 1e-9)
+"""rad; scenes state their ends with twelve digits."""
 _SAME_ANGLE = 1e-3
 """rad; files state angles with three or four digits."""
 _FITS = ("least squares", "smallest largest error")
@@ -100,7 +102,8 @@ def measure_mimic(
 
     The leader's zero is the theta_2 at which the file has the input. The follower's is
     the angle between its two bars there: that of the loop, or that of the bars in the
-    file, whichever the polynomial fits better.
+    file, whichever the polynomial fits better. Of a scene over a whole turn the motion
+    is the range of the leader, if the file has one.
 
     Parameters
     ----------
@@ -118,6 +121,8 @@ def measure_mimic(
         equality: JointEquality = examined(READ, file, joint, scene)
     equality, stated = _state_angles(equality, angles or {})
     positions = np.unique(command(scene).theta_2)
+    if equality.swing is not None and np.ptp(positions) >= _WHOLE_TURN:
+        positions = np.linspace(*equality.swing, len(positions))
     low = float(positions[0])
     high = float(positions[-1])
     if len(positions) < FEWEST_POSITIONS:
@@ -129,7 +134,7 @@ def measure_mimic(
         )
     branch = int(command(scene).branch[0])
     theta_2 = np.union1d(np.linspace(low, high, POSITIONS_FITTED), positions)
-    angle, ratio = _follow(scene, theta_2, branch, equality.bars)
+    angle, ratio = _follow(scene, theta_2, branch, equality)
     # both joints in their own senses
     side = equality.side * equality.sense
     x = theta_2
@@ -139,7 +144,7 @@ def measure_mimic(
         rest = middle + math.remainder(equality.theta_2 - middle, math.tau)
         x = equality.side * (theta_2 - rest)
         if not stated:
-            zeros += _find_in_loop(scene, rest, branch, equality.bars)
+            zeros += _find_in_loop(scene, rest, branch, equality)
         drawn = equality.follower_zero
         if drawn is not None and not any(_is_same_angle(one, drawn) for one in zeros):
             zeros.append(drawn)
@@ -229,11 +234,11 @@ def _find_in_loop(
     scene: Scene,
     theta_2: float,
     branch: int,
-    bars: tuple[int, int],
+    equality: JointEquality,
 ) -> list[float]:
     """Return the angle of a bar against another, rad; none where the loop is open."""
     try:
-        angle, _ = _follow(scene, np.array([theta_2]), branch, bars)
+        angle, _ = _follow(scene, np.array([theta_2]), branch, equality)
     except InputError:
         return []
     return [float(angle[0])]
@@ -243,7 +248,7 @@ def _follow(
     scene: Scene,
     theta_2: Array,
     branch: int,
-    bars: tuple[int, int],
+    equality: JointEquality,
 ) -> tuple[Array, Array]:
     """Return the angle of a bar against another, rad, and its speed over omega_2.
 
@@ -258,14 +263,20 @@ def _follow(
         reason = "the loop does not close there; the motion must be in its range"
         if solution.status_code[~closed][0] == CHANGE_POINT:
             reason = (
-                "a change point, where the output may go on in two ways; the motion"
-                " may not go through it"
+                "a change point, where the output may go on in two ways: state a motion"
+                " that does not go through it"
             )
+            if equality.limits is not None and equality.theta_2 is None:
+                ends = " to ".join(map(_deg, equality.limits))
+                reason += (
+                    "; or state by --pose theta_2=ANGLE the angle of bar 2 in the rest"
+                    f" pose of the file, where {equality.leader} turns from {ends} deg"
+                )
         raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
     still = np.zeros_like(theta_2)
     theta = [still, theta_2, solution.theta_3, solution.theta_4]
     omega = [still, still + 1.0, solution.omega_3, solution.omega_4]
-    turned, bearer = (bar - 1 for bar in bars)
+    turned, bearer = (bar - 1 for bar in equality.bars)
     turn = np.asarray(theta[turned]) - np.asarray(theta[bearer])
     ratio = np.asarray(omega[turned]) - np.asarray(omega[bearer])
     return np.unwrap(turn), ratio
@@ -400,7 +411,10 @@ def _write_theta_2(report: _MimicReport) -> str:
     zero = equality.theta_2 - equality.side * equality.leader_zero
     angle = f"{math.degrees(math.remainder(zero, math.tau)) + 0.0:.6g} deg"
     sign = "+" if equality.side > 0.0 else "-"
-    return f"theta_2 is {angle} {sign} {equality.leader}, from {low} to {high} deg"
+    whose = ", the range of the file" if report.swing == equality.swing else ""
+    return (
+        f"theta_2 is {angle} {sign} {equality.leader}, from {low} to {high} deg{whose}"
+    )
 
 
 def _write_errors(report: _MimicReport) -> str:

@@ -60,6 +60,16 @@ class JointEquality:
     """+1 if theta_2 grows with the leader, -1 if it falls."""
     bars: tuple[int, int]
     """Bar that the follower turns, and the one that it turns against: 1 to 4."""
+    limits: tuple[float, float] | None
+    """Range of the leader in the file, rad; None where it has none."""
+
+    @property
+    def swing(self) -> tuple[float, float] | None:
+        """Range of theta_2 by the leader's limits, rad; None if it is not known."""
+        if self.limits is None or self.theta_2 is None:
+            return None
+        ends = [self.side * (end - self.leader_zero) for end in self.limits]
+        return self.theta_2 + min(ends), self.theta_2 + max(ends)
 
 
 def read_joint_equality(
@@ -110,6 +120,7 @@ def _describe_follower(
     mujoco.mj_kinematics(model, data)
     along = float(data.xaxis[follower] @ data.xaxis[leader])
     theta_2, follower_zero, side = _measure_bars(model, data, tie, scene)
+    low, high = model.jnt_range[leader].tolist()
     return JointEquality(
         name_joint(model, follower),
         name_joint(model, leader),
@@ -120,6 +131,7 @@ def _describe_follower(
         follower_zero,
         side,
         _find_bars(model, leader, follower),
+        (low, high) if model.jnt_limited[leader] else None,
     )
 
 
