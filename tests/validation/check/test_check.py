@@ -1071,24 +1071,33 @@ def test_a_column_of_an_unknown_name_says_what_it_may_be(heading, words, torques
         torques(f"theta_2 [deg],{heading}", "{theta:.0f},1")
 
 
-@pytest.mark.parametrize(
-    ("head", "row", "words"),
-    [
-        (
-            "theta_2 [deg],torque,T2",
-            "{theta:.0f},{torque:.9e},0.5",
-            "columns 2 and 3 are both torque, with other",
-        ),
-        (
-            "theta_2 [deg],torque [kN m]",
-            "{theta:.0f},0",
-            "every number would agree; print more digits",
-        ),
-    ],
-)
-def test_columns_that_say_nothing_or_two_things_are_refused(head, row, words, torques):
-    with pytest.raises(InputError, match=words):
-        judge_table(OURS, torques(head, row))
+def test_columns_that_say_two_things_are_refused(torques):
+    with pytest.raises(InputError, match="columns 2 and 3 are both torque, with other"):
+        torques("theta_2 [deg],torque,T2", "{theta:.0f},{torque:.9e},0.5")
+
+
+COARSE = [
+    ("60,0.4,6.36", FAILED, "more digits: torque 1 of 1 numbers agree, compared to 3"),
+    ("60,0.45,6", HOLDS, "compared to 1 digit"),
+    ("60,0.4,", FAILED, "more digits: line 2, torque Nothing was compared; no digit"),
+    ("60,0.4,6.36\n100,-0.0,", FAILED, "more digits: torque, line 3"),
+    ("60,0.45,6.36\n100,0,1.6", HOLDS, "3 of 3 numbers agree"),
+    ("60,0.4,6.36\n200,-0.61,13", HOLDS, "4 of 4 numbers agree, compared to 1 digit"),
+    ("60,0.1,6.36", FAILED, "1 of 2 numbers agree"),
+    ("60,0,6.36 --rtol 2", HOLDS, "2 of 2 numbers agree within"),
+    ("60,0,6.36 --rtol 0.5", FAILED, "no number has a digit to compare"),
+]
+"""Rows of a crank-rocker with T = 0.4467 N m and F12 = 6.358 N at 60 deg, -0.6074 and
+12.96 at 200, F12 = 1.604 N at 100, and what is said of them.
+"""
+
+
+@pytest.mark.parametrize(("rows", "code", "words"), COARSE)
+def test_a_number_without_a_digit_agrees_with_nothing(rows, code, words, check):
+    rows, *options = rows.split(" ")
+    text = f"theta_2 [deg],torque [N m],F12 [N]\n{rows}\n"
+    found, printed, _ = check(MODELS / "crank_rocker.toml", text, *options)
+    assert found == code and words in printed
 
 
 def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):

@@ -14,6 +14,7 @@ from fourbar.errors import FAILED, HOLDS, InputError, LimitError
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Rise
 from fourbar_validation.check.check import judge_table
+from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands
 from fourbar_validation.check.theirs import read_table
 from tests.support.scenes import CYLINDER, crank_rocker
@@ -246,6 +247,8 @@ LOGGED = [
     ("theta_2 omega_2 torque", "needs a column time beside theta_2, or columns"),
     ("late theta_2 torque", "the law is at 20.0067 deg then, and the table at 20.0043"),
     ("rounded theta_2 torque", HOLDS),
+    ("coarse theta_2 torque", HOLDS),
+    ("rounded degrees torque", HOLDS),
     ("step theta_2 torque", "needs a column time"),
 ]
 
@@ -282,8 +285,10 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
         "time": (time, "time [ms]", 1e3, ".1f"),
         "late": (time + 2e-3, "time [s]", 1.0, ".4f"),
         "rounded": (time, "time", 1.0, ".3f"),
+        "coarse": (time, "time", 1.0, ".1f"),
         "step": (time, "time [rev]", 1e4, ".0f"),
         "theta_2": (theta, "theta_2", 1.0, ".15g"),
+        "degrees": (theta, "theta_2 [deg]", 180.0 / math.pi, ".0f"),
         "omega_2": (omega, "omega_2", 1.0, ".15g"),
         "alpha_2": (alpha, "alpha_2 [deg/s^2]", 180.0 / math.pi, ".15g"),
         "torque": (torque, "torque", 1.0, ".15g"),
@@ -296,6 +301,12 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
     if judged_as == HOLDS:
         judgement = judge_table(SERVO, read(text))
         assert judgement.status == HOLDS and judgement.compared >= len(time)
+        assert not judgement.table.left_out or "omega_2" in names
+        noted = "coarse" in names or "rounded theta_2" in names
+        assert bool(judgement.table.notes) == noted
+        wrong = text.replace(f"{torque[3]:.15g}", f"{1.3 * torque[3]:.15g}")
+        findings = Judge(SERVO, read(wrong)).findings()
+        assert [one.line for one in findings if not one.agrees] == [5]
     else:
         with pytest.raises(InputError, match=judged_as) as caught:
             judge_table(SERVO, read(text))

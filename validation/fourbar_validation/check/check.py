@@ -10,7 +10,6 @@ from functools import cached_property, partial
 from pathlib import Path
 
 import click
-import numpy as np
 
 from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, abbreviate
 from fourbar.files import load
@@ -18,12 +17,16 @@ from fourbar.quantities import STAGE_OF, UNITS
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
 from fourbar_validation.check.csv_columns import list_names_of_points
-from fourbar_validation.check.judge_table import Allowance, Discrepancy, Judge
+from fourbar_validation.check.judge_table import (
+    ONE_DIGIT,
+    Allowance,
+    Discrepancy,
+    Judge,
+)
 from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
 from fourbar_validation.compare.rows import escape_controls
-from fourbar_validation.compare.scales import VANISHING
-from fourbar_validation.compare.tolerance import EPS, magnitude
+from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.report.junit import JunitCase, write_document
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 
@@ -32,6 +35,8 @@ from fourbar_validation.report.sentences import make_words_table, print_sentence
 class Judgement:
     """All findings, and the known mistakes that would explain them."""
 
+    table: TheirTable
+    """The table as it was read."""
     findings: list[Discrepancy]
     not_assembled: list[int]
     """Lines at which the linkage does not assemble, or is singular. There is no right
@@ -91,10 +96,20 @@ class Judgement:
         )
         return math.ceil(math.log10(worst)) if worst <= FEWEST_DIGITS else None
 
+    @cached_property
+    def not_compared(self) -> list[str]:
+        """Name the lines and quantities of which no number has a digit to compare."""
+        compared = dict[str, bool]()
+        for finding in self.findings:
+            for name in (f"line {finding.line}", finding.quantity):
+                compared[name] = compared.get(name, False) or finding.judged
+        return [name for name, is_compared in compared.items() if not is_compared]
+
     @property
     def status(self) -> int:
-        """Exit status; nothing compared is no success."""
-        if self.differing or self.not_assembled or not self.compared:
+        """Exit status; a row or a column that is not compared is no success."""
+        compares = self.compared and not self.not_compared
+        if self.differing or self.not_assembled or not compares:
             return FAILED
         return HOLDS
 
@@ -110,7 +125,7 @@ class Judgement:
                 f"{self.agreeing} of {self.compared} numbers agree within {within};"
                 f" {self.exact} to round-off"
             )
-        if self.compared and self.tolerance is None:
+        if self.digits and self.tolerance is None:
             agreed += f", compared to {self.digits}"
         if self.not_judged:
             agreed += f"; no digit left to judge {self.not_judged} more by"
@@ -127,12 +142,12 @@ class Judgement:
         """
         allowed: dict[str, float] = {}
         for finding in self.findings:
-            if finding.judged:
+            if finding.allowed <= ONE_DIGIT:
                 so_far = allowed.get(finding.quantity, 0.0)
                 allowed[finding.quantity] = max(so_far, finding.allowed)
         fewest: dict[int, list[str]] = {}
         for quantity, most in allowed.items():
-            digits = max(0, math.floor(-math.log10(max(most, EPS))))
+            digits = math.floor(-math.log10(max(most, EPS)))
             fewest.setdefault(digits, []).append(quantity)
         if len(fewest) == 1:
             (digits,) = fewest
@@ -152,31 +167,6 @@ class Judgement:
         return explained >= {finding.quantity for finding in self.differing}
 
 
-def _require_information(judge: Judge) -> None:
-    """Refuse a column that is printed so coarsely that every number would agree."""
-    for key in judge.table.values:
-        mask = judge.where(key)
-        if not mask.any():
-            continue
-        unit = judge.table.units[key]
-        of_angle = name_quantity(key).startswith("theta")
-        if of_angle:
-            largest = np.pi
-        else:
-            largest = float(magnitude(judge.ours(key))[mask].max())
-        rounding = float(judge.table.rounding[key][mask].min())
-        theirs = magnitude(np.nan_to_num(judge.table.values[key]))[mask]
-        least = VANISHING * float(judge.size(key)[mask].max())
-        if least < largest <= rounding and float(theirs.max()) <= rounding:
-            raise InputError(
-                f"column {judge.table.label(key)} [{unit.text}]",
-                None,
-                f"is printed to {2.0 * rounding / unit.factor:.2g} {unit.text}, and the"
-                f" largest right value is {largest / unit.factor:.2g} {unit.text}:"
-                " every number would agree; print more digits",
-            )
-
-
 def judge_table(
     scene: Scene,
     table: TheirTable,
@@ -189,8 +179,7 @@ def judge_table(
     is held to it too.
     """
     judge = Judge(scene, table, tolerance)
-    _require_information(judge)
-    findings = judge.findings()
+    read, findings = judge.table, judge.findings()
     differing_quantities = {
         finding.quantity
         for finding in findings
@@ -211,6 +200,7 @@ def judge_table(
     else:
         explanations = []
     judgement = Judgement(
+        read,
         findings,
         judge.without_answer(),
         explanations,
@@ -260,12 +250,12 @@ def _explain_in_fewer_digits(
     return replace(judgement, explanations=explain_within(power), explained_power=power)
 
 
-def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
+def write_judgement_json(judgement: Judgement) -> str:
     """Return one object in SI units: counts, and every number that differs.
 
     A number that differs is stated as theirs and ours, with what explains it.
     """
-    tolerance = judgement.tolerance
+    table, tolerance = judgement.table, judgement.tolerance
     document = {
         "schema": 1,
         "verdict": judgement.sentence(),
@@ -279,6 +269,7 @@ def write_judgement_json(judgement: Judgement, table: TheirTable) -> str:
         "found_by": table.found_by,
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
+        "without_digits": judgement.not_compared,
         "differing": [
             {
                 name: None if isinstance(x, float) and not math.isfinite(x) else x
@@ -310,9 +301,9 @@ def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]
             yield case(quantity, "failure", "differs", text)
         elif judged:
             yield case(quantity, "passed")
-        else:
-            text = "no digit is left to judge by"
-            yield case(quantity, "skipped", "not judged", text)
+    for name_of_part in judgement.not_compared:
+        text = "no number has a digit to compare"
+        yield case(name_of_part, "failure", "not compared", text)
     for line in judgement.not_assembled:
         text = "the linkage has no motion there"
         yield case(f"line {line}", "failure", "no motion", text)
@@ -421,20 +412,17 @@ def check_command(
     table = table.from_pin(stated.origin)
     judgement = judge_table(stated, table, tolerance)
     if json is not None:
-        write_text(json, write_judgement_json(judgement, table))
+        write_text(json, write_judgement_json(judgement))
     if junit is not None:
         cases = _list_cases_of_table(judgement, theirs.name)
         write_text(junit, write_document(judgement.sentence(), cases))
-    show_judgement(judgement, table, theirs.name)
+    show_judgement(judgement, theirs.name)
     return judgement.status
 
 
-def show_judgement(
-    judgement: Judgement,
-    table: TheirTable,
-    name: str,
-) -> None:
+def show_judgement(judgement: Judgement, name: str) -> None:
     """Print what differs, what explains it, and the count."""
+    table = judgement.table
     for note in table.notes:
         print_sentence(note)
     for why in dict.fromkeys(table.left_out.values()):
@@ -489,6 +477,10 @@ def show_judgement(
             f"line {line}: the linkage has no motion there (it does not assemble, or is"
             " singular)"
         )
+    if judgement.not_compared:
+        names = ", ".join(judgement.not_compared)
+        text = f"no number has a digit to compare, print more digits: {names}"
+        print_sentence(abbreviate(text, LONGEST_MESSAGE))
     for explanation in judgement.explanations:
         print_sentence(f"looks like: {explanation.text} ({_write_extent(explanation)})")
     power = judgement.agreed_power

@@ -21,7 +21,7 @@ from fourbar_validation.check.row_commands import (
     RowCommands,
     find_row_commands,
 )
-from fourbar_validation.check.theirs import TheirTable, name_quantity
+from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, name_quantity
 from fourbar_validation.compare.scales import Scale, TermSizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -33,6 +33,9 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     replace_zero_size,
 )
+
+ONE_DIGIT = 0.1
+"""Largest allowed error by which a digit is compared, as a part of the scale."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +69,15 @@ class Discrepancy:
     """
     place: float
     """Angle by which the row is found, rad."""
+    coarse: bool
+    """True if ours has not all its digits, and the digits that it has allow more than
+    a tenth of the scale, and than the stated tolerance.
+    """
 
     @property
     def judged(self) -> bool:
-        """Return whether any digit is left by which it can be judged."""
-        return self.allowed != math.inf
+        """Return whether it is wrong, or agrees in any digit."""
+        return self.error > self.allowed or not self.coarse
 
     @property
     def exact(self) -> bool:
@@ -128,6 +135,12 @@ class Judge:
                 for key, value in table.values.items()
                 if key not in rows.rates
             },
+            left_out={
+                heading: why
+                for heading, why in table.left_out.items()
+                if not (rows.by_time and why == NOT_JUDGED["time"])
+            },
+            notes=(*table.notes, *rows.notes),
         )
         self.stage = "position" if self.at.speed is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
@@ -301,6 +314,10 @@ class Judge:
             label = self.table.label(key)
             error, allowed, apart = self.judged_right(key)
             permitted = self.permitted(key, ours)
+            coarse = (allowed > ONE_DIGIT) & (error > self.find_exact(key))
+            if permitted is not None:
+                limits = self._allow(key)
+                coarse &= allowed > divide(permitted, limits.size) - limits.rounding
             their_rows, our_rows = (
                 numbers.reshape(len(numbers), -1).tolist() for numbers in (theirs, ours)
             )
@@ -325,6 +342,7 @@ class Judge:
                         *numbers,
                         most,
                         float(self.table.places[i]),
+                        bool(coarse[i]),
                     )
                 )
         return findings

@@ -1,12 +1,13 @@
 """Commands at the rows of a table of results."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, LimitError
+from fourbar.errors import InputError, LimitError, write_count
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, find_signs
@@ -22,6 +23,12 @@ _ONE_PLACE = 1e-6
 """Angle, rad, within which two positions are one: at a limit of the bar by which a row
 is found they differ by the square root of round-off.
 """
+_BY_CHANCE = 1e-3
+"""Probability of rounded times at which the law has every angle as it is printed."""
+_SAMPLES = 32
+"""Times to either side of a rounded one at which a law is looked at."""
+_HALVINGS = 60
+"""Halvings after which an interval of doubles is none."""
 _SINE_BARS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 """Bars whose sine decides the assembly, by the commanded bar."""
 
@@ -34,6 +41,10 @@ class RowCommands(NamedTuple):
     """Commands half a unit of a rounded angle or time away, to either side."""
     rates: tuple[str, ...] = ()
     """Names of the speed and acceleration that the table states, and not the scene."""
+    by_time: bool = False
+    """True if the rates are those of a law at the times of the rows."""
+    notes: tuple[str, ...] = ()
+    """Sentences on rows at another time than the printed one."""
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
@@ -121,40 +132,109 @@ def _follow_law(
     table: TheirTable,
     base: Command,
 ) -> RowCommands | None:
-    """Take the rates of a law at the times of the rows; None if there is no law.
+    """Command the law at the times of the rows; None if there is no law.
 
-    Raises InputError for a row at whose time the law is at another angle, unless the
-    table states its rates itself.
+    Time and angle of a row are each within half a unit of its last digit. A row is
+    judged at its time, or if its angle does not fit that, at the nearest time that
+    rounds to it; and it may be off by what any other time that fits both changes.
+
+    Raises InputError for a row that no time fits, or several, unless the table states
+    its rates itself.
     """
     law = scene.motion.law
     if law is None or table.times is None:
         return None
-    time, half = table.times.T
-    at = _command_each(base, table.places, scene)
-    angles, *rates = law.at(np.clip(time, law.time[0], law.time[-1]))
-    apart = np.abs(wrap_difference(angles - table.places))
-    printed = table.rounding[table.found_by] + _AS_PRINTED * (1.0 + np.abs(angles))
-    off = apart > printed + np.abs(rates[0]) * half + _ONE_PLACE
+    first, *_, last = law.time
+    printed, half = table.times.T
+    stated, *ends = (
+        np.clip(printed + side, first, last) for side in (0.0, -half, half)
+    )
+    rounding = table.rounding[table.found_by]
+    rounding = rounding + _AS_PRINTED * (1.0 + np.abs(table.places))
+
+    def measure(time: Array) -> Array:
+        return np.asarray(wrap_difference(law.at(time)[0] - table.places))
+
+    def fits(time: Array) -> NDArray[np.bool_]:
+        return np.abs(measure(time)) <= rounding
+
+    def command_at(time: Array) -> Command:
+        angle, speed, acceleration = law.at(time)
+        angle = np.where(fits(time), angle, table.places)
+        at = _command_each(base, angle, scene)
+        return at._replace(speed=speed, acceleration=acceleration)
+
+    fits_stated = np.abs(measure(stated)) <= rounding + _ONE_PLACE
+    nearest, several = _find_nearest_time(measure, stated, ends)
+    time = np.where(fits_stated, stated, nearest)
+    off = ~fits_stated & several | (np.abs(measure(time)) > rounding + _ONE_PLACE)
     if off.any():
         names = scene.motion.names[1:]
         if all(name in table.values for name in names):
             return None
         row = int(np.argmax(off))
-        law_at, place = np.degrees([angles[row], table.places[row]])
+        law_at, place = np.degrees([law.at(stated)[0][row], table.places[row]])
         raise InputError(
             f"line {table.lines[row]}, time",
-            float(time[row]),
+            float(printed[row]),
             f"the law is at {law_at:.6g} deg then, and the table at {place:.6g} deg:"
             f" add columns {' and '.join(names)}",
         )
-    found = _with_rounding(at._replace(speed=rates[0], acceleration=rates[1]), table)
-    if np.all(apart <= printed):
-        return found  # the times are as exact as the angles
-    near = []
-    for shift in (-half, half):
-        _, *rates = law.at(np.clip(time + shift, law.time[0], law.time[-1]))
-        near.append(at._replace(speed=rates[0], acceleration=rates[1]))
-    return found._replace(near=(*found.near, *near))
+    at = command_at(time)
+    passed = np.maximum(np.abs(law.at(time)[1]) * half, rounding)
+    if fits_stated.all() and np.prod(rounding / passed) < _BY_CHANCE:
+        return RowCommands(at, by_time=True)  # nobody rounded these times
+    near = tuple(command_at(_bisect(fits, time, end)) for end in ends)
+    moved = np.flatnonzero(~fits_stated)
+    notes = [
+        f"at {write_count(len(moved), 'row')} the time is taken that rounds to the"
+        " printed one and at which the law has the angle: line"
+        f" {table.lines[row]} at {time[row]:.6g} s"
+        for row in moved[:1].tolist()
+    ]
+    return RowCommands(at, near, by_time=True, notes=tuple(notes))
+
+
+def _find_nearest_time(
+    measure: Callable[[Array], Array],
+    stated: Array,
+    ends: Sequence[Array],
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the time nearest to the stated one at which a measure is 0, or smallest.
+
+    Marked are the rows with several such times between the ends.
+    """
+    shares = np.linspace(-1.0, 1.0, 2 * _SAMPLES + 1)[:, None]
+    early, late = ends
+    times = stated + np.where(
+        shares < 0.0, -shares * (early - stated), shares * (late - stated)
+    )
+    apart = np.array([measure(time) for time in times])
+    changes = (apart[1:] > 0.0) != (apart[:-1] > 0.0)
+    changes &= np.abs(apart[1:] - apart[:-1]) < math.pi
+    away = np.abs(shares[1:] + shares[:-1])
+    rows = np.arange(len(stated))
+    chosen = np.argmin(np.where(changes, away, np.inf), axis=0)
+    start, end = times[chosen, rows], times[chosen + 1, rows]
+    above = measure(start) > 0.0
+    root = _bisect(lambda time: (measure(time) > 0.0) == above, start, end)
+    smallest = times[np.argmin(np.abs(apart), axis=0), rows]
+    counts = changes.sum(axis=0)
+    return np.where(counts > 0, root, smallest), counts > 1
+
+
+def _bisect(
+    holds: Callable[[Array], NDArray[np.bool_]],
+    inside: Array,
+    outside: Array,
+) -> Array:
+    """Return the last times, from `inside` towards `outside`, at which it holds."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        within = holds(middle)
+        inside = np.where(within, middle, inside)
+        outside = np.where(within, outside, middle)
+    return inside
 
 
 def _command_each(base: Command, angle: Array, scene: Scene) -> Command:

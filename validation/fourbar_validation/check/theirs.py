@@ -38,7 +38,7 @@ _DECIMALS = 4
 one that was rounded.
 """
 NOT_JUDGED = {
-    "time": "a row is found by an angle, and along a law by the time too",
+    "time": "a row is found by its angle",
     **dict.fromkeys(
         (COUPLE.error, LINE.error, "force_error", "friction_residual"),
         "an error of the formulas themselves",
