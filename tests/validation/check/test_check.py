@@ -1081,14 +1081,17 @@ COARSE = [
     ("60,0.45,6", HOLDS, "compared to 1 digit"),
     ("60,0.4,", FAILED, "more digits: line 2, torque Nothing was compared; no digit"),
     ("60,0.4,6.36\n100,-0.0,", FAILED, "more digits: torque, line 3"),
-    ("60,0.45,6.36\n100,0,1.6", HOLDS, "3 of 3 numbers agree"),
+    ("60,0.45,6.36\n100,0,1.6", FAILED, "3 of 4 numbers agree"),
     ("60,0.4,6.36\n200,-0.61,13", HOLDS, "4 of 4 numbers agree, compared to 1 digit"),
     ("60,0.1,6.36", FAILED, "1 of 2 numbers agree"),
+    ("103.76,,2\n79.18,0.281,3.00", HOLDS, "3 of 3 numbers agree, compared to 2"),
+    ("107,,2\n79.18,0.281,3.00", FAILED, "2 of 3 numbers agree"),
     ("60,0,6.36 --rtol 2", HOLDS, "2 of 2 numbers agree within"),
     ("60,0,6.36 --rtol 0.5", FAILED, "no number has a digit to compare"),
 ]
 """Rows of a crank-rocker with T = 0.4467 N m and F12 = 6.358 N at 60 deg, -0.6074 and
-12.96 at 200, F12 = 1.604 N at 100, and what is said of them.
+12.96 at 200, -0.039 and 1.604 at 100, F12 = 2.00 N at 103.76 and 2.4 N at 107, and what
+is said of them. A spreadsheet leaves off the zeros of 2.00.
 """
 
 

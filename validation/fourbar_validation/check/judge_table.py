@@ -269,10 +269,14 @@ class Judge:
             ]
             spread = divide(np.fmax.reduce(moves), size) if moves else 0.0
             exact = self.find_exact(key)
+            rounding, filled = (
+                divide(roundings[key], size)
+                for roundings in (self.table.rounding, self.table.filled)
+            )
             self._allowed[key] = _Allowed(
                 size,
                 np.where(exact <= MOST_ALLOWED, exact + spread + self.slack, np.inf),
-                divide(self.table.rounding[key], size),
+                np.where(rounding > ONE_DIGIT, filled, rounding),
                 not np.isnan(self.table.values[key]).any(),
             )
         return self._allowed[key]
@@ -281,10 +285,11 @@ class Judge:
         """Return the difference that the given tolerance allows, (n,), in our unit."""
         if self.tolerance is None:
             return None
+        limits = self._allow(key)
         return np.asarray(
             self.tolerance.atol
             + self.tolerance.rtol * magnitude(ours)
-            + self.table.rounding[key]
+            + limits.rounding * limits.size
         )
 
     def explained(

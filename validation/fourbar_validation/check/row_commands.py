@@ -160,7 +160,8 @@ def _follow_law(
 
     def command_at(time: Array) -> Command:
         angle, speed, acceleration = law.at(time)
-        angle = np.where(fits(time), angle, table.places)
+        exact = np.abs(measure(time)) <= _ONE_PLACE
+        angle = np.where(exact, table.places, angle)
         at = _command_each(base, angle, scene)
         return at._replace(speed=speed, acceleration=acceleration)
 

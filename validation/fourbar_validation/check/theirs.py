@@ -151,6 +151,8 @@ class TheirTable:
     units: dict[str, Unit]
     lines: list[int]
     """The line of the file that each row stands in."""
+    filled: dict[str, Array]
+    """Rounding of values if the zeros at their ends were left off."""
     places_rounding: Array
     """Rounding of the angle, rad, (n,): half a unit of its last digit if the column is
     printed with _DECIMALS, else 0: somebody chose it.
@@ -188,6 +190,7 @@ class TheirTable:
             places=self.places[rows],
             values={key: value[rows] for key, value in self.values.items()},
             rounding={key: value[rows] for key, value in self.rounding.items()},
+            filled={key: value[rows] for key, value in self.filled.items()},
             lines=self.lines[rows],
             places_rounding=self.places_rounding[rows],
             times=None if self.times is None else self.times[rows],
@@ -301,6 +304,7 @@ def read_table(
         {found_by: halves[found_by]},
         {found_by: units[found_by]},
         lines,
+        {},
         _find_rounding(halves[found_by], units[found_by]),
         left_out,
         notes,
@@ -431,19 +435,32 @@ def _enter_column(
 ) -> None:
     """Enter a column into the table, a component into its vector."""
     halves = np.where(np.isnan(numbers), 0.0, halves)
+    filled = _fill_zeros(numbers / unit.factor, halves)
     if name[-2:] not in ("_x", "_y"):
-        table.values[name], table.rounding[name], table.units[name] = (
-            numbers,
-            halves,
-            unit,
-        )
+        table.values[name], table.units[name] = numbers, unit
+        table.rounding[name], table.filled[name] = halves, filled
         return
     vector = name[:-2]
     axis = "xy".index(name[-1])
     values = table.values.setdefault(vector, np.full((len(numbers), 2), np.nan))
     values[:, axis] = numbers
-    table.rounding[vector] = np.hypot(table.rounding.get(vector, 0.0), halves)
+    for roundings, more in ((table.rounding, halves), (table.filled, filled)):
+        roundings[vector] = np.hypot(roundings.get(vector, 0.0), more)
     table.units.setdefault(vector, unit)
+
+
+def _fill_zeros(numbers: Array, halves: Array) -> Array:
+    """Return the rounding of numbers with as many digits as others of their column.
+
+    Others are those that are not smaller by a decade.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decades = np.floor(np.log10(np.abs(numbers)))
+    order = np.argsort(-decades, kind="stable")
+    stated = np.where(np.isnan(numbers), np.inf, halves)
+    least = np.minimum.accumulate(stated[order])
+    last = np.searchsorted(-decades[order], -decades, side="right") - 1
+    return np.where(np.isnan(numbers), 0.0, least[last])
 
 
 def _find_rounding(halves: Array, unit: Unit) -> Array:

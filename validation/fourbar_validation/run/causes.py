@@ -155,7 +155,7 @@ def make_answer_table(answer: Answer, regular: Mask) -> TheirTable:
     units = {name: Unit(UNITS[name], 1.0) for name in values}
     lines = list(range(1, len(angle) + 1))
     rounding = dict.fromkeys(values, exact)
-    return TheirTable(angle, values, rounding, units, lines, exact, {})
+    return TheirTable(angle, values, rounding, units, lines, rounding, exact, {})
 
 
 def find_wrong(judge: Judge, key: str) -> Mask:
