@@ -2,9 +2,6 @@
 
 import sys
 
-import click
-
-from fourbar import __version__
 from fourbar.errors import run
 from fourbar_validation.cli import LazyCommand, LazyGroup
 
@@ -65,22 +62,15 @@ LAB_COMMANDS = {
 }
 
 
-@click.group(
-    cls=LazyGroup,
-    listed=LAB_COMMANDS,
-    invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-@click.version_option(__version__, "-V", "--version", prog_name="fourbar-lab")
-@click.pass_context
-def group(context: click.Context) -> None:
+group = LazyGroup(
+    "fourbar-lab",
     """Study the formulas, the harness that checks them, and the engines.
 
     Exit status: 0 all holds, 1 something does not hold, 2 the input is bad, 3 the
     environment or the program failed, 130 interrupted.
-    """
-    if context.invoked_subcommand is None:
-        click.echo(context.get_help())
+    """,
+    LAB_COMMANDS,
+)
 
 
 def main(arguments: list[str] | None = None) -> None:

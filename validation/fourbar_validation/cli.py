@@ -4,7 +4,7 @@ import sys
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pkgutil import resolve_name
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import click
 
@@ -77,8 +77,16 @@ COMMANDS = {
 class LazyGroup(click.Group):
     """A group that imports a command only when it is called."""
 
-    def __init__(self, *, listed: Mapping[str, LazyCommand], **settings: Any) -> None:
-        super().__init__(**settings)
+    def __init__(
+        self, name: str, about: str, listed: Mapping[str, LazyCommand]
+    ) -> None:
+        super().__init__(
+            help=about,
+            callback=click.pass_context(_show_help),
+            invoke_without_command=True,
+            context_settings={"help_option_names": ["-h", "--help"]},
+        )
+        click.version_option(__version__, "-V", "--version", prog_name=name)(self)
         self.listed = listed
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -114,22 +122,20 @@ def _say_missing(library: str) -> str:
     return f"Not available: {library} is not installed."
 
 
-@click.group(
-    cls=LazyGroup,
-    listed=COMMANDS,
-    invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-@click.version_option(__version__, "-V", "--version", prog_name="fourbar-validation")
-@click.pass_context
-def group(context: click.Context) -> None:
+def _show_help(context: click.Context) -> None:
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+group = LazyGroup(
+    "fourbar-validation",
     """Check the closed formulas of the planar four-bar against independent engines.
 
     Exit status: 0 all holds, 1 a comparison fails or nothing was compared, 2 the input
     is bad, 3 the environment or the program failed, 130 interrupted.
-    """
-    if context.invoked_subcommand is None:
-        click.echo(context.get_help())
+    """,
+    COMMANDS,
+)
 
 
 def main(arguments: list[str] | None = None) -> None:
