@@ -440,7 +440,6 @@ def _write_positions(
     from fourbar.solution import write_csv, write_json
 
     scene = solution.scene
-    assert scene is not None
     columns = [] if names is None else choose_columns(scene, solution, names)
     if form == "json":
         motor = list_duty(solution, units)

@@ -623,7 +623,6 @@ def make_scene(
 def list_defaults(scene: Scene) -> list[str]:
     """List the lengths that `make_scene` was given and its defaults, one line each."""
     theta_2 = scene.motion.theta_2
-    assert isinstance(theta_2, float)
     return [
         "lengths in m: "
         + ", ".join(

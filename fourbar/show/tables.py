@@ -196,7 +196,6 @@ def list_columns(
         shown |= _write_column(column, headings.get(name, name), units)
         if name != "sin_mu" or solution.time is not None or drive.error is None:
             continue
-        assert drive.values is not None
         digits = _count_torque_digits(drive.values, drive.error)
         shown[f"digits\nof {drive.symbol[0]}"] = digits
     return shown

@@ -278,7 +278,6 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 recorder, {name: getattr(solution, name) for name in PIN_FORCE.values()}
             )
         a_A = solution.a_A
-        assert a_A is not None
         pin_acceleration = (
             a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)
         ) - gravity

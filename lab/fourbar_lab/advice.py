@@ -186,7 +186,6 @@ def draw_advised_scene(seed: int, index: int) -> tuple[Scene, float]:
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*_SPEEDS))
     alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-_GENTLE, _GENTLE)]))
     sweep = scene.motion.theta_2
-    assert isinstance(sweep, Sweep)
     start, stop = sweep.start, sweep.stop
     if not turns_fully(scene.linkage):
         left_out = 0.5 * (1.0 - PART_OF_THE_RANGE) * (stop - start)
@@ -199,7 +198,6 @@ def draw_advised_scene(seed: int, index: int) -> tuple[Scene, float]:
 def _make_denser(scene: Scene, times: int) -> Scene:
     """Divide the same motion into more positions."""
     sweep = scene.motion.theta_2
-    assert isinstance(sweep, Sweep)
     sweep = replace(sweep, steps=sweep.steps * times)
     return replace(scene, motion=scene.motion.replace(angle=sweep))
 

@@ -93,12 +93,6 @@ def _answer_released(solution: Solution) -> tuple[dict[str, Any], dict[str, Any]
     time = solution.time
     omega = solution.omega_2
     alpha = solution.alpha_2
-    assert (
-        time is not None
-        and omega is not None
-        and alpha is not None
-        and solution.force_error is not None
-    )
     angle = PROMISED * max(1.0, float(time[-1] - time[0]) / _PROMISED_FOR)
     late = angle / float(np.abs(omega).max())
     n = len(time)

@@ -58,7 +58,6 @@ def compute_column(solution: Solution, name: str) -> Array | None:
         stage = of_stage.get(name[:2], solution.points)
         return stage.get(name[2:] if name[:2] in of_stage else name)
     of_spring = SPRING_NAME.fullmatch(name)
-    assert solution.scene is not None
     if of_spring and int(of_spring[1]) >= len(list_springs(solution.scene)):
         raise InputError("header", name, "does not exist in this scene")
     values = derive(solution, name)

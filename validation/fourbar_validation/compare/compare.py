@@ -705,7 +705,6 @@ def mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:
     speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(
         scene.drive_bar, formulas.stroke_speed
     )
-    assert speed is not None
     return mark_turning(speed)
 
 

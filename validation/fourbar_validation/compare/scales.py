@@ -186,7 +186,6 @@ def _sum_angular_accelerations(quantity: str, sizes: TermSizes) -> Array:
     w3 = formulas.omega_3
     w4 = formulas.omega_4
     a2 = formulas.alpha_2
-    assert w2 is not None and w3 is not None and w4 is not None and a2 is not None
     if quantity == "alpha_2":
         return np.abs(a2)
     terms = a * w2 * w2 + a * np.abs(a2) + b * w3 * w3 + c * w4 * w4
