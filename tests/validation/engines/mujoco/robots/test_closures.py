@@ -428,6 +428,66 @@ def test_loops_that_share_bars_are_counted_together(held, counts, ground):
     assert "--hold" not in second.reason and "motors" not in second.reason
 
 
+PUSHED = """
+<mujoco><worldbody>
+<body name="tube"><joint name="tube" axis="0 1 0"/><geom size=".01"/>
+ <body name="rod" pos=".1 0 0"><joint name="rod" type="slide" axis="1 0 0"/>
+  <geom size=".01"/>{tip}</body></body>
+{lever}
+<body name="bucket" pos=".6 0 0"><joint name="bucket" axis="0 1 0"/><geom size=".01"/>
+ <body name="link" pos="0 0 .2"><joint name="link" axis="0 1 0"/><geom size=".01"/>
+  <site name="far" pos="-.4 0 0"/></body></body>
+</worldbody><equality><connect name="foot" site1="low" site2="foot"/>
+<connect name="top" site1="near" site2="far"/></equality></mujoco>
+"""
+LEVER = """
+<body name="lever" pos="{}"><joint name="lever" axis="0 1 0"/><geom size=".01"/>
+ <site name="near" pos="{}"/><site name="low" pos="{}"/></body>
+"""
+"""The lever on the rod and its foot on the ground, and the other way round, m."""
+
+
+def test_a_four_bar_whose_lever_hangs_on_a_slide_is_named_and_can_be_made_one():
+    top = LEVER.format(".1 0 .1", "0 0 .1", "0 0 -.1")
+    foot = '<site name="foot" pos=".2 0 0"/>'
+    *_, closure = report_of(PUSHED.format(tip=top, lever=foot)).closures
+    assert closure.reason.startswith("rod is a slide")
+    assert closure.reason.endswith(
+        "lever, link, bucket on world (400.0, 200.0, 400.0, 200.0 mm) are a four-bar,"
+        " but lever belongs to another loop too: to measure it make a hinge of foot and"
+        " a connect of another joint of that loop"
+    )
+    low = LEVER.format(".2 0 0", "0 0 .2", "0 0 .1")
+    tip = '<site name="foot" pos=".1 0 .1"/>'
+    *_, closure = report_of(PUSHED.format(tip=tip, lever=low)).closures
+    assert closure.loop is not None
+    assert closure.loop.lengths == pytest.approx((0.4, 0.2, 0.4, 0.2))
+
+
+STANDS = """
+<mujoco><worldbody>
+<body name="crank"><joint name="f" axis="0 1 0"/><geom size=".01"/>
+ <body name="rod" pos="0 0 .07"><joint name="r" axis="0 1 0"/><geom size=".01"/></body>
+</body>
+<body name="base" pos=".05 0 0"><joint name="b" axis="0 1 0"/><geom size=".01"/>
+ <body name="back"><joint name="e" axis="0 1 0"/><geom size=".01"/></body></body>
+</worldbody><equality><connect body1="rod" body2="back" anchor=".05 0 0"/>
+<connect body1="base" body2="crank" anchor="-.05 0 0"/></equality></mujoco>
+"""
+
+
+def test_a_bar_that_is_pinned_on_the_axis_of_another_hinge_stands():
+    """Its bars are those of a parallelogram that the second closure does not hold."""
+    finger, idle = report_of(STANDS).closures
+    assert finger.loop is not None
+    assert finger.loop.lengths == pytest.approx((0.05, 0.07, 0.05, 0.07))
+    assert finger.loop.remarks[0].startswith("no motor acts on it: f is taken")
+    assert idle.reason == (
+        "it lies on the axis of f and leaves it free; b cannot turn by it, and counts"
+        " as held"
+    )
+
+
 def test_two_fingers_on_one_base_stay_apart():
     finger = (
         '<body name="{0}a" pos="{1} 0 0"><joint name="{0}a" axis="0 1 0"/>'

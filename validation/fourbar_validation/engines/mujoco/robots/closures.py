@@ -266,10 +266,38 @@ class _Finder:
         self.data = posed.data
         self.held = {find_joint(self.model, name, "--hold") for name in options.held}
         self.root = find_roots(self.model, self.held)
+        self.standing = self._hold_standing()
         self.normals = find_normals(self.model, self.data, self.held)
         self.before = mujoco.MjData(self.model)
         self.before.qpos[:] = posed.stated
         mujoco.mj_kinematics(self.model, self.before)
+
+    def _hold_standing(self) -> dict[int, int]:
+        """Hold the hinges that cannot turn, and return them by the closure that acts.
+
+        A closure of two hinges that lies on the axis of one leaves this one free. The
+        other hinge stands.
+        """
+        standing = {}
+        for number in self._list_others(-1):
+            chain = _Chain(self, number)
+            away = self._list_away(chain)
+            if chain.is_pin and len(away) == 1 and len(chain.joints) == 2:
+                (standing[number],) = away
+                self.held.update(away)
+        self.root = find_roots(self.model, self.held)
+        return standing
+
+    def _list_away(self, chain: _Chain) -> list[int]:
+        """List the joints of a chain but the hinges on whose axis its closure lies."""
+        place, _ = find_ends(self.model, self.data, chain.number)
+        arms = np.cross(place - self.data.xanchor, self.data.xaxis)
+        near = np.linalg.norm(arms, axis=1) <= LARGEST_RESIDUAL
+        return [one for one in chain.joints if one in chain.others or not near[one]]
+
+    def _is_idle(self, chain: _Chain) -> bool:
+        """Tell whether a closure lies on the axes of all its hinges, and holds none."""
+        return chain.is_pin and not self._list_away(chain)
 
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""
@@ -354,7 +382,8 @@ class _Finder:
         if not chain.joints:
             raise _NoFourBarError("both ends are on one rigid body")
         reason = (
-            self._find_ball_in_a_plane(chain)
+            self._explain_idle(chain)
+            or self._find_ball_in_a_plane(chain)
             or self._find_other_joint(chain)
             or self._find_skew_axes(chain)
         )
@@ -365,6 +394,17 @@ class _Finder:
         if reason:
             raise _NoFourBarError(reason)
         return self._make_loop(chain)
+
+    def _explain_idle(self, chain: _Chain) -> str:
+        """Say what a closure on the axes of its hinges holds; empty for others."""
+        if not self._is_idle(chain):
+            return ""
+        names = ", ".join(name_joint(self.model, joint) for joint in chain.joints)
+        text = f"it lies on the axis of {names} and leaves it free"
+        if chain.number in self.standing:
+            stands = name_joint(self.model, self.standing[chain.number])
+            text += f"; {stands} cannot turn by it, and counts as held"
+        return text
 
     def _find_ball_in_a_plane(self, chain: _Chain) -> str:
         """Say what to type for one ball among hinges with parallel axes.
@@ -401,7 +441,10 @@ class _Finder:
             SLIDE: f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})",
         }
         for joint, kind in chain.others.items():
-            return f"{name_joint(self.model, joint)} {words[kind]}"
+            inner = ""
+            if kind == SLIDE and chain.hinges:
+                inner = self._describe_inner_four_bar(chain, self._find_coupled(chain))
+            return f"{name_joint(self.model, joint)} {words[kind]}{inner}"
         return ""
 
     def _suggest_hinge(self, chain: _Chain) -> str:
@@ -490,6 +533,7 @@ class _Finder:
         Loops that share bars with such a loop are among them.
         """
         others = [_Chain(self, other) for other in self._list_others(chain.number)]
+        others = [other for other in others if not self._is_idle(other)]
         joints = {*chain.joints}
         coupled: list[_Chain] = []
         while more := [other for other in others if joints & {*other.joints}]:
@@ -537,18 +581,21 @@ class _Finder:
             f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
             f" ({_SERVE_PLANAR})"
         )
-        return text + self._describe_inner_four_bar(chain, coupled, joints)
+        return text + self._describe_inner_four_bar(chain, coupled)
 
-    def _describe_inner_four_bar(
-        self, chain: _Chain, coupled: list[_Chain], joints: set[int]
-    ) -> str:
+    def _describe_inner_four_bar(self, chain: _Chain, coupled: list[_Chain]) -> str:
         """Describe the four bars that a closure and three pins of others join, if any.
 
         The pins may be those of other closures.
         """
         model = self.model
         pins = dict[frozenset[int], Array]()
-        for joint in joints:
+        connects = dict[frozenset[int], str]()
+        hinges = {*chain.hinges}.union(*(other.hinges for other in coupled))
+        for joint in hinges:
+            across = np.cross(*self.data.xaxis[[joint, chain.hinges[0]]])
+            if float(np.linalg.norm(across)) > math.sin(PARALLEL):
+                continue
             parent = self.root[find_parent(model, int(model.jnt_bodyid[joint]))]
             pins[frozenset((self._find_root(joint), parent))] = self.data.xanchor[joint]
         for one in (*coupled, chain):
@@ -556,6 +603,7 @@ class _Finder:
             first, last = (self.root[end] for end in ends)
             place, _ = find_ends(model, self.data, one.number)
             pins[frozenset((first, last))] = place
+            connects[frozenset((first, last))] = self._name(one.number)
         of_others = {
             self._find_root(joint) for other in coupled for joint in other.joints
         }
@@ -579,10 +627,17 @@ class _Finder:
             if len(shared) == len(cycle) - 1:  # it is the four-bar of another closure
                 continue
             lengths = ", ".join(write_length(sizes[bar]) for bar in cycle)
-            return (
+            text = (
                 f"; {', '.join(names[1:])} on {names[0]} ({lengths} mm) are a"
                 f" four-bar, but {', '.join(shared)} belongs to another loop too"
             )
+            in_it = [connects[pair] for pair in pairs[:-1] if pair in connects]
+            if in_it:
+                text += (
+                    f": to measure it make a hinge of {', '.join(in_it)} and a connect"
+                    " of another joint of that loop"
+                )
+            return text
         return ""
 
     def _list_holdable(
@@ -794,7 +849,7 @@ class _Finder:
             hinge_of[self.root[body]]: self._name(other)
             for other in self._list_others(number)
             for body in find_tied_bodies(self.model, other)
-            if self.root[body] in hinge_of
+            if self.root[body] in hinge_of and not self._is_idle(_Chain(self, other))
         }
         return next(iter(pushed.items())) if len(pushed) == 1 else (None, "")
 
