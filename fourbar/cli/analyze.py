@@ -562,7 +562,7 @@ def tolerance(
             seed,
             progress=progress,
         )
-    if (spreads.without == spreads.samples).all():
+    if not (spreads.spreads["sin_mu"].deviation >= 0.0).any():
         raise _assembles_nowhere(scene, stated)
     named = given.suit_file_units() if units is None else units
     if out is not None:

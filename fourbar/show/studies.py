@@ -39,7 +39,7 @@ from fourbar.show.acting import list_spring_notes
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.lines import wrap_line
 from fourbar.show.motion_curves import find_drive_rounding
-from fourbar.show.shown_units import COMMON, choose_unit
+from fourbar.show.shown_units import COMMON, choose_unit, write_cell
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
     make_plain_table,
@@ -257,11 +257,15 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     changes = {
         name: {row.key: row.change for row in influences[name]} for name in names
     }
-    rows = [
-        ["largest value", *(f"{find_largest(derivatives, name):.4g}" for name in names)]
-    ]
+    others = {
+        name: 0.0 if np.isfinite(derivatives.by[name]).any() else math.nan
+        for name in names
+    }
+    largest = (find_largest(derivatives, name) for name in names)
+    rows = [["largest value", *(write_cell(value, ".4g") for value in largest)]]
     for key in rank_numbers(derivatives, names):
-        rows.append([key, *(f"{changes[name].get(key, 0.0):.3g}" for name in names)])
+        moved = (changes[name].get(key, others[name]) for name in names)
+        rows.append([key, *(write_cell(change, ".3g") for change in moved)])
     table = make_plain_table(
         ["", *(f"{name}\n{find_unit_of_quantity(name)}" for name in names)],
         rows,

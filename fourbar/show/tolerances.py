@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, write_count
 from fourbar.linkage import MOVING_BARS
@@ -104,11 +105,12 @@ def write_spreads(
             " there is due to"
         ),
     ]
-    shown = {
-        part: int(np.nanargmax(spreads.spreads[part].worst))
-        for part in list_shown_parts(spreads)
-        if np.isfinite(spreads.spreads[part].worst).any()
-    }
+    shown = {}
+    for part in list_shown_parts(spreads):
+        spread = spreads.spreads[part]
+        size = spread.worst if np.isfinite(spread.worst).any() else spread.deviation
+        if np.isfinite(size).any():
+            shown[part] = int(np.nanargmax(size))
     for part, worst in shown.items():
         if most := _name_largest(spreads, spreads.spreads[part], worst):
             lines.append(f"  {part}: {most}")
@@ -140,7 +142,7 @@ def _tabulate_parts(
         numbers = [write_cell(number, f".{digits}g") for number in cleaned]
         numbers[1] = write_cell(cleaned[1], ".3g")
         angle = write_cell(of_angle * spreads.theta_2[worst], f".{digits}g")
-        most = f"{factor * spread.worst[worst]:.3g}"
+        most = write_cell(factor * spread.worst[worst], ".3g")
         rows.append([part, unit, angle, *numbers, most])
     band = [f"\n{percentile:g} %" for percentile in BAND_PERCENTILES]
     heads = ["", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", *band]
@@ -172,18 +174,38 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
         if lost:
             share = 100.0 * lost / samples
             lines.append(f"{lost} of {samples} samples ({share:.3g} %) {why}")
-    parted = (
-        describe_parted(spreads, part, units) for part in list_shown_parts(spreads)
-    )
-    return [*lines, *filter(None, parted)]
+    for part in list_shown_parts(spreads):
+        lines += describe_parted(spreads, part, units)
+    return lines
 
 
-def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES) -> str:
-    """Say where first order and samples differ; empty where they do not."""
+def describe_parted(
+    spreads: Tolerances,
+    part: str,
+    units: Conversion = DEGREES,
+) -> list[str]:
+    """Say where first order and samples differ, and where only samples have a value."""
     spread = spreads.spreads[part]
-    rows = np.flatnonzero(spread.parted)
-    if not rows.size:
-        return ""
+    alone = np.isnan(spread.first_order)
+    differ = (
+        f"the samples spread by more than {100.0 * PARTED:g} % more or less than first"
+        " order says"
+    )
+    return [
+        f"{part}: {words} at {_name_positions(spreads, rows, units)}: trust the samples"
+        " there"
+        for words, rows in (
+            (differ, np.flatnonzero(spread.parted & ~alone)),
+            ("first order has no value", np.flatnonzero(spread.parted & alone)),
+        )
+        if rows.size
+    ]
+
+
+def _name_positions(
+    spreads: Tolerances, rows: NDArray[np.intp], units: Conversion
+) -> str:
+    """Count positions, and name the first intervals of theta_2 that they fill."""
     unit, factor = find_unit_in("rad", units)
     runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     ends = [
@@ -196,11 +218,8 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
     places = ", ".join(ends[:_MOST_RUNS])
     if len(ends) > _MOST_RUNS:
         places += ", ..."
-    return (
-        f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less"
-        f" than first order says at {rows.size} of {len(spreads.theta_2)} positions"
-        f" (theta_2 = {places} {unit}): trust the samples there"
-    )
+    positions = write_count(len(spreads.theta_2), "position")
+    return f"{rows.size} of {positions} (theta_2 = {places} {unit})"
 
 
 def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:

@@ -65,7 +65,8 @@ an angle.
 """
 AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest. Its couple, and all that follows from
-it, jumps with the motion.
+it, jumps with the motion. A linkage that stands has its couple 0 and the derivatives of
+that, but none by the speed.
 """
 AT_FREE_LENGTH = "at_free_length"
 """Status where a spring that acts one way just comes off: slopes jump there."""
@@ -105,7 +106,8 @@ class Sensitivity:
     status: list[str]
     """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a
     pin; "at_free_length": a spring that acts one way just comes off. Torque and pin
-    forces have no derivative there. Quantities that a status other than ok concerns are
+    forces have no derivative there; of a linkage that stands, with friction 0, only
+    that by the speed is missing. Quantities that a status other than ok concerns are
     NaN.
     """
     by: dict[str, Array]
@@ -382,8 +384,11 @@ def sensitivity(scene: Scene) -> Sensitivity:
                     )
                 else:
                     by[name][:, index] = slopes.real
+    stands = (status == AT_REST) & (at.stated[1] == 0.0)
+    by_speed = np.array([[key == f"motion.{at.names[1]}"] for key in keys])
+    lost = (status != STATUS_NAMES[OK]) & (by_speed | ~stands)
     for name in set(forces) & set(names):
-        by[name][:, status != STATUS_NAMES[OK]] = np.nan
+        by[name][lost] = np.nan
     return Sensitivity(
         scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by
     )

@@ -15,7 +15,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import require_whole
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Scene, command
-from fourbar.solution import find_values, split_parts
+from fourbar.solution import find_values, is_scalar, split_parts
 from fourbar.solving import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
@@ -246,7 +246,13 @@ def tolerances(
 
         parts = replace(study, at=study.at.with_arrays(take))
         width = columns.stop - columns.start
-        solution = solve(parts)
+        shape = parts.at.angle.shape
+        out = {
+            name: np.empty(shape if is_scalar(name) else (*shape, 2))
+            for name in names
+            if name != "theta_2"  # every solution has it
+        }
+        solution = solve(parts, out=out)
         code = solution.status_code[:, -width:]
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)

@@ -88,8 +88,8 @@ def draw_tolerances(
             " samples; thin: least and greatest sampled; dashed: first-order worst"
             " case."
         )
-        parted = (describe_parted(spreads, part) for part in parts)
-        lines = [caption, *filter(None, parted)]
+        parted = (line for part in parts for line in describe_parted(spreads, part))
+        lines = [caption, *parted]
         text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
         figure.supxlabel(text, **CAPTION_STYLE)
         Drawing(figure).save(path)

@@ -18,7 +18,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.keys import list_entries, read_place
-from tests.fourbar.studies.test_study import ANGLES, LINK, scene
+from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
 
 MODELS = Path(__file__).parents[3] / "models"
 
@@ -46,9 +46,13 @@ def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
 
 
 def test_where_there_is_no_derivative_a_status_says_why():
-    rest = sensitivity(scene((Friction.at(B=0.05),), 2, omega_2=0.0))
-    assert rest.status == ["at_rest"] * len(ANGLES)
-    assert np.isnan(rest.by["torque"]).all() and np.isfinite(rest.by["a_G3"]).all()
+    d, a, b, c = LINK.lengths
+    in_line = np.arccos(((a + b) ** 2 + d * d - c * c) / (2.0 * d * (a + b)))
+    stops = sensitivity(
+        scene((Friction.at(O4=0.05),), theta_2=LINK.ground_angle + in_line)
+    )
+    assert stops.status == ["at_rest"]
+    assert np.isnan(stops.by["torque"]).all() and np.isfinite(stops.by["a_G3"]).all()
     jammed = sensitivity(scene((PinFriction.at(A=(9.0, 2.0)),), 2))
     assert set(jammed.status) <= {"jammed", "several"}
     assert np.isnan(jammed.by["F12"]).all()
@@ -62,6 +66,18 @@ def test_where_there_is_no_derivative_a_status_says_why():
     assert lost.any() and not lost.all()
     for name, rows in slopes.by.items():
         assert np.isnan(rows[:, lost]).all() and np.isfinite(rows[:, ~lost]).all(), name
+
+
+@pytest.mark.parametrize("dry", [Friction.at(B=0.05), RUBBING[1]])
+def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
+    """Torque and pin forces are those with friction 0; the speed makes them jump."""
+    rest = sensitivity(scene((Gravity(), dry), omega_2=0.0))
+    smooth = sensitivity(scene((Gravity(),), omega_2=0.0))
+    assert rest.status == ["at_rest"] * len(ANGLES)
+    for name in ("torque", "F12", "F43", "power"):
+        assert np.isnan(rest.of(name, "motion.omega_2")).all()
+        for key in smooth.keys.keys() - {"motion.omega_2"}:
+            assert_allclose(rest.of(name, key), smooth.of(name, key), atol=1e-13)
 
 
 def differ_by_a_study(nominal, key):

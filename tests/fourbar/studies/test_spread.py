@@ -138,11 +138,14 @@ def test_a_bad_tolerance_is_one_line(line, words):
 
 
 def test_the_positions_at_which_first_order_fails_are_named_each():
-    parted = SimpleNamespace(parted=np.isin(np.arange(73), (0, 1, 9, 72)))
+    parted = np.isin(np.arange(73), (0, 1, 9, 72, 40))
+    first_order = np.where(np.arange(73) == 40, np.nan, 1.0)
+    parted = SimpleNamespace(parted=parted, first_order=first_order)
     degrees = np.radians(np.arange(0.0, 361.0, 5.0))
     study = SimpleNamespace(theta_2=degrees, spreads={"torque": parted})
-    said = "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)"
-    assert said in describe_parted(study, "torque")
+    differ, alone = describe_parted(study, "torque")
+    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in differ
+    assert "first order has no value at 1 of 73 positions (theta_2 = 200" in alone
 
 
 INPUT = Tolerance("lengths.input", 5e-5)
