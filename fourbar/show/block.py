@@ -675,17 +675,26 @@ class _SceneBlock:
         yield _row("speed", row)
 
     def _write_bore(self, pressure: float) -> Iterator[str]:
-        """Write the bore that pushes, and the area that pulls, at a pressure."""
-        if self.facts.peak is None:
+        """Write the bore that pushes, and the area that pulls, at a pressure.
+
+        Where dry friction holds a linkage at rest, they suffice to move it.
+        """
+        facts = self.facts
+        if facts.peak is None:
             yield _row("bore", "none is enough, as the force grows without bound")
             return
+        panels = facts.motion.panels
+        solution = self.solution
+        if facts.held and panels.located:
+            solution = facts.motion.solve_at(panels.list_nodes().ravel())
         parts = []
-        for sense, does in (
-            (1, " to push"),
-            (-1, ", and the rod's area besides, to pull"),
+        for sense, end, does in (
+            (1, LINE.high, " to push"),
+            (-1, LINE.low, ", and the rod's area besides, to pull"),
         ):
-            peak = self.facts.motion.panels.find_peak(LINE.value, sense)
-            force = sense * peak.value
+            force = sense * panels.find_peak(LINE.value, sense).value
+            if facts.held:
+                force = max(force, np.nanmax(sense * getattr(solution, end)))
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
                 parts.append(

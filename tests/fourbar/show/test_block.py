@@ -536,6 +536,16 @@ def test_a_bore_is_that_of_the_motion_and_not_of_its_positions(scene, place):
     assert re.search(said, block(scene, pressure=210e5))
 
 
+def test_a_bore_at_rest_moves_the_linkage_against_its_friction():
+    motion = Motion(Sweep(1.0, 2.6, 8), 0.0)
+    rubbing = {"loads": (SPIKE,), "effects": (Friction.at(O2=5.0),), "drive": CYLINDER}
+    creeping = Motion(np.full(2, CORNERS[2]), np.array([-1e-9, 1e-9]))
+    force = np.abs(solve(crank_rocker(motion=creeping, **rubbing)).drive_force).max()
+    bore = 1e3 * sqrt(4.0 * force / (pi * 210e5))
+    text = block(crank_rocker(motion=motion, **rubbing), pressure=210e5)
+    assert re.search(rf"{bore:.4g} mm\b[^;]* to pull {force:.4g} N", text)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("bar", (2, 3))
 def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
