@@ -98,7 +98,7 @@ class Table(Described):
         first = self.theta_2[0]
         wrapped = shorten(angle(polar(1.0, theta_2)))
         place = first + np.remainder(wrapped - first, TURN)
-        place = self._require_covered(place)
+        place = self._require_covered(theta_2, place)
         piece = np.searchsorted(np.array(self.theta_2), place, "right") - 1
         piece = np.clip(piece, 0, len(self.theta_2) - 2)
         points = make_like(self.theta_2, theta_2)
@@ -114,8 +114,8 @@ class Table(Described):
         past = rest + turns_left * TURN + (lost - turns * _BEYOND_TURN)
         return before + rise * (past / width)
 
-    def _require_covered(self, place: Any) -> Any:
-        """Return angles within a turn from the first.
+    def _require_covered(self, theta_2: Any, place: Any) -> Any:
+        """Return the places of angles within a turn from the first.
 
         Raises InputError for one that the table does not cover.
         """
@@ -128,7 +128,7 @@ class Table(Described):
         round_ = beyond & (first + TURN - place < 1e-12 * TURN)
         if not (round_ == beyond).all():
             ends = np.degrees((first, last))
-            bad = math.degrees(float(np.max(place)))
+            bad = math.degrees(np.extract(beyond & ~round_, theta_2)[0])
             allowed = (
                 f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g}"
                 " deg lies outside"

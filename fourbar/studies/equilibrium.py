@@ -25,7 +25,6 @@ from fourbar.errors import expect
 from fourbar.formulas.mobility import (
     ANGLE_FROM_LIMITS,
     TURN,
-    Circuit,
     turns_fully,
 )
 from fourbar.formulas.motion import Coefficients
@@ -48,7 +47,6 @@ from fourbar.studies.circuit_curve import (
     ROUND_OFF_OF_Q,
     CircuitCurve,
     RestPosition,
-    of_input,
     transmission_angle,
 )
 from fourbar.studies.course import bisect
@@ -147,9 +145,11 @@ def equilibrium(scene: Scene) -> Equilibria:
     both. If the scene states a sweep (of theta_2, of another bar or of a stroke) or a
     motion law, the search stays within the angles theta_2 of it, and `reached` tells
     apart what the sweep itself passes. Speed, acceleration and drive of the scene play
-    no part, nor does viscous damping. Zeros of the generalized force Q are sought
-    between the positions of a grid (3600 a turn, and the ends of the sweep): where Q
-    changes its sign, and where its size is least.
+    no part, nor does viscous damping. Torsion springs are followed from the scene's
+    first position; without a sweep an input that turns fully gets from there to the
+    others either way round, and what no way reaches is no equilibrium. Zeros of the
+    generalized force Q are sought between the positions of a grid (3600 a turn, and the
+    ends of the sweep): where Q changes its sign, and where its size is least.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def equilibrium(scene: Scene) -> Equilibria:
             )
             equilibria.append(_describe_equilibrium(curve, point, size, around))
         singular = tuple(map(curve.place, curve.singular))
-        positions = _solve_at_rest(scene, curve.circuit)
+        positions = _solve_at_rest(curve)
         psi = positions.theta_2 - curve.theta_1
         sense = _moves(
             curve,
@@ -202,48 +202,63 @@ def equilibrium(scene: Scene) -> Equilibria:
 def _mark_wound(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
     """Mark points at which a torsion spring is wound beyond half a turn from its rest.
 
-    The spring is followed from the first position of the sweep that assembles, to the
-    points that the sweep passes.
+    Not marked is what lies beyond a limit or a change point from the first position.
     """
     wound = np.zeros(len(points), dtype=bool)
-    scene = curve.scene
-    if curve.sweep is None or not scene.counts_turns:
+    if not curve.scene.counts_turns:
         return wound
-    stated = curve.at
-    assembled = solve(scene, "position", at=stated).assembled
-    first = stated.theta_2[assembled][:1]
-    for row in np.flatnonzero(curve.reached(points)):
-        theta_2 = np.array([*first, curve.place(points[row]).theta_2])
-        branch = np.full(2, stated.branch[0], dtype=np.int8)
-        followed = solve(scene, "force", at=Command(theta_2, branch, 0.0, 0.0))
-        wound[row] = followed.status_code[1] == WOUND
+    passed = curve.reached(points)
+    if curve.sweep is None and not curve.full:
+        passed &= np.sin(points[:, 1]) * curve.at.branch[0] > 0.0
+    places = [curve.place(point).theta_2 for point in points[passed]]
+    wound[passed] = _is_wound(curve, _turn_to(curve, np.array(places)))
     return wound
 
 
-def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
+def _is_wound(curve: CircuitCurve, theta_2: Array) -> NDArray[np.bool_]:
+    """Mark angles at which a torsion spring is wound.
+
+    The spring is followed from the scene's first position that assembles.
+    """
+    stated = curve.at
+    assembled = solve(curve.scene, "position", at=stated).assembled
+    angles = np.concatenate([stated.theta_2[assembled][:1], theta_2])
+    branch = np.full(angles.shape, stated.branch[0], dtype=np.int8)
+    followed = solve(curve.scene, "force", at=Command(angles, branch, 0.0, 0.0))
+    return np.asarray(followed.status_code[1:] == WOUND)
+
+
+def _turn_to(curve: CircuitCurve, theta_2: Array) -> Array:
+    """Return the angles at which positions are reached from the scene's first one.
+
+    Without a sweep an input that turns fully is turned the other way round where a
+    torsion spring would be wound.
+    """
+    if curve.sweep is not None or not curve.full or not curve.scene.counts_turns:
+        return theta_2
+    back = np.copysign(curve.period, theta_2 - curve.at.theta_2[0])
+    return np.where(_is_wound(curve, theta_2), theta_2 - back, theta_2)
+
+
+def _solve_at_rest(curve: CircuitCurve) -> Solution:
     """Solve the scene's positions at rest.
 
     For a single position, or a released linkage, these are those of the circuit.
     """
-    at = of_input(scene)
+    scene = curve.scene
+    at = curve.at
     if len(at.theta_2) == 1:
         if turns_fully(scene.linkage):
             theta_2 = default_places(replace(scene, motion=Motion()))
         else:
-            low, high = circuit.theta_2
+            low, high = curve.circuit.theta_2
             margin = min(ANGLE_FROM_LIMITS, 0.25 * (high - low))
             theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
-        at = Command(
-            theta_2,
-            np.full(theta_2.shape, at.branch[0], dtype=np.int8),
-            0.0,
-            0.0,
-        )
-    return solve(
-        scene,
-        "force",
-        at=Command(at.theta_2, at.branch, 0.0, 0.0, origin=at.origin),
-    )
+        branch = np.full(theta_2.shape, at.branch[0], dtype=np.int8)
+        at = Command(theta_2, branch, 0.0, 0.0)
+    at = Command(at.theta_2, at.branch, 0.0, 0.0, origin=at.origin)
+    turned = at._replace(angle=_turn_to(curve, at.theta_2))
+    return replace(solve(scene, "force", at=turned), theta_2=at.theta_2, at=at)
 
 
 def _describe_equilibrium(
@@ -471,7 +486,9 @@ def _list_ranges(
 
     def there(tau: Array) -> NDArray[np.bool_]:
         points = curve.points(tau)
-        return curve.inside(points[:, 0]) & holds(points)
+        inside = curve.inside(points[:, 0])
+        inside[inside] = holds(points[inside])  # a load may have no value beyond
+        return inside
 
     grid = (np.arange(curve.positions) + 0.5) * (curve.period / curve.positions)
     tau = np.concatenate([grid, curve.tau(points_held)])

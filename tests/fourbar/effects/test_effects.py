@@ -153,9 +153,9 @@ def test_a_table_is_linear_between_its_points_and_periodic():
     right = [0.0, 1.0, 4.0, 2.0, 1.0, 2.0 / (tau - 1.0)]
     assert table.at(angles) == approx(right, abs=1e-14)
     quarter = Table(("0 deg", "90 deg"), (0.0, 1.0))
-    covered = "covers 0 to 90 deg; the position at 120 deg lies outside"
+    covered = "covers 0 to 90 deg; the position at 480 deg lies outside"
     with raises(InputError, match=covered):
-        quarter.at(np.radians([45.0, 120.0]))
+        quarter.at(np.radians([45.0, 480.0, 125.0]))
 
 
 def test_breaks_change_their_sign_where_forces_jump_or_bend():

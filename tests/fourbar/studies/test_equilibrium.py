@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx
 
 import fourbar
@@ -27,6 +27,7 @@ from fourbar import (
     Spring,
     Springs,
     Sweep,
+    Table,
     Torsion,
     solve,
 )
@@ -128,6 +129,15 @@ PENDULUMS = {
             "that leaves out the other": Sweep(-3.0, 1.2, 30),
         }.items()
     },
+    "a sweep that a table just covers": (
+        crank_as_pendulum(
+            Friction.at(O2=0.01),
+            loads=(Load(2, moment=-2.0, table=Table((0.3, 1.0), (-0.4, 0.3))),),
+            theta_2=Sweep(0.3, 1.0, 10),
+        ),
+        [("stable", 0.7, -2.0, J)],
+        CLOSE,
+    ),
     # at half a turn from rest its force jumps, which is no equilibrium
     **{
         f"torsion {name}": (
@@ -343,6 +353,26 @@ def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, angles)
     assert ends
     for angle, *_, word in ends:
         assert (word == "wound") == (start == 60 and float(angle) >= 113.0)
+
+
+def test_without_a_sweep_a_torsion_spring_is_followed_either_way_round():
+    """The one at O2 is wound nowhere. Past half a turn from the rest of the one at O4,
+    which swings, no way leads.
+    """
+    spring = Torsion.at(O2=(2.0, -2.2, 0.0))
+    positions = equilibrium(crank_as_pendulum(spring)).positions
+    from_rest = np.remainder(positions.theta_2 + 2.0 + pi, TURN) - pi
+    assert_allclose(positions.torque, 2.0 * from_rest, rtol=1e-12)
+    middle = 0.5 * (positions.theta_4.min() + positions.theta_4.max())
+    spring = Torsion.at(O4=(2.0, middle - pi - 0.2, 0.0))
+    balances = Load(4, moment=2.0 * (0.05 - pi))  # 0.05 rad past the middle
+    beside = positions.theta_2[np.argmin(positions.theta_4)]
+    scene = crank_as_pendulum(spring, loads=(balances,), theta_2=beside)
+    equilibria = equilibrium(scene)
+    wound = np.array(equilibria.positions.status) == "wound"
+    assert_array_equal(wound, positions.theta_4 > middle)
+    (reached,) = equilibria.found  # where the output turns back
+    assert reached.place.theta_4 == approx(positions.theta_4.min(), abs=1e-4)
 
 
 def springy_table(**motion):
