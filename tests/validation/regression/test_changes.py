@@ -222,14 +222,17 @@ def test_a_renamed_guest_is_held_to_its_rule_and_to_what_it_answered():
 def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone():
     whole = about({"wg": "", "b": ""}, **{"scenes of": "hard"})
     both = [changed(scene=s, engine=e) for s in "st" for e in ("wg", "b")]
-    for settings, rows, not_run, gone in (
-        ({"chosen": "b"}, both[1::2], ["wg (2 rows)"], []),
-        ({}, both[1::2], [], ["engine wg is gone (2 rows)"]),
-        ({"scenes of": ""}, both[:2], ["scene t (2 rows)"], []),
-        ({"scenes of": "x"}, both[:2], ["scene t (2 rows)"], []),
-        ({"scenes of": "hard"}, both[:2], [], ["scene t is gone (2 rows)"]),
+    without = ["engine wg is gone (2 rows)"]
+    for before, settings, rows, not_run, gone in (
+        ("b, wg 1", {"chosen": "b"}, both[1::2], ["wg (2 rows)"], []),
+        ("b", {"chosen": "b"}, both[1::2], [], without),  # wg was named by --guest
+        ("", {}, both[1::2], [], without),
+        ("", {"scenes of": ""}, both[:2], ["scene t (2 rows)"], []),
+        ("", {"scenes of": "x"}, both[:2], ["scene t (2 rows)"], []),
+        ("", {"scenes of": "hard"}, both[:2], [], ["scene t is gone (2 rows)"]),
     ):
         asked = about({row.engine: "" for row in rows}, **settings)
+        whole.settings["chosen"] = before
         found = compare_rows((whole, both), (asked, rows))
         assert (found.not_run, found.gone) == (not_run, gone), settings
         assert found.status == bool(gone) and not found.strange
@@ -258,5 +261,7 @@ def test_a_scene_that_an_engine_newly_refuses_is_one_regression():
     assert found.gone == ["scene scene is newly refused by wg (3 rows)"]
     first = render.write_differences(found).splitlines()[0]
     assert first == f"Gone: {found.gone[0]}" and found.status == FAILED
+    found = compare_rows((HERE, [ROW]), (HERE, [refusal, ROW]))
+    assert found.kinds[Kind.NEW] == 1 and found.status == HOLDS
     as_before = compare_rows((HERE, [refusal, ROW]), (HERE, [refusal, ROW]))
     assert not as_before.gone and as_before.status == HOLDS

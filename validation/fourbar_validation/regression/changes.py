@@ -454,12 +454,9 @@ def _classify_rows(
         / conditions.where(conditions > 0.0).min(axis=1).fillna(1.0)
     ).where(in_old & in_new)
     missing = _classify_missing(table, before, after)
-    refused = (
-        table[(table.quantity == "all") & (table.verdict_new == REFUSES) & ~in_old]
-        .set_index(["scene", "engine"])
-        .index
-    )
-    refused = table.set_index(["scene", "engine"]).index.isin(refused)
+    pairs = table.set_index(["scene", "engine"]).index
+    refused = (table.quantity == "all") & (table.verdict_new == REFUSES) & ~in_old
+    refused = pairs.isin(pairs[refused]) & pairs.isin(pairs[in_old])
     rank_old, rank_new = (
         table[column].map({verdict: rank for rank, verdict in enumerate(VERDICTS)})
         for column in ("verdict_old", "verdict_new")
@@ -514,12 +511,13 @@ def _classify_missing(
     mended = (table.verdict_old == FAILS) & table.quantity.isin(WHOLE_ENGINE)
     suite = after.settings.get("scenes of", "")
     same_suite = suite != "" and suite == before.settings.get("scenes of")
-    all_engines = after.settings.get("chosen") == ""
+    left_out = ~table.engine.isin(before.guests_by_option)
+    left_out &= after.settings.get("chosen") != ""
     return np.select(
         [~table.scene.isin(scenes), ~table.engine.isin(engines), mended],
         [
             Kind.SCENE_GONE if same_suite else Kind.NOT_RUN,
-            Kind.ENGINE_GONE if all_engines else Kind.NOT_RUN,
+            np.where(left_out, Kind.NOT_RUN, Kind.ENGINE_GONE),
             Kind.GONE_FAILURE,
         ],
         Kind.GONE,

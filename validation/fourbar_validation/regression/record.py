@@ -74,6 +74,17 @@ class About:
         """Return those that are no engines of the harness or the lab."""
         return self._list("guests")
 
+    @property
+    def guests_by_option(self) -> list[str]:
+        """Return the guests that --guest named: --engines did not choose them."""
+        entries = self.settings.get("chosen", "").split(",")
+        chosen = [{*entry.split()} for entry in entries]  # a name, with its version
+        return [
+            guest
+            for guest in self.guests
+            if not any(words >= {*guest.split()} for words in chosen)
+        ]
+
     def _list(self, name: str) -> list[str]:
         return [*filter(None, self.settings.get(name, "").split(", "))]
 
