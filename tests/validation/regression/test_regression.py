@@ -33,6 +33,7 @@ from fourbar_validation.regression import accept, record, render, rules
 from fourbar_validation.regression.changes import Kind, compare_runs
 from fourbar_validation.regression.history import (
     HISTORY,
+    _name_runs,
     collect_history,
     find_since,
     read_history,
@@ -802,9 +803,19 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
         (
             [FAILED_ROW, HELD, FAILED_ROW, FAILED_ROW],
             FAILED_ROW,
-            "has failed since {runs[2]}; it held in {runs[1]}",
+            "has not held since {runs[2]}; it held in {runs[1]}",
+        ),
+        (
+            [HELD, SILENT],  # the engine broke down: nothing of it held
+            FAILED_ROW,
+            "has not held since {runs[1]}; it held in {runs[0]}",
         ),
         ([replace(HELD, quantity="F43")], FAILED_ROW, "is not in {before}"),
+        (
+            [HELD, replace(HELD, quantity="F43")],
+            FAILED_ROW,
+            "is not in {before}; it held in {runs[0]}",
+        ),
         ([replace(FAILED_ROW, engine="theirs")], FAILED_ROW, "is not in {before}"),
         ([replace(FAILED_ROW, scene="b")], FAILED_ROW, "is not in {before}"),
         ([HELD], SILENT, "answered in {before}"),
@@ -812,7 +823,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
         (
             [HELD, SILENT],
             SILENT,
-            "has failed since {runs[1]}; it answered in {runs[0]}",
+            "has not answered since {runs[1]}; it answered in {runs[0]}",
         ),
     ],
 )
@@ -826,6 +837,15 @@ def test_a_failure_is_looked_up_in_the_accepted_runs(
         run = open_run(folder)
         since = find_since(read_history(run), run, [key])[key]
         assert since == words.format(before=run.describe(), runs=RUNS)
+
+
+def test_runs_of_one_day_and_commit_are_named_by_their_time():
+    runs = [(DATES[0], "c0"), ("2026-01-01T03:00:00+00:00", "c0"), (DATES[1], "c0")]
+    assert _name_runs(runs) == [
+        "the run of 2026-01-01 02:00:00 at commit c0",
+        "the run of 2026-01-01 03:00:00 at commit c0",
+        "the run of 2026-01-02 at commit c0",
+    ]
 
 
 @pytest.mark.slow
@@ -857,7 +877,9 @@ def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(
     picture = text.index("<svg")
     assert text.index("</h1>") < picture < text.index("<h2>")
     since = f"since {RUNS[1]}"
-    caption = f"F32: error in the accepted runs and in this one. It has failed {since}"
+    caption = (
+        f"F32: error in the accepted runs and in this one. It has not held {since}"
+    )
     assert caption in text
     assert text.count(since) == 3  # of the picture, its name, and the row
     svg = text[picture : text.index("</svg>")]

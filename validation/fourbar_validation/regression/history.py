@@ -7,6 +7,7 @@ versions in columns of their own (`version_mujoco`).
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -160,29 +161,40 @@ def find_since(
 
 
 def _write_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
-    """Say since which run a quantity of an engine fails, from its rows in a scene."""
+    """Say since which run a quantity of an engine does not hold, from rows in a scene.
+
+    An engine that broke down there has no row of the quantity, which then fails too.
+    """
+    fails = (lines.verdict == FAILS) & lines.quantity.isin([quantity, "all"])
     if quantity != "all":
-        lines = lines[lines.quantity == quantity]
-    fails = (lines.verdict == FAILS) & (lines.quantity == quantity)
+        lines = lines[fails | (lines.quantity == quantity)]
+        fails = fails[lines.index]
     runs = fails.groupby([lines.date, lines.commit], sort=False).any()
     if runs.empty:
         return f"is not in {before.describe()}"
-    held = "answered in" if quantity == "all" else "held in"
+    names = _name_runs(runs.index)
+    verb = "answered" if quantity == "all" else "held"
+    if runs.index[-1] != (before.about.date, before.about.commit):
+        end = "failed" if runs.iloc[-1] else verb
+        return f"is not in {before.describe()}; it {end} in {names[-1]}"
     if not runs.iloc[-1]:
-        return f"{held} {before.describe()}"
+        return f"{verb} in {before.describe()}"
     if runs.all():
-        many = f", and in every accepted run since {_name_run(runs.index[0])}"
+        many = f", and in every accepted run since {names[0]}"
         return f"failed too in {before.describe()}" + many * (len(runs) > 1)
     last = len(runs) - 1 - int(np.argmin(runs.to_numpy()[::-1]))
-    return (
-        f"has failed since {_name_run(runs.index[last + 1])}; it {held}"
-        f" {_name_run(runs.index[last])}"
-    )
+    return f"has not {verb} since {names[last + 1]}; it {verb} in {names[last]}"
 
 
-def _name_run(index: Any) -> str:
-    date, commit = index
-    return f"the run of {date[:10]}" + f" at commit {commit}" * bool(commit)
+def _name_runs(runs: Iterable[tuple[str, str]]) -> list[str]:
+    """Name runs by date and commit, those of one day and commit by their time too."""
+    days = Counter((date[:10], commit) for date, commit in runs)
+    names = []
+    for date, commit in runs:
+        alone = days[date[:10], commit] == 1
+        when = date[:10] if alone else date[:19].replace("T", " ")
+        names.append(f"the run of {when}" + f" at commit {commit}" * bool(commit))
+    return names
 
 
 def draw_row(history: "DataFrame", row: Any) -> str:
