@@ -1030,6 +1030,7 @@ def with_comma(theta, torque):
         ("theta2 (deg),T2 (N m)",),
         ("Theta_2 [DEG],Torque [N M]",),
         ("Crank angle (deg)\tMotor torque (N-m)", "{theta:.0f}\t{torque:.9e}"),
+        ("theta2 [deg],T [N·m]",),
         ("theta_2 [deg],torque,torque", "{theta:.0f},{torque:.9e},{torque:.9e}"),
         ("theta_2 [deg],torque,alpha_2", "{theta:.0f},{torque:.9e},0"),
     ],

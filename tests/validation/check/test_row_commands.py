@@ -282,7 +282,7 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
     time = np.arange(0.0123, 0.79, 0.0517)
     theta, omega, alpha, torque = follow_rise(time)
     columns = {
-        "time": (time, "time [ms]", 1e3, ".1f"),
+        "time": (time, "t [ms]", 1e3, ".1f"),
         "late": (time + 2e-3, "time [s]", 1.0, ".4f"),
         "rounded": (time, "time", 1.0, ".3f"),
         "coarse": (time, "time", 1.0, ".1f"),
@@ -311,6 +311,16 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
         with pytest.raises(InputError, match=judged_as) as caught:
             judge_table(SERVO, read(text))
         assert "Servo" not in str(caught.value)
+
+
+@pytest.mark.parametrize("times", [(0.0,), (0.1, 0.8)])
+def test_times_that_nobody_rounded_leave_all_digits(times, read):
+    theta, _, _, torque = follow_rise(np.array(times))
+    rows = zip(times, np.degrees(theta), torque, strict=True)
+    lines = [f"{time:g},{angle:.2f},{number:.5f}" for time, angle, number in rows]
+    table = read("\n".join(["time,theta_2 [deg],torque", *lines]))
+    judgement = judge_table(SERVO, table)
+    assert judgement.status == HOLDS and judgement.digits[0] >= "4"
 
 
 def test_a_command_of_a_stroke_is_refused(judged):

@@ -14,7 +14,7 @@ from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import BAR_OF_ANGLE
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.theirs import TheirTable
+from fourbar_validation.check.theirs import TheirTable, fill_zeros
 from fourbar_validation.compare.tolerance import EPS, wrap_difference
 
 _AS_PRINTED = 4.0 * EPS
@@ -23,7 +23,7 @@ _ONE_PLACE = 1e-6
 """Angle, rad, within which two positions are one: at a limit of the bar by which a row
 is found they differ by the square root of round-off.
 """
-_BY_CHANCE = 1e-3
+_BY_CHANCE = 0.05
 """Probability of rounded times at which the law has every angle as it is printed."""
 _SAMPLES = 32
 """Times to either side of a rounded one at which a law is looked at."""
@@ -146,9 +146,7 @@ def _follow_law(
         return None
     first, *_, last = law.time
     printed, half = table.times.T
-    stated, *ends = (
-        np.clip(printed + side, first, last) for side in (0.0, -half, half)
-    )
+    stated = np.clip(printed, first, last)
     rounding = table.rounding[table.found_by]
     rounding = rounding + _AS_PRINTED * (1.0 + np.abs(table.places))
 
@@ -166,6 +164,10 @@ def _follow_law(
         return at._replace(speed=speed, acceleration=acceleration)
 
     fits_stated = np.abs(measure(stated)) <= rounding + _ONE_PLACE
+    # zeros at the end of a time that fits may be left off; start and end are exact
+    half = np.where(fits_stated, fill_zeros(printed, half), half)
+    half = np.where(fits_stated & np.isin(printed, (first, last)), 0.0, half)
+    ends = [np.clip(printed + side, first, last) for side in (-half, half)]
     nearest, several = _find_nearest_time(measure, stated, ends)
     time = np.where(fits_stated, stated, nearest)
     off = ~fits_stated & several | (np.abs(measure(time)) > rounding + _ONE_PLACE)

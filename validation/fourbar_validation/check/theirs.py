@@ -68,6 +68,8 @@ _OTHER_NAMES = {
 """Names that other programs and languages use, in small letters, without spaces and
 underscores.
 """
+_BY_UNIT = {"t": {"time": "s", "torque": "N m"}, "m": {"torque": "N m"}}
+"""Letters, spelled as in _OTHER_NAMES, and what they mean by the unit beside them."""
 _REACTIONS = {"F21": "F12", "F23": "F32", "F34": "F43", "F41": "F14"}
 """Pin forces on the other bar, and those that they are the opposite of."""
 _MAY_MEAN = (
@@ -75,7 +77,7 @@ _MAY_MEAN = (
     ("omega", "omega_2"),
     ("alpha", "alpha_2"),
     (r"(?:r|fr|force|kraft|reaction)([1-4])([1-4])[xy]?", r"F\1\2_x or F\1\2_y"),
-    (r"t_?in|m_?in|.*(?:torque|moment).*", "torque"),
+    (r"[tm](?:_?in)?|.*(?:torque|moment).*", "torque"),
     (
         r"f[xy]?(?:at)?(?:a|b|o2|o4)?|.*(?:force|kraft|reaction).*",
         "F12_x, F32_x, F43_x, F14_x, or their y",
@@ -414,7 +416,8 @@ def _read_degrees(
     if not bare or not _TWO_TURNS < largest < _MOST_DEGREES:
         return ()
     if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
-        return ()
+        text = f"{name} has no unit and is read in rad: write {name} [deg] if it is not"
+        return (text,)
     factor = math.pi / 180.0
     numbers[name], halves[name] = values * factor, halves[name] * factor
     units[name] = Unit("deg", factor)
@@ -435,7 +438,7 @@ def _enter_column(
 ) -> None:
     """Enter a column into the table, a component into its vector."""
     halves = np.where(np.isnan(numbers), 0.0, halves)
-    filled = _fill_zeros(numbers / unit.factor, halves)
+    filled = fill_zeros(numbers / unit.factor, halves)
     if name[-2:] not in ("_x", "_y"):
         table.values[name], table.units[name] = numbers, unit
         table.rounding[name], table.filled[name] = halves, filled
@@ -449,7 +452,7 @@ def _enter_column(
     table.units.setdefault(vector, unit)
 
 
-def _fill_zeros(numbers: Array, halves: Array) -> Array:
+def fill_zeros(numbers: Array, halves: Array) -> Array:
     """Return the rounding of numbers with as many digits as others of their column.
 
     Others are those that are not smaller by a decade.
@@ -597,6 +600,8 @@ def _read_headings(
     columns: dict[int, tuple[str, Unit]] = {}
     left_out: dict[str, str] = {}
     renamings: dict[str, str] = {}
+    from fourbar.quantities.units import converts
+
     for index, heading in enumerate(headings):
         match = _HEADING.fullmatch(heading.strip())
         text = "".join(unit_line[index : index + 1]).strip(" []()")
@@ -608,6 +613,9 @@ def _read_headings(
         plain = name
         name = _REACTIONS.get(name[:3], name[:3]) + name[3:]
         name = _find_name(name, commanded, points)
+        if _spell(plain) in _BY_UNIT:
+            means = _BY_UNIT[_spell(plain)].items()
+            name = next((one for one, unit in means if converts(text, unit)), name)
         vector = name[:-2] if name[-2:] in ("_x", "_y") else name
         of_vector = vector in points or _is_vector(vector)
         quantity = vector if of_vector else name
