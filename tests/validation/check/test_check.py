@@ -391,6 +391,9 @@ OF_A_BAR = {
     "mass centre taken at mid-bar": centred(lambda d, x, y: (d / 2.0, 0.0)),
     "mass centre turned by 180 deg": centred(lambda d, x, y: (-x, -y)),
     "mass centre on the other side of the bar's line": centred(lambda d, x, y: (x, -y)),
+    "mass centre on the bar's line, its angle left out": centred(
+        lambda d, x, y: (math.hypot(x, y), 0.0)
+    ),
     "inertia about the pin": steiner,
     "mass left out": scaled(mass=0.0),
     "mass and moment of inertia left out": scaled(mass=0.0, inertia=0.0),

@@ -6,16 +6,15 @@ all changes at once.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
+from fourbar.effects import Flywheel, Gravity, Load
 from fourbar.errors import FourBarError
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array, ComplexArray
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -114,8 +113,8 @@ _PART_FIELDS = {
 _SCALED = {0.0: "missing", 2.0: "doubled", -1.0: "reversed"}
 """Factors on what acts besides inertia, and what was done to it."""
 _IN_DEGREES = {
-    np.degrees(1.0): "is taken of degrees: 57.2958 times",
-    np.radians(1.0): "is taken per degree: 0.0174533 times",
+    np.degrees(1.0): "taken of degrees: 57.2958 times",
+    np.radians(1.0): "taken per degree: 0.0174533 times",
 }
 """Factors on what follows an angle or its rate, and what was done to it."""
 _WHERE = {
@@ -124,11 +123,13 @@ _WHERE = {
     " in what drives alone": tuple(set(FORCE_NAMES) - set(PIN_FORCES)),
 }
 """Quantities in which that was done."""
-_GRAVITY_TURNED = {
-    "turned by 90 deg": np.pi / 2.0,
-    "turned by -90 deg": -np.pi / 2.0,
+_SHIFTS = {
+    "springs": ("preload", "free length"),
+    "torsion": ("preload", "rest angle", "rest angle, its turn counted from 0,"),
 }
-"""Directions that gravity may be given, by their angle from the right one."""
+"""Numbers that shift the force of a spring, by the effect's key."""
+_SPRINGS = {"springs": "spring", "torsion": "torsion spring"}
+"""Name of one spring, by the effect's key."""
 
 
 class Change(NamedTuple):
@@ -175,6 +176,7 @@ class Calculation:
         self.driving = name_driving(scene)
         fields = [one for one in scene.effects if isinstance(one, Gravity)]
         self.weighs = bool(fields)
+        self.wheels = [one for one in scene.effects if isinstance(one, Flywheel)]
         self.weights = self.apply(*fields).force
 
     def none(self) -> BodyWrenches:
@@ -388,26 +390,46 @@ class Calculation:
     def _scale_actions(self) -> Iterator[Change]:
         """Leave out, double or reverse each load and effect, and each part of one."""
         for name, acting, pins in self._list_acting():
-            verb = "are" if name.endswith("s") else "is"
-            ways = {factor: f"{verb} {done}" for factor, done in _SCALED.items()}
-            if name in (_EFFECT_NAMES["viscous"], _EFFECT_NAMES["torsion"]):
-                ways |= _IN_DEGREES
-            for factor, done in ways.items():
-                yield Change(
-                    f"{name} {done}",
-                    self.none().plus(acting, factor - 1.0),
+            for factor, done in _SCALED.items():
+                yield self._scale(
+                    name,
+                    done,
+                    acting,
+                    factor,
                     where=_WHERE,
                     friction=dict.fromkeys(pins, factor),
                 )
         for effect in self.scene.effects:
-            if isinstance(effect, Gravity):
-                for text, angle in _GRAVITY_TURNED.items():
-                    turned = self.apply(replace(effect, angle=effect.angle + angle))
-                    more = turned.plus(self.apply(effect), -1.0)
-                    yield Change(f"gravity is {text}", more)
-                return
-        text = "gravity along -y is included though the scene has none"
-        yield Change(text, self.apply(Gravity()))
+            yield from self._change_effect(effect)
+        if not self.weighs:
+            text = "gravity along -y is included though the scene has none"
+            yield Change(text, self.apply(Gravity()))
+
+    def _scale(
+        self, name: str, done: str, acting: BodyWrenches, factor: float, **more: Any
+    ) -> Change:
+        """Return the change that gives a factor to what acts."""
+        text = f"{name} {'are' if _is_plural(name) else 'is'} {done}"
+        return Change(text, self.none().plus(acting, factor - 1.0), **more)
+
+    def _change_effect(self, effect: Any) -> Iterator[Change]:
+        """State an effect otherwise, or let it act on one of two bars alone."""
+        name = _name_effect(effect)
+        for text, other in _list_other_forms(effect, self.scene.linkage.ground_angle):
+            more = self.apply(other).plus(self.apply(effect), -1.0)
+            yield Change(f"{name} {text}", more)
+        if effect.key in ("viscous", "torsion"):
+            linear = self.apply(_relax(effect, "preload") or effect)
+            for factor, done in _IN_DEGREES.items():
+                yield self._scale(name, done, linear, factor)
+        verb = "act" if _is_plural(name) else "acts"
+        for left_out, words in enumerate(("second", "first")):
+            less = self.none()
+            for part in _list_parts(effect):
+                bar = _list_bars(part)[left_out]
+                if bar in MOVING_BARS:
+                    less = less.plus(self.apply(part).on(bar), -1.0)
+            yield Change(f"{name} {verb} on the {words} of two bars alone", less)
 
     def _list_acting(self) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
         """List what acts besides inertia, with pins whose friction depends on loads."""
@@ -415,49 +437,74 @@ class Calculation:
         if scene.loads:
             yield "the loads", self.apply(*scene.loads), []
         for number, load in enumerate(scene.loads, 1):
-            yield f"load {number} (bar {load.bar})", self.apply(load), []
+            name = f"load {number} (bar {load.bar})"
+            acting = self.apply(load)
+            yield name, acting, []
+            if load.force is not None and load.moment:
+                force_alone = self.apply(replace(load, moment=0.0))
+                yield f"the couple of {name}", acting.plus(force_alone, -1.0), []
         for effect in scene.effects:
-            name = _EFFECT_NAMES.get(effect.key, f"effect {effect.key}")
-            yield name, self.apply(effect), list(effect.loaded_pins)
-            yield from self._list_parts(effect, name)
+            name = _name_effect(effect)
+            acting = self.apply(effect)
+            yield name, acting, list(effect.loaded_pins)
+            parts = _list_parts(effect)
+            several = len(parts) > 1
+            for number, part in enumerate(parts, 1):
+                if several:
+                    pins = list(part.loaded_pins)
+                    yield f"part {number} of {name}", self.apply(part), pins
+                yield from self._list_shifts(part, f"{{}} {number}")
+            if several:
+                yield from self._list_shifts(effect, "every {}")
 
-    def _list_parts(
-        self,
-        effect: Any,
-        name: str,
+    def _list_shifts(
+        self, effect: Any, which: str
     ) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
-        """List the parts of an effect, and what shifts the force of a spring."""
-        field = _PART_FIELDS.get(effect.key, "")
-        parts = getattr(effect, field, ())
-        for i, part in enumerate(parts, 1):
-            alone = replace(effect, **{field: (part,)})
-            acting = self.apply(alone)
-            if len(parts) > 1:
-                yield f"part {i} of {name}", acting, list(alone.loaded_pins)
-            for text, relaxed in _relax(effect.key, part):
-                without = self.apply(replace(effect, **{field: (relaxed,)}))
-                yield f"the {text} spring {i}", acting.plus(without, -1.0), []
+        """List what each number shifts of the force of springs, by their name."""
+        springs = which.format(_SPRINGS.get(effect.key, ""))
+        for number in _SHIFTS.get(effect.key, ()):
+            relaxed = _relax(effect, number)
+            if relaxed is not None:
+                shift = self.apply(effect).plus(self.apply(relaxed), -1.0)
+                yield f"the {number} of {springs}", shift, []
 
     def _velocity_terms(self) -> Iterator[Change]:
-        """Leave out (dJ/dt) v.
+        """Leave out (dJ/dt) v, or reverse it, in the accelerations of the other bars.
 
-        The accelerations of the other bars then follow that of the commanded one alone.
+        Without it these follow that of the commanded bar alone, by the ratios of the
+        speeds: a omega_2 u_2 + b omega_3 u_3 = c omega_4 u_4 fixes them at rest too.
         """
         motion = self.motion
-        commanded = self.right.at.bar
+        right = self.right
+        _, a, b, c = motion.linkage.lengths
+        u = motion.unit
+        speeds = {
+            2: cross_products(u[3], u[4]) / a,
+            3: cross_products(u[4], u[2]) / b,
+            4: -cross_products(u[2], u[3]) / c,
+        }
+        bar = right.at.bar
         with np.errstate(divide="ignore", invalid="ignore"):
-            gain = motion.alpha[commanded] / motion.omega[commanded]
-        wrenches = self.none()
-        moved = MistakenNumbers()
-        for bar in MOVING_BARS:
-            if bar != commanded:
-                alpha = gain * motion.omega[bar]
-                more = alpha - motion.alpha[bar]
-                a = 1j * more * motion.to_centre(bar)
-                moved[f"alpha_{bar}"] = alpha
-                moved |= self._accelerate(wrenches, bar, a, more)
-        text = "(dJ/dt) v is missing in the accelerations of the loop"
-        yield Change(text, wrenches, moved, _FOLLOWING)
+            alone = {k: motion.alpha[bar] * speeds[k] / speeds[bar] for k in speeds}
+        for factor, done in _VELOCITY_TERM.items():
+            added = {k: factor * (motion.alpha[k] - alone[k]) for k in speeds}
+            added[bar] = np.zeros(len(right))
+            of_A, of_B = 1j * added[2] * a * u[2], 1j * added[4] * c * u[4]
+            moved: MistakenNumbers = {
+                **{f"alpha_{k}": motion.alpha[k] + added[k] for k in speeds},
+                "a_A": right.a_A + stack_components(of_A),
+                "a_B": right.a_B + stack_components(of_B),
+            }
+            wrenches = self.none()
+            for k, more in added.items():
+                of_pin = of_A if k == 3 else 0.0
+                swing = of_pin + 1j * more * motion.to_centre(k)
+                moved |= self._accelerate(wrenches, k, swing, more)
+                for wheel in self.wheels:
+                    if wheel.bar == k:
+                        wrenches.couple(k, -wheel.inertia * more)
+            text = f"(dJ/dt) v {done} in the accelerations of the loop"
+            yield Change(text, wrenches, moved, _FOLLOWING)
 
     def _accelerations_of_centres(self) -> Iterator[Change]:
         """Leave out a part of the acceleration of each G about its bar's first pin."""
@@ -465,15 +512,18 @@ class Calculation:
         arms = {bar: motion.to_centre(bar) for bar in MOVING_BARS}
         centripetal = {bar: -(motion.omega[bar] ** 2) * arms[bar] for bar in arms}
         tangential = {bar: 1j * motion.alpha[bar] * arms[bar] for bar in arms}
-        whose = "of every bar, r from its first pin to G"
+        whose: dict[str, tuple[int, ...]] = {"every bar": MOVING_BARS}
+        whose |= {f"bar {bar}": (bar,) for bar in MOVING_BARS}
         for part, of_bars in (("-omega^2 r", centripetal), ("alpha x r", tangential)):
             for factor, done in _PART_OF_ACCELERATION.items():
-                wrenches = self.none()
-                moved = MistakenNumbers()
-                for bar, a in of_bars.items():
-                    moved |= self._accelerate(wrenches, bar, factor * a)
-                text = f"{part} {done} in a_G {whose}"
-                yield Change(text, wrenches, moved, _FOLLOWING)
+                for name, bars in whose.items():
+                    wrenches = self.none()
+                    moved = MistakenNumbers()
+                    for bar in bars:
+                        a = factor * of_bars[bar]
+                        moved |= self._accelerate(wrenches, bar, a)
+                    text = f"{part} {done} in a_G of {name}, r from its first pin to G"
+                    yield Change(text, wrenches, moved, _FOLLOWING)
         for bar in MOVING_BARS:
             wrenches = self.none()
             a = -centripetal[bar] - tangential[bar]
@@ -533,41 +583,67 @@ class Calculation:
                 yield f"mass and moment of inertia{_LEFT_OUT}", both
 
     def _change_loads(self) -> Iterator[Change]:
-        """Measure where a force acts from the wrong point, or turn it with its bar."""
+        """Let each load, and every load, act elsewhere or in another direction."""
+        every: dict[str, BodyWrenches] = {}
         loads = zip(self.stated.loads, self.scene.loads, strict=True)
         for number, (stated, load) in enumerate(loads, 1):
-            if load.force is None:
-                continue
-            bar = load.bar
-            name = f"load {number} (bar {bar})"
-            what = "its place" if load.arm is None else "its arm"
-            force = self.apply(load).force[bar]
-            arm = find_arm(load, self.motion)
-            to_centre = self.motion.to_centre(bar)
-            to_end = self.motion.linkage.bar(bar).length * self.motion.unit[bar]
-            moved = {
-                "its force acts at G of the bar": to_centre - arm,
-                "its force acts at the first pin of the bar": -arm,
-                "its force acts at the second pin of the bar": to_end - arm,
-            }
-            if stated.from_pin is None:
-                from_pin = f"{what} is measured from the bar's first pin, not from G"
-                moved[from_pin] = -to_centre
-            if load.arm is None:  # an engine is told every place from the first pin
-                from_G = f"{what} is measured from G, not from the bar's first pin"
-                moved[from_G] = to_centre
-            for text, shift in moved.items():
-                couple = self.none()
-                couple.couple(bar, cross_products(shift, force))
-                yield Change(f"{name}: {text}", couple)
-            turn = self.motion.unit[bar]
-            how = "turns with the bar"
-            if load.frame == "bar":
-                turn = np.conj(turn)
-                how = "is kept"
+            for text, more in self._list_load_mistakes(stated, load):
+                yield Change(f"load {number} (bar {load.bar}): {text}", more)
+                every[text] = every.get(text, self.none()).plus(more)
+        if len(self.scene.loads) > 1:
+            for text, more in every.items():
+                yield Change(f"every load: {text}", more)
+
+    def _list_load_mistakes(
+        self, stated: Load, load: Load
+    ) -> Iterator[tuple[str, BodyWrenches]]:
+        """List what else may be made of a load, with what it lets act more."""
+        right = self.apply(load)
+        others = {}
+        if load.table is not None:
+            others["its table is left out"] = replace(load, table=None)
+        if load.force is not None and load.frame == "bar":
+            size, angle = load.force
+            text = "the angle of its force has the wrong sign"
+            others[text] = replace(load, force=(size, -angle))
+        for text, other in others.items():
+            yield text, self.apply(other).plus(right, -1.0)
+        if load.force is None:
+            return
+        bar = load.bar
+        what = "its place" if load.arm is None else "its arm"
+        force = right.force[bar]
+        arm = find_arm(load, self.motion)
+        to_centre = self.motion.to_centre(bar)
+        unit = self.motion.unit[bar]
+        moved = {
+            "its force acts at G of the bar": to_centre - arm,
+            "its force acts at the first pin of the bar": -arm,
+            "its force acts at the second pin of the bar": (
+                self.motion.linkage.bar(bar).length * unit - arm
+            ),
+        }
+        if stated.from_pin is None:
+            from_pin = f"{what} is measured from the bar's first pin, not from G"
+            moved[from_pin] = -to_centre
+        if load.arm is None:  # an engine is told every place from the first pin
+            from_G = f"{what} is measured from G, not from the bar's first pin"
+            moved[from_G] = to_centre
+        else:
+            moved["its arm turns with the bar"] = (arm - to_centre) * (unit - 1.0)
+        for text, shift in moved.items():
+            couple = self.none()
+            couple.couple(bar, cross_products(shift, force))
+            yield text, couple
+        directions = {"its force has y reversed": np.conj(force)}
+        if load.frame == "bar":
+            directions["its direction is kept"] = force * np.conj(unit)
+        else:
+            directions["its direction turns with the bar"] = force * unit
+        for text, pushed in directions.items():
             turned = self.none()
-            turned.push(bar, force * turn - force, arm)
-            yield Change(f"{name}: its direction {how}", turned)
+            turned.push(bar, pushed - force, arm)
+            yield text, turned
 
     def _drive_other_bars(self) -> Iterator[Mistake]:
         for bar in MOVING_BARS:
@@ -591,6 +667,8 @@ _PART_OF_ACCELERATION = {
     1.0: "is doubled",
 }
 """What is added of a part of an acceleration, and what was done to it."""
+_VELOCITY_TERM = {-1.0: "is missing", -2.0: "has the wrong sign"}
+"""The same of the part of the others' accelerations that the speeds make."""
 
 
 def join(vectors: Array) -> ComplexArray:
@@ -598,18 +676,78 @@ def join(vectors: Array) -> ComplexArray:
     return np.asarray(vectors[:, 0] + 1j * vectors[:, 1])
 
 
-def _relax(key: str, spring: Any) -> Iterator[tuple[str, Any]]:
-    """List the numbers that shift a spring's force, each with it left out."""
-    if key == "springs":
-        for text, name in {"preload": "preload", "free length": "length"}.items():
-            if getattr(spring, name):
-                with suppress(FourBarError):  # one that acts one way needs its length
-                    yield f"{text} of", replace(spring, **{name: 0.0})
-    elif key == "torsion":
-        for text, place in {"rest angle": 2, "preload": 3}.items():
-            if spring[place]:
-                relaxed = (*spring[:place], 0.0, *spring[place + 1 :])
-                yield f"{text} of torsion", relaxed
+def _name_effect(effect: Any) -> str:
+    return _EFFECT_NAMES.get(effect.key, f"effect {effect.key}")
+
+
+def _is_plural(name: str) -> bool:
+    return name.startswith("the ") and name.endswith("s")
+
+
+def _list_bars(part: Any) -> tuple[int, int]:
+    """Return the two bars on which an effect of one part acts."""
+    (one,) = getattr(part, _PART_FIELDS[part.key])
+    if part.key == "springs":
+        return one.start.bar, one.end.bar
+    return PINS[one[0]]
+
+
+def _list_parts(effect: Any) -> list[Any]:
+    """List the effects of one part each that an effect consists of."""
+    field = _PART_FIELDS.get(effect.key, "")
+    parts = getattr(effect, field, ())
+    return [replace(effect, **{field: (part,)}) for part in parts]
+
+
+def _relax(effect: Any, number: str) -> Any:
+    """Return springs without one of their numbers; None if that changes none.
+
+    A free length or a rest angle that is left out pulls as more preload does.
+    """
+    if effect.key not in _SHIFTS:
+        return None
+    relaxed: list[Any] = []
+    for spring in effect.springs:
+        if effect.key == "torsion":
+            pin, k, rest, preload = spring
+            ways = {
+                "preload": (rest, 0.0),
+                "rest angle": (rest, preload + k * rest),
+            }
+            relaxed.append((pin, k, *ways.get(number, (0.0, preload))))
+            continue
+        changes: dict[str, Any] = {
+            "preload": {"preload": 0.0},
+            "free length": {
+                "preload": spring.preload + spring.stiffness * spring.length
+            },
+            "acts": {"acts": None},
+        }
+        try:
+            relaxed.append(replace(spring, **changes[number]))
+        except FourBarError:  # one that acts one way comes off nowhere without it
+            relaxed.append(spring)
+    if tuple(relaxed) == effect.springs:
+        return None
+    return replace(effect, springs=tuple(relaxed))
+
+
+def _list_other_forms(effect: Any, ground_angle: float) -> Iterator[tuple[str, Any]]:
+    """List effects that may be taken for one, by what was done to it."""
+    if isinstance(effect, Gravity):
+        angles = {
+            "turned by 90 deg": effect.angle + np.pi / 2.0,
+            "turned by -90 deg": effect.angle - np.pi / 2.0,
+            "taken along -y": -np.pi / 2.0,
+            "turned with the ground": effect.angle + ground_angle,
+        }
+        for text, angle in angles.items():
+            yield f"is {text}", replace(effect, angle=float(angle))
+    elif isinstance(effect, Flywheel):
+        other = {2: 4, 4: 2}[effect.bar]
+        yield f"is on bar {other}", replace(effect, bar=other)
+    elif effect.key == "springs" and (both := _relax(effect, "acts")):
+        yield "act both ways", both
 
 
 def find_miscalculated(judge: Judge, wanted: Wanted) -> Iterator[Mistake]:

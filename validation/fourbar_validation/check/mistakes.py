@@ -193,32 +193,15 @@ def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
 
 
 def _list_other_commands(command: Command) -> Iterator[Variant]:
-    name = command.commanded
-    angle = command.angle
     yield Variant(_OTHER_BRANCH, at=command._replace(branch=-command.branch))
-    as_degrees = command._replace(angle=np.radians(angle))
-    yield Variant(f"{name} read as degrees", at=as_degrees)
-    # a whole turn is 6.28 of these degrees
-    in_degrees = command._replace(angle=np.degrees(np.fmod(angle, TURN)))
-    text = f"{name} in radians where degrees were announced"
-    yield Variant(text, at=in_degrees, times=float(np.degrees(1.0)))
-    clockwise = f"{name} {_CLOCKWISE}"
-    for text, mirror in ((clockwise, 1.0), (f"{clockwise}, and y reversed", -1.0)):
-        yield Variant(text, at=command._replace(angle=-angle), mirror=mirror)
     if command.speed is not None:
         at_rest = command._replace(speed=0.0, acceleration=0.0)
         yield Variant("no inertial forces (statics)", at=at_rest)
-        bar = command.bar
-        for words, factor in _OF_SPEEDS.items():
-            other = command._replace(speed=command.speed * factor)
-            yield Variant(f"omega_{bar} in {words.format('s')}", at=other)
-        if np.any(command.acceleration):
-            steady = command._replace(acceleration=0.0)
-            yield Variant(f"alpha_{bar} is left out", at=steady)
-            for words, factor in _DEGREES_TAKEN.items():
-                other = command._replace(acceleration=command.acceleration * factor)
-                yield Variant(f"alpha_{bar} in {words.format('s^2')}", at=other)
-    if len(angle) <= ENOUGH_POSITIONS:
+    if isinstance(command.origin, StrokeOrigin):
+        yield from _list_other_strokes(command, command.origin)
+    else:
+        yield from _list_other_angles(command)
+    if len(command.angle) <= ENOUGH_POSITIONS:
         return
     for text, step in _BETWEEN.items():
         motion = (command.angle, command.speed, command.acceleration)
@@ -229,6 +212,51 @@ def _list_other_commands(command: Command) -> Iterator[Variant]:
             between = between._replace(origin=command.origin._replace(stroke=strokes))
         yield Variant(text, at=between)
         yield Variant(f"{text} (forces alone)", at=between, names=FORCE_NAMES)
+
+
+def _list_other_angles(command: Command) -> Iterator[Variant]:
+    """List other angles, speeds and accelerations of the commanded bar."""
+    name = command.commanded
+    angle = command.angle
+    as_degrees = command._replace(angle=np.radians(angle))
+    yield Variant(f"{name} read as degrees", at=as_degrees)
+    # a whole turn is 6.28 of these degrees
+    in_degrees = command._replace(angle=np.degrees(np.fmod(angle, TURN)))
+    text = f"{name} in radians where degrees were announced"
+    yield Variant(text, at=in_degrees, times=float(np.degrees(1.0)))
+    clockwise = f"{name} {_CLOCKWISE}"
+    for text, mirror in ((clockwise, 1.0), (f"{clockwise}, and y reversed", -1.0)):
+        yield Variant(text, at=command._replace(angle=-angle), mirror=mirror)
+    if command.speed is None:
+        return
+    bar = command.bar
+    for words, factor in _OF_SPEEDS.items():
+        other = command._replace(speed=command.speed * factor)
+        yield Variant(f"omega_{bar} in {words.format('s')}", at=other)
+    if np.any(command.acceleration):
+        steady = command._replace(acceleration=0.0)
+        yield Variant(f"alpha_{bar} is left out", at=steady)
+        for words, factor in _DEGREES_TAKEN.items():
+            other = command._replace(acceleration=command.acceleration * factor)
+            yield Variant(f"alpha_{bar} in {words.format('s^2')}", at=other)
+
+
+def _list_other_strokes(command: Command, origin: StrokeOrigin) -> Iterator[Variant]:
+    """List accelerations of the bar of a cylinder without one of their two terms.
+
+    They are the acceleration of the stroke times omega over its speed, and what the
+    speed makes.
+    """
+    if command.speed is None or not np.all(origin.speed):
+        return
+    per_stroke = np.divide(command.speed, np.asarray(origin.speed, dtype=float))
+    of_stroke = origin.acceleration * per_stroke
+    alone = {
+        "stroke_acceleration is left out": command.acceleration - of_stroke,
+        f"what stroke_speed adds to alpha_{command.bar} is missing": of_stroke,
+    }
+    for text, acceleration in alone.items():
+        yield Variant(text, at=command._replace(acceleration=acceleration))
 
 
 def _shift_by_half(values: Any, step: int) -> Any:
@@ -287,6 +315,7 @@ def _list_wrong_centres(bar: Bar) -> Iterator[tuple[str, tuple[float, float]]]:
         yield "turned by 180 deg about the bar's first pin", (r, phi + np.pi)
     if y:
         yield "on the other side of the bar's line", (r, -phi)
+        yield "on the bar's line, its angle left out", (r, 0.0)
 
 
 def _is_angular(quantity: str) -> bool:

@@ -95,6 +95,12 @@ class BodyWrenches:
             total.moment[bar] = self.moment[bar] + times * other.moment[bar]
         return total
 
+    def on(self, bar: int) -> "BodyWrenches":
+        """Return what acts on one bar alone."""
+        alone = BodyWrenches(len(self.moment[bar]))
+        alone.force[bar], alone.moment[bar] = self.force[bar], self.moment[bar]
+        return alone
+
     def push(self, bar: int, force: Any, arm: Any) -> None:
         """Add a force, at `arm` from the bar's first pin.
 
