@@ -93,8 +93,9 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     if same:
         found = _with_rounding(base, table) if commanded else RowCommands(base)
     elif commanded:
-        at = _command_each(base, table.places, scene)
-        found = _with_rounding(at, table)
+        own = _find_own_positions(base, table)
+        at = _command_each(base, table.places if own is None else own, scene)
+        found = _with_rounding(at, table) if own is None else RowCommands(at)
     else:
         found = _find_by_another_bar(scene, table, base)
     return found._replace(rates=rates)
@@ -244,6 +245,21 @@ def _command_each(base: Command, angle: Array, scene: Scene) -> Command:
     """Command the angle of each row, at the speed of a command."""
     branch = np.full(len(angle), scene.motion.branch, dtype=np.int8)
     return Command(angle, branch, base.speed, base.acceleration, bar=base.bar)
+
+
+def _find_own_positions(base: Command, table: TheirTable) -> Array | None:
+    """Return the scene's positions that all rows round to; None if it may be chance."""
+    angles = np.sort(base.angle)
+    if angles[0] == angles[-1]:
+        return None
+    half = table.rounding[table.found_by]
+    after = np.clip(np.searchsorted(angles, table.places), 1, len(angles) - 1)
+    lower, upper = angles[after - 1], angles[after]
+    nearest = np.where(table.places - lower < upper - table.places, lower, upper)
+    step = np.ptp(angles) / (len(angles) - 1)
+    rounds = np.abs(nearest - table.places) <= half * (1.0 + _ONE_PLACE)
+    by_chance = np.prod(np.minimum(half, 0.5 * step) / (0.5 * step))
+    return nearest if rounds.all() and by_chance < _BY_CHANCE else None
 
 
 def _with_rounding(at: Command, table: TheirTable) -> RowCommands:
