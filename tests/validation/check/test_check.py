@@ -738,8 +738,13 @@ def noise(seed, values):
     return np.random.default_rng(seed).normal(size=values.shape)
 
 
-def test_nonsense_and_a_single_number_are_explained_by_nothing(judged):
-    """Of one torque every mass and every load would be the cause."""
+def test_nonsense_and_a_single_number_are_explained_by_nothing(judged, read):
+    """Of one torque every mass and every load would be the cause.
+
+    Without gravity it is 0.292 N m, which two digits tell from nothing.
+    """
+    few = judge_table(OURS, read("theta_2 [deg],torque\n60,0.29\n"))
+    assert few.differing and not few.explanations
     numbers = right(OURS)
     wild = numbers | {name: noise(3, numbers[name]) for name in FORCES}
     assert judged(OURS, wild, FORCES).explanations == []

@@ -36,6 +36,10 @@ _Vary = Callable[[float], Variant]
 """Function of a factor that returns the problem in which a number has it."""
 ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
+ENOUGH_DIGITS = 3.0
+"""Digits of the differences that a mistake of the calculation must explain. Hundreds of
+mistakes are tried, and some explain fewer by chance.
+"""
 CARRIED = 2.0
 """Factor on what is allowed. A fitted number carries the rounding of the numbers it was
 fitted to.

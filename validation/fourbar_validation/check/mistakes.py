@@ -22,6 +22,7 @@ from fourbar_validation.check.calculated import (
     find_single_precision,
 )
 from fourbar_validation.check.fitted import (
+    ENOUGH_DIGITS,
     ENOUGH_NUMBERS,
     REVERSED,
     find_fitted,
@@ -432,12 +433,14 @@ def _list_explained(
     """List the keys that differ and agree once a mistake is assumed.
 
     Empty if a mistake of the calculation explains fewer than `least`, breaks one that
-    agreed, or is fitted to fewer than ENOUGH_NUMBERS. Empty too if the right numbers
-    lie within what the mistake allows: then there is nothing to explain.
+    agreed, may do so by chance, or is fitted to fewer than ENOUGH_NUMBERS. Empty too if
+    the right numbers lie within what the mistake allows: then there is nothing to
+    explain.
     """
     explained = []
     possible = len(differing)
     numbers = 0
+    digits = 0.0
     others = judge.table.values if mistake.whole else ()
     for key in dict.fromkeys((*differing, *others)):
         ours = judge.ours(key)
@@ -454,12 +457,16 @@ def _list_explained(
         elif agrees:
             explained.append(key)
             error, allowed, _ = judge.judged_right(key)
-            numbers += int((error > allowed)[judge.where(key)].sum())
+            wrong = (error > allowed) & judge.where(key)
+            numbers += int(wrong.sum())
+            digits += float(np.log10(error / allowed)[wrong].sum())
         elif mistake.whole:
             possible -= 1
             if possible < least:
                 return []
     if mistake.whole and mistake.fitted and numbers < ENOUGH_NUMBERS:
+        return []
+    if mistake.whole and digits < ENOUGH_DIGITS:
         return []
     slack = mistake.times, mistake.left
     if all(judge.explained(key, judge.ours(key), *slack) for key in explained):
