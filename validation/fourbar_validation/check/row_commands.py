@@ -159,8 +159,8 @@ def _follow_law(
 
     def command_at(time: Array) -> Command:
         angle, speed, acceleration = law.at(time)
-        exact = np.abs(measure(time)) <= _ONE_PLACE
-        angle = np.where(exact, table.places, angle)
+        on_law = fits(time) | (rounding > _ONE_PLACE)
+        angle = np.where(on_law, angle, table.places)
         at = _command_each(base, angle, scene)
         return at._replace(speed=speed, acceleration=acceleration)
 
