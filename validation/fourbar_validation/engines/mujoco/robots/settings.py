@@ -136,6 +136,8 @@ class SettingsSearch:
         self.own = read_settings(inside.given, inside.loop)
         self.rubbing = _list_rubbing(inside.given, inside.loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
+        self.excluded = set[RobotSettings]()
+        """Settings that are not simulated, because of their single states."""
         self.end = time.process_time() + SEARCH_SECONDS * share
 
     def advise(self, wanted: float, file: RobotFile) -> SettingsAdvice:
@@ -165,12 +167,13 @@ class SettingsSearch:
         )
 
     def _answer(
-        self, settings: RobotSettings, motion: LoopMotion
+        self, settings: RobotSettings, motion: LoopMotion, wanted: float = math.inf
     ) -> list[InsideAnswer]:
         """Return the answers at single states and through time.
 
         One that takes too many steps is left out, as are those after it, and so are all
-        where the settings tear the loop.
+        where the settings tear the loop. Settings are not simulated whose single states
+        are not within an error.
         """
         given = self.inside
         changed = _set_settings(given.given, given.loop, settings)
@@ -179,8 +182,13 @@ class SettingsSearch:
         )
         answers = []
         with suppress(LimitError):
-            answers.append(inside.answer_states(motion))
-            answers.append(inside.answer_through_time(motion))
+            states = inside.answer_states(motion)
+            answers.append(states)
+            if states.find_worst(states.scales(inside.lever)).error > wanted:
+                self.excluded.add(settings)
+            else:
+                self.excluded.discard(settings)
+                answers.append(inside.answer_through_time(motion))
         return answers
 
     def find_range(
@@ -235,13 +243,18 @@ class SettingsSearch:
         )
         return SettingsSearch(inside, self.motion).measure(settings).error
 
-    def measure(self, settings: RobotSettings) -> TriedSettings:
-        """Measure what settings reach."""
-        if settings in self.tried:
-            return self.tried[settings]
+    def measure(
+        self, settings: RobotSettings, wanted: float = math.inf
+    ) -> TriedSettings:
+        """Measure what settings reach; excluded ones are not simulated."""
+        known = self.tried.get(settings)
+        if known is not None and (
+            settings not in self.excluded or known.states.error > wanted
+        ):
+            return known
         states = through = WorstState(math.inf)
         gap = seconds = math.inf
-        answers = self._answer(settings, self.motion)
+        answers = self._answer(settings, self.motion, wanted)
         if answers:
             scales = answers[0].scales(self.inside.lever)
             states = answers[0].find_worst(scales)
@@ -319,10 +332,15 @@ class SettingsSearch:
         for settings in combinations:
             if time.process_time() > self.end:
                 break
-            measured = self.measure(settings)
+            measured = self.measure(settings, wanted)
             if measured.error <= wanted:
                 return measured
-        return min(self.tried.values(), key=lambda one: one.error)
+        best = min(self.tried.values(), key=lambda one: one.error)
+        for one in sorted(self.tried.values(), key=lambda one: one.states.error):
+            if one.states.error >= best.error:
+                break
+            best = min(best, self.measure(one.settings), key=lambda one: one.error)
+        return best
 
     def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
         """Return the key by which combinations are sorted.
