@@ -40,7 +40,7 @@ class _Handle(NamedTuple):
     at: complex
     """Vector from the bar's first pin to the origin of the pair, in the bar's frame, m.
     """
-    beyond: complex = 0.0j
+    beyond: complex
     """The pair itself, m."""
     turns: bool = True
     """True if the pair's angle turns with the bar."""

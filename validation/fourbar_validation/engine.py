@@ -168,10 +168,7 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
             question["command"],
             question["times"],
         )
-        if "step" in question:
-            step = {"step": float(question["step"])}
-        else:
-            step = {}
+        step = {"step": float(question["step"])} if "step" in question else {}
         return protocol.released_to_json(
             make(**step).release(scene, np.array(question["times"]))
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.show.plot.style import INK, Points, split_complex, split_points
+from fourbar.show.plot.style import Points, split_complex, split_points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,8 +43,8 @@ class Label:
     text: str
     at: complex
     shun: complex
-    colour: str = INK
-    size: float = 8.5
+    colour: str
+    size: float
     dots_clear: float = 0.0
     """Radius of the mark at the point itself, typographic points."""
     ring: float = 0.0

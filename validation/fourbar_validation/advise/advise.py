@@ -132,7 +132,7 @@ class SearchRun:
     steps_per_revolution: float
     speed_error: float
     """Greatest deviation of the speed from the commanded one, relative."""
-    step_cost: float = 1.0
+    step_cost: float
     """CPU time of a step, in steps of RK4 with tolerance 0, ten iterations and pads."""
 
     @property
@@ -437,10 +437,7 @@ def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:
     """Find the greatest deviation of the speed from the commanded one, relative."""
     theta_2 = trial.at.theta_2
     omega_2 = np.asarray(trial.at.omega_2, float)
-    if setup.omega > 0.0:
-        first = theta_2.min()
-    else:
-        first = theta_2.max()
+    first = theta_2.min() if setup.omega > 0.0 else theta_2.max()
     squared = setup.omega**2 + 2.0 * setup.alpha * (theta_2 - first)
     due = np.sqrt(np.maximum(squared, 0.0))
     return float(np.max(np.abs(np.abs(omega_2) - due)) / np.max(due))
@@ -458,10 +455,7 @@ def _advise_robot(
     """Print what to type into a robot's file for an error; return the exit status."""
     from fourbar.files import load
 
-    if len(files) == 2:
-        scene = load(files[0])
-    else:
-        scene = None
+    scene = load(files[0]) if len(files) == 2 else None
     measurement = measure_robot(files[-1], options, scene, assets)
     reached = True
     for measured in measurement.loops:

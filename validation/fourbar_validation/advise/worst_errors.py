@@ -67,10 +67,7 @@ def compute_errors(
         formulas = solve(scene, "force", at=command)
     worst = {}
     for field in ERROR_NAMES:
-        if field == "torque":
-            name = name_driving(scene)
-        else:
-            name = field
+        name = name_driving(scene) if field == "torque" else field
         ours = getattr(formulas, name)
         size = scale_of(name, scene, formulas, ours).size
         error = find_error(name, ours, quantities[name][judged], size)

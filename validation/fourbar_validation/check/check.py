@@ -43,8 +43,8 @@ class Judgement:
     answer there.
     """
     explanations: list[Explanation]
-    tolerance: Allowance | None = None
-    blank: int = 0
+    tolerance: Allowance | None
+    blank: int
     """Cells of the judged columns in which no number stands."""
     explained_power: int | None = None
     """Power of ten within which all numbers agree once the mistakes are mended."""

@@ -448,10 +448,9 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     """Yield the right numbers in other rows: each row of theirs goes to our nearest."""
     table = judge.table
     n = len(judge.at.angle)
-    keys = []
-    for key in table.values:
-        if judge.where(key).all() and judge.size(key).all():
-            keys.append(key)
+    keys = [
+        key for key in table.values if judge.where(key).all() and judge.size(key).all()
+    ]
     if not ENOUGH_NUMBERS <= n <= MOST_ROWS_REORDERED or not keys:
         return
     apart = np.zeros((n, n))

@@ -45,7 +45,7 @@ class Allowance:
     atol is in the SI unit of each quantity.
     """
 
-    rtol: float = 0.0
+    rtol: float
     atol: float = 0.0
 
 
@@ -334,10 +334,7 @@ class Judge:
                 ]
                 yours, mine = zip(*stated, strict=True)
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
-                if permitted is None:
-                    most = None
-                else:
-                    most = float(permitted[i])
+                most = None if permitted is None else float(permitted[i])
                 findings.append(
                     Discrepancy(
                         self.table.lines[i],

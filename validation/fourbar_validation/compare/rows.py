@@ -136,10 +136,7 @@ class Row:
         index = int(find_used(errors, allowed).argmax())
         worst = float(errors[index])
         bound = _take_at(index, allowed)
-        if math.isfinite(worst) and worst <= bound:
-            verdict = AGREES
-        else:
-            verdict = FAILS
+        verdict = AGREES if math.isfinite(worst) and worst <= bound else FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
         return cls(

@@ -408,10 +408,7 @@ def _find_velocities(
     }
     for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
         centre = swung(number, *find_centre(bar))
-        if number == 3:
-            moved = centre + velocities["v_A"]
-        else:
-            moved = centre
+        moved = centre + velocities["v_A"] if number == 3 else centre
         velocities[f"v_G{number}"] = moved
     return velocities
 

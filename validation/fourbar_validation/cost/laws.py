@@ -226,10 +226,7 @@ def _fit_law(
     *,
     by_steps: bool = False,
 ) -> ErrorLaw:
-    if by_steps:
-        least = find_floor(points, quantity) or 0.0
-    else:
-        least = 0.0
+    least = find_floor(points, quantity) or 0.0 if by_steps else 0.0
     ordered = sorted(
         (p for p in points if p.setting_value > 0.0),
         key=lambda p: p.setting_value if by_steps else -p.setting_value,

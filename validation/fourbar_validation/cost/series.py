@@ -103,10 +103,7 @@ def _trace_steps(
     """
 
     def at(n: float) -> Settings:
-        if held is None:
-            tc = settings.time_constant_steps
-        else:
-            tc = held * n
+        tc = settings.time_constant_steps if held is None else held * n
         return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
 
     return make_curve(name, "{:g} steps a revolution", steps, at, edit)

@@ -327,10 +327,7 @@ class CostStudy:
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
-            if label == "50 digits":
-                command = few
-            else:
-                command = self.command
+            command = few if label == "50 digits" else self.command
             times = [
                 time_call(partial(method, self.scene, command))
                 for _ in range(TIMINGS_OF_A_SETTING)

@@ -103,10 +103,7 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
             tension = spring.preload + spring.stiffness * (distance - spring.length)
             if spring.acts is not None and (tension < 0.0) != (spring.acts == "push"):
                 continue
-            if distance:
-                per_metre = tension / distance
-            else:
-                per_metre = math.nan
+            per_metre = tension / distance if distance else math.nan
         x = per_metre * x
         y = per_metre * y
         bars.push(spring.start.bar, (x, y), one)
@@ -126,10 +123,7 @@ def _carry_load(load: "Load", bars: Loaded) -> None:
 
     A couple is applied too.
     """
-    if load.table is None:
-        factor = 1.0
-    else:
-        factor = look_up(load.table, bars.angle(2))
+    factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.force is not None:
         force = resolve(*load.force)
         if load.frame == "bar":

@@ -185,10 +185,7 @@ def _collect_place(
 ) -> dict[str, float]:
     """Collect the two numbers that state a place, under two names."""
     stated = find_stated(scene, place)
-    if stated.from_pin is None:
-        pair = stated.from_centre
-    else:
-        pair = stated.from_pin
+    pair = stated.from_centre if stated.from_pin is None else stated.from_pin
     assert pair is not None
     return {distance: pair[0], angle: pair[1]}
 
@@ -748,7 +745,7 @@ def _turn_by_stroke(scene: Scene, x: BallValues) -> BallValues | None:
     rate = s * speed / across
     along_the_stroke = square(speed) + s * x["stroke_acceleration"]
     growth = (along_the_stroke - along * square(rate)) / across
-    longer = length if length > reach else reach
+    longer = max(reach, length)
     turned = {
         f"theta_{bar}": fixed.arg() - held.arg() + side * beta,
         f"omega_{bar}": side * rate,

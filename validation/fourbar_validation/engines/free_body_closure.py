@@ -223,10 +223,7 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     )
     d = scene.linkage.ground
     theta_1 = scene.linkage.ground_angle
-    if on_bar.bar == 4:
-        pivot = complex(*resolve(d, theta_1))
-    else:
-        pivot = 0.0j
+    pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0j
     return (
         complex(*resolve(on_bar.distance, on_bar.angle)),
         complex(*place(on_ground, theta_1)) - pivot,

@@ -101,10 +101,7 @@ class Guest(Engine):
         Without `name` the named setting stays.
         """
         name = setting.pop("name", self.setting)
-        if name:
-            asked = {"name": name, **setting}
-        else:
-            asked = setting
+        asked = {"name": name, **setting} if name else setting
         return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
 
 

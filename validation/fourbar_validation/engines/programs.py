@@ -43,10 +43,7 @@ def bound_memory(process: int = 0) -> None:
         ValueError, OSError
     ):  # a hard limit below it, or a process that ended
         _, hard = prlimit(process, RLIMIT_DATA)
-        if hard < 0:
-            soft = WORKER_MEMORY
-        else:
-            soft = min(WORKER_MEMORY, hard)
+        soft = WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard)
         prlimit(process, RLIMIT_DATA, (soft, hard))
 
 
@@ -486,10 +483,7 @@ class Running:
 
         The text is kept too, as what this process prints.
         """
-        if self._errors is None:
-            text = b""
-        else:
-            text = _take_written(self._errors)
+        text = b"" if self._errors is None else _take_written(self._errors)
         _print_kept(text)
         return text
 

@@ -270,10 +270,7 @@ def _read_rate(
 
 
 def _read_branch(value: Any, n: int) -> Any:
-    if isinstance(value, list):
-        branches = value
-    else:
-        branches = [value] * n
+    branches = value if isinstance(value, list) else [value] * n
     if len(branches) != n or any(
         type(branch) is not int or branch not in (1, -1) for branch in branches
     ):

@@ -42,7 +42,7 @@ class PrintedFigure(NamedTuple):
     """
 
     printed: str
-    errata: tuple[str, ...] = ()
+    errata: tuple[str, ...]
 
 
 def read_printed() -> dict[str, dict[str, PrintedFigure]]:

@@ -234,14 +234,8 @@ def accept_command(
     RESULTS is the run's folder. Later runs are compared with it. It is kept in DIR, and
     its rows are appended to DIR/history.parquet, a table for pandas or DuckDB.
     """
-    if results.is_dir():
-        folder = results
-    else:
-        folder = results.parent
-    if to is None:
-        target = folder.absolute().parent / ACCEPTED
-    else:
-        target = to
+    folder = results if results.is_dir() else results.parent
+    target = folder.absolute().parent / ACCEPTED if to is None else to
     if target.resolve() == folder.resolve():
         raise InputError(
             "--to",

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -143,7 +143,7 @@ class Differences:
     """Scenes that ask something else."""
     weakened: list[Weakening]
     """Rules that are weaker than they were; reported first, and a regression."""
-    notes: list[str] = field(default_factory=list)
+    notes: list[str]
     """Engines and scenes of another name, and what neither record says."""
     baseline: str = ""
     """The old run in words: where it lies, of which date and commit."""

@@ -62,10 +62,7 @@ def write_verdict(diff: Differences) -> str:
         rows = f"{diff.rows}"
     if diff.baseline:
         head += f" against {diff.baseline}"
-    if counts:
-        moved = f" in {rows} rows: {', '.join(counts)}"
-    else:
-        moved = ""
+    moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
 

@@ -92,19 +92,12 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
     a reason or a boundary that is another one is weaker until somebody has accepted it.
     """
     weakened = []
-    for name in sorted(old.keys() & new.keys()):
+    for name in old.keys() & new.keys():
         before = old[name]
         after = new[name]
         for what in before.keys() & after.keys():
             if before[what] != after[what] and _is_weaker(what, before, after):
-                weakened.append(
-                    Weakening(
-                        name,
-                        what,
-                        before[what],
-                        after[what],
-                    )
-                )
+                weakened.append(Weakening(name, what, before[what], after[what]))
     return sorted(
         weakened,
         key=lambda one: (one.name, one.what != FACTOR_CHANGED, one.what),

@@ -236,10 +236,7 @@ class Overview:
         """
         asked: dict[str, dict[str, bool]] = {}
         for row in rows:
-            if row.quantity in DRIVES:
-                name = "torque"
-            else:
-                name = row.quantity
+            name = "torque" if row.quantity in DRIVES else row.quantity
             if row.engine != FORMULAS and name in ("torque", *PIN_FORCES):
                 asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
         whole = len(PIN_FORCES) + 1

@@ -226,10 +226,11 @@ class Summary:
                 times.append((microseconds, ratio))
 
     def _add_orders(self, scene: Record) -> None:
-        orders = []
-        for evidence in scene.evidence.values():
-            if "observed_order" in evidence:
-                orders.append((scene.name, evidence))
+        orders = [
+            (scene.name, evidence)
+            for evidence in scene.evidence.values()
+            if "observed_order" in evidence
+        ]
         self._orders = _keep_largest(
             _ORDERS_SHOWN,
             [*self._orders, *orders],
@@ -250,10 +251,7 @@ class Summary:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
         words = self._say_first_cause()
         if weaker := self.overview.weaker:
-            if len(weaker) > 1:
-                more = f", and {len(weaker) - 1} more"
-            else:
-                more = ""
+            more = f", and {len(weaker) - 1} more" if len(weaker) > 1 else ""
             rules = f"{weaker[0]}{more}, against {self.overview.baseline}"
             return f"WEAKER RULE: {rules}. {words}"
         return words
@@ -269,18 +267,12 @@ class Summary:
         else:
             others = ""
         first = causes[0]
-        if first.engine != FORMULAS:
-            named = first.engine
-        else:
-            named = "fourbar itself"
+        named = first.engine if first.engine != FORMULAS else "fourbar itself"
         what = f"{named} is wrong: {first.text}, in {first.scenes} scene"
         what += f"{'s' if first.scenes > 1 else ''}; "
         if first.worst.quantity != "all":
             what += f"worst {first.worst.quantity} of "
-        if self.overview.since:
-            since = f" {self.overview.since}"
-        else:
-            since = ""
+        since = f" {self.overview.since}" if self.overview.since else ""
         return f"FAILS: {what}{first.place}{others}.{since}"
 
     @property
@@ -329,10 +321,7 @@ class Summary:
         """Return every independent engine by name, then our own consistency."""
         for line in self._engines.values():
             line.version = self._find_version(line.name)
-            if line.name == OWN_CONSISTENCY:
-                engine = FORMULAS
-            else:
-                engine = line.name
+            engine = FORMULAS if line.name == OWN_CONSISTENCY else line.name
             if times := self._times.get(engine):
                 line.microseconds, line.times_formulas = map(
                     median, zip(*times, strict=True)

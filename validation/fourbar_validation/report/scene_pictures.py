@@ -270,10 +270,7 @@ def _draw_errors(
         )
         high = max(high, limit)
     for turn, answer in enumerate(answers):
-        if answer.at is None:
-            formulas = solution
-        else:
-            formulas = solve(scene, at=answer.at)
+        formulas = solution if answer.at is None else solve(scene, at=answer.at)
         mine = getattr(formulas, quantity)
         size = scale_of(quantity, scene, formulas, mine).size
         error = find_error(quantity, mine, answer.quantities[quantity], size)

@@ -85,10 +85,7 @@ def _draw_curve(record: Record, solution: Solution) -> str:
     assert record.scene is not None
     name = name_driving(record.scene)
     released = record.scene.motion.free is not None  # no torque acts
-    if released:
-        ours = None
-    else:
-        ours = getattr(solution, name, None)
+    ours = None if released else getattr(solution, name, None)
     good = solution.status_code == OK
     if ours is None or np.count_nonzero(good) < 2:
         return ""

@@ -171,10 +171,10 @@ def _refuse_beside_mimic(context: click.Context) -> None:
 
 def _write_stated(robot: Mapping[str, Any]) -> str:
     """Write the options that win over the scene, as they were typed."""
-    texts = []
     named = {"range" if name == "span" else name: robot[name] for name in robot}
-    for name, value in named.items():
-        for text in value if isinstance(value, tuple) else (value,):
-            if text:
-                texts.append(f"--{name} {text}")
-    return " ".join(texts)
+    return " ".join(
+        f"--{name} {text}"
+        for name, value in named.items()
+        for text in (value if isinstance(value, tuple) else (value,))
+        if text
+    )

@@ -254,10 +254,7 @@ def _is_same_value(
         floor = 1.0
     else:
         floor = 0.0
-    if key == "closure.softness":
-        same = _SAME_SOFTNESS
-    else:
-        same = SAME_NUMBER
+    same = _SAME_SOFTNESS if key == "closure.softness" else SAME_NUMBER
     return bool(
         np.all(
             np.abs(first - second)

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from fourbar.files import dump
+from fourbar.mjcf.model import write_six_digits
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -56,18 +57,11 @@ def _write_closure(closure: RobotClosure) -> str:
         angle = math.degrees(closure.misaligned)
         parts.append(f"axes {angle if angle > PRINTED_AS_ZERO else 0.0:.2g} deg apart")
     if closure.gap is not None:
-        if closure.gap > PRINTED_AS_ZERO:
-            gap = closure.gap
-        else:
-            gap = 0.0
+        gap = closure.gap if closure.gap > PRINTED_AS_ZERO else 0.0
         parts.append(f"gap {write_length(gap) if gap else 0} mm")
-    parts.append(f"solref {_join_numbers(closure.solref)}")
-    parts.append(f"solimp {_join_numbers(closure.solimp)}")
+    parts.append(f"solref {write_six_digits(*closure.solref)}")
+    parts.append(f"solimp {write_six_digits(*closure.solimp)}")
     return "; ".join(parts)
-
-
-def _join_numbers(numbers: tuple[float, ...]) -> str:
-    return " ".join(f"{number:.6g}" for number in numbers)
 
 
 def _show_report(report: RobotReport) -> None:

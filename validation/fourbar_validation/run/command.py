@@ -123,10 +123,7 @@ def run_command(**stated: Any) -> int:
 
     request = Request(**stated)
     request.require_consistent()
-    if request.part is None:
-        part = None
-    else:
-        part = RunPart.read(request.part)
+    part = None if request.part is None else RunPart.read(request.part)
     plan = make_plan(request)
     if part is not None:
         scenes = plan.count_scenes(plan.list_tasks(part))

@@ -140,10 +140,7 @@ def _make_equation_row(
     condition = 1.0 / count_half_turns(
         question.scene.linkage.ground_angle, question.at.angle
     )
-    if judged.any():
-        reason = f"identity: {equation}"
-    else:
-        reason = NOT_DEMANDED
+    reason = f"identity: {equation}" if judged.any() else NOT_DEMANDED
     return question.row(
         quantity,
         error,

@@ -175,10 +175,7 @@ class Question:
         `where`: positions that are held to it; none of them: undecided.
         `theta_2`: of the errors; left out: of the command.
         """
-        if theta_2 is None:
-            place = self.at.angle
-        else:
-            place = theta_2
+        place = self.at.angle if theta_2 is None else theta_2
         who = (self.name, FORMULAS, "exact")
         return Row.judged(
             who,

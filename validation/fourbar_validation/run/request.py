@@ -142,10 +142,7 @@ class Request:
     @property
     def options(self) -> RunOptions:
         """Return the options of the run itself."""
-        if self.against is None:
-            against = None
-        else:
-            against = find_baseline(self.against)
+        against = None if self.against is None else find_baseline(self.against)
         return RunOptions(
             self.workers,
             not self.no_pictures,
@@ -160,10 +157,7 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
 
     `files`: the scenes as a part kept them.
     """
-    if files is None:
-        suite = _select_scenes(request)
-    else:
-        suite = files
+    suite = _select_scenes(request) if files is None else files
     engines = select_engines(request)
     present, missing = _find_askable(engines, by_name=request.engines is not None)
     return Plan(

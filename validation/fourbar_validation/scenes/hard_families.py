@@ -118,11 +118,11 @@ def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
     At these angles a^2 + d^2 - 2 a d cos psi = (b +- c)^2.
     """
     d, a, b, c = lengths
-    places = []
-    for joined, stretched in ((b + c, True), (b - c, False)):
-        for psi in _compute_corners(d, a, joined)[:1]:
-            places.append((psi, stretched))
-    return places
+    return [
+        (psi, stretched)
+        for joined, stretched in ((b + c, True), (b - c, False))
+        for psi in _compute_corners(d, a, joined)[:1]
+    ]
 
 
 def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:

@@ -166,9 +166,9 @@ def draw_scene(
         ranges.ground_angle(rng),
     )
     weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
-    loads = []
-    for _ in range(int(rng.integers(0, 3))):
-        loads.append(_draw_load(rng, linkage, weight, ranges))
+    loads = [
+        _draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3)))
+    ]
     effects: list[Any] = []
     if rng.random() < ranges.gravity:
         effects.append(Gravity())

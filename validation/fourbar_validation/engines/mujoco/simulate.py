@@ -346,10 +346,7 @@ class _Simulation:
 
     def _write_text(self, timestep: float, flywheel: float | None = None) -> str:
         """Write the generated MJCF without its keyframe."""
-        if flywheel is None:
-            heavy = self.settings.flywheel
-        else:
-            heavy = flywheel
+        heavy = self.settings.flywheel if flywheel is None else flywheel
         settings = replace(
             self.settings,
             timestep=timestep,

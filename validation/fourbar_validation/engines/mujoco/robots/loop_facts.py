@@ -228,7 +228,7 @@ class LoopScene:
     """
     remarks: tuple[str, ...]
     """Sentences on what was chosen, and on what the scene leaves out, with its size."""
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...]
     """Sentences on what was done to the file and its pose."""
 
 
