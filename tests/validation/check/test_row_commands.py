@@ -5,12 +5,13 @@ The second derivation of a position is the intersection of two circles.
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.errors import FAILED, HOLDS, InputError, LimitError
+from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Rise
 from fourbar_validation.check.check import judge_table
@@ -41,10 +42,10 @@ def find_crank(scene, theta_4, side):
 def read(tmp_path):
     """Reads the text of a table."""
 
-    def read_text(text, commanded="theta_2"):
+    def read_text(text, commanded="theta_2", **more):
         path = tmp_path / "theirs.csv"
         path.write_text(text)
-        return read_table(path, commanded)
+        return read_table(path, commanded, **more)
 
     return read_text
 
@@ -267,6 +268,9 @@ LOGGED = [
     ("coarse theta_2 torque", HOLDS),
     ("rounded degrees torque", HOLDS),
     ("step theta_2 torque", "needs a column time"),
+    ("exact torque", HOLDS),
+    ("beyond torque", "time = 0.836: the law lasts from 0 to 0.8 s"),
+    ("step torque", "needs a column theta_2"),
 ]
 
 
@@ -300,6 +304,8 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
     theta, omega, alpha, torque = follow_rise(time)
     columns = {
         "time": (time, "t [ms]", 1e3, ".1f"),
+        "exact": (time, "time [ms]", 1e3, ".4f"),
+        "beyond": (time + 0.1, "time", 1.0, ".3f"),
         "late": (time + 2e-3, "time [s]", 1.0, ".4f"),
         "rounded": (time, "time", 1.0, ".3f"),
         "coarse": (time, "time", 1.0, ".1f"),
@@ -315,6 +321,7 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
     for row in range(len(time)):
         cells = [format(n[row] * x, form) for n, _, x, form in chosen]
         text += ",".join(cells) + "\n"
+    read = partial(read, law=RISE)
     if judged_as == HOLDS:
         judgement = judge_table(SERVO, read(text))
         assert judgement.status == HOLDS and judgement.compared >= len(time)
@@ -340,15 +347,25 @@ def test_times_that_nobody_rounded_leave_all_digits(times, read):
     assert judgement.status == HOLDS and judgement.digits[0] >= "7"
 
 
-def test_a_command_of_a_stroke_is_refused(judged):
-    stroke = fourbar.Motion(stroke=0.25, side="left")
-    with pytest.raises(LimitError, match="takes a command of an angle alone"):
-        judged(
-            crank_rocker(motion=stroke, drive=CYLINDER),
-            "theta_2",
-            [1.0],
-            [1.0],
-        )
+def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged):
+    """The angle by the triangle of O2 and both ends of the cylinder."""
+    motion = fourbar.Motion(stroke=fourbar.Sweep(0.22, 0.28, 4), side="left")
+    scene = crank_rocker(motion=motion, drive=CYLINDER)
+    far, near = (end.distance for _, end in CYLINDER.ends)
+    stroke = np.array([0.28, 0.223, 0.25])
+    cosine = (far * far + near * near - stroke * stroke) / (2.0 * far * near)
+    first = scene.linkage.ground_angle + CYLINDER.ends[0][1].angle
+    theta = first + np.arccos(cosine) - CYLINDER.ends[1][1].angle
+    theta[1] += 1e-6
+    rows = [f"{s!r},{angle!r}" for s, angle in np.transpose([stroke, theta]).tolist()]
+    judgement = judge_table(scene, read("\n".join(["stroke,theta_2", *rows]), "stroke"))
+    assert [finding.line for finding in judgement.differing] == [3]
+    assert judgement.compared == 3 and judgement.table.found_by == "theta_2"
+    own = fourbar.solve(scene, "position")
+    text = tabulate("theta_2", own.theta_2, own.stroke).replace("torque", "stroke")
+    assert judge_table(scene, read(text)).status == HOLDS
+    with pytest.raises(InputError, match="needs a column stroke"):
+        judged(scene, "theta_2", theta, theta)
 
 
 def test_a_table_without_an_angle_names_the_commanded_one(read):

@@ -374,9 +374,9 @@ def check_command(
     command prints to how many digits the numbers were compared. If --rtol or --atol is
     given, these decide, and the number of exact agreements is printed too. If the scene
     states no speed, each row is judged at its own, say omega_2 and alpha_2. Along a law
-    each has the law's at its time, a column beside the angle, or its own.
+    each has the law's at its time, a column beside or without the angle, or its own.
 
-    A row is found by the angle that the scene commands (theta_2, theta_3 or theta_4).
+    A row is found by what the scene commands (theta_2, theta_3, theta_4 or a stroke).
     In its place the angle of another bar may stand, if the motion passes it once or the
     rows are the scene's own positions.
     """
@@ -398,7 +398,8 @@ def check_command(
         return check_problem(scene, theirs)
     stated = load(scene)
     points = list_names_of_points(stated)
-    table = read_table(theirs, stated.motion.commanded, points)
+    motion = stated.motion
+    table = read_table(theirs, motion.commanded, points, motion.law)
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)

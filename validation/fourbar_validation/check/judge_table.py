@@ -142,6 +142,9 @@ class Judge:
             },
             notes=(*table.notes, *rows.notes),
         )
+        if self.at.moves_stroke:
+            names = (f"theta_{self.at.bar}", self.at.angle)
+            self.table = replace(self.table, found_by=names[0], places=names[1])
         self.stage = "position" if self.at.speed is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
@@ -157,7 +160,7 @@ class Judge:
             else:
                 if self.at.speed is None:
                     raise InputError(
-                        f"motion.omega_{self.at.bar}",
+                        f"motion.{self.at.names[1]}",
                         None,
                         f"is needed in the scene or the table to judge {key}",
                     )

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, LimitError, write_count
+from fourbar.errors import InputError, write_count
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, find_signs
@@ -58,11 +59,9 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     Raises InputError for a motion whose rows are not found by an angle, and for an
     angle that the motion passes at several positions.
     """
-    if scene.motion.stroke is not None:
-        raise LimitError(
-            "motion.stroke: a table of results takes a command of an angle alone"
-        )
     base = command(scene)
+    if scene.motion.stroke is not None:
+        return _find_strokes(scene, table, base)
     if scene.motion.free is not None:
         allowed = (
             "not judged while released; without free and omega_2 each row is judged at"
@@ -99,6 +98,23 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     else:
         found = _find_by_another_bar(scene, table, base)
     return found._replace(rates=rates)
+
+
+def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
+    """Command the stroke of each row, or the scene's own if the angles are theirs."""
+    if table.found_by != base.commanded:
+        if _has_positions_of(scene, table):
+            return RowCommands(base)
+        why = "a table at other positions than the scene's own needs a column stroke"
+        raise InputError("motion.stroke", None, why)
+
+    def command_at(shift: Array | float) -> Command:
+        motion = scene.motion.replace(angle=table.places + shift)
+        return command(replace(scene, motion=motion))
+
+    rounding = table.places_rounding
+    near = map(command_at, (-rounding, rounding) if rounding.any() else ())
+    return RowCommands(command_at(0.0), tuple(near))
 
 
 def _list_stated_rates(

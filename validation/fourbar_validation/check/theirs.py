@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
+from fourbar.scene.motion import Law, Rise, Sine
 from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
 from fourbar_validation.check.csv_columns import GROWING
@@ -232,11 +233,13 @@ def read_table(
     path: Path,
     commanded: str = "theta_2",
     points: Collection[str] = (),
+    law: Law | Rise | Sine | None = None,
 ) -> TheirTable:
     """Read a CSV table; InputError names the column or line that cannot be read.
 
     `commanded`: name of the angle that the scene commands. Rows are found by it, or by
-    another bar's angle where the table does not have it.
+    another bar's angle where the table does not have it. Without an angle they are
+    found by their time along the scene's law.
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
@@ -254,7 +257,17 @@ def read_table(
     times = _read_times(columns, rows)
     _drop_repeated(path, columns, left_out, headings, rows)
     names = [name for name, _ in columns.values()]
+    numbers = {name: np.empty(len(rows)) for name in names}
+    halves = {name: np.empty(len(rows)) for name in names}
+    units = {name: unit for name, unit in columns.values()}
     found_by = next((name for name in (commanded, *_PLACES) if name in names), None)
+    if found_by is None and law is not None and times is not None:
+        found_by, units[commanded] = commanded, Unit("rad", 1.0)
+        lines_of_rows = [line for line, _ in rows]
+        numbers[commanded], halves[commanded] = _follow(law, times, lines_of_rows, path)
+        left_out = {
+            name: why for name, why in left_out.items() if why != NOT_JUDGED["time"]
+        }
     if found_by is None:
         raise InputError(
             "header",
@@ -263,8 +276,6 @@ def read_table(
             " angle of another bar" + _list_renamings(renamings),
             str(path),
         )
-    numbers = {name: np.empty(len(rows)) for name in names}
-    halves = {name: np.empty(len(rows)) for name in names}
     for row, (line, cells) in enumerate(rows):
         _require_cells(path, headings, line, cells)
         for index, (name, unit) in columns.items():
@@ -292,7 +303,6 @@ def read_table(
                 f"needs a {found_by}",
                 str(path),
             )
-    units = {name: unit for name, unit in columns.values()}
     notes = _read_degrees(found_by, numbers, halves, units, headings, columns)
     left_out |= {
         headings[index]: _BLANK
@@ -340,6 +350,28 @@ def _read_times(
             times = np.array([_read_cell(cells[index]) for _, cells in rows])
             return times * unit.factor if np.isfinite(times).all() else None
     return None
+
+
+def _follow(
+    law: Law | Rise | Sine,
+    times: Array,
+    lines: list[int],
+    path: Path,
+) -> tuple[Array, Array]:
+    """Return the law's angle at each time, and what the rounding of the time moves it.
+
+    Raises InputError for a time that the law does not have.
+    """
+    printed, half = times.T
+    first, *_, last = law.time
+    inside = np.clip(printed, first, last)
+    beyond = np.abs(printed - inside) > half
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        wanted = f"the law lasts from {first:g} to {last:g} s"
+        raise InputError(f"line {lines[row]}, time", printed[row], wanted, str(path))
+    angle, speed, _ = law.at(inside)
+    return angle, np.abs(speed) * _find_rounding(half, Unit("s", 1.0))
 
 
 def _require_cells(
@@ -410,8 +442,9 @@ def _read_degrees(
 ) -> tuple[str, ...]:
     """Read an angle without a unit as degrees if it can be nothing else."""
     values = numbers[name]
-    heading = next(headings[i] for i, (one, _) in columns.items() if one == name)
-    bare = not re.search(r"[\[(]", heading) and units[name].text == "rad"
+    stated = [headings[i] for i, (one, _) in columns.items() if one == name]
+    bare = not re.search(r"[\[(]", "".join(stated)) and units[name].text == "rad"
+    bare &= bool(stated)  # and not found by a time
     largest = float(np.abs(values).max())
     if not bare or not _TWO_TURNS < largest < _MOST_DEGREES:
         return ()
@@ -467,7 +500,7 @@ def fill_zeros(numbers: Array, halves: Array) -> Array:
 
 
 def _find_rounding(halves: Array, unit: Unit) -> Array:
-    """Find half a unit of the last digit of each angle by which a row is found.
+    """Find half a unit of the last digit of each place by which a row is found.
 
     For a cell whose zeros were left off it is that of the column.
     """
