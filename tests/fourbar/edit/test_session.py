@@ -20,8 +20,10 @@ from pytest import approx, raises
 
 import fourbar
 from fourbar import InputError, solve
+from fourbar.edit.dragging import write_rounded
 from fourbar.files import loads
 from fourbar.files.scene_text import write_new_scene
+from fourbar.quantities.units import find_unit
 
 pytest.importorskip(
     "tomlkit",
@@ -480,6 +482,15 @@ def test_what_was_typed_stays_when_another_linkage_is_drawn(new):
     assert new.now.plain["bars"]["coupler"]["mass"] == "3 lb"
     coupler = new.now.scene.linkage.coupler
     assert coupler.length == approx(INCH * math.hypot(11, 8), abs=INCH * 0.01)
+
+
+def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit():
+    assert write_rounded(0.123456, 0.003, "m") == "0.123 m"
+    assert write_rounded(123.456, 3.0, "mm") == "123 mm"
+    assert write_rounded(1234.0, 300.0, "mm") == "1200 mm"
+    assert find_unit("12 1/2 in", "m") == find_unit("1'6 1/2\"", "m") == "in"
+    assert find_unit("3e-2 kg m^2", "") == "kg m^2"
+    assert find_unit(None, "deg") == "deg"
 
 
 def unpacked(data):

@@ -28,7 +28,7 @@ from fourbar import (
 )
 from fourbar.effects import Place
 from fourbar.errors import InputError
-from fourbar.files import dump, load, loads
+from fourbar.files import dump, load, loads, save
 from fourbar.files.scene_text import NEW_POSITIONS, write_new_scene
 from tests.fourbar.test_solving import scenes
 from tests.support.scenes import crank_rocker
@@ -124,6 +124,22 @@ def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
 def test_every_letter_of_a_title_reads_back():
     title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
     assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
+
+
+def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
+    scene = load(MODELS[0])
+    target = tmp_path / "scene.toml"
+    save(scene, target)
+    before = target.read_bytes()
+    assert facts(load(target)) == facts(scene)
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with raises(OSError, match="No space"):
+        save(replace(scene, title="other"), target)
+    assert target.read_bytes() == before and list(tmp_path.iterdir()) == [target]
 
 
 def test_what_a_file_cannot_hold_is_refused():

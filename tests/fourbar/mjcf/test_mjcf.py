@@ -16,8 +16,8 @@ import fourbar
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep
 from fourbar.effects import Torsion
 from fourbar.formulas.mobility import choose_range, turns_fully
-from fourbar.mjcf import Settings, write_mjcf
-from fourbar.mjcf.document import SETTLING
+from fourbar.mjcf import RECIPE, Settings, write_mjcf
+from fourbar.mjcf.document import SETTLING, choose_run
 from fourbar_validation.scenes.random import (
     MACHINES,
     DrawnType,
@@ -211,3 +211,18 @@ def test_without_keyframe_no_position_is_written():
     assert mujoco.MjModel.from_xml_string(text).nkey == 0
     with raises(InputError, match="timestep"):
         write_mjcf(crank_rocker(), keyframe=False)
+
+
+def test_a_window_has_its_steps_wherever_it_lies():
+    """A quarter radian at 3 rad/s takes 1/12 s.
+
+    The steps in it do not depend on the angle at which it begins.
+    """
+    steps = {
+        choose_run(np.array([start, start + 0.25]), 3.0, 0.0).timestep()
+        for start in (0.1, 2.0, 4.0)
+    }
+    assert max(steps) == approx(min(steps), rel=1e-12)
+    run = choose_run(np.array([2.0, 2.25]), 3.0, 0.0)
+    count = run.time(run.stop) / run.timestep()
+    assert count == approx(round(count)) and count >= RECIPE.steps_per_window

@@ -49,6 +49,22 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
     assert np.allclose(rotation(half), turn @ about_z, atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    "axis, at, expected",
+    [
+        ((0, -1, 0), (0, -9.81), [0, 0, -9.81]),  # x-z, gravity down
+        ((1, 0, 0), (9.81, 0), [0, 0, -9.81]),  # x points down, y stays
+        ((-1, 1, 0), (5, 5), [5, 5, 0]),
+        ((1e-5, 0, -1), (1, 0), [-1, 0, -1e-5]),
+    ],
+)
+def test_a_turned_vector_has_zeros_where_it_has_no_component(axis, at, expected):
+    plane = Plane(axis)
+    turned = plane.turn(*at)
+    assert turned == approx(expected, rel=1e-10, abs=0.0)
+    assert np.linalg.norm(plane.quaternion) == approx(1.0, abs=1e-15)
+
+
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
 def test_what_is_no_direction_is_refused(axis):
     with pytest.raises(InputError, match="axis"):

@@ -184,6 +184,16 @@ def test_a_motion_is_replaced_by_what_it_commands(motion, changes, same):
         motion.replace(theta_2=1.0)
 
 
+def test_a_motion_reads_by_the_name_of_what_it_commands():
+    rates = STROKE.stroke, STROKE.stroke_speed, STROKE.stroke_acceleration
+    assert (*rates, STROKE.theta_2) == (0.3, 0.1, 0.2, None)
+    output = Motion(theta_4=1.0, omega_4=2.0, alpha_4=3.0)
+    own = output.theta_4, output.omega_4, output.alpha_4, output.bar
+    assert own == (1.0, 2.0, 3.0, 4)
+    others = output.theta_2, output.omega_2, output.alpha_2, output.stroke
+    assert others == (None, None, 0.0, None)
+
+
 def make_motion_of_a_law(law):
     """State the positions of a law one by one, each with its speed and growth."""
     angle, speed, acceleration = law.at(law.times())

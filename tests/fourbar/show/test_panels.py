@@ -131,6 +131,16 @@ def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(edge
 ZEROS = [0.3, 0.8, 1.7]
 
 
+def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
+    forwards, backwards = (fit(np.sin, edges) for edges in (EDGES, EDGES[::-1]))
+    for panels in (forwards, backwards):
+        assert panels.find_peak("curve", 1).place == approx(0.5 * pi, abs=1e-5)
+        assert panels.find_peak("curve", -1).value == approx(0.0, abs=1e-8)
+    level = [fit(lambda x: 1.0 + 0.0 * x, edges) for edges in (EDGES, EDGES[::-1])]
+    places = [panels.find_peak("curve").place for panels in level]
+    assert places == approx([0.0, 2.0], abs=1e-8)
+
+
 @pytest.mark.parametrize("edges", (EDGES, np.array([0.0, 0.31, 2.0])))
 @pytest.mark.parametrize(
     "curve, zeros",

@@ -15,7 +15,7 @@ from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.show.plot.figures import draw_figure
-from fourbar.show.shown_units import units, units_of_scene
+from fourbar.show.shown_units import units, units_of_scene, write_digits
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
@@ -120,6 +120,13 @@ def test_plots_say_theirs():
         assert figure.subfigs[0].axes[0].get_ylabel() == label
 
 
+def test_units_are_read_as_people_write_them():
+    assert units("mm, N,lbf-in") == units("mm N lbf-in")
+    assert units("Imperial") == units("imperial")
+    assert not units("si")
+    assert units("in lb lbf")["N"][0] == "lbf"
+
+
 @pytest.mark.parametrize(
     "stated, shown",
     [({}, "rad/s"), ({"omega_2": "60 rpm"}, "rpm"), ({"omega_2": "9 deg/s"}, "deg/s")],
@@ -151,3 +158,17 @@ def test_lengths_have_results_in_their_unit(length, names):
     expected = {"in": (12.0, 12.0), "ft": (1.0, 1.0), "km": (0.3048e-3, foot_pound)}
     of_length, _, of_torque = (factor for _, factor in units_shown)
     assert expected[names[0]] == approx((0.3048 * of_length, foot_pound * of_torque))
+
+
+def test_a_ground_by_coordinates_has_their_unit():
+    one = {"x": "3 in", "y": "1 in"}
+    other = "3 in"
+    shown = [units_of_scene({"lengths": {"ground": ground}}) for ground in (one, other)]
+    assert shown[0] == shown[1]
+
+
+@pytest.mark.parametrize(
+    "value, text", [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
+)
+def test_a_number_has_four_digits_and_zero_no_sign(value, text):
+    assert write_digits(value) == text

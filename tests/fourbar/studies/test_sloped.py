@@ -141,3 +141,9 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
         sensitivity(refused)
     with raises(LimitError, match=r"cannot follow numpy\.maximum"):
         fourbar.equilibrium(refused)
+
+
+def test_a_number_is_zero_only_where_its_slopes_are_too():
+    x = Sloped(np.array([0.0, 0.0, 1.0]), np.array([[0.0, 1.0, 0.0]]))
+    assert (x == 0.0).tolist() == [True, False, False]
+    assert (x != 0.0).tolist() == [False, True, True]

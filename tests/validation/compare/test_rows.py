@@ -25,6 +25,7 @@ from fourbar_validation.compare.rows import (
     FAILS,
     REFUSES,
     UNDECIDED,
+    VERDICTS,
     Counts,
     Row,
     write_results,
@@ -136,6 +137,15 @@ IDENTITY = changed(engine="formulas", quantity="closure")
 def test_all_hold_counts_what_was_compared_alone(rows, sentence, status):
     counts = Counts(rows)
     assert (counts.sentence(), counts.status) == (sentence, status)
+
+
+def test_scenes_are_counted_and_a_row_passes_where_it_was_compared_and_holds():
+    counts = Counts()
+    counts.add_scene(rows(agree=40))
+    counts.add_scene(rows(refuse=3))
+    assert (counts.scenes, counts.scenes_compared, counts.total) == (2, 1, 43)
+    passing = {verdict for verdict in VERDICTS if changed(verdict=verdict).passed}
+    assert passing == {AGREES, DEGRADED}
 
 
 @pytest.mark.parametrize(

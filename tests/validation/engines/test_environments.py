@@ -232,6 +232,14 @@ def test_what_is_no_entry_is_named_with_its_file(text, words, tmp_path):
     assert words in str(error.value) and str(error.value).startswith(str(file))
 
 
+def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known():
+    known = r"must be among pinocchio-inverse, .*mujoco 3\.3\.7"
+    with pytest.raises(InputError, match=known):
+        choose_engines("nobody")
+    with pytest.raises(InputError, match="among Newton: MuJoCo solver, Newton: Kam"):
+        choose_engines("newton")
+
+
 def test_the_list_of_known_engines_has_whole_names():
     with pytest.raises(InputError) as error:
         choose_engines("nobody")

@@ -117,6 +117,14 @@ def test_what_is_read_as_equal_is_said_with_its_difference():
     )
 
 
+def test_the_range_of_the_motor_is_that_of_the_file():
+    """It passes the change point at which the rounded lengths would stop it."""
+    made = read(FOOT_PARALLELOGRAM)
+    sweep = made.scene.motion.angle
+    assert isinstance(sweep, fourbar.Sweep)
+    assert sweep.stop - sweep.start == pytest.approx(2.4, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "text",
     [

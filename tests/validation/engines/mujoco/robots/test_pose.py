@@ -226,3 +226,19 @@ def test_zero_needs_no_unit():
     model = compiled(FOOT.read_text())
     posed = pose_robot(model, PoseOptions(joints={"crank": "0"}))
     assert posed.data.qpos[model.joint("crank").qposadr[0]] == 0.0
+
+
+def test_a_floating_body_that_is_tied_to_the_ground_moves_there():
+    """A metre along x and a turn of 30 deg about z, by half angles."""
+    model = compiled(
+        """<mujoco><worldbody><body name="part"><freejoint name="free"/>
+        <geom size="0.1"/></body></worldbody><equality><weld body1="part"
+        relpose="-1 0 0 0.9659258262890683 0 0 0.25881904510252074"/></equality>
+        </mujoco>"""
+    )
+    posed = pose_robot(model, PoseOptions())
+    assert posed.notes == (
+        "the loops are closed again by least squares: free by 1000 mm and 30 deg",
+    )
+    turned = [math.cos(math.radians(15.0)), 0.0, 0.0, -math.sin(math.radians(15.0))]
+    assert posed.data.qpos[3:] == pytest.approx(turned, abs=1e-9)
