@@ -322,7 +322,9 @@ class Judge:
             label = self.table.label(key)
             error, allowed, apart = self.judged_right(key)
             permitted = self.permitted(key, ours)
-            coarse = (allowed > ONE_DIGIT) & (error > self.find_exact(key))
+            exact = self.find_exact(key)
+            is_exact = (error <= exact) & (exact <= ONE_DIGIT)
+            coarse = (allowed > ONE_DIGIT) & ~is_exact
             if permitted is not None:
                 limits = self._allow(key)
                 coarse &= allowed > divide(permitted, limits.size) - limits.rounding
