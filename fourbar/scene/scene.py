@@ -180,16 +180,17 @@ class Scene:
         figure : "overview", "linkage", "coupler", "kinematics", "points", "torque",
             "stroke", "forces", "energy", "transmission", "shaking", "ratios",
             "centres", "freebody" or "bars".
-        position : what is commanded where linkage and free bodies are drawn, rad or m;
-            left out: the scene's own.
+        position : what is commanded where linkage, free bodies and what is inside the
+            bars are drawn, rad or m; left out: the scene's own, and a motion's bars
+            each where it bends most.
         units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI
             with the prefix that suits, deg.
         dimensions : write the lengths of the bars at them.
 
         Raises
         ------
-        InputError : unknown figure; a figure of forces without omega_2; a position or
-            dimensions for a figure that shows none.
+        InputError : unknown figure; a figure of forces without omega_2; dimensions for
+            a figure that shows none.
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """

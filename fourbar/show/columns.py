@@ -46,6 +46,10 @@ class Column(NamedTuple):
     """(n,)."""
     divisor: str = "1"
     """SI unit of what a ratio is divided by."""
+    size: Array | float = 0.0
+    """Size of which the rounding of a value counts as zero: that of the vector of a
+    component, (n,), and 1 of a pure number.
+    """
 
     def label(self, units: Conversion) -> str:
         """Return the unit that the column is shown in; empty for a pure number."""
@@ -97,7 +101,8 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
             read_column(scene, solution, second),
         )
     if _is_number(solution, name) or "/" not in name:
-        return Column(name, *_find_number(scene, solution, name))
+        unit, values, size = _find_number(scene, solution, name)
+        return Column(name, unit, values, size=size)
     above, _, below = (part.strip() for part in name.partition("/"))
     if _is_force_along_path(solution, above) and _is_force_along_path(solution, below):
         # by virtual work the forces are as the speeds, the other way round
@@ -105,8 +110,8 @@ def read_column(scene: Scene, solution: Solution, name: str) -> Column:
     of = solution
     if _is_velocity(above) and _is_velocity(below):
         of = _solve_at_unit_speed(scene, solution)
-    unit, numerator = _find_number(scene, of, above)
-    divisor, denominator = _find_number(scene, of, below)
+    unit, numerator, _ = _find_number(scene, of, above)
+    divisor, denominator, _ = _find_number(scene, of, below)
     with np.errstate(all="ignore"):
         ratio = numerator / denominator
     ratio = np.where(np.isfinite(ratio), ratio, np.nan)
@@ -156,8 +161,8 @@ def _find_number(
     scene: Scene,
     solution: Solution,
     name: str,
-) -> tuple[str, Array]:
-    """Return the SI unit of a number of each position and its values."""
+) -> tuple[str, Array, Array | float]:
+    """Return the SI unit of a number of each position, its values and their size."""
     values: Array | None
     if name == "time":
         values = solution.time
@@ -166,7 +171,7 @@ def _find_number(
         if values is None:
             none = "passed at no one speed, without a law, the positions have no time"
             raise InputError("--columns", name, none)
-        return "s", values
+        return "s", values, 0.0
     stem, axis = _split_axis(name)
     if not _is_number(solution, name):
         raise _refuse_name(scene, solution, name)
@@ -175,13 +180,14 @@ def _find_number(
     if values is None:
         raise _ask_for_speed(scene, name)
     unit = find_unit_of_quantity(stem)
-    if axis is not None:
-        return unit, values[..., axis]
     if is_scalar(stem):
-        return unit, values
+        return unit, values, float(unit == "1")
+    size = np.hypot(values[..., 0], values[..., 1])
+    if axis is not None:
+        return unit, values[..., axis], size
     if _is_place(solution, stem):
         raise InputError("--columns", name, f"is a place: {name}_x or {name}_y")
-    return unit, np.hypot(values[..., 0], values[..., 1])
+    return unit, size, 0.0
 
 
 def _refuse_name(scene: Scene, solution: Solution, name: str) -> InputError:

@@ -205,6 +205,7 @@ def _write_column(
     column: Column, heading: str, units: Conversion
 ) -> dict[str, list[str]]:
     """Write the cells of a column, by its heading with the unit."""
+    column = column._replace(values=drop_rounding(column.values, column.size))
     cells = write_cells(column.shown(units), _choose_form(column.unit))
     return {f"{heading}\n{column.label(units)}": cells}
 

@@ -49,7 +49,9 @@ function text(value, digits = 5) {
   return shown.replace("-", "\u2212").replace("e+", "e");
 }
 const rounded = (value, digits) => Math.abs(value) < 1e6 ? String(Number(value.toPrecision(digits))) : text(value, digits + 2);
-const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : (value * DEG).toFixed(3).replace("-", "\u2212");
+// A number with so many decimals; rounded to 0 it has no sign.
+const fixed = (value, digits) => value.toFixed(digits).replace(/^-(?=[0.]+$)/, "").replace("-", "\u2212");
+const degrees = value => value === null || !Number.isFinite(value) ? "\u2013" : fixed(value * DEG, 3);
 
 // A number of an SI unit in the unit it is shown in, and that unit's name.
 const inUnit = (si, value) => value === null || value === undefined ? value : value * (data.units[si]?.[1] ?? 1);
@@ -102,7 +104,7 @@ function showNumbers(i) {
       byId(`${name}_x`).textContent = text(f[0]);
       byId(`${name}_y`).textContent = text(f[1]);
       byId(`${name}_size`).textContent = text(known ? Math.hypot(f[0], f[1]) : null);
-      byId(`${name}_angle`).textContent = known ? (Math.atan2(f[1], f[0]) * DEG).toFixed(2).replace("-", "\u2212") : "\u2013";
+      byId(`${name}_angle`).textContent = known ? fixed(Math.atan2(f[1], f[0]) * DEG, 2) : "\u2013";
     }
   }
   const assembled = at(i) !== null, singular = v.status === "singular";
@@ -110,9 +112,9 @@ function showNumbers(i) {
   status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? single() && !timed() ? "What is commanded decides no velocities here: they have no value." : "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || "";
   status.hidden = status.textContent === "";
   byId("theta").value = i;
-  const over = axis(), written = (over.values[i] * over.factor).toFixed(timed() ? clock : 2), spoken = { " s": " seconds", "\u00b0": " degrees" }[over.sign] ?? over.sign;
-  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212");
-  byId("theta-text").textContent = (written + over.sign).replace("-", "\u2212");
+  const over = axis(), written = fixed(over.values[i] * over.factor, timed() ? clock : 2), spoken = { " s": " seconds", "\u00b0": " degrees" }[over.sign] ?? over.sign;
+  const here = `${fixed(grid[i] * DEG, 2)}\u00b0`;
+  byId("theta-text").textContent = written + over.sign;
   byId("theta").setAttribute("aria-valuetext", written + spoken);
   if (!playing) {
     let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : grid[i] === null ? "does not assemble" : `Theta 2 ${here}: does not assemble`;

@@ -395,19 +395,18 @@ def draw_energy(axes: "Axes", view: View) -> None:
     energies = compute_energies(view.scene, view.sweep)
     most = largest_magnitude(energies.kinetic, *energies.work.values())
     factor, unit = choose_unit(most, "J", view.units)
-    axes.plot(
-        over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy"
-    )
-    for (name, values), force in zip(
-        energies.work.items(), cycle(PIN_FORCES), strict=False
-    ):
+    axes.plot(over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic")
+    for number, (name, values) in enumerate(energies.work.items()):
+        # after all colours with their dashes, the colours with the next ones
+        turn, column = divmod(number, len(PIN_FORCES))
+        dashes = PIN_FORCES[(column + turn) % len(PIN_FORCES)]
         look: dict[str, Any] = {
-            "color": FORCE_COLOURS[force],
-            "ls": FORCE_DASHES[force],
+            "color": FORCE_COLOURS[PIN_FORCES[column]],
+            "ls": FORCE_DASHES[dashes],
         }
         axes.plot(over, factor * values, label=name.replace("_", " "), **look)
     draw_zero_line(axes)
-    axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
+    axes.set(ylabel=f"energy ({unit})", title="Kinetic energy and work done")
     place_legend(axes, 3)
     note(
         view,

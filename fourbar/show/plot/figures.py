@@ -19,6 +19,7 @@ from fourbar.show.plot.style import (
     Drawing,
     apply_style,
     format_of,
+    name_powers,
     shorten_text,
 )
 from fourbar.show.plot.view import View, is_over_time, make_view
@@ -133,11 +134,8 @@ FIGURES = {
     "freebody": FigureKind((9.6, 4.6), freebody.draw_free_bodies, True),
     "bars": FigureKind((9.6, 6.2), freebody.draw_internal_forces, True),
 }
-TAKERS = {
-    "position": tuple(name for name in FIGURES if name != "bars"),
-    "dimensions": ("overview", "linkage", "points"),
-}
-"""Figures in which one position is marked, and in which bars are numbered."""
+WITH_DIMENSIONS = ("overview", "linkage", "points")
+"""Figures in which bars are numbered."""
 
 
 def _choose_figure(scene: Scene, figure: str) -> FigureKind:
@@ -184,14 +182,13 @@ def draw_figure(
     """
     kind = _choose_figure(scene, figure)
     require_units(units)
-    for key, value in (("position", position), ("dimensions", dimensions or None)):
-        if value is not None and figure not in TAKERS[key]:
-            raise InputError(
-                key,
-                value,
-                f"must be left out of the figure {figure}, which does not show it;"
-                f" these do: {', '.join(TAKERS[key])}",
-            )
+    if dimensions and figure not in WITH_DIMENSIONS:
+        raise InputError(
+            "dimensions",
+            dimensions,
+            f"must be left out of the figure {figure}, which does not show it;"
+            f" these do: {', '.join(WITH_DIMENSIONS)}",
+        )
     if position is not None:
         position = require("position", position)
     with apply_style():
@@ -247,5 +244,6 @@ def _compose(kind: FigureKind, shown: View) -> "Figure":
     caption = textwrap.fill(" ".join(shown.notes), int(kind.size[0] * 18.5))
     if caption:
         part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
+    name_powers(figure)
     labels.settle(figure)
     return figure

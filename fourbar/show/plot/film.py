@@ -21,7 +21,6 @@ from fourbar.show.plot.linkage_figure import (
     choose_drawing_scale,
     draw_mechanism,
     draw_paths,
-    write_path_legend,
 )
 from fourbar.show.plot.style import (
     TITLE,
@@ -29,8 +28,10 @@ from fourbar.show.plot.style import (
     shorten_text,
     split_complex,
     split_points,
+    write_path_legend,
 )
 from fourbar.show.plot.view import View, make_view
+from fourbar.show.shown_units import write_cell
 from fourbar.show.tables import show_running
 from fourbar.solution import Conversion
 from fourbar.writing import write_bytes
@@ -262,10 +263,11 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         put(index)
         axis = shown.axis
         places = sweep.at.places
-        theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")
+        theta = write_cell(axis.factor * places[index], ".1f").replace("-", "−")
         caption = f"{axis.symbol} = {theta}{axis.unit}"
         if shown.time is not None:
-            theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
+            theta = write_cell(math.degrees(sweep.theta_2[index]), ".1f")
+            theta = theta.replace("-", "−")
             caption = f"t = {shown.time[index]:.2f} s, θ₂ = {theta}°"
         title = axes.set_title(f"{caption}, {shown.branch_name} branch", pad=pad)
         arrows = [] if move_vectors is None else move_vectors(index)

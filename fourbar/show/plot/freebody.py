@@ -154,13 +154,13 @@ class _ActionRecorder(Actions):
         self.turns[bar].append(Couple(name, _take_one(moment).real))
 
     def pin_couple(self, pin: str, couple: Number) -> None:
-        """Add a couple on the second of the two bars at a pin, N m.
+        """Add a couple on the second of the two bars at a pin, N m, and name the pin.
 
         The first bar gets the opposite couple.
         """
-        first, second = PINS[pin]
-        self.couple(second, couple)
-        self.couple(first, -couple)
+        for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True):
+            self.couple(bar, sense * couple)
+            self.turns[bar][-1].text += f" at {pin_name(pin)}"
 
 
 def _take_one(vector: Any) -> complex:
@@ -194,12 +194,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
 
     All arrows have one scale.
     """
-    if not np.isfinite(view.here.F12).all():
-        reason = (
-            f"needs forces, which have no value at {where_in_words(view.here)}:"
-            f" {view.here.status[0]}"
-        )
-        raise InputError("figure", "freebody", reason)
+    _require_forces(view, "freebody")
     freed = [(bar, *list_actions(view, bar)) for bar in MOVING_BARS]
     lines = max(1, *(len(couples) for *_, couples in freed))  # or "no couples"
     panels, below = figure.subplots(2, 3, height_ratios=[_PANEL, LINE_HEIGHT * lines])
@@ -227,15 +222,29 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     )
 
 
+def _require_forces(view: View, figure: str) -> None:
+    """Raise InputError if the drawn position has no forces."""
+    if not np.isfinite(view.here.F12).all():
+        reason = (
+            f"needs forces, which have no value at {where_in_words(view.here)}:"
+            f" {view.here.status[0]}"
+        )
+        raise InputError("figure", figure, reason)
+
+
 def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> None:
     """Draw N, V and M along each bar.
 
-    The position is that of the bar's largest bending moment.
+    The position is the one that is stated, or else that of the bar's largest bending
+    moment.
     """
     panels = figure.subplots(3, 3, sharex="col")
-    if view.sweep.F12 is None or not np.isfinite(view.sweep.F12).any():
+    if view.stated:
+        _require_forces(view, "bars")
+    elif view.sweep.F12 is None or not np.isfinite(view.sweep.F12).any():
         raise InputError("figure", "bars", f"needs forces, and {WITHOUT_VALUES}")
-    bending = locate_bending(describe_motion(view.sweep))
+    solution = view.here if view.stated else view.sweep
+    bending = locate_bending(describe_motion(solution))
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)

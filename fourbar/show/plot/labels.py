@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.show.plot.style import Points, split_complex, split_points
+from fourbar.show.plot.style import (
+    Points,
+    fit_legends,
+    split_complex,
+    split_points,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,7 +86,7 @@ class Labels:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
-        figure.draw_without_rendering()
+        fit_legends(figure)
         # labels must not move what they were measured against
         figure.set_layout_engine(None)
         rooms = {}

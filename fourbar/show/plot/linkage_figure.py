@@ -3,7 +3,6 @@
 Plots and films draw it alike.
 """
 
-import math
 from collections.abc import Iterator
 from functools import cache
 from itertools import cycle
@@ -26,6 +25,7 @@ from fourbar.show.plot.style import (
     plot_points,
     split_points,
     write_labelled_quantity,
+    write_path_legend,
 )
 from fourbar.show.plot.symbols import (
     BARREL,
@@ -327,17 +327,6 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     labels.keep_off(axes, *ends)
     for pin in ends:
         draw_support(axes, pin, size, labels)
-
-
-def write_path_legend(axes: "Axes") -> float:
-    """Write the legend of the paths above the drawing.
-
-    Return the distance of the title over it, typographic points.
-    """
-    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
-    pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3)
-    axes.set_title(axes.get_title(loc="left"), pad=pad)
-    return pad
 
 
 def _list_paths(view: View) -> Iterator[tuple[Points, str, tuple[float, ...], str]]:

@@ -291,8 +291,67 @@ def place_legend(axes: "Axes", columns: int = 4) -> None:
     if not axes.get_legend_handles_labels()[1]:
         return
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)
+    legend.set_in_layout(False)  # it would make its panel narrower
     rows = math.ceil(len(legend.get_texts()) / columns)
     axes.set_title(axes.get_title(loc="left"), pad=7.0 + 11.0 * rows)
+
+
+def write_path_legend(axes: "Axes", columns: int = 3) -> float:
+    """Write the legend of the paths above the drawing.
+
+    Return the distance of the title over it, typographic points.
+    """
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=columns)
+    legend.set_in_layout(False)  # it would make its panel narrower
+    pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / columns)
+    axes.set_title(axes.get_title(loc="left"), pad=pad)
+    return pad
+
+
+def fit_legends(figure: "Figure") -> None:
+    """Lay a figure out; a legend wider than its panel gets the columns that fit."""
+    from matplotlib.axes import Axes
+
+    figure.draw_without_rendering()
+    dpi = figure.dpi
+    figure.set_dpi(PICTURE_DPI)  # on coarser pixels letters are narrower
+    is_changed = False
+    for axes in figure.findobj(Axes):
+        legend = axes.get_legend()
+        if legend is None or legend.get_in_layout():
+            continue
+        place = write_path_legend if axes.get_aspect() == 1.0 else place_legend
+        columns = len(legend.get_texts())
+        while legend and legend.get_window_extent().width > axes.bbox.width and columns:
+            place(axes, columns)
+            legend = axes.get_legend()
+            columns -= 1
+            is_changed = True
+    figure.set_dpi(dpi)
+    if is_changed:
+        figure.draw_without_rendering()
+
+
+def name_powers(figure: "Figure") -> None:
+    """Write powers of ten of upright axes into their names, as legends stand above."""
+    from matplotlib import rcParams
+    from matplotlib.axes import Axes
+    from matplotlib.ticker import ScalarFormatter
+
+    least, most = rcParams["axes.formatter.limits"]
+    for axes in figure.findobj(Axes):
+        formatter = axes.yaxis.get_major_formatter()
+        if not isinstance(formatter, ScalarFormatter) or not axes.get_ylabel():
+            continue
+        power = math.floor(math.log10(max(map(abs, axes.get_ylim()))))
+        if least < power < most:
+            formatter.set_scientific(False)
+            continue
+        formatter.set_powerlimits((power, power))
+        axes.yaxis.get_offset_text().set_visible(False)
+        name, _, unit = axes.get_ylabel().partition(" (")
+        scale = f"10{str(power).translate(RAISED_CHARACTERS)}"
+        axes.set_ylabel(f"{name} ({scale} {unit}" if unit else f"{name} ({scale})")
 
 
 def draw_zero_line(axes: "Axes") -> None:

@@ -46,6 +46,8 @@ class View:
     """Units of the numbers drawn; one that is left out is the SI unit with a prefix."""
     dimensions: bool = False
     """The lengths of the bars are written at them."""
+    stated: bool = False
+    """The scene, or whoever draws it, states the one position."""
 
     @property
     def axis(self) -> "Axis":
@@ -229,9 +231,10 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     positions = list_sweep(scene)
     sweep = solve(scene, at=positions)
     _require_drawable(sweep)
-    stated = command(scene)
-    if position is None and len(stated.angle) == 1:
-        position = float(stated.places[0])
+    of_scene = command(scene)
+    if position is None and len(of_scene.angle) == 1:
+        position = float(of_scene.places[0])
+    stated = position is not None
     if position is None:
         position = find_drawn_place(scene)
     if position is None:
@@ -240,7 +243,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     if not here.assembled[0]:
         where = where_in_words(here)
         raise NotAssembledError(f"the linkage does not assemble at {where}")
-    return View(scene, sweep, here)
+    return View(scene, sweep, here, stated=stated)
 
 
 def _require_drawable(sweep: Solution) -> None:
@@ -271,7 +274,8 @@ def _view_motion(scene: Scene, position: float | None) -> View:
                 f" it stays within {low:.6g} and {high:.6g} deg"
             )
         index = int(np.argmin(np.abs(angle - position)))
-    shown = View(scene, sweep, solve(scene, at=sweep.at.part(slice(index, index + 1))))
+    here = solve(scene, at=sweep.at.part(slice(index, index + 1)))
+    shown = View(scene, sweep, here, stated=position is not None)
     if sweep.change_points:
         shown.notes.append(f"{describe_change_points(sweep)}.")
     return shown

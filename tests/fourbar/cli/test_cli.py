@@ -580,7 +580,6 @@ analyze @gallery/excavator_bucket.toml --pressure 210 | did you mean "210 bar"?
 plot @crank_rocker.toml -o a.svg --at 12 | did you mean "12 deg"?
 plot @capabilities/stroke_input.toml -o a.svg --at 350 | did you mean "350 mm"?
 plot @crank_rocker.toml -o a.doc | a.doc
-plot @crank_rocker.toml -o a.svg --figure bars --at 9deg | --at: must be left out of
 plot @crank_rocker.toml -o a.svg --figure torque --dimensions | --dimensions: must
 plot @crank_rocker.toml -o a.svg --figure pie | --figure = 'pie': must be one of
 mjcf @crank_rocker.toml -o a.xml --axis '0 0 0' | --axis = (0.0, 0.0, 0.0): must

@@ -147,13 +147,18 @@ def test_ratios_and_centres_are_those_of_the_formulas(speed):
         assert derive(s, name) == approx(centre, rel=1e-11), name
 
 
-def test_what_has_no_value_is_a_dash_and_no_number():
-    """Bars 2 and 4 are parallel: I13 lies at infinity."""
-    motion = Motion(np.array([1.0, 2.0]))
-    s = solve(fourbar.Scene(fourbar.uniform(3.0, 1.0, 3.0, 1.0), motion))
+def test_what_has_no_value_is_a_dash_and_what_is_rounding_zero():
+    """Bars 2 and 4 are parallel: I13 lies at infinity, and the weight pulls down."""
+    motion = Motion(np.array([1.0, 2.0]), 0.0)
+    linkage = fourbar.uniform(3.0, 1.0, 3.0, 1.0)
+    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    s = solve(scene)
     assert np.isnan(derive(s, "I13")).all()
     assert derive(s, "omega_4/omega_2") == approx(1.0)
     assert " - " in print_positions(s, None, DEGREES)
+    columns = choose_columns(scene, s, "shaking_force_x,omega_3/omega_2")
+    *_, first, last = print_positions(s, None, columns=columns).splitlines()
+    assert first.split() == last.split() == ["0", "0"]
 
 
 def test_csv_has_every_derived_quantity():

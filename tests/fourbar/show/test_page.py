@@ -169,6 +169,7 @@ def test_each_step_and_each_branch_shows_the_numbers_of_its_position(turning):
         page["forward"].click()
     page["back"].click()
     page.require(s, 3, "torque")
+    assert page.state("fixed(-1e-9, 2) + fixed(-1.5, 1)") == "0.00−1.5"
     assert "torque" in page.state("document.getElementById('live').textContent")
     page.run("chooseBranch(-1)")
     crossed = s.scene.motion.replace(branch=-1)

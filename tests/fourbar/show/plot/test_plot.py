@@ -25,10 +25,13 @@ from pytest import approx, raises
 import fourbar
 from fourbar import (
     Free,
+    Friction,
     Gravity,
     LinearDrive,
     Motion,
+    Point,
     Sweep,
+    Torsion,
     Viscous,
     load,
     solve,
@@ -47,7 +50,7 @@ from fourbar.show.plot.curves import (
     find_free_place,
     find_poles,
 )
-from fourbar.show.plot.figures import FIGURES, TAKERS, draw_figure
+from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
 from fourbar.show.plot.film import choose_frames
 from fourbar.show.plot.freebody import list_actions
 from fourbar.show.plot.labels import Labels
@@ -203,13 +206,12 @@ def test_a_file_has_a_dark_form_and_a_hostile_title_is_text(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
 def test_every_figure_shows_what_it_takes_and_no_texts_overlap(name):
-    """A position and dimensions show where they are taken; panels share scales."""
-    options = {"position": radians(77.7), "dimensions": True}
-    taken = {key: value for key, value in options.items() if name in TAKERS[key]}
+    """A position shows, dimensions where they are taken; panels share scales."""
+    taken = {"position": radians(77.7), "dimensions": name in WITH_DIMENSIONS}
     figure = composed(CRANK_ROCKER, name, "mm", **taken)
     words = " ".join(text for text, _ in texts_shown(figure))
-    assert ("77.7°" in words) == (name in TAKERS["position"])
-    assert ("2: 100 mm" in words) == (name in TAKERS["dimensions"])
+    assert "77.7°" in words
+    assert ("2: 100 mm" in words) == (name in WITH_DIMENSIONS)
     require_clear_texts(figure)
     for panel in figure.axes:
         if name == "overview" and panel.name != "polar":
@@ -420,6 +422,37 @@ def test_free_bodies_balance(drive):
         moments += [couple.moment for couple in couples]
         assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
         assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
+        at_pins = ("viscous", "friction", "pin friction", "torsion")
+        named = [couple.text for couple in couples if couple.text.startswith(at_pins)]
+        assert named and all(" at $" in text for text in named)
+
+
+@pytest.mark.parametrize(
+    "angle, position", [(radians(60.0), None), (None, radians(60.0))]
+)
+def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, position):
+    """Bar 4 hangs between two pins at 60 deg: its moment is m g cos 60 deg c/8."""
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    scene = fourbar.Scene(linkage, Motion(angle, 0.0), effects=(Gravity(),))
+    figure = composed(scene, "bars", position=position)
+    words = " ".join(figure.subfigs[0].get_supxlabel().split())
+    moment = 1e3 * linkage.output.mass * 9.81 * 0.5 * 0.1 / 8.0
+    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50.0 mm" in words
+    assert all(axes.get_title("left").endswith("60°") for axes in figure.axes[:3])
+
+
+def test_what_stands_at_an_axis_is_whole():
+    """A name that is too long for three columns, a power of ten, and a place at 0."""
+    points = tuple(Point(30 * name, 3, (0.1, 0.7)) for name in "PQR")
+    scene = crank_rocker(motion=Motion(Sweep(-1.0, 1.0, 20), 1e-4), points=points)
+    figure = composed(scene, "overview")
+    for axes in figure.axes:
+        if (legend := axes.get_legend()) is not None:
+            assert legend.get_window_extent().x1 <= figure.bbox.x1
+    names = [axes.get_ylabel() for axes in figure.axes]
+    fastest = np.abs([solve(scene).alpha_3, solve(scene).alpha_4]).max()
+    assert f"{fastest:.0e}".endswith("e-09") and r"$\alpha$ (10⁻⁹ rad/s²)" in names
+    assert "Linkage at θ₂ = 0°" in figure.axes[0].get_title("left")
 
 
 def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
@@ -533,6 +566,12 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     done = sum(energies.work.values())
     assert_allclose(done, energies.kinetic, atol=ENERGY * largest)
     assert composed(scene, "energy").axes[0].get_ylabel() == "energy (J)"
+    more = Friction.at(A=1e-3), Torsion.at(O2=(0.1, 0.4, 0.0))
+    (axes,) = composed(
+        released(20, 0.3, effects=(*scene.effects, *more)), "energy"
+    ).axes
+    looks = [(line.get_color(), line.get_linestyle()) for line in axes.lines[:-1]]
+    assert len(looks) == len({*looks}) == 6
 
 
 @pytest.mark.slow
