@@ -169,7 +169,7 @@ PROGRAMS = {
         "answered question 2 where 1 was",
     ),
     "no id": ((LAST, LAST.replace('"id": question["id"], ', "")), NO_ID),
-    "a list": (say("print([1], flush=True)"), f"{NO_ID}: [1]"),
+    "a list": (say("print([1], flush=True)"), f"{NO_ID}; it said: [1]"),
     "NaN": ((TORQUE, '"torque": math.nan'), f"{NO_JSON} (NaN is no number"),
     "1e400": (
         say("text = text.replace('0.33', '1e400')", SAY),

@@ -416,21 +416,14 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
         wrong = [fail(replace(of_scene, quantity=name)) for name in ("F32", "F43")]
         causes = {"mine": [sign, swapped] if k < 3 else [swapped]}
         scenes.append(record_of(of_scene.scene, [of_scene, *wrong], causes=causes))
-    died = "exit status 3: Cannot find module 'x'"
-    scenes[0].rows.append(
-        Row.unmeasured(
-            "scene 00",
-            "theirs",
-            "",
-            "all",
-            FAILS,
-            died,
-        )
-    )
+    said = "said what is no JSON (Expecting ','); it said: "
+    for scene, numbers in zip(scenes[:2], ("[0.25, 0.5", "[-0.125"), strict=True):
+        died = f"{said}{numbers}"
+        scene.rows.append(Row.unmeasured(scene.name, "theirs", "", "all", FAILS, died))
     summary = summary_of(scenes)
     assert [str(cause) for cause in summary.overview.causes] == [
         f"mine: {swapped}: 23 scenes; worst scene 00 120 deg",
-        f"theirs: no answer: {died}: 1 scene; worst scene 00",
+        f"theirs: no answer: {said}[0.25, 0.5: 2 scenes; worst scene 00",
     ]
     assert [line.engine for line in summary.lines] == ["mine", "theirs"]
     assert summary.headline.startswith(f"FAILS: mine is wrong: {swapped}")
@@ -516,6 +509,10 @@ CAUSES = [
         "torque and pin forces differ, motion agrees: the first 7 digits agree",
     ),
     ([fail(OF_MINE, math.nan)], "no number for torque"),
+    (
+        [fail(OF_MINE, math.nan), replace(OPEN, error=math.nan)],
+        "no number at any position",
+    ),
     ([fail(OF_MINE, 1e6), DEAD], "no answer: exit status 3 after 4 s"),
 ]
 
@@ -548,6 +545,31 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
     words = "one, two agree with each other, and differ from it in"
     assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
+
+
+BROKEN = fail(replace(OF_MINE, engine=FORMULAS, quantity="force_sum"))
+ALONE = fail(replace(OF_MINE, quantity="a_G3"), 0.5)
+ALONE_TOO = replace(ALONE, engine="two")
+
+
+@pytest.mark.parametrize(
+    ("rows", "against", "wrong"),
+    [
+        ([], {"alpha_3": ["mine", "two"]}, {FORMULAS}),
+        ([OF_MINE, BROKEN], {}, {FORMULAS}),
+        ([fail(OF_MINE), BROKEN], {}, {FORMULAS, "mine"}),
+        ([OF_MINE], {}, {"mine"}),
+        ([OF_MINE, ALONE_TOO, BROKEN], {}, {FORMULAS, "mine", "two"}),
+    ],
+)
+def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
+    rows, against, wrong
+):
+    """At an angular acceleration on which two agree, or in a sum of forces of which
+    torque and pin forces are confirmed.
+    """
+    summary = summary_of([record_of("a", [*rows, ALONE], against=against)])
+    assert {cause.engine for cause in summary.overview.causes} == wrong
 
 
 def test_pin_forces_of_which_one_fails_do_not_agree():

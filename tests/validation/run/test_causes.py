@@ -448,6 +448,15 @@ def test_a_sign_is_named_under_every_command_and_at_change_points(name):
     assert causes == ["sign reversed, or F_ij given for F_ji: F43"]
 
 
+def test_the_commanded_angle_is_looked_at_too():
+    def measure_from_B(numbers, at):
+        numbers["theta_4"] = numbers["theta_4"] + math.pi
+
+    scene = fourbar.load(CAPABILITIES / "command_output.toml")
+    (cause,) = find_causes(partial(Altered, measure_from_B), scene)
+    assert cause.startswith("measured from the other end of the bar")
+
+
 LINE_DRIVEN = ("stroke_output", "cylinder_2_3", "push_output")
 
 

@@ -22,7 +22,11 @@ from fourbar_validation.compare.rows import (
     Counts,
     Row,
 )
-from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
+from fourbar_validation.compare.tolerance import (
+    EQUIVALENCE,
+    FULL_ACCURACY,
+    ErrorBound,
+)
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run import judge as judging
@@ -54,6 +58,22 @@ class Echo:
         )
         self.spoil(answer)
         return answer
+
+
+class Rounded(Echo):
+    def spoil(self, answer):
+        for name, values in answer.quantities.items():
+            answer.quantities[name] = values.astype(np.float32)
+
+
+class Turned(Echo):
+    def spoil(self, answer):
+        answer.quantities["theta_3"] += 1e-9
+
+
+class Silent(Echo):
+    def spoil(self, answer):
+        answer.assembled[:] = False
 
 
 class Refuses(Echo):
@@ -94,6 +114,23 @@ def test_a_refusal_or_a_breakdown_is_one_row():
         ((quantity, row),) = rows_of(adapter).items()
         assert (quantity, row.verdict, row.passed) == ("all", verdict, False)
         assert row.reason.startswith(reason)
+
+
+def test_angles_close_the_loop_to_what_their_engine_declares():
+    declared = ErrorBound("stated", "7 digits", 1e-5, conditioned=False)
+    rows = rows_of(Rounded, None, declared)
+    assert rows["closure"].allowed >= 1e-5
+    assert not [row for row in rows.values() if row.failed]
+
+
+@pytest.mark.parametrize(
+    ("adapter", "failing"),
+    [(Turned, ["closure", "theta_3"]), (Silent, ["assembled"])],
+)
+def test_what_fails_with_the_loads_is_not_told_again_of_the_inertia(adapter, failing):
+    rows = rows_of(adapter)
+    assert sorted(name for name, row in rows.items() if row.failed) == failing
+    assert "torque_inertia" in rows
 
 
 def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch):

@@ -327,11 +327,13 @@ def read_table(
         if name != found_by and not np.isnan(numbers[name]).all():
             _enter_column(table, name, units[name], numbers[name], halves[name])
     if not table.values:
-        examples = "torque, F12_x and F12_y, or F12 (its magnitude)"
+        needed = "a result, such as torque, F12_x and F12_y, or F12 (its magnitude)"
+        if blank := [heading for heading, why in left_out.items() if why == _BLANK]:
+            needed = f"a number under {', '.join(blank)}, or another result"
         raise InputError(
             "header",
             headings,
-            f"needs a result, such as {examples}{_list_renamings(renamings)}; "
+            f"needs {needed}{_list_renamings(renamings)}; "
             "known are the columns of fourbar analyze SCENE --csv",
             str(path),
         )

@@ -51,7 +51,6 @@ from fourbar_validation.compare.scales import (
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
-    IDENTITY,
     MOST_ALLOWED,
     TIMES_PREDICTED,
     ErrorBound,
@@ -113,7 +112,9 @@ torque on bar 3 or 4, the force of a cylinder and the pin forces have poles wher
 speed of the drive vanishes.
 """
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
-NOT_DEMANDED = "no position at which it is demanded"
+NO_POSITION = "no position at which"
+NOT_DEMANDED = f"{NO_POSITION} it is demanded"
+NOWHERE = "no number at any position"
 
 
 class Demands(NamedTuple):
@@ -235,9 +236,7 @@ class Comparison:
         theta_3 = answer.quantities["theta_3"]
         theta_4 = answer.quantities["theta_4"]
         condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
-        allowed = (
-            IDENTITY if answer.setting == "exact" else self.demands.tolerance
-        ).factor / condition
+        allowed = self.demands.tolerance.factor / condition
         if answer.assembled.any():
             reason = f"identity: {CLOSURE}"
         else:
@@ -325,6 +324,8 @@ class Comparison:
             self.scene.linkage, command.angle, command.bar
         )
         count = np.count_nonzero(differ)
+        if count and not theirs.any():
+            return self._unmeasured("assembled", FAILS, NOWHERE)
         if count:
             reason = f"{count} of {len(differ)} positions differ"
         else:
@@ -404,7 +405,7 @@ class Comparison:
             if compared[i]:
                 due.append(_Due(quantity, ours, theirs, masks[i], note))
             else:
-                nowhere = "no position at which this quantity can be compared" + note
+                nowhere = f"{NO_POSITION} this quantity can be compared{note}"
                 judged.rows[quantity] = self._unmeasured(quantity, UNDECIDED, nowhere)
         return due
 

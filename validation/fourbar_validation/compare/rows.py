@@ -38,6 +38,8 @@ FORMULAS = "formulas"
 """Engine of the rows that no engine answers: identities of the formulas."""
 LONGEST_REASON = 500
 """Characters of what somebody else's code gives as a reason."""
+QUOTED = "; it said: "
+"""Words of a reason before what an engine said, by which reasons do not differ."""
 
 
 @dataclass(frozen=True, slots=True, order=True)

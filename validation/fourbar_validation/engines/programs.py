@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from fourbar_validation.compare.answer import EngineError
-from fourbar_validation.compare.rows import escape_controls, write_one_line
+from fourbar_validation.compare.rows import QUOTED, escape_controls, write_one_line
 
 WORKER_MEMORY = 8 * 2**30
 """Bytes of data of one process, a guest too; a scene takes a hundredth."""
@@ -429,10 +429,10 @@ class Running:
             )
         except (ValueError, RecursionError) as error:
             raise EngineError(
-                f"said what is no JSON ({write_one_line(str(error))}): {said}"
+                f"said what is no JSON ({write_one_line(str(error))}){QUOTED}{said}"
             ) from None
         if not isinstance(data, dict) or type(data.get("id")) is not int:
-            raise EngineError(f"said what is no object with an id: {said}")
+            raise EngineError(f"said what is no object with an id{QUOTED}{said}")
         if data["id"] != self._number:
             raise EngineError(
                 f"answered question {data['id']} where {self._number} was asked"

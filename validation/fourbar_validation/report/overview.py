@@ -8,10 +8,13 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from fourbar.errors import abbreviate
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
+from fourbar_validation.compare.compare import NO_POSITION, NOWHERE
 from fourbar_validation.compare.rows import (
     FORMULAS,
     HOLDING_VERDICTS,
+    QUOTED,
     REFUSES,
     UNDECIDED,
     Row,
@@ -48,7 +51,9 @@ a pin force without an inertia may agree.
 _MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
 _MOST_LISTED = len(PIN_FORCES) + 1
-"""Quantities listed in which fourbar differs from all engines."""
+"""Quantities that are listed where several are wrong."""
+_LONGEST_QUOTE = 60
+"""Characters that are printed of what an engine said."""
 OTHER_CAUSES = "other causes"
 NO_ANSWER_PREFIX = "no answer: "
 """Beginning of the cause of an engine that broke down."""
@@ -56,10 +61,11 @@ ERROR_OF_MISSING_DIGITS = 1e-5
 """Largest error, relative to a quantity's scale, of an engine that lacks digits and not
 an equation.
 """
-AT_A_LIMIT, _NO_VALUE, NO_DIGITS, _DOES_NOT_APPLY = (
+AT_A_LIMIT, _NO_VALUE, _NO_DIGITS, _NOWHERE, _DOES_NOT_APPLY = (
     "at declared limits of an engine",
     "where the formulas state no value",
     "with no digit left to decide by",
+    "at no position that both answer",
     "where a check does not apply",
 )
 """Kinds of what was not compared."""
@@ -216,7 +222,8 @@ class Overview:
         if row.verdict == REFUSES:
             self.not_compared[AT_A_LIMIT if row.quantity == "all" else _NO_VALUE] += 1
         elif row.verdict == UNDECIDED:
-            self.not_compared[NO_DIGITS] += 1
+            nowhere = row.reason.startswith(NO_POSITION)
+            self.not_compared[_NOWHERE if nowhere else _NO_DIGITS] += 1
         if row.engine == FORMULAS:
             self.statements += row.compared
             self.statements_failed += row.failed
@@ -252,10 +259,10 @@ class Overview:
 
     def _add_causes(self, scene: Record) -> None:
         failing: dict[str, list[Row]] = {}
+        ours = _list_ours(scene)
         for row in scene.rows:
             if row.failed:
-                ours = _name_whole(row) in scene.against
-                engine = FORMULAS if ours else row.engine
+                engine = FORMULAS if _name_whole(row) in ours else row.engine
                 failing.setdefault(engine, []).append(row)
         for engine, rows in failing.items():
             # without an answer the rest is a consequence
@@ -294,7 +301,7 @@ class Overview:
                 kind = max((left[texts] for texts in explained), key=lambda k: k.used)
                 words = text
                 if kind.worst.quantity == "all":
-                    words = f"{NO_ANSWER_PREFIX}{_take_reason(kind.worst)}"
+                    words = NO_ANSWER_PREFIX + "".join(_take_reason(kind.worst))
                 of_engine.append(
                     Cause(
                         engine,
@@ -400,9 +407,36 @@ def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
             yield engine, reason
 
 
-def _take_reason(row: Row) -> str:
-    """Return why an engine has no answer, without what it printed."""
-    return write_one_line(row.reason.partition("; what it printed")[0])
+def _list_ours(scene: Record) -> set[str]:
+    """List the quantities in which fourbar itself is wrong.
+
+    Engines agree with each other against it, or one that alone answers the quantity is
+    among these. By itself it is believed where equations of fourbar do not hold, whose
+    torque and pin forces agree with its own: then accelerations are wrong.
+    """
+    witnesses = {name for names in scene.against.values() for name in names}
+    rows = [row for row in scene.rows if row.engine != FORMULAS]
+    if any(row.engine == FORMULAS and row.failed for row in scene.rows):
+        forces = [row for row in rows if _find_group(row) in OVERVIEW_GROUPS[:2]]
+        failing = {row.engine for row in forces if not row.passed}
+        witnesses |= {row.engine for row in forces} - failing
+    answered = Counter(row.quantity for row in rows if row.compared)
+    return {*scene.against} | {
+        row.quantity
+        for row in rows
+        if row.failed and row.quantity in UNITS and answered[row.quantity] == 1
+        if row.engine in witnesses
+    }
+
+
+def _take_reason(row: Row) -> tuple[str, str]:
+    """Return why an engine has no answer, and the beginning of what it said.
+
+    What it printed is left out.
+    """
+    reason = write_one_line(row.reason.partition("; what it printed")[0])
+    why, quoted, said = reason.partition(QUOTED)
+    return why, f"{quoted}{abbreviate(said, _LONGEST_QUOTE)}"
 
 
 def _name_causes(
@@ -416,28 +450,25 @@ def _name_causes(
     """
     whole = [row for row in rows if row.quantity == "all"]
     if whole:
-        return [
-            f"{NO_ANSWER_PREFIX}{NUMBER_IN_A_REASON.sub('#', _take_reason(whole[0]))}"
-        ]
+        why, _ = _take_reason(whole[0])
+        return [f"{NO_ANSWER_PREFIX}{NUMBER_IN_A_REASON.sub('#', why)}"]
     if known := scene.causes.get(engine):
         return known
     if engine == FORMULAS and scene.against:
         engines = sorted({name for names in scene.against.values() for name in names})
         return [
             f"{', '.join(engines)} agree with each other, and differ from it in"
-            f" {', '.join([*scene.against][:_MOST_LISTED])}"
-            + ", ..."
-            * (len(scene.against) > _MOST_LISTED)
+            f" {_list_first([*scene.against])}"
         ]
     if engine == FORMULAS:
-        names = sorted({row.quantity for row in rows})
-        return [
-            f"{', '.join(names[:3])} {'does' if len(names) == 1 else 'do'} not hold"
-        ]
+        names = sorted({row.quantity for row in rows if row.engine == FORMULAS})
+        return [f"{_list_first(names)} {'does' if len(names) == 1 else 'do'} not hold"]
     groups = set(map(_name_group, rows))
     missing = sorted({row.quantity for row in rows if math.isnan(row.error)})
     if missing and len(missing) == len({row.quantity for row in rows}):
-        return [f"no number for {', '.join(missing[:4])}"]
+        if "assembled" in missing:
+            return [NOWHERE]
+        return [f"no number for {_list_first(missing)}"]
     differ = [group for group in OVERVIEW_GROUPS if group in groups]
     differ += sorted(groups - set(OVERVIEW_GROUPS))
     of_engine = [row for row in scene.rows if row.engine == engine]
@@ -454,6 +485,11 @@ def _name_causes(
     if engine not in scene.causes:
         return [f"{words}; mistakes are not looked for there"]
     return [f"{words}; no known mistake explains it"]
+
+
+def _list_first(names: Sequence[str]) -> str:
+    """List the first of some names, with dots for the others."""
+    return ", ".join(names[:_MOST_LISTED]) + ", ..." * (len(names) > _MOST_LISTED)
 
 
 def _name_group(row: Row) -> str:

@@ -270,7 +270,7 @@ class Summary:
         named = first.engine if first.engine != FORMULAS else "fourbar itself"
         what = f"{named} is wrong: {first.text}, in {first.scenes} scene"
         what += f"{'s' if first.scenes > 1 else ''}; "
-        if first.worst.quantity != "all":
+        if not math.isnan(first.worst.error):
             what += f"worst {first.worst.quantity} of "
         since = f" {self.overview.since}" if self.overview.since else ""
         return f"FAILS: {what}{first.place}{others}.{since}"

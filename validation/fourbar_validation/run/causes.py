@@ -148,7 +148,7 @@ def make_answer_table(answer: Answer, regular: Mask) -> TheirTable:
     blank = ~(answer.assembled & regular)[rows]
     values: dict[str, Array] = {}
     for name, numbers in answer.quantities.items():
-        if name in UNITS and name not in {*_NO_CAUSE, answer.at.commanded}:
+        if name in UNITS and name not in _NO_CAUSE:
             values[name] = np.array(numbers[rows], dtype=float)
             values[name][blank] = np.nan
     exact = np.zeros(len(angle))

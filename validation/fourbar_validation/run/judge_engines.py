@@ -41,6 +41,9 @@ def compare_answers(question: Question) -> Iterator[Row]:
         )
     ]
     question.against = find_agreement(question, rows)
+    for row in rows:
+        if row.failed:
+            question.failing.setdefault(row.engine, set()).add(row.quantity)
     yield from rows
 
 
@@ -217,10 +220,13 @@ def _check_inertia(
         return  # the refusal has its row
     drive = name_driving(question.scene)
     rows = compare_answer(bare, replace(engine, answers=(drive,)), answer)
+    told = question.failing.get(engine.name, set()) | {"undecided"}
     rows = [
-        row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)
+        row
+        for row in rows
+        if row.quantity == drive
+        or (row.verdict in (REFUSES, FAILS) and row.quantity not in told)
     ]
-    rows = [row for row in rows if row.quantity != "undecided"]
     if any(row.failed for row in rows) and engine.name not in question.causes:
         _note_causes(question, bare, engine, answer)
     if rows:  # a failure besides the torque, or in place of it, is not left out

@@ -78,6 +78,8 @@ class Question:
     """Known mistakes that explain what differs, by engine."""
     against: dict[str, list[str]] = field(default_factory=dict)
     """Quantities in which engines agree with each other against the formulas."""
+    failing: dict[str, set[str]] = field(default_factory=dict)
+    """What fails in the answer of each engine."""
     timings: list[Timing] = field(default_factory=list)
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
     """Answer of each engine, by its name, and the seconds that it took."""
