@@ -304,7 +304,7 @@ def read_table(
                 str(path),
             )
     notes = _read_degrees(found_by, numbers, halves, units, headings, columns)
-    left_out |= {
+    blank = {
         headings[index]: _BLANK
         for index, (name, _) in columns.items()
         if np.isnan(numbers[name]).all()
@@ -318,7 +318,7 @@ def read_table(
         lines,
         {},
         _find_rounding(halves[found_by], units[found_by]),
-        left_out,
+        left_out | blank,
         notes,
         found_by,
         times,
@@ -328,7 +328,7 @@ def read_table(
             _enter_column(table, name, units[name], numbers[name], halves[name])
     if not table.values:
         needed = "a result, such as torque, F12_x and F12_y, or F12 (its magnitude)"
-        if blank := [heading for heading, why in left_out.items() if why == _BLANK]:
+        if blank:
             needed = f"a number under {', '.join(blank)}, or another result"
         raise InputError(
             "header",
