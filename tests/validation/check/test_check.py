@@ -793,7 +793,7 @@ BAD_TABLES = {
     "theta_2\n1\n": "needs a result",
     "theta_2,torque_error\n1,0\n": "needs a result",
     "theta_2,torque\n,2\n": "line 2 = ['', '2']: needs a theta_2",
-    "theta_2,torque\n1,\n": "needs a number under torque, or another result",
+    "theta_2,torque\n1,\n": "needs a result in place of blank cells",
     "theta_2,torque\n1,2,3\n": "needs 2 cells; with decimal commas, semicolons",
     "theta_2,torque\nrad,kg\n1,2\n": "kg",
     "theta_2,torque_low\n1,2\n": "no dry friction",

@@ -327,13 +327,12 @@ def read_table(
         if name != found_by and not np.isnan(numbers[name]).all():
             _enter_column(table, name, units[name], numbers[name], halves[name])
     if not table.values:
-        needed = "a result, such as torque, F12_x and F12_y, or F12 (its magnitude)"
-        if blank:
-            needed = f"a number under {', '.join(blank)}, or another result"
+        example = "such as torque, F12_x and F12_y, or F12 (its magnitude)"
+        stated = " in place of blank cells" * bool(blank)
         raise InputError(
             "header",
             headings,
-            f"needs {needed}{_list_renamings(renamings)}; "
+            f"needs a result{stated}, {example}{_list_renamings(renamings)}; "
             "known are the columns of fourbar analyze SCENE --csv",
             str(path),
         )
