@@ -406,7 +406,7 @@ def draw_energy(axes: "Axes", view: View) -> None:
         }
         axes.plot(over, factor * values, label=name.replace("_", " "), **look)
     draw_zero_line(axes)
-    axes.set(ylabel=f"energy ({unit})", title="Kinetic energy and work done")
+    axes.set(ylabel=f"energy ({unit})", title="Kinetic energy and work")
     place_legend(axes, 3)
     note(
         view,
