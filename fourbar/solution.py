@@ -590,4 +590,4 @@ def _fill_gaps(rows: Array) -> Array:
     first = finite.argmax(axis=1)[:, None]
     place = np.where(finite, np.arange(rows.shape[1]), first)
     place = np.maximum.accumulate(place, axis=1)
-    return np.asarray(rows[np.arange(len(rows))[:, None], place])
+    return rows[np.arange(len(rows))[:, None], place]

@@ -49,7 +49,7 @@ def derive(solution: Solution, name: str) -> Any:
             values = _COMPUTE[name](solution)
         else:
             values = _measure_spring(solution, int(of_spring[1]), of_spring[2])
-        return np.asarray(np.where(np.isfinite(values), values, np.nan))
+        return np.where(np.isfinite(values), values, np.nan)
 
 
 def list_derived_names(solution: Solution) -> list[str]:
@@ -79,7 +79,7 @@ def _compute_transmission(solution: Solution) -> Array:
     Sine and cosine of the angle both keep their digits.
     """
     cosine = np.cos(solution.theta_4 - solution.theta_3)
-    return np.asarray(np.arctan2(np.abs(solution.sin_mu), np.abs(cosine)))
+    return np.arctan2(np.abs(solution.sin_mu), np.abs(cosine))
 
 
 def _compute_ratio(solution: Solution, bar: int) -> Array:

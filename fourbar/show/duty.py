@@ -124,13 +124,13 @@ def shaking_moment(solution: Solution) -> Array:
     at_O4 = moment(length, ground_angle, F14)
     if solution.drive is None:
         of_drive = -_require_quantity(solution, "torque")
-        return np.asarray(of_drive - at_O4)
+        return of_drive - at_O4
     of_drive = np.zeros(())
     for _, place in solution.drive.ends:
         if place.bar == 1:
             angle = place.angle + ground_angle
             of_drive = moment(place.distance, angle, _find_push(solution))
-    return np.asarray(of_drive - at_O4)
+    return of_drive - at_O4
 
 
 def _find_push(solution: Solution) -> Array:
@@ -141,7 +141,7 @@ def _find_push(solution: Solution) -> Array:
         return np.zeros((*solution.theta_2.shape, 2))
     size = _require_quantity(solution, "drive_force")[..., None]
     direction = _require_quantity(solution, "drive_line")
-    return np.asarray(sense * size * direction)
+    return sense * size * direction
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
@@ -308,12 +308,12 @@ def _require_quantity(solution: Solution, name: str) -> Array:
 def _compute_spans(solution: Solution, power: Array) -> Array:
     """Compute the time between each two positions, s; NaN where nothing moves."""
     if solution.time is not None:
-        return np.asarray(np.diff(solution.time))
+        return np.diff(solution.time)
     speed = getattr(solution, solution.at.names[1])
     speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
     spans = np.full(speed.shape, np.nan)
     np.divide(np.diff(solution.at.places), speed, out=spans, where=speed != 0.0)
-    return np.asarray(np.abs(spans))
+    return np.abs(spans)
 
 
 def _integrate_power(
@@ -323,7 +323,7 @@ def _integrate_power(
     """Integrate the positive and the negative part of the power, each over time."""
 
     def integrate(part: Array) -> Array:
-        return np.asarray(0.5 * spans * (part[..., :-1] + part[..., 1:]))
+        return 0.5 * spans * (part[..., :-1] + part[..., 1:])
 
     steps_in = integrate(np.maximum(power, 0.0))
     steps_out = integrate(np.maximum(-power, 0.0))

@@ -274,7 +274,7 @@ class Panels:
     def list_nodes(self) -> Array:
         """List the places of the nodes, (p, N)."""
         half = 0.5 * (self.stop - self.start)
-        return np.asarray((self.start + half)[:, None] + half[:, None] * _X)
+        return (self.start + half)[:, None] + half[:, None] * _X
 
     def _place(self, panel: int, x: Array) -> Array:
         """Convert places within a panel, from -1 to 1, to those of the motion."""
@@ -352,7 +352,7 @@ def _find_panel_zeros(series: Array) -> Array:
         return np.zeros(0)
     roots = Legendre(series).roots()
     zeros = np.sort(roots[np.isreal(roots)].real)
-    return np.asarray(zeros[(zeros > -1.0) & (zeros < 1.0)])
+    return zeros[(zeros > -1.0) & (zeros < 1.0)]
 
 
 class _Fit(NamedTuple):

@@ -166,7 +166,7 @@ class CircuitCurve:
         middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
         half = 0.5 * (self.sweep[1] - self.sweep[0])
         apart = np.abs(_measure_apart(psi, middle, self.period))
-        return np.asarray(apart <= half + AT_END_OF_SWEEP)
+        return apart <= half + AT_END_OF_SWEEP
 
     def reached(self, points: Array) -> NDArray[np.bool_]:
         """Mark the points that the sweep passes, all of them without a sweep.
@@ -344,7 +344,7 @@ class CircuitCurve:
 def _measure_apart(psi: Array, middle: float, period: float) -> Array:
     """Return how far psi lies from a middle, within half a period."""
     away = psi - middle
-    return np.asarray(away - period * np.rint(away / period))
+    return away - period * np.rint(away / period)
 
 
 def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:

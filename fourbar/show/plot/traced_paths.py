@@ -106,4 +106,4 @@ def _thin(path: Points) -> Points:
     kept[:-1] |= before_edge
     kept[1:] |= before_edge
     kept[[0, -1]] = True
-    return np.asarray(path[kept])
+    return path[kept]

@@ -293,7 +293,7 @@ class _OpenSimBars(Loaded):
         ):
             if place.bar != 1:
                 rate += sense * self._compute_station_jacobian(name)
-        return np.asarray(self.line()[1] @ rate)
+        return self.line()[1] @ rate
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
         """Set the commanded speed; return the coordinates' speeds and accelerations.

@@ -289,7 +289,7 @@ class Judge:
         if self.tolerance is None:
             return None
         limits = self._allow(key)
-        return np.asarray(
+        return (
             self.tolerance.atol
             + self.tolerance.rtol * magnitude(ours)
             + limits.rounding * limits.size

@@ -538,17 +538,17 @@ class Errors:
     def decidable(self) -> Mask:
         """Positions that are compared and have enough digits to decide by."""
         most = max(MOST_ALLOWED, self.tolerance.factor)
-        return np.asarray(self.mask & (self.allowed <= most))
+        return self.mask & (self.allowed <= most)
 
     @cached_property
     def judged(self) -> Mask:
         """Positions that have a verdict: an error that is no number needs no digits."""
-        return np.asarray(self.decidable | (self.mask & ~np.isfinite(self.error)))
+        return self.decidable | (self.mask & ~np.isfinite(self.error))
 
     @cached_property
     def beyond(self) -> Mask:
         """Positions at which the error is beyond the allowed one, or is no number."""
-        return np.asarray(self.judged & ~(self.error <= self.allowed))
+        return self.judged & ~(self.error <= self.allowed)
 
     def explain(self, at: tuple[int, int]) -> str:
         """Say in a sentence what a quantity is allowed at a position, and why."""

@@ -54,7 +54,7 @@ class DriveLine(NamedTuple):
                     + 1j * omega[2] * self.linkage.input.length * self.directions[2]
                 )
             rate = rate + sense * velocity
-        return np.asarray((np.conj(self.unit) * rate).real)
+        return (np.conj(self.unit) * rate).real
 
     @property
     def lever(self) -> Array:
@@ -69,9 +69,7 @@ class DriveLine(NamedTuple):
             0.0 if point.bar == 2 else self.linkage.ground * self.directions[1]
         )
         longer = np.maximum(np.abs(self.arms[on_bar]), np.abs(to_ground))
-        return np.asarray(
-            np.abs((np.conj(self.unit) * self.arms[on_bar]).imag) / longer
-        )
+        return np.abs((np.conj(self.unit) * self.arms[on_bar]).imag) / longer
 
     @property
     def most(self) -> float:

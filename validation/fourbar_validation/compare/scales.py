@@ -189,9 +189,7 @@ def _sum_angular_accelerations(quantity: str, sizes: TermSizes) -> Array:
     if quantity == "alpha_2":
         return np.abs(a2)
     terms = a * w2 * w2 + a * np.abs(a2) + b * w3 * w3 + c * w4 * w4
-    return np.asarray(
-        terms / ((b if quantity == "alpha_3" else c) * formulas.condition)
-    )
+    return terms / ((b if quantity == "alpha_3" else c) * formulas.condition)
 
 
 def _choose_bars(quantity: str) -> tuple[int, ...]:
@@ -235,19 +233,17 @@ def _sum_forces(_: str, sizes: TermSizes) -> Array:
             scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}
         ).most
         gain = max(1.0, max(scene.linkage.lengths) / short)
-    return np.asarray(
-        gain * _sum_force_terms(scene, formulas) / formulas.drive_condition
-    )
+    return gain * _sum_force_terms(scene, formulas) / formulas.drive_condition
 
 
 def _sum_torques(_: str, sizes: TermSizes) -> Array:
     longest = max(sizes.scene.linkage.lengths[1:])
-    return np.asarray(longest * sizes.sum_terms(_A_FORCE))
+    return longest * sizes.sum_terms(_A_FORCE)
 
 
 def _sum_powers(_: str, sizes: TermSizes) -> Array:
     if sizes.scene.drive is not None:
-        return np.asarray(sizes.sum_terms(_A_FORCE) * sizes.sum_terms(_A_VELOCITY))
+        return sizes.sum_terms(_A_FORCE) * sizes.sum_terms(_A_VELOCITY)
     speed = getattr(sizes.solution, f"omega_{sizes.scene.drive_bar}")
     return np.asarray(sizes.sum_terms(COUPLE.value) * np.abs(speed))
 

@@ -24,4 +24,4 @@ def solve_refined(matrix: Array, right: Array) -> Array:
     elimination, Mathematics of Computation 35 (1980).
     """
     x = np.linalg.solve(matrix, right)
-    return np.asarray(x + np.linalg.solve(matrix, right - matrix @ x))
+    return x + np.linalg.solve(matrix, right - matrix @ x)

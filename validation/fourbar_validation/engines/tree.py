@@ -161,7 +161,7 @@ class Tree(Loaded, Protocol):
         rate = sum(
             sense * self.end_jacobian(place) for sense, place in self.force_drive.ends
         )
-        return np.asarray(along @ rate)
+        return along @ rate
 
     def end_jacobian(self, point: "Place") -> Array:
         """Return the derivative of an end of the drive by the coordinates, (2, 3), m.

@@ -392,7 +392,7 @@ def _take_plain(quantity: str, values: Array, axis: int | None) -> Array:
     if quantity in ANGLES:
         return np.degrees(values)
     if values.ndim == 2 and axis is not None:
-        return np.asarray(values[:, axis])
+        return values[:, axis]
     if values.ndim == 2:
         return magnitude(values)
     return values

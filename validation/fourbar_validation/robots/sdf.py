@@ -382,7 +382,7 @@ class _Conversion:
         if placed:
             pose = pose @ np.linalg.inv(self._locate(_join(name, placed), name))
         self.pending.discard((name, base))
-        return np.asarray(pose)
+        return pose
 
     def _find_link(self, name: str) -> str:
         """Return the link that a name stands for or is attached to."""
@@ -407,7 +407,7 @@ class _Conversion:
 
     def _locate_in(self, link: str, name: str) -> Array:
         """Return the pose of a member in a link, (4, 4)."""
-        return np.asarray(np.linalg.inv(self._locate(link)) @ self._locate(name))
+        return np.linalg.inv(self._locate(link)) @ self._locate(name)
 
     def _find_frame(self, edge: _Edge, link: str) -> str:
         """Return the frame of a joint on one of its links."""

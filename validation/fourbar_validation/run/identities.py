@@ -467,4 +467,4 @@ def _mark_large(scene: Scene, reference: Solution) -> Mask:
         values = getattr(reference, name)
         if values is not None:
             large |= magnitude(values) > _LARGE
-    return np.asarray(large)
+    return large

@@ -223,7 +223,7 @@ class ClosedLoop(Assembled):
         start, end = CYLINDER_SITES
         direction = self.line() / self.stroke()
         jacobian = self.jacobian_at(end) - self.jacobian_at(start)
-        return np.asarray(direction @ jacobian)
+        return direction @ jacobian
 
     def angle(self, bar: int) -> float:
         """Sum of the joint angles that a bar's direction is, rad."""

@@ -42,7 +42,7 @@ class LoopFrame:
 
     def in_plane(self, vector: Array) -> Array:
         """Project a vector of the world on the plane, (2,)."""
-        return np.asarray(self.axes @ vector)
+        return self.axes @ vector
 
     def locate(self, bar: int, pin: str) -> Array:
         """Locate a pin of a bar in world axes, (3,), m."""

@@ -642,7 +642,7 @@ class LoopInside:
             return np.asarray(data.qfrc_inverse - loads)
 
         def leave(turns: Array) -> Array:
-            return np.asarray(find_forces(turns) @ self.basis)
+            return find_forces(turns) @ self.basis
 
         def differ(turns: Array) -> Array:
             # the forces are linear but where dry friction reaches its couple
