@@ -293,15 +293,6 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
     assert np.array_equal(lost, jammed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("figure", ["overview", "torque", "forces", "shaking"])
-def test_figures_without_a_single_force_are_drawn_without_a_word(figure, tmp_path):
-    scene = Scene(PARALLELOGRAM, Motion(np.linspace(0.3, 2.0, 5), 1.0), 3)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        draw(scene, tmp_path / "figure.svg", figure)
-
-
 def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path):
     scene = Scene(PARALLELOGRAM, Motion(np.array([0.3]), 1.0), 3)
     said = r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque"

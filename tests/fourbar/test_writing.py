@@ -4,17 +4,13 @@ writing fails.
 
 import os
 import stat
-from pathlib import Path
 
 import pytest
 from pytest import raises
 
-import fourbar
 from fourbar import InputError
-from fourbar.cli import status
 from fourbar.writing import write_bytes
 
-CRANK_ROCKER = Path(__file__).parents[2] / "models" / "crank_rocker.toml"
 pytestmark = pytest.mark.posix
 
 
@@ -55,21 +51,3 @@ def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path):
     (tmp_path / "nowhere").symlink_to("no/such/folder")
     with raises(InputError, match="no such folder"):
         write_bytes(tmp_path / "nowhere", b"")
-
-
-@pytest.mark.slow
-def test_save_and_analyze_write_through_links_and_keep_the_mode(tmp_path):
-    for name, write in {
-        "scene.toml": lambda path: fourbar.save(fourbar.load(CRANK_ROCKER), path),
-        "table.csv": lambda path: status(
-            ["analyze", str(CRANK_ROCKER), "--csv", "-o", str(path)]
-        ),
-    }.items():
-        real, link = tmp_path / name, tmp_path / f"link_{name}"
-        real.write_text("old")
-        real.chmod(0o600)
-        link.symlink_to(real)
-        write(link)
-        assert (
-            link.is_symlink() and mode(real) == 0o600 and real.read_text() != "old"
-        ), name

@@ -5,13 +5,11 @@ Pipes are read to their end.
 
 import subprocess
 import sys
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 
 from fourbar.cli import status
-from fourbar.errors import BAD_INPUT
 
 SCENE = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 TEXT = SCENE.read_bytes()
@@ -42,13 +40,6 @@ def test_a_scene_is_read_from_standard_input_and_from_a_pipe_of_the_shell(name, 
     assert (0, piped.stdout, piped.stderr) == call("analyze", str(SCENE), "--json")
 
 
-@pytest.mark.slow
-def test_a_mistake_on_standard_input_is_one_line(call):
-    code, _, err = call("analyze", "-", scene=b"[lengths]\nground = 3\n")
-    assert code == BAD_INPUT
-    assert err.count(b"\n") == 1 and b"lengths.ground" in err
-
-
 @pytest.mark.parametrize(
     "arguments, start",
     [
@@ -66,9 +57,3 @@ def test_a_file_is_written_to_standard_output(arguments, start, call, tmp_path):
     assert code == 0, err
     assert out.lower().startswith(start)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.slow
-def test_the_defaults_of_lengths_do_not_enter_the_file(call):
-    _, out, err = call("mjcf", "--lengths", "0.3", "0.1", "0.25", "0.22", "-o", "-")
-    assert ET.fromstring(out).tag == "mujoco" and b"kg/m" in err

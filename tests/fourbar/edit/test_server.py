@@ -383,48 +383,6 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
 
 
 @pytest.mark.slow
-def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog):
-    async def ask(made, address):
-        line = await page(address)
-        reading = asyncio.create_task(
-            heard(line, lambda about: about.get("for") == "last")
-        )
-        for _ in range(3):
-            reader, writer = await asyncio.open_connection(
-                "127.0.0.1", int(port_of(address))
-            )
-            host, path = address.split("/")[2], "/" + address.split("/", 3)[3] + "live"
-            head = (
-                f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin:"
-                f" http://{host}\r\nUpgrade: websocket\r\n"
-            )
-            head += (
-                "Connection: Upgrade\r\nSec-WebSocket-Version:"
-                f" 13\r\nSec-WebSocket-Key: {'A' * 22}==\r\n\r\n"
-            )
-            writer.write(head.encode())
-            await reader.readuntil(b"\r\n\r\n")
-            for number in range(60):
-                text = json.dumps({"do": "units", "units": "SI", "id": number}).encode()
-                writer.write(
-                    struct.pack("!BB4x", 0x81, 0x80 | len(text)) + text
-                )  # masked by zeros
-            await writer.drain()
-            writer.transport.pause_reading()
-            while made.waiting:
-                await asyncio.sleep(0.05)
-            writer.transport.abort()
-        await asyncio.sleep(0.5)
-        gc.collect()
-        await line.write_message(json.dumps({"do": "hello", "id": "last"}))
-        assert (await reading)["file"] == "scene.toml"
-
-    bench(ask)
-    gc.collect()
-    assert not caplog.records
-
-
-@pytest.mark.slow
 def test_the_line_of_a_page_that_does_not_read_is_closed(bench, caplog, monkeypatch):
     """One page changes the scene, another one that reads nothing is told each time."""
     monkeypatch.setattr(server, "PING", 0.5)

@@ -22,7 +22,6 @@ import fourbar
 from fourbar import InputError, solve
 from fourbar.edit.dragging import write_rounded
 from fourbar.files import loads
-from fourbar.files.scene_text import write_new_scene
 from fourbar.quantities.units import find_unit
 
 pytest.importorskip(
@@ -658,30 +657,6 @@ def test_exports_go_into_their_folder_under_their_own_names(session):
     for name, ending in (("csv", "csv"), ("mjcf", "xml"), ("page", "html")):
         ask(session, "export", format=name)
         assert (session.exports.folder / f"scene.{ending}").stat().st_size > 1000
-
-
-@pytest.mark.slow
-def test_new_entries_and_limits_have_the_units_of_the_scene(tmp_path):
-    path = tmp_path / "inches.toml"
-    path.write_text(write_new_scene(["12 in", "4 in", "10.123456789 in", "9 in"]))
-    session = Session(path, tmp_path / "exports")
-    offers = ask(session, "hello")["offers"]
-    labels = [row.get("label", row["at"][-1]) for row in offers["parts"]]
-    for label in ("force", "moment", "point", "springs"):
-        ask(session, "add", part=labels.index(label), name="P")
-    stated = session.now.plain
-    bar = offers["fields"]["bars"]["input"]
-    assert bar["density"] == "0.28 lb/in^3" and bar["inertia"] == "0.68 lb in^2"
-    assert stated["effects"]["springs"][0]["stiffness"] == "1.1 lbf/in"
-    assert stated["bars"]["input"]["mass"] == "0.2 lb"  # 4 in of 0.05 lb/in
-    force, moment = stated["loads"]
-    assert force["force"] == ["2.2 lbf", "-90 deg"]
-    assert moment["moment"] == "-8.9 lbf in" and "force" not in moment
-    assert stated["points"]["P"]["from_pin"] == ["2 in", "20 deg"]
-    summary = settled(session)["data"]["summary"]
-    assert "s + l = 16 in < p + q = 19.1235 in" in summary
-    # a mass that nobody weighed has no twelve digits, which its field would cut off
-    assert stated["bars"]["coupler"]["mass"] == "0.5062 lb"
 
 
 @pytest.mark.parametrize(

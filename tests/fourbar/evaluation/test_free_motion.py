@@ -9,7 +9,6 @@ from math import pi
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
-from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx, raises
 from scipy.optimize import brentq
 
@@ -57,40 +56,6 @@ def integrate(linkage, effects, theta_2, omega_2, times, loads=()):
     return release_at(replace(scene, loads=loads), times)
 
 
-@pytest.mark.slow
-def test_one_window_of_iftomm_a02():
-    """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
-    bar = Bar(1.0, 1.0)
-    linkage = FourBar(1.0, bar, bar, bar)
-    times = np.array([0.0, 10.0])
-    m = integrate(linkage, (DOWN,), pi / 2, -1.0, times)
-    x, y = math.cos(m.command.theta_2[-1]), math.sin(m.command.theta_2[-1])
-    w = m.command.omega_2[-1]
-    printed = (0.478385058, 0.878150179, 1.727264076, -0.940952179)
-    for ours, theirs in zip((x, y, -y * w, x * w), printed, strict=True):
-        assert abs(ours - theirs) <= 0.5e-9
-    assert m.energy_drift < 1e-12  # hundreds of steps of 3e-14
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("coupler", [0.12, 0.15])
-def test_runs_on_through_limits_and_names_its_change_points(coupler):
-    """The first has a change point, the second a limit position only."""
-    bars = Bar(0.2, 0.2), Bar(coupler, 0.5), Bar(0.22, 0.4)
-    linkage = FourBar(0.3, *bars)
-    times = np.linspace(0.0, 1.0, 21)  # there, back and there again
-    passed = integrate(linkage, (DOWN,), 1.0, 0.0, times)
-    assert len(passed.command.time) == len(times) and passed.energy_drift < 1e-11
-    solution = solve(let_go(1.0, 0.0, 1.0, 20, DOWN, linkage=linkage))
-    assert set(solution.branch) == {1, -1}
-    # on an assembly with a change point theta_2 passes the ground's line, where its
-    # sine changes sign
-    assert bool(passed.change_points) == (coupler == 0.12)
-    for time in passed.change_points:
-        at_it = integrate(linkage, (DOWN,), 1.0, 0.0, np.array([0.0, time]))
-        assert abs(math.sin(at_it.command.theta_2[-1])) < 1e-9
-
-
 @pytest.mark.parametrize("bar", [2, 4])
 def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar):
     """Bars without mass, of a drag link: alpha = M/J."""
@@ -122,27 +87,6 @@ BY_FREE_BODIES = 1e-12
 """Of the largest force, at one metre of a torque: an angle of bar 4 in doubles, and a
 system of 13 equations whose condition is below 1e4.
 """
-
-
-@pytest.mark.slow
-def test_a_release_is_computed_once_and_solved_as_any_command():
-    released, solution = release(SWING), solve(SWING, "force")
-    again = solve(SWING, "force", at=released.command)
-    for name in solution.evaluated():
-        assert_array_equal(
-            getattr(again, name),
-            getattr(solution, name),
-            err_msg=name,
-        )
-    assert_array_equal(released.command.time, solution.time)
-    assert_array_equal(released.command.theta_2, solution.theta_2)
-    assert_allclose(released.command.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
-    assert_allclose(released.command.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
-    some = np.array(
-        [3, 70, 4]
-    )  # positions of both independent angles, in an order of their own
-    few = solve(SWING, "force", at=released.command.part(some))
-    assert_array_equal(few.F43, solution.F43[some])
 
 
 @pytest.mark.parametrize(

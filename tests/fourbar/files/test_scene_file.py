@@ -288,22 +288,6 @@ def test_hostile_names(name, tmp_path, capsys):
     refused(["analyze", str(tmp_path / name)], [], tmp_path, capsys)
 
 
-def rocker(theta_2):
-    """A linkage that closes for theta_2 between 22.3 and 71.7 deg."""
-    text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
-    return text.replace('"60 deg"', theta_2)
-
-
-@pytest.mark.slow
-def test_some_positions_do_not_assemble(tmp_path, capsys):
-    (tmp_path / "scene.toml").write_text(
-        rocker('{ from = "0 deg", to = "90 deg", steps = 9 }')
-    )
-    assert status(["analyze", str(tmp_path / "scene.toml")]) == 0
-    shown = capsys.readouterr()
-    assert "10 positions: 5 ok, 5 not assembled" in shown.out and shown.err == ""
-
-
 @pytest.mark.parametrize(
     "arguments, words",
     [

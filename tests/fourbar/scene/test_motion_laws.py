@@ -197,19 +197,15 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     assert float(said[3]) == approx(changes[2], rel=2e-3)
 
 
+def test_a_table_that_leaves_no_choice_says_nothing_of_its_ends():
+    times, angles = (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi)
+    rates = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 0.0))
+    for law in (Law(times, angles, ends="periodic"), rates):
+        scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law))
+        assert "ends" not in write_note(scene)
+
+
 def write_note(scene):
     from fourbar.show.block import write_block
 
     return " ".join(" ".join(write_block(scene, solve(scene, "error"))).split())
-
-
-@pytest.mark.slow
-def test_what_leaves_no_choice_says_nothing_of_its_ends():
-    periodic = Law(
-        (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi), ends="periodic"
-    )
-    rates = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 0.0))
-    three = Law((0.0, 0.5, 1.0), (0.0, 1.0, 1.5), ends="rest")
-    for law in (periodic, rates, three):
-        scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law))
-        assert "ends" not in write_note(scene)

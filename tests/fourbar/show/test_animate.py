@@ -18,7 +18,7 @@ from math import pi, radians
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal, assert_equal
+from numpy.testing import assert_array_equal
 from pytest import approx, raises
 
 import fourbar
@@ -94,33 +94,6 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
 RELEASED = crank_rocker(
     motion=Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
 )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "angles",
-    [Sweep(0.0, 2.0 * pi, 12), Sweep(3.0, 1.0, 12), 1.0],
-    ids=["turn", "backwards", "one position"],
-)
-def test_what_is_solved_already_changes_no_number(angles):
-    scene = crank_rocker(motion=Motion(angles, 10.0))
-    plain = animate.collect_live_data(scene, signs=(1, -1))
-    solved = solve(scene)
-    shown = animate.collect_live_data(scene, signs=(1, -1), solved=solved)
-    assert_equal(shown, plain)
-
-
-@pytest.mark.slow
-def test_a_free_motion_is_embedded_instant_by_instant():
-    data = embedded(animate.write_page(RELEASED))
-    solution = solve(RELEASED)
-    (columns,) = data["branches"].values()
-    assert_array_equal(data["time"], solution.time)
-    for name in (*QUANTITIES, "theta_2", "omega_2"):  # to the last bit
-        assert_array_equal(np.array(columns[name]), getattr(solution, name))
-    assert columns["energy"][0] == 0.0 and max(columns["energy"]) > 0.1
-    assert "torque" not in columns  # nothing drives it
-    assert data["rate"] == 1.0 and "real time" in data["pace"]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Scenes and solutions in a notebook, as tables, and new scene files."""
 
 import math
-import subprocess
 import sys
 from base64 import b64decode
 from dataclasses import replace
@@ -57,20 +56,6 @@ def test_without_pandas_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with raises(DependencyError, match="pip install pandas"):
         solve(thesis()).to_pandas()
-
-
-@pytest.mark.slow
-def test_showing_needs_numpy_alone():
-    code = (
-        "import sys, fourbar as f; s = f.Scene(f.FourBar(4.0, f.Bar(2.0), f.Bar(5.0),"
-        " f.Bar(5.0)), f.Motion(1.0, 1.0));sys.modules['matplotlib'] = None;"
-        " s._repr_html_(); f.solve(s)._repr_html_(); del sys.modules['matplotlib'];"
-        " print(*{n.partition('.')[0] for n in sys.modules})"
-    )
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split()
-    assert not {"pandas", "matplotlib", "pint", "rich", "click", "scipy"} & set(loaded)
 
 
 def test_a_new_scene_never_replaces_a_file(tmp_path, capsys):

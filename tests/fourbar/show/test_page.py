@@ -365,35 +365,6 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "width, scaling",
-    [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")],
-)
-def test_no_arrow_and_no_name_of_one_leaves_the_picture(show, width, scaling):
-    page = show(thesis() if scaling == "position" else crank_rocker(), width)
-    script = """
-        const choice = document.getElementById("arrow-scale");
-        choice.value = arguments[0];
-        choice.dispatchEvent(new Event("change"));
-        const least = [];
-        for (let i = 0; i < grid.length; i += 7) {
-          go(i);
-          for (const e of document.querySelectorAll("#arrows .head")) {
-            if (e.style.display === "none") continue;
-            const tip = e.getAttribute("d").slice(1).split("L")[0];
-            const [x, y] = tip.split(" ").map(Number);
-            least.push(Math.min(x, y, view.width - x, view.height - y));
-          }
-        }
-        return least;
-    """
-    distances = page.run(script, scaling)
-    assert (
-        len(distances) > 30 and min(distances) > 15.0
-    )  # its name stands beyond the tip
-
-
-@pytest.mark.slow
 def test_keyboard_drives_it(turning):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -631,63 +602,24 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(show):
 
 
 @pytest.mark.slow
-def test_a_scene_without_bands_says_why_or_shows_nothing(show):
-    loose = (Tolerance("lengths.input", 5e-5),)
-    page = show(replace(RELEASED, tolerances=loose))
-    assert "free motion" in page["tolerance-note"].text
-    assert not page["bands"].is_displayed()
-    page = show(crank_rocker())
-    assert not page["tolerances"].is_displayed()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "names, head, mass, length",
-    [
-        ("imperial", "mass lb inertia lb in²", 0.45359237, 0.0254),
-        ("mm N", "mass kg inertia kg m²", 1.0, 1.0),
-    ],
-)
-def test_the_bars_of_the_sheet_have_the_units_of_its_heads(
-    show, names, head, mass, length
-):
-    """`mass`, `length`: the units of the heads in kg and m."""
+def test_the_bars_of_the_sheet_have_the_units_of_its_heads(show):
+    inch, pound = 0.0254, 0.45359237
     scene = crank_rocker()
-    page = show(scene, units=units(names))
+    page = show(scene, units=units("imperial"))
     assert not page["bars"].is_displayed()
     page.print()
     table = page["bars"]
-    assert head in table.text
-    drawn = 0.001 if names == "mm N" else length
+    assert "mass lb inertia lb in²" in table.text
     rows = table.find_elements("css selector", "tbody tr")
     for bar, row in zip(scene.linkage.moving, rows[1:], strict=True):
         *cells, centre = (cell.text for cell in row.find_elements("tag name", "td")[:4])
-        stated = [
-            bar.length / drawn,
-            bar.mass / mass,
-            bar.moment_of_inertia / (mass * length**2),
-        ]
+        inertia = bar.moment_of_inertia / (pound * inch**2)
+        stated = [bar.length / inch, bar.mass / pound, inertia]
         assert [number(cell) for cell in cells] == approx(stated, rel=PRINTED)
-        to_centre = bar.to_centre / drawn
+        to_centre = bar.to_centre / inch
         assert [number(part) for part in centre.split(", ")] == approx(
             [to_centre.real, to_centre.imag], rel=PRINTED, abs=PRINTED
         )
-
-
-CLEAR_OF_ITS_BAR = """
-go(arguments[1]);
-const [bar, box] = [parts.bars[arguments[0]], parts.label[arguments[0]].getBBox()];
-const end = n => [bar[`x${n}`].baseVal.value, bar[`y${n}`].baseVal.value];
-let least = Infinity;
-for (let n = 0; n <= 200; n++) {
-  const [x, y] = [0, 1].map(j => end(1)[j] + n / 200 * (end(2)[j] - end(1)[j]));
-  const across = Math.max(box.x - x, x - box.x - box.width, 0);
-  const along = Math.max(box.y - y, y - box.y - box.height, 0);
-  least = Math.min(least, Math.hypot(across, along));
-}
-return least;
-"""
-"""Least distance of the name of a bar from the middle line of the bar, px."""
 
 
 @pytest.mark.slow
@@ -704,10 +636,6 @@ def test_a_printed_page_is_one_sheet_with_lengths_and_the_chart_s_name(show):
     for text in ("1: 300 mm", "2: 100 mm", "3: 250 mm", "4: 220 mm"):
         assert text in labels
     assert page["plotted"].text == "torque on bar 2, N m"
-    for bar in (2, 3, 4):  # no length stands on its bar, at no position
-        for row in (60, 140, 300):
-            clear = page.run(CLEAR_OF_ITS_BAR, bar, row)
-            assert clear > 3.0, (bar, row)
     background = "getComputedStyle(document.body).backgroundColor"
     assert page.state(background) == "rgb(255, 255, 255)"
     hidden = ("play", "show-labels", "quantity", "download")

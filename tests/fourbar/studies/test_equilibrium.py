@@ -38,7 +38,7 @@ from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar.studies.equilibrium import equilibrium
-from tests.support.scenes import CYLINDER, balanced_lamp, bare, crank_rocker
+from tests.support.scenes import balanced_lamp, bare
 from tests.support.shares import slow_but
 
 ROOT = Path(__file__).parents[3]
@@ -473,33 +473,3 @@ def test_what_assembles_nowhere_is_refused():
     scene = Scene(fourbar.uniform(1.0, 1.5, 1.0, 0.2), Motion(pi))
     with pytest.raises(fourbar.NotAssembledError, match="assembles at none"):
         equilibrium(scene)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name, start, stop, side",
-    [
-        ("theta_3", 1.0, 1.25, {"branch": -1}),
-        ("theta_4", 1.95, 2.4, {"branch": -1}),
-        ("stroke", 0.17, 0.3, {"side": "left"}),
-    ],
-)
-def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(
-    name, start, stop, side
-):
-    """A single position has those of its circuit."""
-    swept = Motion(**{name: Sweep(start, stop, 90)}, **side)
-    scene = crank_rocker(motion=swept, effects=(DOWN,), drive=CYLINDER)
-    theta_2 = solve(scene).theta_2
-    same = Sweep(float(theta_2.min()), float(theta_2.max()), 90)
-
-    def find(motion):
-        found = equilibrium(replace(scene, motion=motion)).found
-        assert found
-        return [(*rest.place, rest.frequency) for rest in found]
-
-    for row, other in zip(find(swept), find(Motion(same)), strict=True):
-        assert row == approx(other)
-    single = Motion(**{name: start}, **side)
-    for row, other in zip(find(single), find(Motion(float(theta_2[0]))), strict=True):
-        assert row == approx(other)

@@ -16,9 +16,6 @@ from fourbar.cli import status
 from fourbar.files import dump, loads
 from fourbar.linkage import PINS
 from fourbar.studies.spread import tolerances
-from tests.oracle.oracles import judge_by
-from tests.oracle.test_derived import failing
-from tests.oracle.variants import DRAWN_SETTING, is_coordinate
 from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
 
@@ -102,69 +99,6 @@ length = "20 mm"
 """Places of every kind in the drawing, some on the first pin of their bar, where a
 distance and an angle have no derivative.
 """
-
-
-PUSHED = (
-    DRAWING
-    + """
-[motion]
-stroke = "STROKE"
-stroke_speed = "0.1 m/s"
-[drive]
-from = { bar = 1, drawn = FROM }
-to = { bar = BAR, drawn = TO }
-[bars.coupler]
-mass = "1 kg"
-"""
-)
-
-
-def push(bar, stroke, start, end):
-    parts = {"BAR": bar, "STROKE": stroke, "FROM": start, "TO": end}
-    text = PUSHED
-    for name, part in parts.items():
-        text = text.replace(name, part)
-    return text
-
-
-TURNED_BY_BAR_4 = (
-    ACTS.replace("omega_2", "omega_4")
-    .replace("alpha_2", "alpha_4")
-    .replace(
-        'theta_2 = { from = "50 deg", to = "80 deg", steps = 4 }',
-        'theta_4 = ["170 deg", "175 deg", "185 deg"]',
-    )
-)
-
-
-STATED = {
-    "pins": DRAWING + ACTS,
-    "pins, of a command of bar 4": DRAWING + TURNED_BY_BAR_4,
-    "places": PLACED,
-    "cylinder on bar 2": push(
-        "2", "222 mm", '["250 mm", "120 mm"]', '["20 mm", "85 mm"]'
-    ),
-    "cylinder on bar 4, from O2": push(
-        "4", "262 mm", '["-10 mm", "-10 mm"]', '["230 mm", "90 mm"]'
-    ),
-}
-
-
-COORDINATES = {"pins": 14, "pins,": 14, "places": 30, "cylinder": 12}
-"""Count of the coordinates of pins and places, by the first word of the name."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("check", ["sensitivity", "study"])
-@pytest.mark.parametrize("name", STATED)
-def test_coordinates_move_as_in_files_with_them_moved(name, check):
-    scene = loads(STATED[name])
-    rows = [row for row in judge_by(scene, check) if row.setting == DRAWN_SETTING]
-    assert {"theta_4", "F12"} <= {row.quantity for row in rows if row.compared}
-    assert not failing(rows)
-    coordinates = {key for key in sensitivity(scene).keys if is_coordinate(key)}
-    assert coordinates >= {*PIN_KEYS}
-    assert len(coordinates) == COORDINATES[name.split(maxsplit=1)[0]]
 
 
 DRAWN = loads(DRAWING + ACTS)

@@ -8,7 +8,6 @@ import pytest
 from pytest import approx
 from scipy.spatial import ConvexHull
 
-from fourbar.evaluation import free_motion
 from fourbar.files import loads
 from fourbar.show.path_rows import write_paths
 from fourbar.show.shown_units import units
@@ -184,24 +183,3 @@ def test_a_direction_that_is_rounding_is_printed_as_zero():
     )
     _, straight, _ = write_paths(solve(scene), units("m deg"))
     assert straight.endswith("stroke 4.00000 m along 0 deg,")
-
-
-@pytest.mark.slow
-def test_a_release_is_integrated_once_for_its_path(monkeypatch):
-    """The crank swings as far beyond the rest of its spring as it is let go before."""
-    runs = []
-    begin = free_motion._Run.begin
-
-    def count(*arguments):
-        runs.append(arguments)
-        begin(*arguments)
-
-    monkeypatch.setattr(free_motion._Run, "begin", count)
-    motion = 'theta_2 = "20 deg"\nomega_2 = "0 rad/s"\n'
-    free = 'free = { duration = "1.5 s", steps = 15 }\n'
-    spring = f'{{ stiffness = "1 N m/rad", rest = "{20.0 + math.degrees(0.5)} deg" }}'
-    acts = f'[bars.input]\nmass = "1 kg"\n[effects]\ntorsion = {{ O2 = {spring} }}\n'
-    solution = solve(loads(CRANK + motion + free + acts))
-    (path,) = measure_paths(solution).values()
-    assert len(runs) == 1
-    assert path.stroke == approx(0.16 * sin(0.5), abs=1e-9)

@@ -19,11 +19,10 @@ from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, u
 from fourbar.cli import status
 from fourbar.files import loads
 from fourbar.formulas.mobility import choose_range, limit_positions
-from fourbar.show.tolerances import describe_parted, list_shown_parts
+from fourbar.show.tolerances import describe_parted
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
 
 MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
 
@@ -166,14 +165,6 @@ def test_what_the_study_refuses(stated, options, words):
         spread(*stated, **{"samples": 64, **options})
 
 
-@pytest.mark.slow
-def test_angles_stand_in_place_of_forces_where_nothing_loads_the_drive():
-    linkage = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
-    stated = Tolerance("lengths.input", 5e-5)
-    moving = Scene(linkage, Motion(Sweep(0.3, 6.0, 6), 10.0), tolerances=(stated,))
-    assert list_shown_parts(tolerances(moving, 8)) == ["theta_3", "theta_4"]
-
-
 def test_the_command_prints_draws_and_writes(tmp_path, capsys):
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")
@@ -234,11 +225,3 @@ def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, capsys):
         assert 0.001 < sigma < 0.02
     above = printed[: printed.index("  theta_2")].splitlines()
     assert max(map(len, above)) <= 80
-
-
-@pytest.mark.slow
-def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it():
-    told = []
-    tolerances(crank_rocker(tolerances=(INPUT,)), 16384, progress=told.append)
-    assert (told[0], told[-1]) == (0.0, 1.0)
-    assert len(told) > 3 and np.all(np.diff(told) > 0.0)

@@ -5,8 +5,6 @@ Nothing may overlap, and they must reach the file atomically.
 
 import json
 import math
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
@@ -276,20 +274,6 @@ def test_a_leader_crosses_no_text_and_no_leader_and_no_text_stands_on_a_bar(
         assert len(leaders) > 1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "figure, at_rest, moving", [("overview", 5, 8), ("kinematics", 1, 3)]
-)
-def test_positions_at_rest_have_no_panel_of_zeros(figure, at_rest, moving):
-    """With a speed there are speeds, accelerations and power besides."""
-    for speed, panels in ((0.0, at_rest), (1.0, moving)):
-        motion = Motion(Sweep(1.0, 2.0, 10), speed)
-        axes = composed(replace(CRANK_ROCKER, motion=motion), figure).axes
-        labels = " ".join(one.get_ylabel() for one in axes)
-        assert len(axes) == panels
-        assert ("rad/s" in labels) == (speed > 0.0)
-
-
 MOVING = {
     "turn": (CRANK_ROCKER, r"$\theta_2$ (°)"),
     **{label: (commanding(motion), label) for label, motion in COMMANDS.items()},
@@ -341,16 +325,6 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
     assert lengths == approx([100.0, 250.0, 220.0])  # mm
     assert math.atan2(*bars[0][::-1]) == approx(1.3)
     assert axes.get_aspect() == 1.0
-
-
-@pytest.mark.slow
-def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign():
-    figure = composed(crank_rocker(), "freebody", position=radians(135.0))
-    lines = [text for text, _ in texts_shown(figure) if text[0] in "↺↻"]
-    assert lines and not any(" = −" in line for line in lines)
-    assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith(
-        "At θ₂ = 135°. "
-    )
 
 
 @pytest.mark.slow
@@ -539,14 +513,6 @@ def test_what_cannot_be_drawn_is_named_and_leaves_no_file(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-def test_the_position_of_a_motion_through_time_is_one_that_it_passes():
-    shown = make_view(released(), position=0.3)
-    k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
-    assert shown.here.time[0] == shown.sweep.time[k]
-    assert shown.here.F12[0] == approx(shown.sweep.F12[k])
-
-
 ENERGY = 1e-6
 """Of the work against the kinetic energy, relative: the spline's (dt omega)^4, its
 instants 2 ms apart.
@@ -572,23 +538,6 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     ).axes
     looks = [(line.get_color(), line.get_linestyle()) for line in axes.lines[:-1]]
     assert len(looks) == len({*looks}) == 6
-
-
-@pytest.mark.slow
-def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path):
-    code = """
-import sys, fourbar.show.plot, fourbar.show.animate
-assert 'matplotlib' not in sys.modules
-sys.modules['matplotlib'] = None
-from tests.support.scenes import crank_rocker
-try:
-    fourbar.show.plot.draw(crank_rocker(), sys.argv[1])
-except fourbar.errors.DependencyError as error:
-    print(error)
-"""
-    command = [sys.executable, "-c", code, str(tmp_path / "a.png")]
-    said = subprocess.check_output(command, text=True)
-    assert said == 'drawing needs matplotlib: pip install ".[plot]" in the checkout\n'
 
 
 @pytest.mark.parametrize(
@@ -640,18 +589,6 @@ def test_one_position_of_another_command_stands_in_its_range():
     limits = find_intervals(CRANK_ROCKER.linkage, 4)
     low, high = next(ends for ends in limits if ends[0] < 2.0 + math.tau < ends[1])
     assert low < shown.sweep.theta_4.min() < shown.sweep.theta_4.max() < high
-
-
-@pytest.mark.parametrize("bar", slow_but({3}, [2, 3]))
-@pytest.mark.slow
-def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis(bar):
-    """Bars 2 and 3 stretched: cosine rule for O2, B, O4, where theta_3 = theta_2."""
-    d, a, b, c = CRANK_ROCKER.linkage.lengths
-    cosine = ((a + b) ** 2 + d * d - c * c) / (2.0 * (a + b) * d)
-    stretched = math.degrees(CRANK_ROCKER.linkage.ground_angle + math.acos(cosine))
-    sweep = {f"theta_{bar}": Sweep(0.7, 1.25, 40), f"omega_{bar}": 1.0}
-    figure = composed(commanding(Motion(**sweep)), "transmission")
-    assert find_marks(figure)["dead centre"] == approx([stretched])
 
 
 def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():

@@ -24,7 +24,6 @@ from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage_figure import choose_drawing_scale, draw_mechanism
 from fourbar.show.plot.symbols import list_acting
 from fourbar.show.plot.view import make_view
-from tests.fourbar.show.plot.test_plot import GALLERY, clashes, composed
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
@@ -155,14 +154,3 @@ def test_the_points_of_a_scene_are_drawn_where_they_are():
     (point,) = collect_page_data(scene, {})["points"]
     assert point["name"] == "P"
     assert abs(complex(*point["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
-
-
-@pytest.mark.slow
-def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything):
-    at_pins = fourbar.Viscous.at(O2=0.01, A=0.01), fourbar.Friction.at(O2=0.05, A=0.05)
-    kept = [e for e in everything.effects if e.key not in ("viscous", "friction")]
-    loads = (*everything.loads, Load(2, moment=0.1), Load(2, (15.0, 0.0)))
-    scene = replace(everything, loads=loads, effects=(*kept, *at_pins), drive_bar=2)
-    assert not clashes(composed(scene, "freebody"))
-    pump = fourbar.load(GALLERY / "pump_jack.toml")
-    assert not clashes(composed(pump, "overview", units="imperial"))
