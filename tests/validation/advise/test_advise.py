@@ -3,8 +3,6 @@ serves.
 """
 
 import math
-import re
-import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -29,6 +27,21 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
 from tests.validation.cost.test_cost import turning
+
+
+@pytest.fixture
+def call(tmp_path):
+    """Return a function that asks for advice on files of scenes, with options."""
+
+    def run(scenes, *options):
+        files = [str(tmp_path / f"{name}.toml") for name in scenes]
+        for file, scene in zip(files, scenes.values(), strict=True):
+            Path(file).write_text(fourbar.dump(scene))
+        line = [*files, "--error", *options]
+        done = CliRunner().invoke(advise.advise_command, line, standalone_mode=False)
+        return done.return_value, " ".join(done.output.split()), done
+
+    return run
 
 
 @pytest.mark.slow
@@ -107,19 +120,15 @@ def test_figures_of_rockers_and_the_thesis(name, most):
 
 
 @pytest.mark.slow
-def test_the_file_alone_keeps_the_error(tmp_path):
+def test_the_file_alone_keeps_the_error(tmp_path, call):
     """What -o writes, loaded by nothing but its text.
 
     Reset to the keyframe and stepped for a revolution.
     """
-    scene, out = tmp_path / "scene.toml", tmp_path / "out.xml"
-    scene.write_text(fourbar.dump(turning(positions=72)))
-    process = CliRunner().invoke(
-        advise.advise_command,
-        [str(scene), "--error", "1e-5", "-o", str(out)],
-        standalone_mode=False,
-    )
-    assert process.return_value == 0, process.output
+    out = tmp_path / "out.xml"
+    scenes = {"scene": turning(positions=72)}
+    status, printed, _ = call(scenes, "1e-5", "-o", str(out))
+    assert status == 0, printed
     loop = ClosedLoop(out.read_text())
     mujoco.mj_resetDataKeyframe(loop.model, loop.data, 0)
     steps = round(2.0 * math.pi / 10.0 / loop.model.opt.timestep)
@@ -149,57 +158,18 @@ def test_the_file_alone_keeps_the_error(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_lies_between_two_steps_is_judged_too():
-    """Two steps that are right at both of their ends miss what the pin forces do
-    between.
-    """
-    scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
-    setup = JudgedSetup(scene)
-    trial = setup.try_out(advise.make_settings(12.0, 6.0))
-    assert (
-        trial.steps == 2
-        and compute_errors(scene, trial.at, trial.quantities).worst < 2e-3
-    )
-    assert matters.judge_trial(scene, trial).worst > 0.1
-    advice = advise.advise(scene, 1e-2, setup)
-    assert advice.reached and advice.best.steps > 4
-    largest = [
-        np.linalg.norm(fourbar.solve(scene, "force", at=commanded).F12, axis=1).max()
-        for commanded in (setup.command, setup.try_out(advice.best.settings).at)
-    ]
-    assert largest[1] == pytest.approx(largest[0], rel=1e-2)
-
-
-@pytest.mark.slow
-def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path, monkeypatch):
+def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path, monkeypatch, call):
     monkeypatch.setattr(advise, "MOST_STEPS_OF_A_RUN", 1500)
-    scene = tmp_path / "scene.toml"
-    scene.write_text(fourbar.dump(turning(positions=12)))
-    out = tmp_path / "none.xml"
-    process = CliRunner().invoke(
-        advise.advise_command,
-        [str(scene), "--error", "1e-14", "-o", str(out)],
-        standalone_mode=False,
-    )
-    assert process.return_value == 1 and not out.exists()
-    assert "No setting of plain MJCF" in " ".join(
-        process.output.split()
-    ) and "inverse dynamics" in " ".join(process.output.split())
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
-    scene.write_text(fourbar.dump(still))
-    process = CliRunner().invoke(
-        advise.advise_command,
-        [str(scene), "--error", "1e-3"],
-        standalone_mode=False,
-    )
-    assert process.return_value == 1 and "nothing to run through" in process.output
-    scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
-    process = CliRunner().invoke(
-        advise.advise_command,
-        [str(scene), "--error", "1e-3"],
-        standalone_mode=False,
-    )
-    assert process.return_value == 1 and "motion law" in process.output
+    out = tmp_path / "none.xml"
+    for scene, error, words in (
+        (turning(positions=12), "1e-14", ("No setting of plain MJCF", "inverse dyn")),
+        (still, "1e-3", ("nothing to run through",)),
+        (FAULT_SCENES["law"], "1e-3", ("motion law",)),
+    ):
+        status, printed, _ = call({"scene": scene}, error, "-o", str(out))
+        assert status == 1 and not out.exists()
+        assert all(word in printed for word in words)
 
 
 def test_a_predicted_error_that_is_no_number_is_no_small_one():
@@ -298,35 +268,6 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
 
 
 @pytest.mark.slow
-def test_the_time_of_the_settings_is_told():
-    """A second of 10 rad/s has 1.59 revolutions.
-
-    A trial takes longer than its steps and readings, for it assembles the model too;
-    fifty of its steps and readings alone take longer than one.
-    """
-    scene = turning(10.0, 36)
-    setup = JudgedSetup(scene)
-    best = advise.advise(scene, 1e-4, setup).best
-    words = advise._describe_time(setup, best)
-    found = re.fullmatch(
-        r"This costs (\S+) ms of processor time per simulated second \((\S+) ms per"
-        r" revolution\): (\d+) steps, and (\d+) readings of torque and pin forces\.",
-        words,
-    )
-    assert found, words
-    second, revolution, steps, readings = map(float, found.groups())
-    two_digits = 0.1  # of the numbers printed
-    assert second / revolution == pytest.approx(10.0 / (2.0 * math.pi), rel=two_digits)
-    assert (steps, readings) == (best.steps, best.readings)
-    began = time.process_time()
-    setup.try_out(best.settings)
-    trial = time.process_time() - began
-    assert 0.0 < revolution / 1e3 * setup.revolutions < trial
-    time_steps, time_readings = setup.make_clocks(best.settings)
-    assert time_steps(50 * best.steps) + time_readings(100) > revolution / 1e3
-
-
-@pytest.mark.slow
 def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     setup = JudgedSetup(turning(10.0, 36))
     attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
@@ -339,32 +280,13 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
 
 
 @pytest.mark.slow
-def test_several_scenes_have_one_table(tmp_path):
-    files = []
-    for name, scene in (
-        ("one", turning(10.0, 36)),
-        ("still", replace(turning(10.0, 36), motion=fourbar.Motion(1.0, 1.0))),
-    ):
-        files.append(str(tmp_path / f"{name}.toml"))
-        Path(files[-1]).write_text(fourbar.dump(scene))
-    process = CliRunner().invoke(
-        advise.advise_command,
-        [*files, "--error", "1e-4"],
-        standalone_mode=False,
-    )
-    assert process.return_value == 1  # one of them cannot be run through
-    lines = process.output.replace("\n    ", " ").splitlines()
-    assert lines[2].startswith(
-        "The timestep matters most here. If it is twice as long, the error is"
-    )
-    assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == [
-        "still.toml",
-        "-",
-    ]
-    with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):
-        CliRunner().invoke(
-            advise.advise_command,
-            [*files, "--error", "1e-4", "-o", "x.xml"],
-            standalone_mode=False,
-            catch_exceptions=False,
-        )
+def test_several_scenes_have_one_table(call):
+    still = replace(turning(10.0, 36), motion=fourbar.Motion(1.0, 1.0))
+    scenes = {"one": turning(10.0, 36), "still": still}
+    status, printed, done = call(scenes, "1e-4")
+    assert status == 1  # one of them cannot be run through
+    assert "timestep matters most here. If it is twice as long, the error is" in printed
+    *_, first, second = map(str.split, done.output.replace("\n    ", " ").splitlines())
+    assert first[0] == "one.toml" and second[:2] == ["still.toml", "-"]
+    *_, done = call(scenes, "1e-4", "-o", "x.xml")
+    assert "MJCF of one scene, not of 2" in str(done.exception)

@@ -3,9 +3,7 @@
 Nothing of it in the formulas, in the MJCF or in the compiled model.
 """
 
-import subprocess
 import sys
-from pathlib import Path
 
 import mujoco
 import pytest
@@ -16,8 +14,6 @@ from fourbar.mjcf import write_mjcf
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.validation.engines.test_applied_effects import ACTING
-
-ROOT = Path(fourbar.__file__).parent.parent
 
 
 def called(**acting):
@@ -106,39 +102,6 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, actuators, 0)
     assert disabled == BARE - enabled and rows == 3 + more_rows
     assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring
-
-
-POSITIONS_ONLY = """
-import sys
-import fourbar
-from fourbar_validation.run.judge import judge
-link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
-scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20)))
-record = judge("scene", scene)
-print(sorted(name for name in ("mujoco", "pinocchio") if name in sys.modules))
-print(*record.left_out, sep="\\n")
-print(*sorted({row.engine for row in record.rows}))
-"""
-
-
-@pytest.mark.slow
-def test_positions_alone_start_no_force_engine():
-    done = subprocess.run(
-        [sys.executable, "-c", POSITIONS_ONLY],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=ROOT,
-    )
-    engines, *left_out, answered = done.stdout.splitlines()
-    assert engines == "[]" and answered == "formulas free-body"
-    assert {line.split(":")[0] for line in left_out} == {
-        "pinocchio-inverse",
-        "mujoco-inverse",
-        "mujoco-simulated",
-        "scenes stated otherwise",
-    }
-    assert all("the scene states positions only" in line for line in left_out)
 
 
 def moved(*motion):

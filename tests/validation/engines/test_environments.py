@@ -13,18 +13,14 @@ import pytest
 
 import fourbar
 from fourbar.errors import LONGEST_MESSAGE, DependencyError, InputError
-from fourbar.scene import command as list_positions
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments
 from fourbar_validation.engines.environments import (
     Entry,
     make_environment,
     read_engines,
-    start_engine,
 )
-from fourbar_validation.engines.guests import adjust_engines
 from fourbar_validation.engines.programs import Ended
-from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.judge import judge
@@ -172,35 +168,6 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
     assert "--without-pip" not in made
     assert Path(filled[0]).is_relative_to(tmp_path)
     assert filled[-2:] == ["install", "x"]
-
-
-OURS = {engine.name: engine for engine in ENGINES}
-
-
-def start_like(name, **stated):
-    """Start an entry whose adapter is one of ours."""
-    return start_engine(Entry("mine", adapter=name, **stated), like=OURS[name])
-
-
-@pytest.mark.slow
-def test_an_engine_of_ours_is_held_as_here_and_asked_for_its_steps_or_an_error():
-    pytest.importorskip("mujoco")
-    simulated = "mujoco-simulated"
-    guest = start_like(simulated, steps=(48, 96))
-    assert (guest.name, guest.tolerance) == ("mine", OURS[simulated].tolerance)
-    assert guest.through_time and guest.residuals
-    assert guest.version and not guest.generated
-    (wanted,) = adjust_engines([guest], 1e-3)
-    refused = start_like(simulated, steps=(48, 96), setting="fast")
-    (as_ever,) = adjust_engines([start_like("free-body")], 1e-3)
-    stepped, precise, unable, free = (
-        engine.start().answer(SCENE, list_positions(SCENE))
-        for engine in (guest, wanted, refused, as_ever)
-    )
-    assert stepped.setting == "RK4 96/rev" != precise.setting
-    assert precise.evidence["wanted_error"] == 1e-3
-    assert unable.refusal == "the engine's hello does not list 'fast' in settings"
-    assert free.setting == "exact"
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,6 @@ alone.
 
 import re
 import shutil
-import subprocess
-import sys
 import time
 from collections import defaultdict
 
@@ -20,7 +18,6 @@ from fourbar.errors import InputError
 from fourbar.files import save
 from fourbar.scene.motion import Free
 from fourbar_validation.compare.answer import explain_refusal
-from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, programs
 from fourbar_validation.engines.asking import ask_at
@@ -477,62 +474,6 @@ def test_a_hello_that_fails_is_one_failing_row(name, reason):
     assert others_agree(by_engine)
     ((verdict, said),) = by_engine[name].values()
     assert verdict == FAILS and said.startswith(reason)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
-    tmp_path, mark
-):
-    files = [tmp_path / f"{name}.toml" for name in ("scene", "second")]
-    for file in files:
-        save(SCENE, file)
-    silent = write_program(tmp_path, "silent", SILENT["silent"])
-    out = tmp_path / "out"
-    line = [sys.executable, "-m", "validation", "run", *map(str, files)]
-    line += ["--engines=free-body", "--workers=1", "--no-pictures", f"--out={out}"]
-    line += [f"--guest={entry}" for entry in (silent, HERE + "Right", HERE + "Prints")]
-    began = time.monotonic()
-    done = subprocess.run(
-        [*line, "--time-limit=5"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1 and time.monotonic() - began < 200.0, done.stderr
-    assert "owned" not in done.stdout + done.stderr
-    rows = {}
-    for row in read_columns(out / "results.csv"):
-        reason = row.reason if row.quantity == "all" else ""
-        rows.setdefault(row.engine, set()).add((row.verdict, reason))
-    raised = f"ValueError: no licence {place_of('licence')}"
-    assert rows == {
-        **{name: {(AGREES, "")} for name in ("formulas", "free-body", "right")},
-        "silent": {(FAILS, "no answer within 5 s")},
-        "prints": {(FAILS, f"{raised}; what it printed: output.txt")},
-    }
-    text = (out / "output.txt").read_text()
-    assert text.count("\\x1b]0;owned\\x07begin\nfrom a shell") == 2
-    if sys.platform == "linux":
-        time.sleep(2.0)
-        assert not list_processes(mark)
-
-
-@pytest.mark.slow
-def test_a_report_shows_the_versions_that_guests_state(tmp_path, suite, monkeypatch):
-    judge_here(monkeypatch)
-    stated = {"numpy-like": "", "own": "2.1", "own 3.0": "3.0"}
-    hello = '["gravity"]}'
-    entries = [
-        write_program(tmp_path, name, (hello, f'["gravity"], "version": "{version}"}}'))
-        for name, version in stated.items()
-    ]
-    plan = Plan(
-        suite,
-        guests.read_guests(entries, ()),
-        RunOptions(drawn=False),
-    )
-    summary = run(plan, tmp_path / "out")
-    shown = {line.name: line.version for line in summary.engines if line.name in stated}
-    assert shown == {"numpy-like": "", "own": "2.1", "own 3.0": ""}
-    assert "| own 2.1 |" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
 
 
 MINE = """

@@ -29,8 +29,7 @@ from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import MODELS
-from fourbar_validation.regression import accept, record, render, rules
-from fourbar_validation.regression.changes import Kind, compare_runs
+from fourbar_validation.regression import record, render, rules
 from fourbar_validation.regression.history import (
     HISTORY,
     _name_runs,
@@ -134,21 +133,6 @@ def test_other_versions_are_reported():
     found = compare_rows((older, [ROW]), (HERE, [ROW]))
     assert {what for what, _, _ in found.surroundings} == {*others, "machine"}
     assert "\nmujoco: 3.3.7 -> " in "\n" + render.write_differences(found)
-
-
-@pytest.mark.slow
-def test_command_writes_every_form_and_leaves_with_the_status(tmp_path, saved, compare):
-    rows = [ROW, changed(scene="<script>alert(1)</script>|`x`")]
-    old = saved("old", *rows)
-    new = saved("new", *(replace(row, error=1e-9) for row in rows))
-    forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
-    code, (*_, verdict) = compare(old, new, *forms)
-    assert code == FAILED and verdict.startswith("2 regressions")
-    for form in ("html", "markdown"):
-        assert "<script>" not in (tmp_path / form).read_text()
-    assert len(ET.parse(tmp_path / "junit").getroot().findall(".//failure")) == 2
-    code, (*_, verdict) = compare(old, old)
-    assert code == HOLDS and verdict.startswith("No regression")
 
 
 @pytest.mark.slow
@@ -347,41 +331,6 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
     (tmp_path / ABOUT).unlink()
     with pytest.raises(InputError, match="is not a table written by"):
         read_run(tmp_path)
-
-
-@pytest.mark.slow
-def test_of_two_long_runs_every_row_is_counted_and_the_worst_are_listed(
-    tmp_path, monkeypatch, compare, accepts
-):
-    """They are too long for a text, and for a history."""
-    scenes = 300
-    for name, few in (
-        ("compare.results_file.GROUP_ROWS", 60),
-        ("compare.results_file.BATCH_ROWS", 60),
-        ("compare.results_file.CSV_ROWS", 100),
-        ("regression.accept.CSV_ROWS", 100),
-    ):
-        monkeypatch.setattr(f"fourbar_validation.{name}", few)
-    old, new, kept = (tmp_path / name for name in ("old", "new", "kept"))
-    for folder, grown in ((old, 1.0), (new, 1e3)):
-        folder.mkdir()
-        with ResultsWriter(folder) as columns:
-            for k in range(scenes):
-                error = 1e-9 * (1.0 + k * (grown - 1.0))
-                row = changed(scene=f"random-0-{k:09d}", condition=1e-3, error=error)
-                columns.add([replace(row, quantity="F12", error=1e-15), row])
-        write_about(HERE, folder)
-        assert not (folder / TABLE).exists()
-        assert len(columns.first_lines) < 60
-    changes = compare_runs(*((HERE, open_run(folder).frame()) for folder in (old, new)))
-    assert changes.rows == 2 * scenes
-    assert changes.regressed == changes.kinds[Kind.WORSE] == scenes - 1
-    worst = [name[-3:] for name in changes.of(Kind.WORSE).scene[:3]]
-    assert worst == ["299", "298", "297"]
-    assert compare(old, new)[0] == FAILED
-    assert accepts(new) == HOLDS
-    assert {path.name for path in kept.iterdir()} == {ABOUT, "results.parquet"}
-    assert compare(kept, new)[0] == HOLDS
 
 
 def test_what_is_compared_can_be_chosen(saved, call, compare):
@@ -846,44 +795,6 @@ def test_runs_of_one_day_and_commit_are_named_by_their_time():
         "the run of 2026-01-01 03:00:00 at commit c0",
         "the run of 2026-01-02 at commit c0",
     ]
-
-
-@pytest.mark.slow
-def test_the_page_of_differences_begins_with_a_picture_of_what_fails_first(
-    tmp_path, monkeypatch, saved, call, nights
-):
-    """What it says since when, and what it draws, is of one table, read once."""
-    histories = []
-
-    def read_and_keep(before):
-        histories.append(read_history(before))
-        return histories[-1]
-
-    failing = [replace(FAILED_ROW, error=error) for error in (2e-3, 3e-3, 4e-3)]
-    kept = nights([HELD], *([row] for row in failing[:2]))
-    about, rows = made(failing[2:], {"scene": SCENE})
-    latest = saved("latest", *rows, about=replace(about, date=DATES[3]))
-    page = tmp_path / "page.html"
-    monkeypatch.setattr(accept, "read_history", read_and_keep)
-    call(
-        "compare",
-        kept,
-        latest,
-        "--html",
-        page,
-    )
-    assert len(histories) == 1
-    text = page.read_text("utf-8")
-    picture = text.index("<svg")
-    assert text.index("</h1>") < picture < text.index("<h2>")
-    since = f"since {RUNS[1]}"
-    caption = (
-        f"F32: error in the accepted runs and in this one. It has not held {since}"
-    )
-    assert caption in text
-    assert text.count(since) == 3  # of the picture, its name, and the row
-    svg = text[picture : text.index("</svg>")]
-    assert all(f">{name}<" in svg for name in ("c0", "c1", "c2", "this run"))
 
 
 @pytest.mark.slow

@@ -6,11 +6,10 @@ Quiet, readable in the dark, its links and its download right.
 import base64
 import gzip
 import json
-import re
 
 import pytest
 
-from fourbar_validation.compare.rows import FORMULAS, write_rows
+from fourbar_validation.compare.rows import write_rows
 from fourbar_validation.report.html import ALL_OPEN
 from tests.validation.report.test_report import copies, report
 from tests.whole.test_imports import ROOT
@@ -60,26 +59,6 @@ return found.sort((a, b) => a[0] - b[0]).slice(0, 5);
 """
 
 
-SMALLEST = 9.0
-"""px, of text at the size at which it is shown. Its box is two px more: room above its
-letters.
-"""
-TEXTS = """
-const clipped = [];
-let smallest = Infinity;
-for (const text of document.querySelectorAll("svg text")) {
-  const box = text.getBoundingClientRect();
-  if (!box.width) continue;
-  const frame = text.ownerSVGElement.getBoundingClientRect();
-  const inside = box.left >= frame.left - 2 && box.right <= frame.right + 2
-    && box.top >= frame.top - 2 && box.bottom <= frame.bottom + 2;
-  if (!inside) clipped.push(text.textContent);
-  const m = text.getScreenCTM();
-  const size = parseFloat(getComputedStyle(text).fontSize) * Math.hypot(m.a, m.b);
-  smallest = Math.min(smallest, size);
-}
-return [clipped, smallest];
-"""
 PAPERS = """
 return [...document.querySelectorAll("svg path, svg rect")].filter(shape => {
   const frame = shape.ownerSVGElement.getBoundingClientRect();
@@ -116,48 +95,6 @@ def test_all_text_is_readable(browse, dark):
     assert driver.execute_script(PAPERS) == []
     page = (ROOT / "docs" / "examples" / "benchmark.html").read_text()
     require_contrast(browse(page[: page.index("</table>")], dark=dark))
-
-
-@pytest.mark.slow
-def test_engines_stand_before_what_checks_fourbar_against_itself(browse):
-    """The columns that a phone shows are those of engines, and so are the marks."""
-    driver = browse(report(copies(2, failing=1))[1], 400)
-    heads = driver.execute_script(
-        "return [...document.querySelectorAll('details.scene[open] table')][0]"
-        ".querySelectorAll('thead th').values().map(e => e.textContent).toArray()"
-    )
-    names = [re.sub("^[^a-z]+", "", head) for head in heads[1:]]
-    own = [name == FORMULAS for name in names]
-    assert own == sorted(own) and True in own and False in own
-    caption = driver.find_element("css selector", "details.scene[open] .pictures + p")
-    told = [name for name in names if re.search(rf"\W {name}\b", caption.text)]
-    assert told == [name for name in names if name != FORMULAS]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [1440, 400, 360])
-def test_every_text_is_whole_and_large_enough_and_nothing_is_left_out(browse, width):
-    """The pictures of the first screen, those of a scene that is open, and tables."""
-    pages = copies(2, failing=1)
-    orders = {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0}
-    for record in pages:
-        record.evidence = {"mujoco-simulated": orders}
-    driver = browse(report(pages)[1], width)
-    assert driver.execute_script("return document.documentElement.scrollWidth") <= width
-    assert len(driver.find_elements("css selector", "details[open] svg")) == 3
-    clipped, smallest = driver.execute_script(TEXTS)
-    assert clipped == []
-    assert smallest >= SMALLEST or width < 400
-    heads = driver.execute_script(
-        "return [...document.querySelectorAll('table.engines th')]"
-        ".map(e => [e.textContent, e.checkVisibility()])"
-    )
-    assert len(heads) > 10 and all(visible for _, visible in heads)
-    widths = driver.execute_script(
-        "return [...document.querySelectorAll('table.short')]"
-        ".map(e => [e.scrollWidth, e.parentElement.clientWidth])"
-    )
-    assert widths and all(table <= room for table, room in widths)
 
 
 @pytest.mark.slow
@@ -200,20 +137,3 @@ def test_200_scenes_open_quickly_and_a_scene_when_opened(browse):
     driver.execute_script("arguments[0].open = true", scene)
     assert wait(driver, lambda: len(scene.find_elements("tag name", "svg")) == 3)
     assert scene.find_element("tag name", "table").is_displayed()
-
-
-@pytest.mark.slow
-def test_it_prints_on_paper(browse):
-    driver = browse(report(copies(2, failing=1))[1], dark=True)
-    pdf = driver.execute_cdp_cmd(
-        "Page.printToPDF",
-        {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69},
-    )
-    pages = base64.b64decode(pdf["data"]).count(b"/Type /Page\n")
-    assert 2 <= pages <= 6
-    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    paper = driver.execute_script(
-        "return getComputedStyle(document.body).backgroundColor"
-    )
-    # white on paper, also where the screen is dark
-    assert paper == "rgb(254, 254, 254)"

@@ -8,10 +8,8 @@ import base64
 import csv
 import gzip
 import io
-import json
 import math
 import re
-import shlex
 from dataclasses import replace
 from functools import cache
 from html import unescape
@@ -24,7 +22,6 @@ import pytest
 import fourbar
 from fourbar import Free, Motion, Sweep
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import (
     AGREES,
@@ -34,11 +31,7 @@ from fourbar_validation.compare.rows import (
     Row,
     write_rows,
 )
-from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.engines import guests
-from fourbar_validation.engines.registry import ENGINES, WORK, load_further
-from fourbar_validation.engines.table import choose_engines, fill_table
-from fourbar_validation.report import svg
+from fourbar_validation.engines.registry import ENGINES, WORK
 from fourbar_validation.report.html import (
     ALL_OPEN,
     Section,
@@ -57,7 +50,6 @@ from fourbar_validation.report.svg import LEAST_DRAWN_ERROR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.run.question import FREE_BODY
-from tests.support.guests import write_program
 from tests.support.here import summary_of
 from tests.support.scenes import crank_rocker
 
@@ -258,31 +250,6 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
     assert len(text) < 1.0e6
 
 
-@pytest.mark.slow
-def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch, tmp_path):
-    """Whoever is drawn first, and in whatever process: the engine says its number."""
-    monkeypatch.setattr(svg, "STYLE_NUMBERS", {})
-    classes = "tests.support.hostile_class:"
-    program = json.dumps(shlex.split(write_program(tmp_path, "plain")))
-    entries = [
-        f'[[engine]]\nname = "{name}"\ncommand = {program}\n'
-        for name in ("one", "another")
-    ]
-    (tmp_path / "engines.toml").write_text("".join(entries))
-    table = fill_table([tmp_path], [f"{classes}Right", f"{classes}Leaves"])
-    _, *engines = choose_engines("free-body,one,another", table)
-    assert len(engines) == 4
-    names = [engine.name for engine in (*ENGINES, *load_further(), *engines)]
-    svg.STYLE_NUMBERS.update(guests.number_guests(engines))
-    styles = [svg.choose_style(name) for name in names]
-    for mark in ("symbol", "marker"):
-        assert len({getattr(style, mark) for style in styles}) == len(names)
-    svg.STYLE_NUMBERS.clear()  # a scene in which the first broke down
-    svg.STYLE_NUMBERS.update(guests.number_guests(engines[1:]))
-    assert svg.choose_style(names[-1]).symbol == styles[-1].symbol
-    assert all(style.variable in svg.LIGHT_COLOURS for style in styles)
-
-
 @pytest.fixture
 def printed(tmp_path, capsys):
     """Prints the table of a run, and returns its text."""
@@ -357,33 +324,6 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     cells = "error of allowed | torque | pin forces | motion | compared"
     assert head == f"| largest {cells} |"
     assert line.startswith(f"| MuJoCo {version}, simulated | - | {cell}")
-
-
-@pytest.mark.slow
-def test_the_picture_shows_the_pin_force_that_fails():
-    """Without a failure it shows the largest."""
-    sizes = {name: magnitude(SOLUTION[name]).max() for name in PIN_FORCES}
-    largest, other = max(sizes, key=sizes.get), min(sizes, key=sizes.get)
-    numbers = {name: SOLUTION[name] for name in ("torque", *PIN_FORCES)}
-    answer = Answer(
-        "free-body",
-        "exact",
-        command(SCENE),
-        quantities=numbers,
-    )
-    record = Record(
-        "demo",
-        SCENE,
-        solution=SOLUTION,
-        answers=[answer],
-    )
-    assert f"|{largest}|" in (draw_scene_figure(record) or "")
-    record.rows = [
-        fail(replace(OF_MINE, quantity=other), error=0.5),
-        fail(replace(OF_MINE, quantity=largest)),
-    ]
-    drawn = draw_scene_figure(record) or ""
-    assert f"|{other}|" in drawn and f"|{largest}|" not in drawn
 
 
 def record_of(name, rows, **parts):

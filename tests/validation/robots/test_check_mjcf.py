@@ -1007,28 +1007,6 @@ def call(folder, text, *options, scene=FEW):
     return CliRunner().invoke(check_mjcf_command, arguments, standalone_mode=False)
 
 
-@pytest.mark.slow
-def test_what_is_printed_and_written(tmp_path):
-    """The anchor of an open rest pose makes another linkage, which is soft as well."""
-    text = other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"')
-    stated = {**MINE, "coupler": "rod<b>|"}
-    names = [f"--name={role}={name}" for role, name in stated.items()]
-    process = call(tmp_path, text.replace('"rod"', '"rod&#60;b&#62;|"'), *names)
-    assert process.return_value == 1, process.output
-    said = " ".join(process.output.split())
-    assert "the lengths of another linkage first, then the dearest difference" in said
-    first = said.partition("the file holds what it is held to")[2]
-    assert re.match(r"cost what differs ─+ \S+ \S+ lengths\.output:", first.strip())
-    assert "Mend the lengths first" in said
-    assert "fourbar-validation advise" not in said
-    printed = process.output.replace(str(tmp_path), "").splitlines()
-    assert max(map(len, printed)) <= 80
-    report = (tmp_path / "out" / "robot.md").read_text()
-    assert "\x1b" not in process.output and "\x1b" not in report
-    rows = read_columns(tmp_path / "out" / "results.csv")
-    assert (FAILS, FILE_AT_ONE_STATE) in {(row.verdict, row.engine) for row in rows}
-
-
 @pytest.mark.parametrize(
     ("with_scene", "options", "words"),
     [

@@ -17,12 +17,12 @@ import fourbar
 from fourbar.effects import Flywheel, Friction
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import RECIPE, write_mjcf
-from fourbar.quantities import FORCE_NAMES, PIN_FORCES
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
-from fourbar_validation.compare.tolerance import SIMULATED, wrap_difference
+from fourbar_validation.compare.rows import AGREES, DEGRADED
+from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import (
     examine_file,
@@ -32,18 +32,14 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, Rob
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.differences import find_differences
-from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
-    judge_file,
-    list_rows,
 )
 from fourbar_validation.robots.loop_errors import find_left_out
 from fourbar_validation.run.transformed import _convert
 from tests.support.robots import Planar, answer_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine
-from tests.support.scenes import mirrored
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
@@ -313,8 +309,6 @@ def test_a_pose_at_a_limit_of_the_output_tells_no_assembly_of_its_command(
 
 
 HEAVY = replace(BARE, effects=(fourbar.Gravity(),))
-WITHOUT_FLYWHEEL = 1e-4
-"""What MuJoCo's stiffest constraint leaves in these files: 5.1e-5 of a pin force."""
 
 
 def turned(scene, angle):
@@ -327,28 +321,6 @@ def turned(scene, angle):
             replace(effect, angle=effect.angle + angle) for effect in scene.effects
         ),
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("scene", "other"),
-    [
-        (HEAVY, turned(HEAVY, 0.7)),
-        (BARE, turned(BARE, -2.0)),
-        (BARE, mirrored(BARE)),
-        (BARE, turned(mirrored(BARE), 0.4)),
-    ],
-    ids=["with gravity", "level", "from behind", "turned from behind"],
-)
-def test_a_file_may_stand_in_its_plane_as_it_likes(scene, other):
-    """As `loops` writes a scene.
-
-    Gravity down, or the ground along x where the plane is level.
-    """
-    examined = examine(scene, write_mjcf(other, drive="none"), {})
-    assert not list_keys(scene, examined, "lengths.", "bars.", "gravity.")
-    for name in ("torque", "F12", "F43"):
-        assert error_of(scene, examined, FILE_AT_ONE_STATE, name) < WITHOUT_FLYWHEEL
 
 
 def test_a_file_that_is_turned_against_gravity_is_not_the_same():
@@ -397,53 +369,6 @@ def test_the_cause_that_explains_the_error_stands_first(
         c.row.error for c in report.errors if c.row.quantity in ("torque", "F12", "F43")
     )
     assert cost is not None and cost > 0.1 * worst
-
-
-def force_errors(rows):
-    return {
-        (row.engine, row.quantity): row.error
-        for row in rows
-        if row.quantity in FORCE_NAMES
-    }
-
-
-def set_attribute(text, name, value):
-    changed, times = re.subn(f' {name}="[^"]*"', f' {name}="{value}"', text)
-    assert times == 1
-    return changed
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("key", "was"),
-    [("closure.solimp", "0.9 0.95 0.001 0.5 2"), ("option.timestep", "0.003")],
-)
-def test_a_setting_costs_what_typing_it_into_the_file_gains(
-    key,
-    was,
-    tmp_path,
-):
-    """In the stiff file that is generated, a timestep would matter less.
-
-    The loop's impedance would not matter at all.
-    """
-    scene = replace(BARE, motion=FAST)
-    text = set_attribute(write_mjcf(scene, drive="none"), "integrator", "Euler")
-    name = key.partition(".")[2]
-    typed = re.search(f' {name}="([^"]*)"', write_mjcf(scene))
-    assert typed is not None
-    report = judge_path("arm", scene, written(set_attribute(text, name, was), tmp_path))
-    (difference,) = (d for d in report.differences if d.key == key)
-    mended = examine(scene, set_attribute(text, name, typed[1]), {}).measured
-    after = force_errors(list_rows("arm", mended, SIMULATED))
-    before = force_errors(error.row for error in report.errors)
-    worst = [
-        {how: max(errors[of] for of in errors if of[0] == how) for how, _ in errors}
-        for errors in (before, after)
-    ]
-    gained = max(worst[0][how] - worst[1][how] for how in worst[0])
-    assert gained > 1e-3
-    assert difference.cost == pytest.approx(gained, rel=0.02)
 
 
 def test_where_no_force_gives_the_acceleration_is_said():
@@ -556,47 +481,6 @@ def test_loads_of_passive_motors_are_the_loads_of_the_scene():
     assert error_of(scene, examined, FILE_AT_ONE_STATE, "F32") < 1e-4
 
 
-FINGER = """<mujoco><compiler angle="degree" autolimits="true"/>
-<default><geom density="2700" contype="0" conaffinity="0"/></default>
-<worldbody><body name="palm">
-<body name="crank"><joint name="motor" axis="0 0 -1" range="-40 40" armature="2e-5"/>
-<geom type="capsule" fromto="0 0 0 0 0.03 0" size="0.004"/>
-<body name="tip" pos="0 0.03 0" quat="0.9238795 0 0 0.3826834">
-<joint name="tip_j" axis="0 0 -1"/>
-<geom type="capsule" fromto="0 0 0 0.05 0.01 0" size="0.004"/>
-<geom type="box" size="0.03 0.006 0.006" pos="0.06 0.04 0"/>
-<site name="a" pos="0.05 0.01 0"/></body></body>
-<body name="follower" pos="0.035 0 0" euler="0 180 0">
-<joint name="follow" axis="0 0 1"/>
-<geom type="capsule" fromto="0 0 0 0 0.05 0" size="0.004"/>
-<site name="b" pos="0 0.0722 0"/></body>
-</body></worldbody>
-<equality><connect name="close" site1="a" site2="b"/></equality></mujoco>"""
-"""A soft loop whose scene, as `loops` writes it, ends at the range of its motor."""
-
-
-@pytest.mark.slow
-def test_a_range_that_ends_where_the_motion_does_is_not_the_cause(
-    tmp_path,
-):
-    """Both limits are touched, to round-off, at the ends of the sweep.
-
-    The soft loop is the error, and the file is judged as it is without the range.
-    """
-    path = written(FINGER, tmp_path)
-    scene = read_loop_scene(read_robot(path), PoseOptions(), None, None).scene
-    report = judge_path("finger", scene, path)
-    free = examine(scene, FINGER.replace(' range="-40 40"', ""), {}).measured
-    assert report.differences[0].key == "closure.solimp"
-    assert any(
-        "the stops of joint 'motor'" in note
-        for note in [*report.notes, *report.measured.remarks]
-    )
-    judged = force_errors(error.row for error in report.errors)
-    alone = force_errors(list_rows("finger", free, SIMULATED))
-    assert judged == pytest.approx(alone, rel=1e-9)
-
-
 STIFF = 'solimp="0.9999 0.9999 0.001 0.5 2"'
 
 
@@ -610,16 +494,6 @@ def read_cut(cut):
     scene = read_loop_scene(file, PoseOptions(), None, 1.0).scene
     few = np.linspace(*command(scene).theta_2[[0, -1]], 5)
     return replace(scene, motion=scene.motion.replace(angle=few)), file
-
-
-@pytest.mark.slow
-def test_a_softness_that_nothing_typed_mends_stays_a_difference():
-    scene, file = read_cut("A")
-    options = MeasureOptions(PoseOptions(), error=1e-9)
-    judgement = judge_file("cut", scene, file, options)
-    assert judgement.counts[FAILS]
-    costs = {one.key: one.price for one in judgement.differences}
-    assert costs["closure.softness"] == "-"
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3])

@@ -1,19 +1,15 @@
 """A robot's file with its includes and meshes: what is read, left out and refused."""
 
-import re
-
 import mujoco
 import pytest
 
-import fourbar
 from fourbar.errors import BAD_INPUT, InputError
-from fourbar.mjcf import write_mjcf
 from fourbar_validation.cli import status
 from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
-from fourbar_validation.robots import files, guard
+from fourbar_validation.robots import files
 from fourbar_validation.robots.files import read_robot
 from tests.whole.test_imports import ROOT
 
@@ -238,30 +234,6 @@ def test_includes_have_a_limit_in_number(
     assert read_robot(path).text
     monkeypatch.setattr(files, "MOST_INCLUDES", 2)
     assert_refused(path, "more than 2 files are included")
-
-
-@pytest.mark.slow
-def test_a_million_copies_end_in_one_line(
-    tmp_path,
-    monkeypatch,
-    capsys,
-):
-    """A robot may have <replicate>; what it becomes is bounded where it is compiled."""
-    monkeypatch.setattr(guard, "ROBOT_SECONDS", 5.0)
-    scene = ROOT / "models" / "crank_rocker.toml"
-    # MuJoCo 3.14 counts the coordinates of a keyframe before it makes the copies
-    text = write_mjcf(fourbar.load(scene))
-    text = re.sub("<keyframe>.*</keyframe>", "", text, flags=re.DOTALL)
-    path = tmp_path / "robot.xml"
-    bodies = "<body><geom size='.1'/></body>"
-    copies = f"<replicate count='1000000'>{bodies}</replicate>"
-    path.write_text(text.replace("<worldbody>", f"<worldbody>{copies}"))
-    arguments = ["check-mjcf", str(scene), str(path), "--out", str(tmp_path / "out")]
-    assert status(arguments) == BAD_INPUT
-    message = capsys.readouterr().err.strip().splitlines()[-1]
-    assert message.startswith(f"error: {path}: MJCF = 'robot.xml': ")
-    assert message.endswith("MuJoCo did not come back in 5 s")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("rows", ["file='hills.png'", "nrow='60000' ncol='60000'"])

@@ -1,17 +1,14 @@
 """check-mjcf and advise on a robot's file: what is printed, and the exit status."""
 
-import math
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
-import fourbar
-from fourbar.mjcf import write_mjcf
 from fourbar_validation.advise.advise import advise_command as advise
 from fourbar_validation.robots.check_mjcf import check_mjcf_command as check_mjcf
 from fourbar_validation.robots.loops import loops_command as loops
-from tests.support.robots import FOOT_PARALLELOGRAM, make_parallelogram
+from tests.support.robots import FOOT_PARALLELOGRAM
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
@@ -74,62 +71,6 @@ def test_options_that_do_not_go_together_are_refused():
     ):
         result = call(command, *arguments)
         assert result.exception is not None, arguments
-
-
-@pytest.mark.slow
-def test_a_turn_of_a_parallelogram_is_reported_in_lines_of_a_terminal(
-    tmp_path,
-):
-    file = tmp_path / "parallelogram.xml"
-    file.write_text(make_parallelogram(0.5, 0.4, "0 0 0").text, encoding="utf-8")
-    checked = call(check_mjcf, str(file), "-o", str(tmp_path))
-    assert checked.return_value == 0, checked.output
-    said = join_lines(checked)
-    assert (
-        "left out: 2 of 37 states, with coupler and output in line (hinge_1 = 90, 270"
-        " deg), where the loop may go on in two ways"
-    ) in said
-    assert (
-        "torque is zero but for rounding: its error is of the largest pin force"
-        " times the longest moving bar, "
-    ) in said
-    assert "hinge_1 from 0 to 360 deg" in said
-    assert "no other degree of freedom is held; through time" in said
-    assert "0 other" not in said
-    printed = checked.output.replace(str(tmp_path), "").splitlines()
-    assert max(map(len, printed)) <= 80
-    advised = call(advise, str(file), "--error", "0.01")
-    assert advised.return_value == 0, advised.output
-    sentences = [line for line in advised.output.splitlines() if "<connect" not in line]
-    assert max(map(len, sentences)) <= 80
-    assert "at 9 positions, against rigid pins" in join_lines(advised)
-
-
-@pytest.mark.slow
-def test_errors_beside_a_limit_are_told_from_those_of_the_motion(
-    tmp_path,
-):
-    """O2 O4 = 4, O2 A = 1, A B = 1.5, O4 B = 2 m: no bar turns fully.
-
-    Bars 3 and 4 are in line where cos theta_2 = (16 + 1 - 3.5^2)/8.
-    """
-    limit = math.degrees(math.acos((16.0 + 1.0 - 3.5**2) / 8.0))
-    arms = (fourbar.Bar(1.0, 1.0), fourbar.Bar(1.5, 1.0), fourbar.Bar(2.0, 1.0))
-    end = math.radians(limit - 2.0)
-    motion = fourbar.Motion(fourbar.Sweep(-end, end, 10), 1.0)
-    scene = fourbar.Scene(
-        fourbar.FourBar(4.0, *arms),
-        motion,
-        effects=(fourbar.Gravity(),),
-    )
-    (tmp_path / "arm.toml").write_text(fourbar.dump(scene), encoding="utf-8")
-    file = tmp_path / "arm.xml"
-    file.write_text(write_mjcf(scene, drive="motor"), encoding="utf-8")
-    asked = (str(tmp_path / "arm.toml"), str(file), "--loop", "B")
-    checked = call(check_mjcf, *asked, "-o", str(tmp_path))
-    assert checked.exception is None, checked.output
-    said = join_lines(checked)
-    assert "deg is 2 deg from a limit position, where forces grow" in said
 
 
 def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path):

@@ -53,22 +53,6 @@ def measured():
 
 
 @pytest.mark.slow
-def test_what_was_switched_off_and_left_out_is_said():
-    said = [
-        block for block in describe_measurement(measured()) if isinstance(block, str)
-    ]
-    text = "\n".join(said)
-    assert (
-        "switched off, because it ties its bars to joints that are held, or to each"
-        " other: dip_loop" in text
-    )
-    assert "contacts, joint limits and motors are off" in text
-    let_go = len(measured().loops[0].torn)
-    assert f"under the torque, let go from rest at {let_go} positions for ten" in text
-    assert "with rigid pins the robot differs from the formulas by" in text
-
-
-@pytest.mark.slow
 def test_the_states_are_those_that_were_asked_at():
     rows = list(csv.DictReader(io.StringIO(write_states(measured().loops))))
     (loop,) = measured().loops

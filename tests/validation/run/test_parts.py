@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, InputError
+from fourbar.errors import BAD_INPUT, HOLDS, InputError
 from fourbar_validation.cli import status
-from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import MODELS
 from fourbar_validation.run import plan
 from fourbar_validation.run.plan import RunPart
@@ -165,23 +164,6 @@ def test_scene_files_need_not_be_where_parts_are_collected(tmp_path):
     scene.unlink()
     assert status(["collect", part, "-o", str(out)]) == HOLDS
     assert (out / "results.csv").read_text().count("\nmine,") > 20
-
-
-@pytest.mark.slow
-def test_an_engine_that_is_missing_has_the_status_of_a_whole_run(
-    tmp_path, monkeypatch, capsys
-):
-    def miss(engine):
-        return f"{engine.library} is not installed" if engine.library else None
-
-    monkeypatch.setattr(Engine, "missing", miss)
-    folder, out = (str(tmp_path / name) for name in ("part", "all"))
-    options = ["--random", "3", "--no-pictures", "--part", "1/1", "-o", folder]
-    for line in (["run", *options], ["collect", folder, "-o", out]):
-        capsys.readouterr()
-        assert status(line) == BROKEN
-    assert "is not installed, or say --engines free-body" in capsys.readouterr().err
-    assert Path(out, "results.csv").is_file()
 
 
 @pytest.mark.parametrize(

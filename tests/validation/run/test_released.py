@@ -3,7 +3,6 @@
 Judged to its end, whatever an engine does there.
 """
 
-import json
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +14,6 @@ from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.engines.pinocchio import PinocchioReleased
-from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 
@@ -194,33 +192,3 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch):
         lambda released: replace(released, theta_2=released.theta_2 + next(off)),
     )
     assert row(rows, "pinocchio-forward", "theta_2").verdict == UNDECIDED
-
-
-@pytest.mark.slow
-def test_the_summary_names_the_change_points_of_a_release():
-    from fourbar.show.block import write_block
-    from fourbar.solution import write_json
-
-    scene = falling(0.12)
-    solution = solve(scene)
-    assert solution.change_points
-    written = " ".join(" ".join(write_block(scene, solution)).split())
-    assert "all bars are in line, where another motion is possible" in written
-    assert f"t = {solution.change_points[0]:.4g} s" in written
-    stored = json.loads(write_json(solution))["change_points"]
-    assert stored == list(solution.change_points)
-
-
-@pytest.mark.slow
-def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch):
-    from fourbar_validation.report import scene_pictures
-
-    scene = falling()
-    shown = []
-    monkeypatch.setattr(
-        scene_pictures,
-        "_draw_quantity",
-        lambda quantity, *_: shown.append(quantity) or "",
-    )
-    scene_pictures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
-    assert shown == ["theta_4", "F32"]

@@ -4,7 +4,6 @@ How much is judged of a suite does not depend on pictures.
 """
 
 import itertools
-from dataclasses import replace
 
 import pytest
 
@@ -12,9 +11,7 @@ from fourbar.scene.motion import Law
 from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.guests import list_needs
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.plan import Plan, RunOptions
 from fourbar_validation.run.question import FREE_BODY
-from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import read_default_suite
 from tests.oracle.variants import is_coordinate
 
@@ -112,14 +109,3 @@ def test_every_scene_of_it_holds(index):
     ).rows
     assert not [row for row in rows if row.failed]
     assert any(row.compared and row.engine == FREE_BODY.name for row in rows)
-
-
-@pytest.mark.slow
-def test_pictures_change_nothing_that_is_judged(tmp_path):
-    suite = replace(SUITE, texts=SUITE.texts[:1])
-    tables = []
-    for drawn in (True, False):
-        options = RunOptions(workers=1, drawn=drawn)
-        run(Plan(suite, (FREE_BODY,), options), tmp_path / str(drawn))
-        tables.append((tmp_path / str(drawn) / "results.csv").read_text())
-    assert tables[0] == tables[1] and "free-body,exact,torque" in tables[0]

@@ -148,22 +148,6 @@ def test_a_change_point_is_a_declared_limit():
         assert (refusal is not None and "change point" in refusal) == refused
 
 
-@pytest.mark.slow
-def test_error_falls_with_the_fourth_power_of_the_timestep():
-    """RK4, the closure's time constant held in seconds.
-
-    The softness stays what it is.
-    """
-    posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
-
-    def error(answer):
-        right = fourbar.solve(posed, at=answer.at).F43
-        return float(np.abs(answer.quantities["F43"] - right).max())
-
-    coarse, fine, order = observe_order(posed, fourbar.command(posed), error)
-    assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
-
-
 def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch):
     def gap(self, right=ClosedLoop.gap):
         return (right(self)[0], math.nan) if self.data.time else right(self)

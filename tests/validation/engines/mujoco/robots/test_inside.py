@@ -25,7 +25,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.inside import HEAVY, LoopInside
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
     RobotFile,
@@ -228,34 +228,6 @@ def test_the_start_of_a_simulation_is_not_judged():
         settled = errors[quantity].max() / scale
         assert settled < 0.02
         assert single.errors()[quantity].max() / scale > 10.0 * settled
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FILES)
-def test_what_holds_the_other_joints_hardly_matters(name):
-    """And what held them too firmly would: the solver then loses the light bars."""
-    inside, _ = open_loop(name)
-    angles = (inside.loop.angles[1] + np.linspace(-0.3, 0.3, 5)).tolist()
-    answers = [
-        inside.answer_through_time(LoopMotion(tuple(angles), 2.0, 0.0), heavy)
-        for heavy in (HEAVY, 0.1 * HEAVY)
-    ]
-    for quantity in FORCE_QUANTITIES:
-        one, other = (
-            np.array([row.soft.values()[quantity] for row in answer.rows])
-            for answer in answers
-        )
-        assert np.abs(one - other).max() < 0.01 * np.abs(one).max()
-
-
-@pytest.mark.slow
-def test_a_motor_opens_the_loop_the_more_the_harder_it_pushes():
-    inside, _ = open_loop("biped_foot")
-    start = [inside.loop.angles[1]]
-    (weak,) = inside.answer_under_torque(start, 2.0, 0.02)
-    (strong,) = inside.answer_under_torque(start, 20.0, 0.02)
-    assert math.isfinite(strong.gap) and strong.gap > 2.0 * weak.gap > 0.0
-    assert np.hypot(*strong.forces["F43"]) > 2.0 * np.hypot(*weak.forces["F43"])
 
 
 def mirror(point, one, other):

@@ -66,20 +66,6 @@ SINGLE = """
 <actuator><motor joint="j2"/></actuator></mujoco>
 """
 """400, 100, 200 and 300 mm, with one change point at 180 deg."""
-RHOMBUS = """
-<mujoco><option gravity="0 0 0"/><worldbody>
-<body name="one" pos="0 0 4"><joint name="h1" axis="1 0 0"/>
- <geom type="cylinder" size=".2 2" pos="0 2 0" euler="90 0 0" contype="0"
-   conaffinity="0"/>
- <body name="two" pos="0 4 0"><joint name="h2" axis="1 0 0"/>
-  <geom type="cylinder" size=".2 2" pos="0 0 -2" contype="0" conaffinity="0"/>
-  <site name="end" pos="0 0 -4"/></body></body>
-<body name="three" pos="0 0 0"><joint name="h3" axis="1 0 0"/>
- <geom type="cylinder" size=".2 2" pos="0 2 0" euler="90 0 0" contype="0"
-   conaffinity="0"/>
- <site name="tip" pos="0 4 0"/></body>
-</worldbody><equality><connect name="pin" site1="end" site2="tip"/></equality></mujoco>
-"""
 FILE = """
 <mujoco><compiler angle="degree"/><option gravity="0 -9.81 0"/><worldbody>{}{}
 </worldbody><equality>{}</equality><actuator><motor joint="j2"/></actuator></mujoco>
@@ -302,23 +288,6 @@ def test_a_torque_beside_a_change_point_is_judged_by_itself():
 
 
 @pytest.mark.slow
-def test_one_scale_for_a_column_where_the_torque_is_rounding():
-    """The torque is a sum that cancels: 12.6 % of 8042 N m, not 1e6 %."""
-    loop = measure(RHOMBUS, speed=1.0)
-    torques = errors_of(loop)
-    force = max(np.hypot(*row.rigid.forces["F12"]) for row in loop.states.rows)
-    for torque in torques.values():
-        assert torque.vanishes
-        assert torque.scale == pytest.approx(4.0 * force, rel=1e-9)
-        assert torque.scale == pytest.approx(8042.0, abs=0.5)
-        assert torque.part == torque.error / torque.scale
-        assert torque.median < torque.part
-    assert torques[MEASURED_THROUGH_TIME].part == pytest.approx(0.126, abs=0.002)
-    assert torques[STATES].part == pytest.approx(0.0674, abs=1e-4)
-    assert loop.influence is not None and loop.influence.worst < 0.01
-
-
-@pytest.mark.slow
 def test_what_the_scene_leaves_out_is_no_error_of_mujoco():
     """An armature I between bars 2 and 3 takes I (a3 - a2)(w3 - w2)/w2 of the motor."""
     text = driven_by_a_motor(BARE)
@@ -346,31 +315,6 @@ def test_a_couple_is_found_where_nothing_accelerates():
     loop = measure(make_parallelogram(0.5, 0.4, "0 0 0"), speed=0.0)
     assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
     assert all(abs(row.soft.torque) < 1e-9 for row in loop.states.rows)
-
-
-@pytest.mark.slow
-def test_what_a_second_solver_of_dry_friction_changes_is_said():
-    """The same file without it is measured by itself.
-
-    Below the speed at which dry friction acts in full the solver changes it, and never
-    the force of the loop.
-    """
-    plain = make_parallelogram(0.5, 0.4, "0 0 0").text
-    rubbing = plain.replace('name="hinge_2"', 'name="hinge_2" frictionloss="0.1"')
-    assert rubbing != plain
-    twice = rubbing.replace("<worldbody>", '<option noslip_iterations="5"/><worldbody>')
-    with_it, without = (measure(text, speed=1e-3) for text in (twice, rubbing))
-    changed = max(
-        np.abs(np.subtract(mine.soft.values()[name], other.soft.values()[name])).max()
-        / with_it.scales[name]
-        for name in FORCE_QUANTITIES
-        for mine, other in zip(with_it.states.rows, without.states.rows, strict=True)
-    )
-    (remark,) = (text for text in with_it.remarks if "noslip" in text)
-    told = float(remark.split("errors by ")[1].split()[0])
-    assert changed > 1e-3
-    assert told == pytest.approx(changed, rel=0.5)  # one digit, the size of a vector
-    assert not any("noslip" in text for text in without.remarks)
 
 
 @cache

@@ -71,31 +71,6 @@ def test_what_is_typed_reaches_the_error_that_was_wanted():
     assert again.error == pytest.approx(advice.best.error, rel=1e-3)
 
 
-@pytest.mark.slow
-def test_stiffness_alone_helps_and_what_costs_nothing_is_tried_first():
-    file = read_robot(FOOT)
-    advice = search(file).advise(2e-3, file)
-    stiff = next(one for one in advice.alone if list(one.changes) == ["solimp"])
-    assert stiff.error < 0.1 * advice.before.error
-    assert advice.best.changes.keys() <= {"solimp", "solref"}
-    assert advice.best.settings.timestep == advice.before.settings.timestep
-
-
-@pytest.mark.slow
-def test_an_error_that_nothing_reaches_is_not_reached(monkeypatch):
-    monkeypatch.setattr(
-        "fourbar_validation.engines.mujoco.robots.settings.SEARCH_SECONDS", 3.0
-    )
-    file = read_robot(FOOT)
-    tries = search(file)
-    advice = tries.advise(1e-12, file)
-    assert not advice.reached
-    excluded = [*tries.excluded][:3]  # their single states do not reach it either
-    assert excluded and not any(tries.tried[one].cost < math.inf for one in excluded)
-    others = (advice.before, *advice.alone, *map(tries.measure, excluded))
-    assert advice.best.error <= min(one.error for one in others)
-
-
 LIMIT = math.acos((0.2**2 + 0.3**2 - (0.12 + 0.15) ** 2) / (2.0 * 0.2 * 0.3))
 """rad; coupler and output are stretched there."""
 NEAR = math.radians(1.0)
