@@ -12,15 +12,10 @@ import pytest
 
 from fourbar_lab.benchmark import (
     BENCHMARKED_ENGINES,
-    PANELS,
     REFUSED,
-    find_panel,
     read_reasons,
-    read_work,
 )
 from fourbar_lab.cli import status
-from fourbar_lab.simulators.problems import PROBLEMS
-from fourbar_validation.check.problem import judge_answers, read_problem, read_result
 from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.engines.environments import read_engines, read_engines_of
 from tests.whole.test_imports import ROOT
@@ -90,21 +85,6 @@ def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder):
     )
 
 
-@pytest.mark.slow
-def test_what_was_answered_is_not_asked_again(folder):
-    first = run(folder, "crank_rocker")
-    code = (folder / "mine.py").read_text()
-    told = "        told = ["
-    (folder / "mine.py").write_text(code.replace(told, f"        1 / 0\n{told}"))
-    assert run(folder, "crank_rocker") == first
-    file = folder / "out" / "results" / "mine" / "crank_rocker.json"
-    problem = read_problem(PROBLEMS / "crank_rocker.json")
-    judged = judge_answers(problem, read_result(file, problem))
-    assert {row.level for row in judged} == {"A"}
-    file.unlink()
-    assert run(folder, "crank_rocker")[0]["mine", "crank_rocker"] == "-"
-
-
 def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too():
     engines = read_engines_of(BENCHMARKED_ENGINES)
     assert len(engines) >= 25 and engines.items() <= read_engines([]).items()
@@ -124,84 +104,3 @@ def test_an_engine_answers_the_slider_cranks(library, folder):
     )
     letters, _ = run(folder, "slider_crank", "slider_crank_offset", "crank_rocker")
     assert sorted(letters.values()) == ["AA", "AA", REFUSED]
-
-
-SLOW = """
-import json, sys
-text = open({path!r}).read().split("for question in")[0]
-exec(text)
-for question in map(json.loads, sys.stdin):
-    reply = {{
-        "engine": "slow",
-        "version": "2",
-        "answers": NAMES,
-        "effects": ["gravity"],
-        "settings": ["good", "bad"],
-    }}
-    if question["ask"] == "answer":
-        steps, rows = question["setting"]["steps_per_turn"], []
-        if steps == 9:
-            refusal = {{"id": question["id"], "error": "too coarse"}}
-            print(json.dumps(refusal), flush=True)
-            continue
-        told = question["command"]
-        bad = question["setting"]["name"] == "bad"
-        for theta in told["theta_2"]:
-            row = solve(question["scene"], theta, told["omega_2"], 0.0, told["branch"])
-            row["torque"] *= 1.0 + 100.0 / steps**2 * bad
-            rows.append(row)
-        answers = {{name: [row[name] for row in rows] for name in NAMES}}
-        if not bad:
-            del answers["F43"]
-        reply = {{"answers": answers, "setting": f"RK4 {{steps}}/rev"}}
-    elif question["ask"] == "slopes":
-        reply = {{"slopes": [{{"how": "by hand"}}]}}
-    print(json.dumps({{"id": question["id"], **reply}}), flush=True)
-"""
-
-
-@pytest.mark.slow
-def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(folder):
-    (folder / "slow.py").write_text(SLOW.format(path=str(folder / "mine.py")))
-    (folder / "engines.toml").write_text(
-        '[[engine]]\nname = "slow"\n'
-        f'command = ["python", "{folder / "slow.py"}"]\nsteps = [9, 100, 1000]\n'
-        '[because]\n"slow: bad" = "its torque is wrong on purpose"\n'
-        '"slow" = "another reason"\n'
-    )
-    letters, table = run(folder, "crank_rocker", "sprung")
-    assert letters["slow: good", "crank_rocker"] == "AA"
-    assert letters["slow: bad", "crank_rocker"] == "AC"
-    assert letters["slow: bad", "sprung"] == REFUSED
-    torque = find_rows(table, "setting", engine="slow: bad", quantity="torque")
-    assert {setting: row["level"] for setting, row in torque.items()} == {
-        "RK4 100/rev": "",
-        "RK4 1000/rev": "C",
-    }
-    assert torque["RK4 1000/rev"]["reason"] == "its torque is wrong on purpose"
-    missing = find_rows(table, "level", engine="slow: good", quantity="F43")
-    assert missing["-"]["reason"] == "not read" and missing.keys() == {"-", ""}
-    page = (folder / "out" / "benchmark.html").read_text()
-    for text in ("order 2.0", "Derivatives of the torque, by hand", "slow 2: bad"):
-        assert text in page
-
-
-def test_the_picture_has_every_run_through_time_in_the_panel_of_its_family():
-    table = ROOT / "docs" / "examples" / "benchmark.csv"
-    with table.open(encoding="utf-8", newline="") as file:
-        lines = read_work(csv.DictReader(file))
-    picture = table.with_suffix(".svg").read_text(encoding="utf-8")
-    assert len(lines) > 15
-    assert {find_panel(name) for name in lines} == set(PANELS)
-    assert all(f">{text}<" in picture for text in (*lines, *PANELS))
-    for name, family in (
-        ("MuJoCo 4.0.0: simulated", "MuJoCo"),
-        ("MuJoCo Warp 4.0.0: simulated", "Descendants of MuJoCo"),
-        ("Newton 1.8.0: MuJoCo solver", "Descendants of MuJoCo"),
-        ("Newton 1.8.0: Kamino", "Others"),
-    ):
-        assert find_panel(name) == family
-    # the worst of torque and pin forces, of each number of steps
-    exact = lines["Pinocchio 4.1.0: constraintDynamics"]
-    assert [len(lines["Newton 1.8.0: Kamino"]), len(exact)] == [2, 3]
-    assert all(0.0 < run.error < 1e-6 for run in exact)

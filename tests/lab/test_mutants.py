@@ -3,7 +3,6 @@
 How they are made, what counts as a changed number, and what the harness catches.
 """
 
-import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -62,50 +61,3 @@ def test_a_mutant_acts_wherever_its_function_was_imported_and_only_while_active(
     with chosen.active():
         assert is_changed(before, compute_numbers(SCENE))
     assert not is_changed(before, compute_numbers(SCENE))
-
-
-def test_every_operator_and_number_of_functions_methods_and_properties_is_changed(
-    tmp_path, monkeypatch
-):
-    source = """
-A = 3
-def f(x):
-    return -x if 0 < x <= 1.5 and x is not None else x**2
-class C:
-    @property
-    def p(self):
-        return [self + k for k in (True,)]
-"""
-    (tmp_path / "small.py").write_text(source.lstrip())
-    monkeypatch.syspath_prepend(tmp_path)
-    small = importlib.import_module("small")
-    names = [mutant.name.partition(", line ")[2] for mutant in compile_mutants(small)]
-    assert sorted(names) == sorted(
-        [
-            "3: -x -> +x",
-            "3: 0 -> 1",
-            "3: 1.5 -> 2.5",
-            "3: 2 -> 3",
-            "3: x ** 2 -> x * 2",
-            "3: 0 < x <= 1.5 -> 0 <= x <= 1.5",
-            "3: 0 < x <= 1.5 -> 0 < x < 1.5",
-            "3: x is not None -> x is None",
-            "3: 0 < x <= 1.5 and x is not None -> 0 < x <= 1.5 or x is not None",
-            "7: self + k -> self - k",
-            "7: True -> False",
-        ]
-    )
-
-
-@pytest.mark.posix
-def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch):
-    tried = [harness.Baseline(SCENE, compute_numbers(SCENE))]
-    mutant = next(compile_mutants(torque))
-
-    def raises(*_):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(harness, "compute_numbers", raises)
-    assert harness.judge_mutant(mutant, tried) is True
-    monkeypatch.setattr(harness, "compute_numbers", lambda *_: tried[0].before)
-    assert harness.judge_mutant(mutant, tried) is None

@@ -8,15 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from fourbar.errors import BROKEN, HOLDS
-from fourbar_lab import worlds
-from fourbar_lab.cli import status
 from fourbar_lab.simulators.mujoco_c import MujocoFile
 from fourbar_lab.worlds import (
     CONTENDERS,
     FORMULAS_ON_ONE_CORE,
-    WorldsCost,
-    list_worlds_rows,
     measure_worlds,
 )
 from tests.lab.simulators.test_simulators import ask_position
@@ -68,73 +63,6 @@ def test_a_world_that_is_not_finite_fails():
     results[2][0] = np.nan
     with pytest.raises(ArithmeticError, match="diverged"):
         prepared.read(results)
-
-
-def test_times_are_divided_by_those_of_the_formulas():
-    costs = [
-        WorldsCost(FORMULAS_ON_ONE_CORE, 1000, 2e-4, 2e-4, 0.01),
-        WorldsCost(MUJOCO, 1000, 6e-3, 8e-3, 0.1, 1e-12, 3e-12),
-        WorldsCost(FORMULAS_ON_ONE_CORE, 10_000, 1e-3, 1e-3, 0.02),
-        WorldsCost("MuJoCo Warp, single precision", 1000, 1e-4, 3e-4, 43.0, 0.01, 0.1),
-        WorldsCost(MUJOCO, 10_000, 5e-2, 6e-2, 0.2, 2e-12, math.nan),
-    ]
-    columns, rows = list_worlds_rows(costs)
-    assert columns[1:3] == ["1 000", "10 000"]
-    assert rows == [
-        [FORMULAS_ON_ONE_CORE, "200 ns", "100 ns", "reference", "reference", "0.02"],
-        [MUJOCO, "30 (40)", "50 (60)", "2.0e-12", "nan", "0.2"],
-        [
-            "MuJoCo Warp, single precision",
-            "0.5 (1.5)",
-            "failed",
-            "1.0e-02",
-            "1.0e-01",
-            "43",
-        ],
-    ]
-
-
-class OnGpu(MujocoFile):
-    """MuJoCo in the place of a simulator on a GPU."""
-
-    on_gpu = True
-
-
-def load_without_warp(adapter):
-    if "warp" in adapter:
-        raise ModuleNotFoundError("No module named 'warp'")
-    return OnGpu
-
-
-NO_GPU = {name: "no GPU" for name, one in CONTENDERS.items() if one.needs_gpu}
-NO_WARP = {"MuJoCo Warp, single precision": "No module named 'warp'"}
-
-
-@pytest.mark.parametrize(
-    ("load", "options", "left_out"),
-    [
-        (lambda _: MujocoFile, [], NO_GPU),
-        (load_without_warp, [], NO_WARP),
-        (lambda _: OnGpu, [], {}),
-        pytest.param(
-            lambda _: MujocoFile, ["--any-device"], {}, marks=pytest.mark.slow
-        ),
-    ],
-)
-def test_what_is_not_run_is_named_and_nothing_is_claimed_of_it(
-    load, options, left_out, monkeypatch, tmp_path, capsys
-):
-    monkeypatch.setattr(worlds, "load_simulator", load)
-    out = tmp_path / "worlds.md"
-    words = ["worlds", "--worlds", str(TWO_TURNS), "-o", str(out), *options]
-    assert status(words) == (BROKEN if left_out else HOLDS)
-    printed, page = capsys.readouterr().out, out.read_text(encoding="utf-8")
-    for name in CONTENDERS:
-        reason = left_out.get(name)
-        assert (f"{name}, {TWO_TURNS} worlds: " in printed) == (reason is None)
-        assert (f"| {name} |" in page) == (reason is None)
-        line = f"{name}: not run: {reason}"
-        assert (line in printed) == (line in page) == (reason is not None)
 
 
 def test_the_page_states_errors_that_hold():

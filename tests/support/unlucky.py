@@ -5,17 +5,13 @@ A worker that imports them imports no more than it needs to judge.
 
 import os
 import signal
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines import workers
 from fourbar_validation.scenes.suites import Suite
 from tests.support.scenes import crank_rocker
-
-PREPARE = workers.prepare_worker
 
 
 @dataclass(frozen=True)
@@ -70,12 +66,6 @@ def dies_at_first(*_):
         os._exit(1)
 
 
-def wait_a_second(function):
-    """Prepare a worker that waits for the others' pipe for a second alone."""
-    workers._LOCKED = 1.0
-    PREPARE(function)
-
-
 def start_and_sleep(starts):
     """Work for some looks of the pool, before and after telling of it in a file."""
     time.sleep(1.0)
@@ -83,13 +73,3 @@ def start_and_sleep(starts):
         file.write("begun\n")
     time.sleep(1.0)
     return "done"
-
-
-def die_with_the_pipe(_):
-    """Kill this worker while it holds the lock of the pipe that all workers share."""
-    frame = sys._getframe()
-    while "channel" not in frame.f_locals:
-        assert frame.f_back is not None
-        frame = frame.f_back
-    assert frame.f_locals["channel"].mutex.acquire()
-    os.kill(os.getpid(), signal.SIGKILL)

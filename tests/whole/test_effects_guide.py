@@ -12,7 +12,6 @@ import sys
 import textwrap
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from fourbar import effects
@@ -20,9 +19,6 @@ from fourbar.effects import Load
 from fourbar.errors import LimitError
 from fourbar.files import dump, loads
 from fourbar.mjcf import write_mjcf
-from fourbar.solving import solve
-from fourbar.studies.derivatives import sensitivity
-from fourbar.studies.study import vary
 from fourbar_validation.compare import effect_sizes as in_scales
 from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
@@ -134,15 +130,6 @@ def test_without_its_size_nothing_is_judged_by_another_scale(latch, monkeypatch)
     rows = judge("scene", guide_scene(), EXACT).rows
     engines = {row.engine for row in rows if row.failed and "'latch'" in row.reason}
     assert engines >= {engine.name for engine in EXACT}
-
-
-def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch):
-    scene, step = guide_scene(), 1e-6
-    couples = [0.2 + step, 0.2 - step]
-    torque = solve(vary(scene, {"effects.latch.couple": couples})).torque
-    slope = sensitivity(scene).of("torque", "effects.latch.couple")
-    assert torque is not None and np.count_nonzero(slope) >= 2
-    assert slope == pytest.approx((torque[0] - torque[1]) / (2.0 * step), abs=1e-8)
 
 
 @pytest.mark.parametrize("key", effects.list_kinds())

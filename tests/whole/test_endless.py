@@ -87,22 +87,14 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 def test_a_free_motion_without_end_is_given_up_with_its_reason(
     tmp_path, monkeypatch, capsys
 ):
-    (tmp_path / "released.toml").write_text(RELEASED)
+    file, out = tmp_path / "released.toml", tmp_path / "out.csv"
+    file.write_text(RELEASED)
     monkeypatch.setattr(free_motion, "MOST_INTEGRATION_STEPS", 500)
-    for command, ending in (("analyze", "csv"), ("plot", "svg"), ("animate", "html")):
-        out = tmp_path / f"out.{ending}"
-        assert (
-            fourbar.cli.status(
-                [command, str(tmp_path / "released.toml"), "-o", str(out)]
-            )
-            == BAD_INPUT
-        )
-        printed = capsys.readouterr().err
-        assert (
-            printed.count("\n") == 1
-            and "released.toml: motion.free.duration = 1000000000.0" in printed
-        )
-        assert "followed for 500 steps" in printed and not out.exists()
+    assert fourbar.cli.status(["analyze", str(file), "-o", str(out)]) == BAD_INPUT
+    printed = capsys.readouterr().err
+    assert "released.toml: motion.free.duration = 1000000000.0" in printed
+    assert "followed for 500 steps" in printed and printed.count("\n") == 1
+    assert not out.exists()
 
 
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(

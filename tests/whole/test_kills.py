@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-import tomllib
 from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +27,7 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.engines.table import choose_engines
-from fourbar_validation.report.machine import CODE, build, hash_modules
+from fourbar_validation.report.machine import hash_modules
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import jobs
 from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
@@ -49,10 +48,8 @@ from tests.support.unlucky import (
     Few,
     Moody,
     Unlucky,
-    die_with_the_pipe,
     dies_at_first,
     start_and_sleep,
-    wait_a_second,
 )
 
 SEED = 7
@@ -164,20 +161,6 @@ def apply_one(function, item, seconds=None):
 
 
 @pytest.mark.slow
-@pytest.mark.posix
-def test_a_worker_killed_with_the_lock_of_the_pipe_ends_the_run_soon(monkeypatch):
-    """Nobody gives the lock back: the others wait twice as long as for a message, and
-    not as long as Pebble does, two minutes.
-    """
-    assert workers._LOCKED <= 10.0
-    monkeypatch.setattr(workers, "prepare_worker", wait_a_second)
-    begin = time.monotonic()
-    with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
-        apply_one(die_with_the_pipe, None)
-    assert time.monotonic() - begin < 60.0
-
-
-@pytest.mark.slow
 def test_a_clock_that_jumps_forward_ends_nothing(tmp_path, monkeypatch):
     """As that of a machine does which slept while an item was worked at."""
     starts = tmp_path / "starts"
@@ -214,18 +197,6 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path):
         (tmp_path / name).write_text(text)
         hashes.append(hash_modules(tmp_path / "fourbar", tmp_path / "harness"))
     assert len(set(hashes)) == 3 and hashes[2] == hashes[3] == hashes[4]
-    project = tomllib.loads(
-        (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
-    )
-    read = project["tool"]["setuptools"]["package-data"][
-        "fourbar"
-    ]  # what is only shown, and what only lists names, decides no number
-    assert {
-        Path(name).suffix
-        for name in read
-        if not name.startswith("show/") and name not in ("py.typed", "__init__.pyi")
-    } <= set(CODE)
-    assert build("numpy") and build("no-such-package") == ""
 
 
 def test_a_record_is_read_from_its_part_as_it_was(tmp_path):

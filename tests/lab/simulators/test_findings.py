@@ -4,8 +4,6 @@ What each says of itself, its script where the engine is, and the list of them.
 """
 
 import re
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +13,6 @@ from fourbar_lab.simulators.findings import (
     FINDINGS,
     FIXED,
     find_interpreter,
-    read_docstring,
     read_findings,
 )
 
@@ -47,22 +44,3 @@ def test_each_finding_is_a_report_and_stands_in_the_list():
         assert entry in listed, finding.script
     scripts = re.findall(r"\]\(findings/(\w+\.py)\)", listed)
     assert sorted(scripts) == sorted(finding.script.name for finding in ALL)
-
-
-@pytest.mark.parametrize(
-    ("code", "state"),
-    [
-        ("", "holds"),
-        ("import sys; sys.exit('fixed')", FIXED),
-        ("1 / 0", "not run: ZeroDivisionError: division by zero"),
-        ("import time; time.sleep(60)", "not run: no answer within 1 s"),
-    ],
-)
-def test_a_script_that_breaks_down_is_not_fixed(code, state, tmp_path):
-    (tmp_path / "one.py").write_text(
-        f'"""It is\nso.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n'
-    )
-    finding = read_docstring(tmp_path / "one.py")
-    assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"
-    seconds = 1.0 if "sleep" in code else SECONDS
-    assert finding.run(Path(sys.executable), seconds) == state

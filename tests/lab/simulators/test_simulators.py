@@ -7,17 +7,14 @@ import json
 import math
 from dataclasses import replace
 from importlib.util import find_spec
-from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar.errors import NotAssembledError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command
 from fourbar_lab import benchmark
 from fourbar_lab.simulators import (
     gradients,
@@ -26,11 +23,9 @@ from fourbar_lab.simulators import (
     protocol_engines,
 )
 from fourbar_lab.simulators.problems import PROBLEMS
-from fourbar_lab.simulators.protocol_engines import Instant, Simulator
 from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import read_engines_of
-from fourbar_validation.engines.free_body import FreeBody
 from tests.support.scenes import low_parallelogram
 from tests.whole.test_imports import ROOT, imported
 
@@ -129,102 +124,6 @@ def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated
         level = theta_2 + of_3_to_2 - scene.linkage.ground_angle
         assert abs(math.remainder(theta_4 - theta_2, math.tau)) < 1e-12
         assert abs(math.remainder(level, math.tau)) < 1e-12
-
-
-class Rigid(Simulator):
-    """A simulator that is the free bodies at the end of each step.
-
-    A test changes it.
-    """
-
-    name, version, device, made_for = "rigid", "1", "abacus", "tests"
-    settings: ClassVar[dict[str, Any]] = {"plain": 1.0, "wrong": 1.1}
-    left_out = ""
-    diverges_at = math.inf
-    timesteps: ClassVar[list[float]] = []
-
-    def through(self, scene, course):
-        Rigid.timesteps.append(course.timestep)
-        speed, done = scene.motion.omega_2 or 0.0, 0
-        branch = np.array([scene.motion.branch], dtype=np.int8)
-
-        def advance(steps):
-            nonlocal done
-            done += steps
-            return (
-                protocol_engines.start(scene).qpos[0] + speed * done * course.timestep
-            )
-
-        def read(theta):
-            command = Command(np.array([theta]), branch, speed, 0.0)
-            exact = FreeBody().answer(scene, command).quantities
-            (theta_3,), (theta_4,) = exact["theta_3"], exact["theta_4"]
-            if done > self.diverges_at:
-                theta_3 = math.nan
-            forces = {pin: exact[pin][0] for pin in PIN_FORCES if pin != self.left_out}
-            torque = self.settings[self.setting] * float(exact["torque"][0])
-            return Instant((theta, theta_3, theta_4), speed, 0.0, torque, forces)
-
-        return self.run(scene, course, advance, read)
-
-
-def test_a_run_is_judged_at_the_motion_that_it_made():
-    errors = find_errors(Rigid, steps_per_turn=50)
-    assert max(errors.values()) < EXACT and set(errors) == READ
-    assert Rigid.timesteps[-1] == pytest.approx(math.tau / 10.0 / 50)
-    assert find_errors(Rigid, name="wrong")["torque"] == pytest.approx(0.1, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("problem", "speed", "begins", "last_stop"),
-    [
-        ("crank_rocker", 10.0, (-0.5, -0.5), 125),
-        ("crank_rocker", -10.0, (2.5, 2.5), 125),
-        # 30 degrees from a change point
-        ("pinocchio_2729", 10.0, (0.03, 0.13), None),
-    ],
-)
-def test_a_run_begins_before_its_first_position_where_the_linkage_closes(
-    problem, speed, begins, last_stop
-):
-    scene, command = ask_position(problem)
-    scene = replace(scene, motion=scene.motion.replace(speed=speed))
-    led, course = protocol_engines.lay_out(scene, command._replace(speed=speed), 100)
-    low, high = (math.pi * part for part in begins)
-    assert low - 1e-12 < protocol_engines.start(led).qpos[0] < high + 1e-12
-    assert course.timestep == pytest.approx(math.tau / 10.0 / 100)
-    count = len(command.theta_2)
-    assert course.rows.tolist() == list(range(count))[:: 1 if speed > 0 else -1]
-    assert course.stops[0] > 1 and course.stops[-1] == (last_stop or course.stops[-1])
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"alpha_2": 1.0},
-        {"branch": [1, -1] * 12 + [1]},
-        {"omega_2": 0.0},
-        {"theta_2": [1.0, 1.0001] * 12},
-    ],
-)
-def test_a_motion_that_no_simulator_makes_is_a_refusal(changes):
-    answer = Rigid().answer(*ask_position(**changes))
-    assert answer.refusal is not None and answer.setting == "plain, 628/rev"
-
-
-def test_a_run_that_diverges_or_stops_is_no_answer(monkeypatch):
-    monkeypatch.setattr(Rigid, "diverges_at", 100)
-    with pytest.raises(ArithmeticError, match="diverged"):
-        Rigid().answer(*ask_position())
-    monkeypatch.setattr(protocol_engines.Readings, "read", lambda *_: None)
-    with pytest.raises(NotAssembledError, match="0 of 25 positions were read"):
-        Rigid().answer(*ask_position())
-
-
-def test_a_force_that_is_not_read_is_missing_and_the_others_count(monkeypatch):
-    monkeypatch.setattr(Rigid, "left_out", "F43")
-    errors = find_errors(Rigid)
-    assert np.isnan(errors.pop("F43")) and max(errors.values()) < EXACT
 
 
 @pytest.mark.usefixtures("sealed")
