@@ -14,13 +14,9 @@ import fourbar
 from fourbar import InputError, Tolerance, sensitivity, solve, uniform, vary
 from fourbar.cli import status
 from fourbar.files import dump, loads
-from fourbar.linkage import PINS
 from fourbar.studies.spread import tolerances
 from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
-
-PIN_KEYS = tuple(f"pins.{pin}.{axis}" for pin in PINS for axis in (0, 1))
-
 
 STEP = 1e-6
 """Difference of a coordinate, m."""
