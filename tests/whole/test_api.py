@@ -338,6 +338,15 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     assert not holes, "\n".join(holes)
 
 
+@pytest.mark.slow
+def test_a_figure_is_refused_arguments_of_another_type():
+    plot = partial(crank_rocker().plot, "torque")
+    for key, wrong in itertools.product(("position", "units"), ALWAYS_WRONG):
+        with pytest.raises(InputError) as caught:
+            plot(**{key: wrong})
+        assert "\n" not in str(caught.value)
+
+
 def test_classify_as_json_is_what_the_formulas_say(capsys):
     assert status(["classify", "0.3", "0.1", "0.25", "0.22", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

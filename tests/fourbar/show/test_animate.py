@@ -18,7 +18,7 @@ from math import pi, radians
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_array_equal, assert_equal
 from pytest import approx, raises
 
 import fourbar
@@ -80,6 +80,16 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches():
         assert columns["sign"] == [sign] * 61
         assert columns.keys().isdisjoint(animate.CENTRES)  # they are no curves
     assert_array_equal(data["theta_2"], solve(scene).theta_2)
+
+
+@pytest.mark.slow
+def test_what_is_solved_already_changes_no_number():
+    turn, backwards = Sweep(0.0, 2.0 * pi, 12), Sweep(3.0, 1.0, 12)
+    for angles in (turn, backwards, 1.0):
+        scene = crank_rocker(motion=Motion(angles, 10.0))
+        plain = animate.collect_live_data(scene, signs=(1, -1))
+        shown = animate.collect_live_data(scene, signs=(1, -1), solved=solve(scene))
+        assert_equal(shown, plain)
 
 
 def test_a_single_position_is_one_of_the_rows_and_the_first_shown():

@@ -23,6 +23,7 @@ from fourbar.show.tolerances import describe_parted
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
 from tests.support.rows import read_rows
+from tests.support.scenes import crank_rocker
 
 MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
 
@@ -225,3 +226,9 @@ def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, capsys):
         assert 0.001 < sigma < 0.02
     above = printed[: printed.index("  theta_2")].splitlines()
     assert max(map(len, above)) <= 80
+
+
+def test_the_share_that_is_done_reaches_all_of_it():
+    told = []
+    tolerances(crank_rocker(tolerances=(INPUT,)), 64, progress=told.append)
+    assert (told[0], told[-1]) == (0.0, 1.0)

@@ -274,9 +274,11 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     clocks = (lambda count: 2e-6 * count), (lambda count: 3e-5 * count)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(setup, "make_clocks", lambda settings: clocks)
-        seconds = advise._time_attempt(setup, attempt)
-    expected = 2e-6 * attempt.steps + 3e-5 * attempt.readings
-    assert seconds == pytest.approx(expected, rel=1e-12)
+        words = advise._describe_time(setup, attempt)
+    revolution = 1e3 * (2e-6 * attempt.steps + 3e-5 * attempt.readings)
+    second = revolution * 10.0 / math.tau  # at 10 rad/s
+    assert f"{second:.2g} ms of processor time per simulated second" in words
+    assert f"({revolution:.2g} ms per revolution): {attempt.steps} steps, and" in words
 
 
 @pytest.mark.slow

@@ -1238,6 +1238,34 @@ def rounded(values, digits):
     return np.array([float(f"{x:.{digits - 1}e}") for x in values.tolist()])
 
 
+@pytest.mark.parametrize(("digits", "power"), slow_but({(5, -4)}, [(8, -7), (5, -4)]))
+@pytest.mark.slow
+def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
+    digits, power, check
+):
+    """Rounded to so many digits, printed with 15; the option that is named agrees.
+
+    A number that is off by 1 % has no such line.
+    """
+    numbers = fourbar.solve(THESIS)
+    torque = rounded(numbers.torque, digits)
+
+    def print_digits():
+        columns = {"theta_2": numbers.theta_2, "torque": torque}
+        return tabulate(columns, "{:.14e}".format)
+
+    table = print_digits()
+    code, printed, _ = check(THESIS, table)
+    option = ("--rtol", f"1e{power}")
+    assert code == FAILED
+    within = f"all agree within 1e{power} of each number"
+    assert f"{within}: {' '.join(option)} judges so" in printed
+    assert check(THESIS, table, *option)[0] == HOLDS
+    torque[7] *= 1.01
+    code, printed, _ = check(THESIS, print_digits())
+    assert code == FAILED and "all agree within" not in printed
+
+
 @pytest.mark.parametrize("sign", slow_but({1.0}, [1.0, -1.0]))
 def test_a_table_with_mistakes_and_few_right_digits_is_told_both(sign, check):
     """Angles half a turn off, perhaps forces of the other sign, and 8 right digits.

@@ -331,3 +331,19 @@ def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused():
     scene = draw_random_scene(2026, 2265, tuple(DrawnType))
     assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
     assert not [row for row in judged(scene) if row.failed]
+
+
+@pytest.mark.slow
+def test_error_falls_with_the_fourth_power_of_the_timestep():
+    """RK4, the closure's time constant held in seconds.
+
+    The softness stays what it is.
+    """
+    posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
+
+    def error(answer):
+        right = fourbar.solve(posed, at=answer.at).F43
+        return float(np.abs(answer.quantities["F43"] - right).max())
+
+    coarse, fine, order = observe_order(posed, fourbar.command(posed), error)
+    assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)

@@ -323,6 +323,31 @@ def past_a_change_point(speed):
 
 
 @pytest.mark.slow
+def test_what_a_second_solver_of_dry_friction_changes_is_said():
+    """The same file without it is measured by itself.
+
+    Below the speed at which dry friction acts in full the solver changes it, and never
+    the force of the loop.
+    """
+    plain = make_parallelogram(0.5, 0.4, "0 0 0").text
+    rubbing = plain.replace('name="hinge_2"', 'name="hinge_2" frictionloss="0.1"')
+    assert rubbing != plain
+    twice = rubbing.replace("<worldbody>", '<option noslip_iterations="5"/><worldbody>')
+    with_it, without = (measure(text, speed=1e-3) for text in (twice, rubbing))
+    changed = max(
+        np.abs(np.subtract(mine.soft.values()[name], other.soft.values()[name])).max()
+        / with_it.scales[name]
+        for name in FORCE_QUANTITIES
+        for mine, other in zip(with_it.states.rows, without.states.rows, strict=True)
+    )
+    (remark,) = (text for text in with_it.remarks if "noslip" in text)
+    told = float(remark.split("errors by ")[1].split()[0])
+    assert changed > 1e-3
+    assert told == pytest.approx(changed, rel=0.5)  # one digit, the size of a vector
+    assert not any("noslip" in text for text in without.remarks)
+
+
+@pytest.mark.slow
 def test_a_state_after_a_turn_is_that_of_the_same_motion():
     """Beyond its change point the other assembly has the branch of the scene."""
     loop = past_a_change_point(1.0)

@@ -6,6 +6,7 @@ import pytest
 
 import fourbar
 from fourbar.errors import InputError
+from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.answers import (
     MeasureOptions,
@@ -13,12 +14,13 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.robots.judge_loop import FILE_THROUGH_TIME
 from fourbar_validation.robots.loop_errors import (
     find_left_out,
     find_worst_of_loop,
 )
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
-from tests.support.robots import file_of, measure
+from tests.support.robots import answer_of, examine_text, file_of, measure, notes_of
 
 TEXT = """
 <mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
@@ -126,3 +128,14 @@ def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():
     (note,) = [note for note in made.notes if "what is left is 6.24 mm" in note]
     assert "--pose holds j_crank, j_rod, j_rocker, around which" in note
     assert "ranges" not in note
+
+
+@pytest.mark.slow
+def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too():
+    scene = make_scene("open")
+    examined = examine_text(scene, write_mjcf(scene), {})
+    judged = len(answer_of(examined, FILE_THROUGH_TIME).quantities["torque"])
+    positions = len(fourbar.command(scene).theta_2) - 1
+    assert judged < positions
+    (note,) = [note for note in notes_of(examined) if "are not judged" in note]
+    assert f"({positions - judged} of {positions} positions" in note
