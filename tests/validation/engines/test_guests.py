@@ -495,6 +495,15 @@ def answer(scene, at):
 
 
 @pytest.mark.slow
+def test_what_a_guest_prints_is_kept_beside_the_results(tmp_path, suite):
+    printing = guests.read_guests([HERE + "Prints"], ())
+    options = RunOptions(workers=1, drawn=False)
+    run(Plan(suite, printing, options), tmp_path / "out")
+    text = (tmp_path / "out" / "output.txt").read_text()
+    assert "\\x1b]0;owned\\x07begin\nfrom a shell" in text
+
+
+@pytest.mark.slow
 def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suite):
     """Runs that are interrupted once the first part is there.
 

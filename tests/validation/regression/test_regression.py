@@ -863,3 +863,27 @@ def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path, monkeypatch, sav
         record.accept(open_run(run), kept)
     assert caught.value.filename == str(kept / TABLE)
     assert caught.value.filename2 is None
+
+
+@pytest.mark.slow
+def test_what_is_too_long_for_a_text_and_a_history_is_compared_and_accepted(
+    tmp_path, monkeypatch, compare, accepts
+):
+    for module in ("compare.results_file", "regression.accept"):
+        monkeypatch.setattr(f"fourbar_validation.{module}.CSV_ROWS", 100)
+    old, new = tmp_path / "old", tmp_path / "new"
+    for folder, times in ((old, 1.0), (new, 1e3)):
+        folder.mkdir()
+        with ResultsWriter(folder) as columns:
+            for k in range(101):
+                error = 1e-9 * (1.0 + k * (times - 1.0))
+                name = f"random-0-{k:09d}"
+                columns.add([changed(scene=name, condition=1e-3, error=error)])
+        write_about(HERE, folder)
+        assert not (folder / TABLE).exists()
+    code, lines = compare(old, new)
+    assert code == FAILED and lines[-1].startswith("100 regressions against")
+    assert accepts(new) == HOLDS
+    kept = tmp_path / "kept"
+    assert {path.name for path in kept.iterdir()} == {ABOUT, "results.parquet"}
+    assert compare(kept, new)[0] == HOLDS

@@ -22,6 +22,7 @@ import pytest
 import fourbar
 from fourbar import Free, Motion, Sweep
 from fourbar.quantities import PIN_FORCES
+from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import (
     AGREES,
@@ -31,6 +32,7 @@ from fourbar_validation.compare.rows import (
     Row,
     write_rows,
 )
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.registry import ENGINES, WORK
 from fourbar_validation.report.html import (
     ALL_OPEN,
@@ -610,3 +612,30 @@ def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whol
     cells = ["limit_positions", "3.1e+00", "1.0e-09", "3.1e+09", at]
     shown = re.findall("^   mujoco-simulated(.*)", text, re.MULTILINE)
     assert " ".join(shown).split() == cells
+
+
+@pytest.mark.slow
+def test_the_picture_shows_the_pin_force_that_fails():
+    """Without a failure it shows the largest."""
+    sizes = {name: magnitude(SOLUTION[name]).max() for name in PIN_FORCES}
+    largest, other = max(sizes, key=sizes.get), min(sizes, key=sizes.get)
+    numbers = {name: SOLUTION[name] for name in ("torque", *PIN_FORCES)}
+    answer = Answer(
+        "free-body",
+        "exact",
+        command(SCENE),
+        quantities=numbers,
+    )
+    record = Record(
+        "demo",
+        SCENE,
+        solution=SOLUTION,
+        answers=[answer],
+    )
+    assert f"|{largest}|" in (draw_scene_figure(record) or "")
+    record.rows = [
+        fail(replace(OF_MINE, quantity=other), error=0.5),
+        fail(replace(OF_MINE, quantity=largest)),
+    ]
+    drawn = draw_scene_figure(record) or ""
+    assert f"|{other}|" in drawn and f"|{largest}|" not in drawn

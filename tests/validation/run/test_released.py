@@ -14,6 +14,7 @@ from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.engines.pinocchio import PinocchioReleased
+from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 
@@ -192,3 +193,18 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch):
         lambda released: replace(released, theta_2=released.theta_2 + next(off)),
     )
     assert row(rows, "pinocchio-forward", "theta_2").verdict == UNDECIDED
+
+
+@pytest.mark.slow
+def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch):
+    from fourbar_validation.report import scene_pictures
+
+    scene = falling()
+    shown = []
+    monkeypatch.setattr(
+        scene_pictures,
+        "_draw_quantity",
+        lambda quantity, *_: shown.append(quantity) or "",
+    )
+    scene_pictures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
+    assert shown == ["theta_4", "F32"]
