@@ -870,7 +870,7 @@ def test_what_is_too_long_for_a_text_and_a_history_is_compared_and_accepted(
     tmp_path, monkeypatch, compare, accepts
 ):
     for module in ("compare.results_file", "regression.accept"):
-        monkeypatch.setattr(f"fourbar_validation.{module}.CSV_ROWS", 100)
+        monkeypatch.setattr(f"fourbar_validation.{module}.CSV_ROWS", 40)
     old, new = tmp_path / "old", tmp_path / "new"
     for folder, times in ((old, 1.0), (new, 1e3)):
         folder.mkdir()
