@@ -221,15 +221,17 @@ def test_a_renamed_guest_is_held_to_its_rule_and_to_what_it_answered():
 
 def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone():
     whole = about({"wg": "", "b": ""}, **{"scenes of": "hard"})
-    both = [changed(scene=s, engine=e) for s in "st" for e in ("wg", "b")]
-    without = ["engine wg is gone (2 rows)"]
+    both = [changed(scene=s, engine=e) for s in "stu" for e in ("wg", "b")]
+    without = ["engine wg is gone (3 rows)"]
+    others = ["scene t (2 rows)", "scene u (2 rows)"]
+    gone_scenes = [text.replace(" (", " is gone (") for text in others]
     for before, settings, rows, not_run, gone in (
-        ("b, wg 1", {"chosen": "b"}, both[1::2], ["wg (2 rows)"], []),
+        ("b, wg 1", {"chosen": "b"}, both[1::2], ["wg (3 rows)"], []),
         ("b", {"chosen": "b"}, both[1::2], [], without),  # wg was named by --guest
         ("", {}, both[1::2], [], without),
-        ("", {"scenes of": ""}, both[:2], ["scene t (2 rows)"], []),
-        ("", {"scenes of": "x"}, both[:2], ["scene t (2 rows)"], []),
-        ("", {"scenes of": "hard"}, both[:2], [], ["scene t is gone (2 rows)"]),
+        ("", {"scenes of": ""}, both[:2], others, []),
+        ("", {"scenes of": "x"}, both[:2], others, []),
+        ("", {"scenes of": "hard"}, both[:2], [], gone_scenes),
     ):
         asked = about({row.engine: "" for row in rows}, **settings)
         whole.settings["chosen"] = before

@@ -210,11 +210,13 @@ class Differences:
 
     @property
     def strange(self) -> bool:
-        """Return whether the runs share fewer than half of what both were asked for.
+        """Return whether the old run has fewer than half of the new one's rows.
 
-        The old one is then of another suite.
+        Not counted are engines and scenes that the new one does not have. The old one
+        is then of another suite.
         """
-        return 2 * self.shared < self.rows - self.kinds[Kind.NOT_RUN]
+        missing = (Kind.NOT_RUN, Kind.ENGINE_GONE, Kind.SCENE_GONE)
+        return 2 * self.shared < self.rows - len(self.of(*missing))
 
     @property
     def status(self) -> int:
