@@ -308,7 +308,7 @@ def write_new_scene(
     d, a, b, c = numbers
     FourBar(d, Bar(a), Bar(b), Bar(c))
     unit = find_unit(texts[0], "m")
-    return _fill_in("\n".join(rows), (a, b, c), _BRANCH_LINE, unit, template)
+    return _fill_in(rows, (a, b, c), _BRANCH_LINE, unit, template)
 
 
 _BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
@@ -332,7 +332,7 @@ def write_drawn_scene(
     a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
     x_of_A, _ = pins["A"]
     unit = find_unit(x_of_A, "m")
-    return _fill_in("\n".join(rows), (a, b, c), "", unit, template)
+    return _fill_in(rows, (a, b, c), "", unit, template)
 
 
 def _quote(text: str) -> str:
@@ -379,7 +379,7 @@ _IMPERIAL_EXAMPLES = {
 
 
 def _fill_in(
-    lines: str,
+    rows: list[str],
     lengths: tuple[float, float, float],
     branch: str,
     unit: str,
@@ -401,7 +401,7 @@ def _fill_in(
 
     text = files("fourbar.files").joinpath(template).read_text(encoding="utf-8")
     return Template(text).substitute(
-        linkage=lines,
+        linkage="\n".join(rows),
         branch=branch,
         **dict(moving),
         **examples,

@@ -1,7 +1,6 @@
 """The table at the end of a run."""
 
 import math
-from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -108,18 +107,23 @@ def _make_overview(summary: Summary) -> "Table":
 
 
 def _make_worst_table(summary: Summary) -> "Table":
+    from rich.box import SIMPLE_HEAD
     from rich.markup import escape
+
+    from fourbar.show.folded import FoldedTable
 
     title = "worst row of each scene and engine"
     if len(summary.worst) < summary.judged:
         title = (
             f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
         )
-    shown = _make_bare_table(
-        ("scene and engine", "worst"),
-        ("error", "allowed", "used", "at deg"),
-        title=title,
+    shown = FoldedTable(
+        title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True
     )
+    for heading in ("scene and engine", "worst"):
+        shown.add_column(heading, overflow="fold")
+    for heading in ("error", "allowed", "used", "at deg"):
+        shown.add_column(heading, justify="right", overflow="fold", no_wrap=True)
     for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
         shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
         for w in group:
@@ -139,26 +143,4 @@ def _make_worst_table(summary: Summary) -> "Table":
                 *numbers,
                 style="" if w.failed == 0 else "bold red",
             )
-    return shown
-
-
-def _make_bare_table(
-    words: Sequence[str],
-    numbers: Sequence[str],
-    title: str | None,
-) -> "Table":
-    from rich.box import SIMPLE_HEAD
-
-    from fourbar.show.folded import FoldedTable
-
-    shown = FoldedTable(
-        title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True
-    )
-    for heading in (*words, *numbers):
-        shown.add_column(
-            heading,
-            justify="left" if heading in words else "right",
-            overflow="fold",
-            no_wrap=heading in numbers,
-        )
     return shown

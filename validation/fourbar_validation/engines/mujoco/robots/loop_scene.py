@@ -329,8 +329,10 @@ class SceneOfLoop:
             self.loop = replace(self.loop, rounding=math.fsum(changes))
         return met
 
-    def _in_plane(self, vector: Array) -> complex:
-        return complex(*self.seen.in_plane(vector))
+    @property
+    def _pull(self) -> complex:
+        """Gravity in the plane, m/s^2."""
+        return complex(*self.seen.in_plane(self.gravity))
 
     def _list_armature(self) -> dict[str, float]:
         """Return the armature of each hinge that has any, by its pin, kg m^2."""
@@ -356,7 +358,7 @@ class SceneOfLoop:
     ) -> Iterator[Effect]:
         """List the effects, the pins in their order."""
         model = self.model
-        pull = self._in_plane(self.gravity)
+        pull = self._pull
         if abs(pull) > ROUND_OFF_OF_LOADS * float(np.linalg.norm(self.gravity)):
             yield Gravity(round_off(abs(pull)), _round_angle(cmath.phase(pull)))
         hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
@@ -402,7 +404,7 @@ class SceneOfLoop:
         for bar in MOVING_BARS:
             bodies = self.carried[bar]
             lifted = lifted_masses[bodies]
-            force = -float(lifted.sum()) * self._in_plane(self.gravity)
+            force = -float(lifted.sum()) * self._pull
             if not force:
                 continue
             place = self.seen.polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
