@@ -11,7 +11,14 @@ from pathlib import Path
 
 import click
 
-from fourbar.errors import FAILED, HOLDS, LONGEST_MESSAGE, InputError, abbreviate
+from fourbar.errors import (
+    FAILED,
+    HOLDS,
+    LONGEST_MESSAGE,
+    InputError,
+    abbreviate,
+    write_count,
+)
 from fourbar.files import load
 from fourbar.quantities import STAGE_OF, UNITS
 from fourbar.scene import Scene
@@ -151,9 +158,9 @@ class Judgement:
             fewest.setdefault(digits, []).append(quantity)
         if len(fewest) == 1:
             (digits,) = fewest
-            return f"{digits} digit{'s' if digits != 1 else ''}"
+            return write_count(digits, "digit")
         return "; ".join(
-            f"{digits} digit{'s' if digits != 1 else ''} of {', '.join(names)}"
+            f"{write_count(digits, 'digit')} of {', '.join(names)}"
             for digits, names in sorted(fewest.items())
         )
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fourbar.errors import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS, write_count
 from fourbar.quantities import Array
 from fourbar.writing import write_text
 from fourbar_validation.compare.answer import EngineError
@@ -425,7 +425,7 @@ class Counts:
             share = ""
         else:
             share = f"{self.scenes_compared} of "
-        return f" on {share}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
+        return f" on {share}{write_count(self.scenes, 'scene')}"
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
         return [

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from fourbar.errors import write_count
 from fourbar_validation.compare.rows import COMPARED_VERDICTS, FAILS
 from fourbar_validation.regression.changes import REGRESSIONS, WHOLE, Differences, Kind
 from fourbar_validation.report.junit import (
@@ -46,12 +47,8 @@ def write_verdict(diff: Differences) -> str:
     counts = [f"{count} {kind}" for kind, count in diff.kinds.items() if count]
     many = diff.regressed
     if diff.weakened:
-        rules = len(diff.weakened)
-        counts.insert(0, f"{rules} rule{'s' if rules > 1 else ''} weaker")
-    if many:
-        head = f"{many} regression{'s' if many > 1 else ''}"
-    else:
-        head = "No regression"
+        counts.insert(0, f"{write_count(len(diff.weakened), 'rule')} weaker")
+    head = write_count(many, "regression") if many else "No regression"
     if diff.nothing and not many:
         head = "Nothing was compared"
     elif diff.strange:

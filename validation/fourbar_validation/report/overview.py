@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fourbar.errors import abbreviate
+from fourbar.errors import abbreviate, write_count
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
 from fourbar_validation.compare.compare import NO_POSITION, NOWHERE
 from fourbar_validation.compare.rows import (
@@ -143,7 +143,7 @@ class Cause:
         return f"{self.worst.scene} {math.degrees(self.worst.theta_2):.4g} deg"
 
     def __str__(self) -> str:
-        count = f"{self.scenes} scene{'s' if self.scenes > 1 else ''}"
+        count = write_count(self.scenes, "scene")
         return f"{self.engine}: {self.text}: {count}; worst {self.place}"
 
 
@@ -352,7 +352,7 @@ class Overview:
         for line in sorted(self._lines.values(), key=lambda one: one.engine):
             if not line.compared and not line.failed and line.reasons:
                 reason, count = line.reasons.find_commonest()
-                scenes = f"{count} scene{'s' if count > 1 else ''}"
+                scenes = write_count(count, "scene")
                 lines.append(f"{line.engine}: nothing compared ({scenes}): {reason}")
         return lines
 

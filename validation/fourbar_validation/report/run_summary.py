@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fourbar.errors import HOLDS
+from fourbar.errors import HOLDS, write_count
 from fourbar_validation.compare.rows import (
     DEGRADED,
     FORMULAS,
@@ -262,14 +262,11 @@ class Summary:
             missing = ", ".join(engine for engine, _ in self.missing)
             return self.counts.headline + (f"; not run: {missing}" if missing else "")
         more = len(causes) - 1
-        if more:
-            others = f", and {more} more cause{'s' if more > 1 else ''}"
-        else:
-            others = ""
+        others = f", and {write_count(more, 'more cause')}" if more else ""
         first = causes[0]
         named = first.engine if first.engine != FORMULAS else "fourbar itself"
-        what = f"{named} is wrong: {first.text}, in {first.scenes} scene"
-        what += f"{'s' if first.scenes > 1 else ''}; "
+        scenes = write_count(first.scenes, "scene")
+        what = f"{named} is wrong: {first.text}, in {scenes}; "
         if not math.isnan(first.worst.error):
             what += f"worst {first.worst.quantity} of "
         since = f" {self.overview.since}" if self.overview.since else ""

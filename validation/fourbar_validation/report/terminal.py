@@ -5,7 +5,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fourbar.errors import clean_line
+from fourbar.errors import clean_line, write_count
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
 from fourbar_validation.report.run_summary import Summary
@@ -73,7 +73,7 @@ def _print_rows(summary: Summary, console: Any) -> None:
     if more > 0:
         console.print(f"{more} more rows fail; results.csv has them.")
     for engine, reason, count in summary.refusals:
-        scenes = f"{count} scene{'s' if count > 1 else ''}"
+        scenes = write_count(count, "scene")
         why = escape(clean_line(reason))
         console.print(f"not compared: {escape(engine)} in {scenes}: {why}")
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 import mujoco
 import numpy as np
 
-from fourbar.errors import LimitError
+from fourbar.errors import LimitError, write_count
 from fourbar.mjcf import Settings, write_mjcf
 from fourbar.mjcf.document import WindowMotion
 from fourbar.quantities import PIN_FORCES, Array
@@ -105,7 +105,7 @@ def describe_settings(settings: Settings, steps_per_revolution: float) -> str:
         f"time constant {settings.time_constant_steps:.3g} steps",
         "no pads" if settings.pad is None else "pads",
         f"tolerance {settings.tolerance:g}",
-        f"{settings.iterations} iteration{'s' if settings.iterations > 1 else ''}",
+        write_count(settings.iterations, "iteration"),
         f"flywheel {settings.flywheel:g}",
     ]
     return ", ".join(parts)

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from fourbar.effects import Flywheel
-from fourbar.errors import InputError, LimitError
+from fourbar.errors import InputError, LimitError, write_count
 from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -323,11 +323,8 @@ def _describe_findings(
         name = model.actuator(inside.acting.actuator).name
         yield f"its actuator {name!r} gives the cylinder's force that is solved for"
     if inside.as_it_is and inside.contacts:
-        contacts = "contact" if inside.contacts == 1 else "contacts"
-        yield (
-            f"{inside.contacts} {contacts} at a position where nothing but pins should"
-            " touch"
-        )
+        contacts = write_count(inside.contacts, "contact")
+        yield f"{contacts} at a position where nothing but pins should touch"
     if through is not None and through.skipped:
         yield (
             f"through time the first {through.settling:.3g} s ({through.skipped} of"
