@@ -33,7 +33,11 @@ SCENES = {
     for name in ("thesis", "crank_rocker", "drag_link")
 }
 OURS, THESIS = SCENES["crank_rocker"], SCENES["thesis"]
-SCENES["accelerating"] = replace(OURS, motion=OURS.motion.replace(acceleration=30.0))
+SCENES["accelerating"] = replace(
+    OURS,
+    motion=OURS.motion.replace(acceleration=30.0),
+    linkage=replace(OURS.linkage, ground_angle=0.3),
+)
 MOMENT, FORCE = OURS.loads
 TURNING = replace(OURS, loads=(MOMENT, replace(FORCE, frame="world")))
 SCENES["load_in_the_world"] = TURNING
@@ -148,6 +152,20 @@ def test_right_digits_agree_and_the_last_of_them_is_judged(scene, differing):
             if given is numbers or name == "F43":
                 wrong = given | {name: given[name] * (1.0 + off)}
                 assert differing(scene, wrong, ALL, 5) == {name}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "digits"),
+    [("1.1", "3.17", "2 digits"), ("1.10", "3.2", "1 digit")],
+)
+def test_zeros_that_are_left_off_are_digits_if_they_are_right(
+    first, second, digits, read
+):
+    """The torque is 1.10071 and 3.16939 N m."""
+    places = right(THESIS)["theta_2"].tolist()
+    table = f"theta_2,torque\n{places[0]},{first}\n{places[1]},{second}\n"
+    judgement = judge_table(THESIS, read(table))
+    assert judgement.status == HOLDS and judgement.digits == digits
 
 
 def test_blank_cells_are_counted_and_the_rest_of_their_row_is_judged(read):
@@ -461,6 +479,10 @@ IN_CRANK_ROCKER = {
     "numbers in N mm where N m": units("torque", factor=1e3),
     "numbers in kN where N was": units(*PINS, factor=1e-3),
     "numbers in lbf ft where N m": units("torque", factor=1 / 1.3558179483314004),
+    "all loads and effects are missing": solved(
+        lambda scene: replace(scene, loads=(), effects=())
+    ),
+    "the power is given": changed(lambda right: {"torque": 10.0 * right["torque"]}),
     "the sign is lost: sizes alone": changed(
         lambda right: {"torque": np.abs(right["torque"])}
     ),
@@ -547,6 +569,11 @@ MISTAKES = {
     "thesis": IN_THESIS,
     "crank_rocker": IN_CRANK_ROCKER,
     "accelerating": {
+        "ground_angle is left out": solved(
+            lambda scene: replace(
+                scene, linkage=replace(scene.linkage, ground_angle=0.0)
+            )
+        ),
         "alpha_2 is left out": solved(acceleration=0.0),
         "alpha_2 in deg/s^2 taken for": solved(acceleration=math.degrees(30.0)),
         "alpha_2 in rad/s^2 taken for": solved(acceleration=math.radians(30.0)),
@@ -572,6 +599,8 @@ def test_a_known_mistake_is_the_first_explanation(name, words, judged):
     assert judgement.differing
     first = judgement.explanations[0]
     assert words in first.text and first.complete
+    said = [(one.text, one.quantities) for one in judgement.explanations]
+    assert len(set(said)) == len(said)
 
 
 def test_every_hypothesis_has_a_case_and_no_two_have_one_text():

@@ -16,6 +16,7 @@ import pytest
 
 import fourbar
 from fourbar import (
+    Bar,
     Flywheel,
     Friction,
     Gravity,
@@ -598,6 +599,15 @@ SLIDING = replace(SCENE, motion=Motion(Sweep(3.5, 5.0, 12), 10.0, 5.0))
     for solution in [fourbar.solve(SLIDING)]
     for slip in solution.omega_4 - solution.omega_3
 }
+RUBBED = replace(SLIDING, effects=(Friction.at(B=0.5),))
+MOVING = ("input", "coupler", "output")
+BARS = {name: getattr(SCENE.linkage, name) for name in MOVING}
+LIGHT = {name: Bar(bar.length) for name, bar in BARS.items()}
+WEIGHTS = tuple(
+    Load(number, (9.81 * bar.mass, -0.5 * math.pi), from_pin=bar.mass_centre)
+    for number, bar in enumerate(BARS.values(), 2)
+)
+RUBBING = Viscous((("A", 0.2),))
 DAMPED = replace(SCENE, effects=(Gravity(), Viscous((("O4", 0.2),))))
 OTHER_SCENES = {
     "coupler: mass of the input": (
@@ -635,12 +645,22 @@ OTHER_SCENES = {
             (2.0 * math.degrees(1.0), 0.4, 0.5), (math.degrees(1.0), 1.0, -0.3)
         ),
     ),
+    "the viscous damping is of the second bar's own speed": (
+        with_effects(RUBBING),
+        replace(
+            with_effects(RUBBING), loads=(Load(3, moment=-2.0), Load(2, moment=2.0))
+        ),
+    ),
+    "no inertial forces (statics), with friction": (
+        replace(RUBBED, effects=(*RUBBED.effects, Gravity(9.81))),
+        replace(RUBBED, linkage=with_bars(**LIGHT).linkage, loads=WEIGHTS),
+    ),
     "the springs act both ways": (
         with_effects(Springs((PULLING,))),
         with_effects(Springs((SLACK,))),
     ),
     "the dry friction acts on the second of two bars alone": (
-        replace(SLIDING, effects=(Friction.at(B=0.5),)),
+        RUBBED,
         replace(SLIDING, effects=(), loads=(Load(4, moment=-SLIP),)),
     ),
     "the flywheel is on bar 4": (

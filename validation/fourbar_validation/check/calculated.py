@@ -351,6 +351,8 @@ class Calculation:
         }
 
     def _equal_forces(self) -> Iterator[Mistake]:
+        text = f"the power is given in place of the {self.driving}"
+        yield _state(text, {self.driving: self.right.power}, whole=False)
         for name in PIN_FORCES:
             for other in PIN_FORCES:
                 if other == name:
@@ -401,6 +403,12 @@ class Calculation:
                 )
         for effect in self.scene.effects:
             yield from self._change_effect(effect)
+        every = (*self.scene.loads, *self.scene.effects)
+        if self.scene.effects and len(every) > 1:
+            less = self.none().plus(self.apply(*every), -1.0)
+            dry = dict.fromkeys(list_sliding_pins(self.scene), 0.0)
+            text = "all loads and effects are missing: inertia alone"
+            yield Change(text, less, friction=dry)
         if not self.weighs:
             text = "gravity along -y is included though the scene has none"
             yield Change(text, self.apply(Gravity()))
@@ -422,6 +430,12 @@ class Calculation:
             linear = self.apply(_relax(effect, "preload") or effect)
             for factor, done in _IN_DEGREES.items():
                 yield self._scale(name, done, linear, factor)
+        if effect.key == "viscous":
+            more = self.none()
+            for pin, k in effect.coefficients:
+                more.twist_at(pin, -k * self.motion.omega[PINS[pin][0]])
+            how = "is of the second bar's own speed"
+            yield Change(f"{name} {how}", more)
         verb = "act" if _is_plural(name) else "acts"
         for left_out, words in enumerate(("second", "first")):
             less = self.none()

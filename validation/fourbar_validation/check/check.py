@@ -25,7 +25,6 @@ from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
 from fourbar_validation.check.csv_columns import list_names_of_points
 from fourbar_validation.check.judge_table import (
-    ONE_DIGIT,
     Allowance,
     Discrepancy,
     Judge,
@@ -45,6 +44,8 @@ class Judgement:
     table: TheirTable
     """The table as it was read."""
     findings: list[Discrepancy]
+    precisions: dict[str, float]
+    """Largest allowed error of each quantity."""
     not_assembled: list[int]
     """Lines at which the linkage does not assemble, or is singular. There is no right
     answer there.
@@ -147,13 +148,8 @@ class Judgement:
 
         Of the numbers of a quantity the one with the fewest digits counts.
         """
-        allowed: dict[str, float] = {}
-        for finding in self.findings:
-            if finding.allowed <= ONE_DIGIT:
-                so_far = allowed.get(finding.quantity, 0.0)
-                allowed[finding.quantity] = max(so_far, finding.allowed)
         fewest: dict[int, list[str]] = {}
-        for quantity, most in allowed.items():
+        for quantity, most in self.precisions.items():
             digits = math.floor(-math.log10(max(most, EPS)))
             fewest.setdefault(digits, []).append(quantity)
         if len(fewest) == 1:
@@ -187,6 +183,7 @@ def judge_table(
     """
     judge = Judge(scene, table, tolerance)
     read, findings = judge.table, judge.findings()
+    precisions = judge.list_precisions()
     differing_quantities = {
         finding.quantity
         for finding in findings
@@ -209,6 +206,7 @@ def judge_table(
     judgement = Judgement(
         read,
         findings,
+        precisions,
         judge.without_answer(),
         explanations,
         tolerance,

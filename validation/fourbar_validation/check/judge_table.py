@@ -101,6 +101,8 @@ class _Allowed(NamedTuple):
     is left.
     """
     rounding: Array
+    filled: Array
+    """The same if the zeros at the end of a number were left off."""
     complete: bool
     """True if the table has a number in every row and component."""
 
@@ -280,6 +282,7 @@ class Judge:
                 size,
                 np.where(exact <= MOST_ALLOWED, exact + spread + self.slack, np.inf),
                 np.where(rounding > ONE_DIGIT, filled, rounding),
+                np.asarray(filled),
                 not np.isnan(self.table.values[key]).any(),
             )
         return self._allowed[key]
@@ -353,6 +356,22 @@ class Judge:
                     )
                 )
         return findings
+
+    def list_precisions(self) -> dict[str, float]:
+        """Return the largest allowed error of each quantity, of numbers with a digit.
+
+        A number that agrees with zeros in place of those left off is compared to them.
+        """
+        precisions: dict[str, float] = {}
+        for key in self.table.values:
+            error, allowed, _ = self.judged_right(key)
+            limits = self._allow(key)
+            filled = limits.exact + limits.filled
+            allowed = np.where(error <= filled, np.minimum(allowed, filled), allowed)
+            compared = allowed[self.where(key) & (allowed <= ONE_DIGIT)]
+            if compared.size:
+                precisions[self.table.label(key)] = float(compared.max())
+        return precisions
 
     def without_answer(self) -> list[int]:
         """List lines with a number where the linkage does not assemble.

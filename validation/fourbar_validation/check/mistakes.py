@@ -54,6 +54,8 @@ _OF_SPEEDS = {
 }
 """The same of a speed."""
 _OTHER_BRANCH = "the other branch"
+_SLOW = 1e-18
+"""Factor on a speed of which only the sign is left."""
 _CLOCKWISE = "counted clockwise, with all angles and torques"
 MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
@@ -189,6 +191,13 @@ def _difference(
 def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
     """List the problems that differ by numbers of the scene, or by the command."""
     yield from _list_other_commands(command)
+    if scene.linkage.ground_angle:
+        yield Variant("ground_angle is left out", {"lengths.ground_angle": 0.0})
+    dry = any(effect.key in ("friction", "pin_friction") for effect in scene.effects)
+    if dry and command.speed is not None:
+        slow = command._replace(speed=_SLOW * command.speed, acceleration=0.0)
+        text = "no inertial forces (statics), with friction"
+        yield Variant(text, at=slow, names=FORCE_NAMES)
     yield from _exchange_bars(scene)
     yield from _move_centres(scene)
 
@@ -419,9 +428,11 @@ def explain(
     together = {name for one in of_columns for name in one.quantities}
     if len(together) < least:
         of_columns.clear()
-    explanations = [*of_columns, *whole]
-    explanations.sort(key=lambda one: (-len(one.quantities), not one.whole))
-    return explanations[:MOST_EXPLANATIONS]
+    unlike = {(one.text, one.quantities): one for one in (*of_columns, *whole)}
+    order = sorted(
+        unlike.values(), key=lambda one: (-len(one.quantities), not one.whole)
+    )
+    return order[:MOST_EXPLANATIONS]
 
 
 def _list_explained(
