@@ -233,18 +233,6 @@ def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
     assert judged(scene, "theta_4", angles, expected, "{:.0f}").status == HOLDS
 
 
-def test_an_angle_that_is_never_reached_has_no_motion(judged):
-    angles = np.radians([10.0, 130.0])
-    found = judged(
-        commanding(2, 60.0, 220.0),
-        "theta_4",
-        angles,
-        angles,
-        "{:.0f}",
-    )
-    assert found.not_assembled == [2]
-
-
 @pytest.mark.parametrize(
     ("name", "commanded", "angle"),
     [

@@ -7,8 +7,6 @@ import numpy as np
 import fourbar
 from fourbar.effects import Place
 from fourbar_validation.compare.scales import TermSizes
-from fourbar_validation.run.judge import make_question
-from fourbar_validation.run.transformed import _take_plain_positions
 from tests.support.scenes import crank_rocker
 
 LOADED = crank_rocker(
@@ -36,14 +34,3 @@ def test_a_place_that_the_formulas_misread_widens_nothing(monkeypatch):
 
     monkeypatch.setattr(Place, "polar_from_pin", misread)
     np.testing.assert_array_equal(sum_terms(), sizes)
-
-
-def test_a_scene_that_is_stated_otherwise_has_its_places_where_they_are(monkeypatch):
-    question = make_question("scene", LOADED, ())
-    wanted = question.solution.torque
-    monkeypatch.setattr(
-        Place, "in_one_pair", lambda place: Place(place.bar, (1.0, 0.0))
-    )
-    few = _take_plain_positions(question)
-    at = [int(np.argmin(abs(question.at.angle - x))) for x in few.command.angle]
-    np.testing.assert_allclose(few.solution.torque, wanted[at], rtol=1e-12)

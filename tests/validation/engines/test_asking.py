@@ -7,8 +7,6 @@ import fourbar
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.scenes.suites import MODELS
-from tests.support.scenes import crank_rocker
 
 
 class Told:
@@ -48,16 +46,3 @@ def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch, told):
     assert command.branch.tolist() == [branch, -branch, -branch, branch]
     _, made = told(scene, command._replace(angle=angles + 1e-3))
     assert made.branch.tolist() == [branch] * 4
-
-
-def test_an_engine_is_told_no_angles_that_the_formulas_found_from_a_stroke(told):
-    scene = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
-    command, _ = told(scene)
-    assert np.isfinite(fourbar.command(scene).angle).all()
-    assert np.isnan(command.angle).all() and np.isnan(command.speed).all()
-    assert command.condition == 1.0 and not command.lost.any()
-    assert np.isfinite(command.stated[0]).all()
-    scene = crank_rocker()
-    command, made = told(scene)
-    np.testing.assert_array_equal(command.angle, fourbar.command(scene).angle)
-    np.testing.assert_array_equal(made.angle, command.angle)

@@ -35,16 +35,14 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop, tree
 from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
-from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
+from fourbar_validation.engines.mujoco.inverse import MujocoTree
 from fourbar_validation.engines.pinocchio import PinocchioTree
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.engines.tree import keep_tree
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-from tests.support.engine_limits import compile_body
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
 from tests.validation.engines.test_applied_effects import ACTING, scene
@@ -317,49 +315,6 @@ def test_light_bars_are_held_or_refused(name):
     assert failed == [] or refused
 
 
-@pytest.mark.parametrize(("mass", "inertia"), [(1.0, 1.0), (0.9, 1.0), (1.0, 0.9)])
-def test_the_floor_of_mujoco_is_where_it_is_stated_to_be(mass, inertia):
-    floor = LIGHTEST.boundary
-    lightest = Bar(0.22, mass * floor, inertia * floor)
-    case = Scene(
-        FourBar(
-            0.3,
-            Bar(0.1, 1.0),
-            Bar(0.25, 1.0),
-            lightest,
-        )
-    )
-    refusal = MujocoInverse().answer(case, command(case)).refusal
-    if mass == inertia:
-        assert refusal is None
-        compile_body(floor, floor)
-        return
-    assert refusal is not None
-    with pytest.raises(ValueError, match="mass and inertia"):
-        compile_body(lightest.mass, lightest.inertia)
-
-
-@present("opensim-constraints")
-def test_simbody_loses_a_constraint_where_the_limit_says(name, monkeypatch):
-    """Bars 3 and 4 nearly in one line.
-
-    Just inside the limit it is exact, well beyond it the force is lost.
-    """
-    from fourbar_lab.engines import opensim
-
-    linkage = FourBar(
-        0.3,
-        Bar(0.25, 0.2),
-        Bar(0.22, 0.5),
-        Bar(0.3, 0.4),
-    )
-    beyond = at_limit(linkage, 1e-13)
-    assert failures(name, at_limit(linkage, 1e-6)) == []
-    assert "drops" in failures(name, beyond)[0][1]
-    monkeypatch.setattr(opensim, "LEAST_CONDITIONED", 0.0)
-    assert {*FIGURES} <= {quantity for quantity, _ in failures(name, beyond)}
-
-
 @dataclass(frozen=True)
 class Wind(Effect):
     """An effect that no engine knows."""
@@ -523,29 +478,6 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
     """
     case = Random(index + 1, 3, tuple(DrawnType)).scene(index)
     assert failures(name, case) == []
-
-
-@each_engine
-def test_a_thousand_turns_take_no_position(name):
-    angles = np.array([1.0, 4.0])
-    near, far = (
-        answered(name, Scene(CRANK_ROCKER, Motion(x, 10.0, 3.0)))
-        for x in (angles, angles + 2000.0 * math.pi)
-    )
-    assert far.assembled.all()
-    torques = (answer.quantities["torque"] for answer in (far, near))
-    np.testing.assert_allclose(*torques, rtol=1e-9)
-
-
-@each_engine
-def test_a_position_before_leaves_nothing_behind(name):
-    fast = Scene(CRANK_ROCKER, Motion(np.array([1.0, 2.0]), 3e4, 1e9))
-    second = command(fast)
-    second = second._replace(angle=second.theta_2[1:], branch=second.branch[1:])
-    both, alone = (answered(name, fast, at).quantities for at in (None, second))
-    for quantity in ("omega_3", "alpha_4", "F12", "F43", "torque"):
-        np.testing.assert_array_equal(both[quantity][1:], alone[quantity])
-        assert np.isfinite(alone[quantity]).all(), quantity
 
 
 @pytest.mark.parametrize("kind", [PinocchioTree, MujocoTree])

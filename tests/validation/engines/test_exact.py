@@ -39,11 +39,6 @@ def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
     assert np.all(~(np.abs(compute_exact_sines(longer, command)) < 1e-6))
 
 
-@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.1, 0.2, 0.3, 0.4001)])
-def test_other_lengths_are_their_doubles(lengths):
-    assert find_stated_lengths(lengths) == [Fraction(length) for length in lengths]
-
-
 def test_the_status_on_a_change_point_in_decimals_is_right():
     linkage = fourbar.uniform(0.08, 0.1, 0.12, 0.06)
     motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)

@@ -13,7 +13,6 @@ from fourbar_validation.compare.rows import (
     write_results,
 )
 from fourbar_validation.engines.limits import BOUNDARIES
-from fourbar_validation.engines.registry import HARD_ENGINES, WORK, load_further
 from fourbar_validation.report.html import write_html
 from fourbar_validation.report.sections import (
     LARGEST_INLINE_PICTURE,
@@ -80,13 +79,6 @@ def test_the_report_of_the_hard_suite_has_every_statement_and_every_limit(tmp_pa
         *(escape(limit.name) for limit in BOUNDARIES),
     ):
         assert shown in text
-
-
-def test_every_engine_says_what_its_time_goes_into():
-    assert set(WORK) == {
-        "formulas",
-        *(engine.name for engine in (*HARD_ENGINES, *load_further())),
-    }
 
 
 @pytest.mark.slow

@@ -16,8 +16,6 @@ from tests.whole.test_imports import ROOT
 TETRAHEDRON = (
     "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 )
-VOLUME = 1e-3 / 6.0
-"""m^3, of the tetrahedron."""
 
 ROBOT = """
 <mujoco>
@@ -46,15 +44,6 @@ def make(
     options = '<mujocoinclude><option timestep="0.004"/></mujocoinclude>'
     (folder / "options.xml").write_text(options)
     return path
-
-
-def test_includes_and_meshes_of_its_folder_are_read(tmp_path):
-    path = make(tmp_path)
-    (tmp_path / "assets").mkdir()
-    (tmp_path / "assets" / "part.obj").write_text(TETRAHEDRON)
-    model = compile_robot(read_robot(path)).model
-    assert model.opt.timestep == 0.004
-    assert model.body("arm").mass[0] == pytest.approx(1000.0 * VOLUME)
 
 
 @pytest.mark.parametrize("where", ["beside", "assets"])

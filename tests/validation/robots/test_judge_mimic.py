@@ -15,7 +15,6 @@ from fourbar.solving import solve
 from fourbar_validation.cli import status
 from fourbar_validation.robots.judge_mimic import (
     fit_minimax,
-    fit_squares,
     measure_mimic,
     show_mimic,
 )
@@ -209,14 +208,6 @@ def test_the_smallest_largest_error_is_that_of_the_textbooks(
     y = function(x)  # type: ignore[operator]
     left = np.polynomial.polynomial.polyval(x, fit_minimax(x, y, degree)) - y
     assert np.abs(left).max() == pytest.approx(smallest, rel=1e-5)
-
-
-def test_least_squares_are_the_normal_equations():
-    x = np.linspace(-0.7, 0.7, 41)
-    y = np.exp(x)
-    powers = np.vander(x, 4, increasing=True)
-    right = np.linalg.solve(powers.T @ powers, powers.T @ y)
-    np.testing.assert_allclose(fit_squares(x, y, 3), [*right, 0.0], rtol=1e-10)
 
 
 def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):

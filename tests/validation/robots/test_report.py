@@ -135,19 +135,6 @@ def test_the_report_is_printed_and_written(
     assert torque.error in [error.part for error in errors]
 
 
-@pytest.mark.parametrize(
-    ("degrees", "near"), [(8.9, True), (-9.0, True), (11.0, False)]
-)
-def test_how_near_a_state_is_to_a_change_point_is_told_within_ten_degrees(
-    degrees, near
-):
-    told = _describe_limit(SimpleNamespace(scene=SCENE), math.radians(degrees))
-    assert told.startswith(
-        f"{abs(degrees):.2g} deg from a change point" if near else ""
-    )
-    assert bool(told) == near
-
-
 @pytest.mark.parametrize(("ground", "grow"), [(0.0, True), (90.0, False)])
 @pytest.mark.parametrize("side", [-5.0, 5.0])
 def test_forces_are_said_to_grow_only_where_those_of_rigid_pins_do(ground, grow, side):

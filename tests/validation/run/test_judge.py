@@ -286,15 +286,6 @@ def test_positions_without_a_value_are_counted_next_to_those_that_were_compared(
         assert said.startswith("round-off of both sides: 50 eps over the condition")
 
 
-class Counting(FreeBody):
-    """The free bodies, with who was started."""
-
-    started = 0
-
-    def __init__(self):
-        Counting.started += 1
-
-
 @pytest.fixture
 def asked(monkeypatch):
     """Scenes and commands that the free bodies are asked, in their order."""
@@ -307,16 +298,6 @@ def asked(monkeypatch):
 
     monkeypatch.setattr(FreeBody, "answer", note)
     return asked
-
-
-def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(asked):
-    scene = crank_rocker()
-    judge("scene", scene, [FREE_BODY])
-    assert len({(id(one), id(command)) for one, command in asked}) == len(asked)
-    # nor of the bars without loads, which the answer holds too
-    assert [one for one, _ in asked if one.linkage is scene.linkage] == [scene]
-    judge("scene", scene, [Engine("counting", Counting, EQUIVALENCE)])
-    assert Counting.started == 1
 
 
 def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(asked):

@@ -31,7 +31,6 @@ from fourbar_validation.run.transformed import (
     TRANSFORMATIONS,
     check_transformed,
 )
-from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
 EVERYTHING = (
@@ -204,11 +203,6 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
         assert sum("wound" in line for line in question.left_out) == many
 
 
-@pytest.mark.parametrize("index", range(6))
-def test_random_scenes_have_the_same_numbers(index):
-    assert list_held(draw_random_scene(3, index, tuple(DrawnType)))
-
-
 @pytest.mark.parametrize("name", TRANSFORMATIONS)
 def test_one_number_that_differs_fails_its_row(name, monkeypatch):
     solve = transformed.solve
@@ -227,19 +221,6 @@ def test_one_number_that_differs_fails_its_row(name, monkeypatch):
     monkeypatch.setattr(transformed, "solve", differ)
     (row,) = ask(scene)[1].values()
     assert row.failed and row.reason.endswith("worst in torque")
-
-
-def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
-    """As a fault would: gravity from the ground's line in place of the world's."""
-    field = Gravity.field.fget
-    held = crank_rocker().linkage.ground_angle
-
-    def turn(load):
-        return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))
-
-    monkeypatch.setattr(Gravity, "field", property(turn))
-    _, rows = ask(crank_rocker())
-    assert rows["turned"].failed and rows["mirrored"].failed
 
 
 def test_every_effect_of_the_package_can_be_stated_otherwise():

@@ -63,16 +63,6 @@ THROUGH_CHANGE_POINTS = dict(families.sweep_change_point(steps=16))
 SWEEP = crank_rocker(motion=Motion(Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
 
 
-def test_the_suite_is_made_from_its_parameters_alone():
-    first, second = Hard(), Hard()
-    names = [first.name(i) for i in range(len(first))]
-    assert names == sorted(set(names)) == [second.name(i) for i in range(len(second))]
-    for i in (0, len(first) // 2, len(first) - 1):
-        assert first.scene(i) == second.scene(i)
-    sources = {first.scene(i).source for i in range(len(first))}
-    assert sources == {family.statement for family in HARD_FAMILIES}
-
-
 def take_last(family):
     """Return the last scene of a family, at few positions."""
     *_, (_, scene) = family.scenes()
@@ -407,23 +397,6 @@ def test_a_free_motion_through_change_points_in_every_engine():
         ("mujoco-forward", "energy", 1e-5),
     ):
         assert rows[engine, quantity].error < most
-
-
-def test_a_golden_file_of_others_swept_through_its_change_point():
-    """a, b, c, d = 1, 3, 2, 4 through 180 deg exactly.
-
-    Others stored -99 910 N m there.
-    """
-    linkage = uniform(4.0, 1.0, 3.0, 2.0)
-    scene = Scene(linkage, Motion(np.radians([170.0, 180.0, 190.0]), 10.0))
-    s = fourbar.solve(scene)
-    assert s.status == ["ok", "change_point", "ok"]
-    # the motion is its own mirror image in the ground's line, so that the torque is odd
-    # about the change point
-    assert s.torque[0] == pytest.approx(-s.torque[2], rel=1e-12)
-    assert abs(s.torque[1]) < 1e-12 * abs(s.torque[0])
-    assert s.omega_4[0] == pytest.approx(s.omega_4[2], rel=1e-12)
-    assert np.sign(s.sin_mu[[0, 2]]).tolist() == [1.0, -1.0]
 
 
 @pytest.mark.parametrize(

@@ -107,23 +107,3 @@ def test_the_plotted_error_is_that_of_a_second_loop(drive, case):
 @pytest.mark.parametrize("drive", DRIVES)
 def test_so_is_that_of_every_integrator_and_softness(drive, case):
     compare(drive, CASES[case])
-
-
-def test_finer_steps_do_not_make_the_defaults_worse_where_bar_4_is_driven():
-    """Their softness alone is left.
-
-    Read through another one the error grew as the steps fell.
-    """
-    scene = make_scene("drag_link 4")
-    setup = TrialSetup(scene, command(scene))
-    errors = []
-    for steps in (640.0, 2560.0):
-        settings = replace(
-            BEST,
-            pad=None,
-            integrator="Euler",
-            steps_per_revolution=steps,
-        )
-        trial = setup.try_out(settings, restore_defaults)
-        errors.append(compute_errors(scene, trial.at, trial.quantities).torque)
-    assert min(errors) > 0.05 and max(errors) < 0.1

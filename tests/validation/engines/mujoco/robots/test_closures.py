@@ -98,18 +98,6 @@ def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign):
     assert loop.senses["A"] == -float(sign)
 
 
-def test_bodies_without_joints_are_one_bar_and_what_hangs_on_it_is_held():
-    plate = (
-        '<body name="plate" pos="0.1 0 0"><geom size="0.01"/><body name="flap"><joint'
-        ' name="flap" axis="0 1 0"/><geom size="0.01"/></body></body>'
-    )
-    loop = loop_of(Planar(on_coupler=plate).text())
-    model = mujoco.MjModel.from_xml_string(Planar(on_coupler=plate).text())
-    held = {model.joint(joint).name for joint in loop.held}
-    assert held == {"", "flap"}  # the free joint has no name
-    assert loop.bodies[3] == (model.body("coupler").id,)
-
-
 FIVE_BAR = """
 <mujoco><worldbody><body name="base">
 <body name="a"><joint name="a" axis="0 1 0"/><geom size="0.01"/>
@@ -364,12 +352,6 @@ def test_a_hinge_that_another_loop_moves_is_the_driven_one():
     assert "piston_pin acts on it: rocker is taken as driven" in loop.remarks[0]
     assert model.joint("rocker").id > model.joint("bucket").id
     assert loop_of(EXCAVATOR, drive="bucket").joint == model.joint("bucket").id
-
-
-def test_a_joint_without_a_name_is_held_by_the_name_that_is_printed():
-    assert loop_of(NO_NAME, held=("joint 3",)).lengths == pytest.approx(
-        loop_of(FIVE_BAR.format(more=""), held=("d",)).lengths
-    )
 
 
 def test_a_loop_is_chosen_by_its_name():

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.scene import find_signs
 from fourbar.solving import solve
@@ -217,11 +216,6 @@ def test_axes_sides_and_twins_have_the_same_errors():
 
 def angles_of(loop):
     return np.array([row.angle for row in loop.states.rows]) - loop.turned
-
-
-def test_a_loop_that_is_not_there_is_refused():
-    with pytest.raises(InputError, match="no such closure"):
-        measure(read_robot(ROBOTS / "gripper.xml"), loop="tail")
 
 
 HALVES = Planar(

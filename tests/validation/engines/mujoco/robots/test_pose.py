@@ -205,15 +205,6 @@ def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop():
     assert "boom by" in free.notes[0]
 
 
-def test_motors_that_make_up_for_rounding_move_by_no_more():
-    """The rod alone closes the loop to 1 um, beside a dead centre of its crank."""
-    held = '<actuator><motor joint="handle"/><motor joint="jaw"/></actuator></mujoco>'
-    model = compiled(GRAB.replace("</mujoco>", held))
-    qpos = pose_robot(model, PoseOptions()).data.qpos
-    assert gap(model, qpos) < 1e-9
-    assert np.abs(np.degrees(qpos[[0, 2]])).max() < 2.5
-
-
 def test_a_stated_joint_with_ranges_beside_it_is_the_reason_too():
     (note,) = pose_robot(compiled(GRAB), PoseOptions(joints={"pin": "-150 deg"})).notes
     assert note.startswith(
