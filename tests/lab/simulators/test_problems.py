@@ -417,4 +417,5 @@ def test_the_command_judges_a_result_file(text, status_of_it, said, tmp_path, ca
     assert status(["check", problem, str(file)]) == status_of_it
     printed = capsys.readouterr()
     assert said in printed.out + printed.err
+    assert max(map(len, printed.out.splitlines()), default=0) <= 80
     assert printed.err.count("\n") == (status_of_it == 2)

@@ -336,7 +336,11 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, 
     ):
         monkeypatch.setattr(f"{cost}cost.fit_laws", lambda _, laws=laws: laws)
         assert status(["cost", "--out", str(tmp_path)]) == code
-        assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
+        printed = capsys.readouterr().out
+        assert ("Nothing was compared" in printed) == (code == FAILED)
+        sentences, _, _ = printed.partition("Pictures, laws and every point")
+        assert len(sentences.splitlines()) > 3
+        assert max(map(len, sentences.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(

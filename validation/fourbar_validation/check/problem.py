@@ -226,7 +226,7 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     from rich.console import Console
     from rich.markup import escape
 
-    from fourbar_validation.report.sentences import make_words_table
+    from fourbar_validation.report.sentences import make_words_table, print_sentence
 
     problem = read_problem(problem_file)
     answered = read_result(result_file, problem)
@@ -252,11 +252,10 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
         )
     )
     levels = find_levels(rows)
-    console.print(
-        "levels: " + ", ".join(f"{group} {level}" for group, level in levels.items())
-    )
+    listed = ", ".join(f"{group} {level}" for group, level in levels.items())
+    print_sentence(f"levels: {listed}")
     limits = ", ".join(f"{level} {most:g}" for level, most in LEVELS.items())
-    console.print(
+    print_sentence(
         f"of the largest value, angles in rad: {limits}, D worse; - no answer"
     )
     if levels and not set(levels.values()) & {WORSE, MISSING}:

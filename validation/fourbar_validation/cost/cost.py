@@ -29,7 +29,7 @@ from fourbar_validation.cost.work_precision import (
 )
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
-from fourbar_validation.report.sentences import make_words_table
+from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import render
 from fourbar_validation.scenes.suites import read_scene_files
 
@@ -90,8 +90,8 @@ def cost(
         title = scene.title or name
         conclusion = conclude(curves, laws, influences)
         write_cost(study, curves, laws, title, conclusion)
-        click.echo(write_subtitle(scene, title))
-        click.echo("\n".join(conclusion))
+        for sentence in (write_subtitle(scene, title), *conclusion):
+            print_sentence(sentence)
         if verbose:
             _print_details(study, curves, laws)
         click.echo(f"Pictures, laws and every point: {out / name / 'cost.md'}")
@@ -114,7 +114,7 @@ def cost(
         )
         Console().print(make_words_table(head, rows, show_edge=False))
     if not fitted:
-        click.echo("Nothing was compared: no law has points enough for a fit.")
+        print_sentence("Nothing was compared: no law has points enough for a fit.")
     if fitted and all(law.holds for law in fitted):
         return HOLDS
     return FAILED
@@ -137,7 +137,8 @@ def _print_details(
         *(f"warning: {line}" for line in list_warnings(curves)),
         *(f"left out: {line}" for line in study.left_out),
     ]
-    click.echo("\n".join(lines))
+    for line in lines:
+        print_sentence(line)
 
 
 def write_cost(
