@@ -18,7 +18,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
-from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels
+from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels, split_runs
 from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution, where_assembled
 from fourbar.solving import solve, split
@@ -470,7 +470,7 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     curve = panels.curves[f"theta_{bar}"]
     angles = curve.values.ravel()
     rows = np.flatnonzero(np.isfinite(angles))
-    stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    stretches = split_runs(rows)
     for stretch in stretches:
         angles[stretch] = np.unwrap(angles[stretch])
     coarse = getattr(solution, f"theta_{bar}")

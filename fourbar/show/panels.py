@@ -467,6 +467,13 @@ def _find_open(
     return is_open
 
 
+def split_runs(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Split rising numbers where one is left out; none make no run."""
+    if not len(rows):
+        return []
+    return np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+
+
 def _find_panels_at_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
     """Find the panels that no halving settles and towards which a curve grows.
 
@@ -475,10 +482,7 @@ def _find_panels_at_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> li
     """
     sizes = np.nan_to_num(np.abs(curve.sizes), nan=0.0).max(axis=1)
     poles = []
-    rows = np.flatnonzero(unsettled)
-    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
-        if not len(run):
-            continue
+    for run in split_runs(np.flatnonzero(unsettled)):
         beside = [run[0] - _PANELS_BESIDE, run[-1] + _PANELS_BESIDE]
         away = [sizes[panel] for panel in beside if 0 <= panel < len(sizes)]
         if away and sizes[run].max() > _GROWTH * max(away):

@@ -24,7 +24,7 @@ from fourbar.show.motion_curves import (
     compute_pin_loads,
     describe_motion,
 )
-from fourbar.show.panels import EXTREME_ERROR, TIED, PanelCurve, Peak
+from fourbar.show.panels import EXTREME_ERROR, TIED, PanelCurve, Peak, split_runs
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
@@ -274,9 +274,7 @@ def _list_held(solution: Solution, drive: Driving, kind: str) -> list[HeldRange]
     places = solution.at.places
     rows = np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
     ranges = list[HeldRange]()
-    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
-        if len(run) == 0:
-            continue
+    for run in split_runs(rows):
         if kind == "turn" and ranges and run[0] == len(solution) - 1 and rows[0] == 0:
             continue
         ends = float(places[run[0]]), float(places[run[-1]])

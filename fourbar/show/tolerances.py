@@ -17,6 +17,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
 from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
+from fourbar.show.panels import split_runs
 from fourbar.show.shown_units import drop_rounding, write_cell
 from fourbar.show.tables import (
     make_plain_table,
@@ -207,7 +208,7 @@ def _name_positions(
 ) -> str:
     """Count positions, and name the first intervals of theta_2 that they fill."""
     unit, factor = find_unit_in("rad", units)
-    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    runs = split_runs(rows)
     ends = [
         " to ".join(
             f"{factor * spreads.theta_2[i]:.6g}"

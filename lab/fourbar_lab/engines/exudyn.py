@@ -41,7 +41,6 @@ from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, ExudynBodies
 from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     ON_BARS,
-    PART_POINTS,
     find_unknown,
     list_moving_parts,
     place,
@@ -233,10 +232,6 @@ class ExudynBars(Loaded):
     def alpha(self, bar: int) -> float:
         """Return a bar's angular acceleration in rad/s^2."""
         return float(self.a[self.turn[bar]])
-
-    def positions(self) -> dict[str, Array]:
-        """Locate the points of the bars."""
-        return {name: self.point(point) for name, point in PART_POINTS.items()}
 
     def move(
         self,

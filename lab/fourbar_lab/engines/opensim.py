@@ -22,7 +22,6 @@ from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     ON_BARS,
-    PART_POINTS,
     find_unknown,
     inertia_about_first_pin,
     list_moving_parts,
@@ -252,10 +251,6 @@ class _OpenSimBars(Loaded):
         """Return the body's rotation matrix, (2, 2)."""
         matrix = self.body[bar].getTransformInGround(self.state).R()
         return np.array([[matrix.get(i, j) for j in (0, 1)] for i in (0, 1)])
-
-    def positions(self) -> dict[str, Array]:
-        """Locate the points of the bars."""
-        return {name: self.point(point) for name, point in PART_POINTS.items()}
 
     def move(
         self,

@@ -16,6 +16,7 @@ from fourbar.scene import Scene
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import (
     FORCE_AT,
+    PART_POINTS,
     name_driving,
     rotate,
     rotate_by,
@@ -166,6 +167,10 @@ class Loaded(EngineBars, Protocol):
         """Return the angular acceleration of a bar, rad/s^2."""
 
     # methods that follow from these
+    def positions(self) -> Mapping[str, Array | Sequence[float]]:
+        """Locate the points of the bars."""
+        return {name: self.point(point) for name, point in PART_POINTS.items()}
+
     def angle(self, bar: int) -> float:
         """Compute the direction from the bar's axes; the ground's line as described."""
         if bar == 1:
