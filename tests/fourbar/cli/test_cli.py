@@ -12,7 +12,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from importlib import import_module
-from math import acos, degrees, pi, tau
+from math import acos, degrees, tau
 from pathlib import Path
 
 import numpy as np
@@ -132,21 +132,6 @@ def test_a_free_motion_has_time_and_no_drive(run):
     save(crank_rocker(motion=released), "scene.toml")
     document = strict(run("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
-
-
-@pytest.mark.parametrize(
-    "ending",
-    slow_but({"csv"}, ["csv", "json", "txt"]),
-)
-def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(ending, run):
-    named, asked = Path(f"named.{ending}"), Path("asked")
-    form = () if ending == "txt" else (f"--{ending}",)
-    takes_csv = ("analyze", CRANK_ROCKER), ("classify", 4, 2, 3, 3)
-    for command in takes_csv[:1] if ending == "csv" else takes_csv:
-        printed = run(*command, *form)[1]
-        for options in ((named,), (asked, *form)):
-            assert run(*command, "-o", *options) == (HOLDS, "", "")
-            assert options[0].read_text() == printed
 
 
 @pytest.mark.parametrize("command, write", [("sdf", write_sdf), ("usd", write_usd)])
@@ -700,16 +685,3 @@ def test_a_linkage_moves_as_the_bar_of_another_does(run):
     document = strict(run("analyze", second, "--positions", positions, "--json"))
     assert document["torque"] == expected.torque.tolist()
     assert document["alpha_4"] == expected.alpha_4.tolist()
-
-
-def test_one_position_has_the_angles_that_the_sweep_has_there(run):
-    """Beyond half a turn of the output of a drag-link, and whatever else is asked."""
-    scene, rows = MODELS / "drag_link.toml", [120, 10, 300]
-    sweep = solve(load(scene))
-    at = [f"--at={theta!r} rad" for theta in sweep.theta_2[rows].tolist()]
-    table = strict(run("analyze", scene, "--json", *at))
-    for name in ("theta_3", "theta_4"):
-        assert table[name] == approx(getattr(sweep, name)[rows]), name
-    block = run("analyze", scene, at[2])[1]
-    assert f"{math.degrees(sweep.theta_4[300]):.4f}" in block
-    assert abs(sweep.theta_4[300]) > pi

@@ -640,19 +640,6 @@ def test_the_history_and_what_is_kept_do_not_grow_without_end(session, monkeypat
     assert '"104 mm"' in again.now.text
 
 
-@pytest.mark.posix
-def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(session):
-    session.path.chmod(0o600)
-    link = session.path.with_name("link.toml")
-    link.symlink_to(session.path)
-    linked = Session(link, session.exports.folder)
-    assert linked.state_file == session.state_file
-    ask(linked, set_to("lengths/input", "105 mm"))
-    assert ask(linked, "save")["saved"]
-    assert link.is_symlink() and '"105 mm"' in session.path.read_text()
-    assert session.path.stat().st_mode & 0o777 == 0o600
-
-
 def test_exports_go_into_their_folder_under_their_own_names(session):
     for name, ending in (("csv", "csv"), ("mjcf", "xml"), ("page", "html")):
         ask(session, "export", format=name)

@@ -1,7 +1,6 @@
 """The effects' formulas against potentials, exact arithmetic and limiting cases."""
 
 import math
-from dataclasses import replace
 from math import pi, tau
 
 import numpy as np
@@ -12,7 +11,6 @@ import fourbar
 from fourbar.effects import (
     Flywheel,
     Friction,
-    Gravity,
     Load,
     PinFriction,
     Place,
@@ -36,22 +34,6 @@ from tests.support.scenes import crank_rocker
 
 LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
-
-
-def alone(*effects, **motion):
-    """Static, so that only the effects act."""
-    stated = {"theta_2": np.linspace(0.2, 6.0, 9), "omega_2": 0.0, **motion}
-    return crank_rocker(motion=Motion(**stated), loads=(), effects=effects)
-
-
-GAS = Place(1, (0.2, 2.0)), Place(4, (0.22, 0.0))
-FORCES = 40.0, 70.0
-"""N: of the gas spring at no and at full stroke."""
-
-
-def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
-    constant = Spring(*GAS, 0.0, 0.5, -FORCES[0])
-    assert Spring.gas(*GAS, 0.5, 0.3, FORCES[0]) == constant
 
 
 JAMS = math.nan, math.nan
@@ -113,31 +95,6 @@ def test_jamming_is_a_status_and_leaves_no_force():
     jammed = np.array([status == "jammed" for status in s.status])
     assert np.array_equal(np.isnan(s.torque), jammed)
     assert np.isfinite(s.theta_3).all()
-
-
-@pytest.mark.parametrize(
-    "friction",
-    [Friction.at(O2=0.02, B=0.03), PinFriction.at(O2=(0.2, 0.01), B=(0.3, 0.02))],
-)
-def test_at_rest_the_interval_is_that_of_beginning_to_move(friction):
-    """Its ends are the torques of slow motions in either sense, at rest their inside.
-
-    (1e-9 rad/s)^2 of inertia is nothing against these torques.
-    """
-    scene = alone(Gravity(), friction)
-    rest = solve(scene)
-    slow = [
-        solve(replace(scene, motion=scene.motion.replace(speed=speed))).torque
-        for speed in (1e-9, -1e-9)
-    ]
-    assert rest.torque_high == approx(np.maximum(*slow), rel=1e-13)
-    assert rest.torque_low == approx(np.minimum(*slow), rel=1e-13)
-    assert ((rest.torque_low < rest.torque) & (rest.torque < rest.torque_high)).all()
-    for side, beginning in zip((1, -1), slow, strict=True):
-        begun = solve(scene, "force", side=side).torque
-        assert begun == approx(beginning, rel=1e-13)
-    bare = solve(crank_rocker())
-    assert bare.torque_low is bare.torque_high is bare.friction_residual is None
 
 
 def test_pin_load_friction_needs_the_pin_forces():

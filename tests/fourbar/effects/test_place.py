@@ -3,13 +3,10 @@
 Places of bars in every form, loads at them, and the cases that people brought.
 """
 
-import cmath
-
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from pytest import approx, raises
 
-import fourbar
 from fourbar import Point, Spring, solve
 from fourbar.effects import Load, Place
 from fourbar.errors import InputError
@@ -31,31 +28,6 @@ def test_a_weight_hung_at_the_tip_of_the_rocker():
 def test_a_pull_at_the_tip_of_massless_bars():
     torque = solve(loads(PULL)).torque
     assert torque[0] == approx(1.656231, abs=PRINTED)
-
-
-def test_one_place_in_three_forms_is_one_load_one_spring_and_one_cylinder():
-    place = cmath.rect(0.19, -0.4)
-    point = Point("P", 3, cmath.polar(place))
-    ground = Place(1, (0.2, 2.0))
-    forms = (
-        {"from_pin": cmath.polar(place)},
-        {"from_centre": cmath.polar(place - crank_rocker().linkage.coupler.to_centre)},
-        {"point": "P"},
-    )
-    drives = []
-    for form in forms:
-        load, end = Load(3, (5.0, 1.2), **form), Place(3, **form)
-        spring = fourbar.Springs((Spring(ground, end, 200.0, 0.05),))
-        loaded = crank_rocker(loads=(load,), points=(point,))
-        sprung = crank_rocker(effects=(spring,), points=(point,))
-        pushed = crank_rocker(drive=fourbar.LinearDrive(ground, end), points=(point,))
-        pushing = solve(pushed).drive_force
-        torques = solve(loaded).torque, solve(sprung).torque
-        drives.append([*torques, pushing])
-        settled = loaded.settled().loads[0].place
-        assert settled.vector() == approx(place)
-    assert_allclose(drives[1], drives[0], rtol=1e-9)
-    assert_array_equal(drives[2], drives[0])
 
 
 @pytest.mark.parametrize(

@@ -171,57 +171,6 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     assert (error <= BARS * solution.torque_error).all()
 
 
-def near_a_limit_of_bar_3():
-    """A position 1e-9 rad from a limit of theta_3."""
-    lengths = (
-        0.17339921633840288,
-        0.3243788955157556,
-        0.25387035792278817,
-        0.11411483234949293,
-    )
-    motion = Motion(theta_3=-0.9625944120558366, omega_3=3.0)
-    return Scene(
-        uniform(*lengths),
-        motion,
-        effects=(Gravity(),),
-    )
-
-
-def beside_a_free_length():
-    """A position 6e-6 rad beside that at which a spring does not pull."""
-    spring = Spring(
-        Place(1, (0.1, -1.5)),
-        Place(4, (0.08, 0.0)),
-        200.0,
-        0.293784713457564,
-    )
-    two, three, four = (Bar(length) for length in (0.1, 0.25, 0.22))
-    return Scene(
-        FourBar(0.3, two, three, four),
-        Motion(2.264630407249073 + 5.682965972475529e-06, 3.0),
-        effects=(Springs((spring,)),),
-    )
-
-
-@pytest.mark.skipif(
-    np.finfo(np.longdouble).nmant != 63,
-    reason="what these scenes show is of long doubles of 64 bits",
-)
-@pytest.mark.parametrize("make", (near_a_limit_of_bar_3, beside_a_free_length))
-def test_an_error_bar_holds_what_long_doubles_do_not_resolve(make, monkeypatch):
-    """Double and long double agree here and are both wrong.
-
-    Pairs of doubles have 32 digits.
-    """
-    scene = make()
-    bars = solve(scene, "error")
-    monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
-    errors = solve(scene, "error")
-    for name in ("torque_error", "force_error"):
-        bar, error = getattr(bars, name)[0], getattr(errors, name)[0]
-        assert error <= bar <= 2.0**11 * error, name  # what doubles do not resolve
-
-
 @pytest.mark.parametrize("power", range(24, 41, 2))
 def test_an_error_bar_grows_with_the_angle(power):
     """A crank under its weight, m g r cos(theta).

@@ -55,12 +55,6 @@ things too.
 """
 
 
-def test_the_file_that_the_mistakes_are_made_in_is_good(tmp_path, capsys):
-    (tmp_path / "good.toml").write_text(GOOD)
-    assert status(["analyze", str(tmp_path / "good.toml")]) == 0
-    assert capsys.readouterr().err == ""
-
-
 MISTAKES = [
     # what is replaced, by what, words that the line must hold
     ('title = "good"', "colour = 1", ["colour", "title, source, lengths"]),
@@ -241,19 +235,6 @@ def refused(arguments, words, folder, capsys):
     for word in words:
         assert word in printed.err, printed.err
     assert sorted(folder.rglob("*")) == before
-
-
-@pytest.mark.parametrize("command", ["analyze", "mjcf", "plot", "animate"])
-def test_every_command_refuses_a_bad_file(command, tmp_path, capsys):
-    refused(
-        [command, str(tmp_path / "missing.toml")],
-        ["missing.toml", "file not found"],
-        tmp_path,
-        capsys,
-    )
-    bad = tmp_path / "bad.toml"
-    bad.write_text(GOOD.replace('"open"', '"opne"'))
-    refused([command, str(bad)], [str(bad), "motion.branch", "opne"], tmp_path, capsys)
 
 
 def test_a_huge_file_is_not_read(tmp_path, capsys):

@@ -20,7 +20,6 @@ from fourbar.formulas.mobility import (
     find_circuit,
     find_intervals,
     limit_positions,
-    swing,
     time_ratio,
     turns_fully,
 )
@@ -36,8 +35,6 @@ at most 4 pi.
 """
 GRID = 2000
 """Positions of a scan over one turn."""
-MISSED = 20.0 * pi / GRID
-"""Of half the end of a range, by a scan: a step, the bar up to ten times as fast."""
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 
 
@@ -170,38 +167,6 @@ def test_circuits_agree_with_a_scan(bars):
     pairs = [*zip(component[both], number[both], strict=True)]
     for partition in (component[both], number[both], pairs):
         assert len(set(partition)) == len(circuits(bars))
-
-
-@pytest.mark.parametrize("bar", MOVING_BARS)
-def test_ranges_hold_every_position_and_no_more(bar):
-    """theta_k goes as a square root near its limit's theta_2, or is tangent to it."""
-    nearly_a_structure = bare(6.0, 1.0, 2.0, 3.0001, 0.3)
-    for bars in [nearly_a_structure, *random_linkages(8, 48)]:
-        start, stop = find_intervals(bars)[0]
-        around = 0.5 * (start + stop) + np.linspace(-pi, pi, GRID)
-        fine = np.linspace(start, stop, GRID)
-        theta_2 = np.concatenate([around, fine, 2.0 * bars.ground_angle - fine])
-        theta_2 = theta_2[closes(bars, theta_2) > 16.0 * EPS * sum(bars.lengths)]
-        reached = np.concatenate(
-            [angle(bars, theta_2, branch, bar) for branch in (1, -1)]
-        )
-        ranges = find_intervals(bars, bar)
-        from_ends = np.abs(np.sin(0.5 * np.subtract.outer(reached, np.ravel(ranges))))
-        clear = from_ends.min(axis=1) > 1e-6
-        assert inside(reached[clear], ranges).all()
-        # the first range holds the ground's direction (bar 4: its opposite) or begins
-        # less than pi after it
-        ahead = bars.ground_angle + (pi if bar == 4 else 0.0)
-        assert abs(ranges[0][0] - ahead) <= pi * (1.0 + EPS)
-        low, high = ranges[0]
-        assert swing(bars, bar) == high - low
-        if turns_fully(bars, bar):
-            assert choose_range(bars, bar) == (0.0, tau)
-        else:
-            assert from_ends.min(axis=0).max() < MISSED
-            left_out = min(math.radians(1.0), 0.25 * (high - low))
-            chosen = low + left_out, high - left_out
-            assert choose_range(bars, bar) == approx(chosen, abs=4.0 * EPS)
 
 
 def exact_psi(bars, bar, stretched):

@@ -65,19 +65,6 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
     assert crossed.alpha(4)[[0, 2]] == approx([0.0, 0.0], abs=8 * EPS)
 
 
-@pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
-def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths):
-    """The speeds have all their digits."""
-    link, after = bare(*lengths), 2.0 * EPS * np.arange(5)  # the next doubles after pi
-    moving = compute_state(link, pi + after, 1)
-    assert (np.abs(moving.position.sin_mu) < 8.0 * EPS).all()
-    assert find_singular(moving.position).all()
-    near = compute_state(link, pi + np.array([-1e-8, 1e-8]), 1).omega(3).mean()
-    assert moving.omega(3) == approx(np.full(5, near), abs=1e-14)
-    beside = compute_state(link, pi + after + 1e-13, 1)
-    assert not find_singular(beside.position).any()
-
-
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
 @pytest.mark.parametrize("branch", [1, -1])
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1):

@@ -75,24 +75,6 @@ def test_point_coefficients_are_derivatives(drawn):
         assert abs(value[0] - right) <= allowed
 
 
-def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24():
-    for drawn in random_positions(16, 60):
-        moving, sine = drawn.moving(), drawn.sine
-        O4 = drawn.bars.ground * moving.position.u1
-        x, y = instant_centres(*drawn)[1, 3].point
-        spin = float(moving.omega(3)[0])
-        pin, speed = moving.foot(3)[0], moving.velocity(3, 0.0)[0]
-        still = abs(speed + 1j * spin * (complex(x[0], y[0]) - pin))
-        reach = abs(spin) * math.hypot(x[0], y[0]) + 1.0
-        assert still <= 1e3 * EPS * reach / sine**3
-        x, y = instant_centres(*drawn)[2, 4].point
-        spin_4 = float(moving.omega(4)[0])
-        # both bars give the same velocity there: x r_2 = omega_4 (r_2 - O4)
-        here = complex(x[0], y[0])
-        apart = abs(here - spin_4 * (here - O4))
-        assert apart <= 1e3 * EPS * (abs(here) + 1.0) * (1.0 + abs(spin_4)) / sine**3
-
-
 def test_centres_at_infinity_have_a_direction():
     """In a parallelogram bars 2 and 4 are parallel, and the coupler to the ground."""
     centres = instant_centres(bare(2.0, 1.0, 2.0, 1.0), np.array([1.0]), 1)

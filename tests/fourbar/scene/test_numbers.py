@@ -77,8 +77,3 @@ def test_a_wrong_point_is_refused_in_one_line(name):
     assert words in str(caught.value)
     assert "points" in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_two_points_of_one_name_are_refused():
-    with raises(InputError, match="a name of its own"):
-        scene(POINTS[0], Point("P", 2, (0.1, 0.0)))

@@ -271,17 +271,6 @@ def test_two_commands_of_motion_are_one_line(lines, said):
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    "angle", [1.5, Sweep(3.8, 4.2, 7), np.array([4.0, 4.1]), FromLimit(1, 1e-9), None]
-)
-def test_a_file_of_it_reads_back_bit_for_bit(angle):
-    motion = Motion(theta_4=angle, omega_4=2.0, alpha_4=-0.1, branch=-1)
-    scene = replace(LOADED, motion=motion)
-    text = dump(scene)
-    again = fourbar.files.loads(text)
-    assert again == scene and dump(again) == text
-
-
 def test_what_takes_theta_2_alone_refuses_in_one_line():
     of_output = Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0)
     scene = replace(LOADED, motion=of_output, loads=())

@@ -25,7 +25,6 @@ from fourbar import (
     uniform,
 )
 from fourbar.files.scene_file import read_tables
-from fourbar.scene import command_at
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_block, write_facts
 from fourbar.show.lines import BLOCK_WIDTH
@@ -66,7 +65,6 @@ def opposite(side, first, second):
 
 
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
-STROKES = Motion(stroke=Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
 LIMITED = (0.3, 0.4, 0.2, 0.25)
 LIMIT = opposite(0.45, 0.3, 0.4)
 OF_THESIS = fourbar.limit_positions(thesis().linkage)
@@ -510,30 +508,6 @@ def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero(
 CORNERS = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))
 SPIKE = Load(2, moment=-1.0, table=fourbar.Table(CORNERS, (1.0, 1.0, 50.0, 1.0, 1.0)))
 """A couple on the crank that is largest between two positions."""
-
-
-@pytest.mark.parametrize(
-    "scene, place",
-    [
-        (crank_rocker(motion=STROKES, drive=CYLINDER), 0.33),
-        (
-            crank_rocker(
-                motion=Motion(Sweep(1.0, 2.6, 8), 10.0),
-                loads=(SPIKE,),
-                effects=(),
-                drive=CYLINDER,
-            ),
-            CORNERS[2],
-        ),
-    ],
-    ids=("strokes", "spike"),
-)
-def test_a_bore_is_that_of_the_motion_and_not_of_its_positions(scene, place):
-    (force,) = solve(scene, at=command_at(scene, np.array([place]))).drive_force
-    bore = 1e3 * sqrt(4.0 * abs(force) / (pi * 210e5))
-    word = "push" if force > 0.0 else "pull"
-    said = rf"{bore:.4g} mm\b[^;]* to {word} {abs(force):.4g} N"
-    assert re.search(said, block(scene, pressure=210e5))
 
 
 def test_a_bore_at_rest_moves_the_linkage_against_its_friction():

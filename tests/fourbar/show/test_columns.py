@@ -43,15 +43,6 @@ def test_a_vector_is_its_size_and_a_place_two_coordinates():
         assert np.array_equal(read[name], expected), name
 
 
-def test_a_ratio_of_speeds_does_not_ask_for_a_speed():
-    """At rest, with the positions alone, and at any speed it is the same."""
-    moving = columns(TURN, "omega_4/omega_2,v_P/v_J,v_B_x/omega_2")
-    for speed in (None, 0.0, -3.0):
-        still = replace(TURN, motion=TURN.motion.replace(speed=speed))
-        for name, values in columns(still, ",".join(moving)).items():
-            assert values == approx(moving[name], rel=1e-12, abs=1e-13), name
-
-
 def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     s = solve(TURN)
     torque, ratio = choose_columns(TURN, s, "torque/F12,F12/F14")

@@ -116,17 +116,6 @@ def test_the_ends_of_a_motion_are_positions_and_one_position_is_one():
     assert locate(turn, "B_x", "1.3 m").places == approx([0.0], abs=TOUCHED)
 
 
-def test_a_scene_of_single_positions_is_searched_over_its_range():
-    """Over a turn B_x = 0.8 + 0.5 cos theta_2 has the value twice, by the cosine."""
-    for motion in ("60 deg", "10 deg"):
-        scene = loads(
-            DWELL.split("law", maxsplit=1)[0] + f'theta_2 = ["{motion}", "20 deg"]\n'
-        )
-        found = np.degrees(locate(scene, "B_x", "0.4 m").places)
-        first = math.degrees(acos(-0.8))
-        assert found == approx([first, 360.0 - first])
-
-
 def test_a_law_has_a_value_at_times_and_none_while_it_dwells():
     scene = loads(DWELL)
     at = locate(scene, "B_x", "1.05 m")

@@ -116,18 +116,6 @@ def test_the_largest_size_is_the_first_of_equal_ones(curve, peak, place):
     assert found.place == approx(place, abs=2e-6)
 
 
-@pytest.mark.parametrize("edges", (EDGES, EDGES[::-1]))
-def test_a_flat_maximum_at_the_pole_of_another_curve_is_where_the_rise_ends(edges):
-    """Panels beside a pole are so short that in many the values are nearly equal."""
-
-    def compute(places):
-        return {"flat": np.cos(places - POLE), "pole": 1.0 / np.abs(places - POLE)}
-
-    wanted = dict.fromkeys(("flat", "pole"), Wanted())
-    peak = fit_panels(compute, edges, wanted).find_peak("flat")
-    assert peak.place == approx(POLE, abs=2e-6)
-
-
 ZEROS = [0.3, 0.8, 1.7]
 
 

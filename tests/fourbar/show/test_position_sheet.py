@@ -3,7 +3,6 @@
 Every number is that of the solution, in the units of the scene.
 """
 
-import math
 import re
 from dataclasses import replace
 
@@ -84,19 +83,6 @@ def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
     )
     assert "e-1" not in text and "-0 " not in text
     assert re.search(r"^centre I13 +at infinity$", text, re.MULTILINE)
-
-
-@pytest.mark.parametrize("turns", [0, 2777777777, 10**16])
-def test_columns_of_an_angle_of_many_turns_stay_apart(turns):
-    angle = 1.0 + math.tau * turns
-    scene = replace(ONE, motion=Motion(angle, 10.0, 3.0))
-    solution = solve(scene)
-    rows = PositionSheet(scene, solution, COMMON).write_bars()[1:]
-    for bar, row in enumerate(rows, 2):
-        of_bar = [getattr(solution, f"{name}_{bar}")[0] for name in ("theta", "omega")]
-        written = numbers(row.partition(str(bar))[2])[:2]
-        shown = np.radians(written[0]), written[1] * math.tau / 60.0
-        assert shown == approx(of_bar, rel=SIX_DIGITS)
 
 
 PRESSED = (

@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -142,31 +141,3 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys):
     slopes = sensitivity(load(model)).of("F12", "lengths.input")
     assert_array_equal(document["by"]["F12"]["lengths.input"], slopes)
     assert status(["analyze", str(model), "--sensitivity", "--csv"]) == 2
-
-
-@pytest.mark.parametrize(
-    "link, ground_angle, theta_2",
-    [
-        (LINK, 0.0, np.pi),
-        (LINK, -0.4, np.pi - 0.4),
-        (LINK, 0.3, np.pi),
-        (LINK, 0.0, -np.pi),
-        (uniform(0.3, 0.3, 0.2, 0.2), 0.0, 1.0),
-        (uniform(0.3, 0.1, 0.3, 0.1), 0.0, 4.0),
-    ],
-)
-def test_the_first_derivative_is_the_ratio_of_the_speeds(link, ground_angle, theta_2):
-    """Half a turn from the ground the tangent of the half angle is 1e16, of whose slope
-    no digit is left; of a kite (a = d, b = c) a factor of Heron's product is constant.
-    """
-    link = replace(link, ground_angle=ground_angle)
-    slopes = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
-    solution = slopes.solution
-    by_angle = slopes.of("theta_3", "motion.theta_2")
-    assert_allclose(by_angle, solution.omega_3 / 10.0, rtol=1e-13, atol=1e-15)
-    turned = 10.0 * slopes.of("omega_3", "motion.theta_2")
-    turned = turned + 3.0 * slopes.of("omega_3", "motion.omega_2")
-    assert_allclose(turned, solution.alpha_3, rtol=1e-12, atol=1e-12)
-    # a linkage turned as a whole
-    with_ground = by_angle + slopes.of("theta_3", "lengths.ground_angle")
-    assert_allclose(with_ground, 1.0, rtol=1e-13)

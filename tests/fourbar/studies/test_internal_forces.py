@@ -44,22 +44,6 @@ def load_beam(load, bar=3, stations=None, **parts):
     return solved(Scene(BARE, AT, loads=(load,), **parts), bar, stations)
 
 
-def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports():
-    """P a b/L under a load P at a from one end, here 75 mm from A.
-
-    Sagging to the right of the bar, which is clockwise before it.
-    """
-    across = (8.0, math.radians(-90.0))
-    load = Load(3, across, from_centre=(0.05, math.pi), frame="bar")
-    internal = load_beam(load, 3, [0.0, 0.03, 0.08, 0.1, 0.25])
-    M = 8.0 * np.array([0.0, 0.03 * 0.175, 0.075 * 0.17, 0.075 * 0.15, 0.0]) / 0.25
-    assert_allclose(internal.M[0], M, atol=1e-14)
-    assert_allclose(internal.V[0], [5.6, 5.6, -2.4, -2.4, 0.0], atol=1e-13)
-    largest = internal.largest.moment[0], internal.largest.x[0]
-    assert largest == approx((8.0 * 0.075 * 0.175 / 0.25, 0.075))
-    assert internal.uniform
-
-
 @pytest.mark.parametrize(
     "bar, load, foot",
     [

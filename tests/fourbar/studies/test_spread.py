@@ -76,20 +76,6 @@ def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go():
         assert (sigmas > norm.isf(1.0 / 2048)).all()
 
 
-def test_samples_agree_with_first_order_where_it_is_straight_and_so_do_the_shares():
-    both = Tolerance("lengths.input", 5e-5), Tolerance("lengths.output", 2e-5, True)
-    study, alone = spread(*both), [spread(tolerance) for tolerance in both]
-    for name in ("torque", "|F12|", "F43_x", "theta_4"):
-        of_both = study.spreads[name]
-        assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
-        for share, one in zip(of_both.shares, alone, strict=True):
-            assert_allclose(np.sqrt(share), one.spreads[name].deviation, rtol=QUASI)
-        ordered = ("least", "low", "nominal", "high", "greatest")
-        rows = [getattr(of_both, part) for part in ordered]
-        assert (np.diff(rows, axis=0) >= 0.0).all()
-        assert (of_both.low < of_both.nominal).all()
-
-
 def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch):
     """A generator draws those of its seed."""
     loose = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)

@@ -4,7 +4,6 @@ What no scene takes has a status.
 """
 
 import json
-import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -13,27 +12,21 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pytest import raises
 
 from fourbar import (
-    Bar,
-    FourBar,
     InputError,
     Motion,
     Scene,
     Sweep,
     Tolerance,
-    dump,
     solve,
     uniform,
 )
 from fourbar.effects import (
     Gravity,
-    LinearDrive,
     PinFriction,
-    Place,
 )
 from fourbar.files import loads
 from fourbar.scene import command
 from fourbar.scene.motion import Free, FromLimit
-from fourbar.scene.numbers import Point
 from fourbar.studies.keys import list_entries, read_place, replace_place
 from fourbar.studies.study import vary
 from tests.support.rows import read_rows
@@ -220,25 +213,6 @@ def test_what_cannot_vary_is_refused_in_one_line(motion, values, words):
     with raises(InputError) as caught:
         vary(replace(scene(), motion=motion), values)
     assert words in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_a_key_has_the_unit_that_a_scene_file_has():
-    drive = LinearDrive(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.1)))
-    bars = (Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22))
-    case = replace(
-        scene((*DRIVEN, PinFriction.at(A=(0.1, 0.01)))),
-        linkage=FourBar(0.3, *bars, 0.4),
-        points=(Point("P", 3, (0.1, 0.2)),),
-        drive=drive,
-        drive_bar=None,
-    )
-    written = tomllib.loads(dump(case))
-    for key, number in list_entries(case).items():
-        entry = written
-        for name in key.split("."):
-            entry = entry[int(name) if isinstance(entry, list) else name]
-        unit = entry.partition(" ")[2] if isinstance(entry, str) else "1"
-        assert unit == number.unit, key
 
 
 def test_texts_with_units_are_the_numbers():
