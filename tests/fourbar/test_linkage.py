@@ -4,24 +4,14 @@ import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
 from fourbar import Bar, InputError
 from fourbar.files.scene_file import loads
-from fourbar_validation.engines.protocol import scene_to_json
 
 STEEL = 7850.0
-LENGTHS = (1.0, 0.4, 1.0, 0.8)
 
 
 ROD = {"density": STEEL, "diameter": 0.02}
 PER_LENGTH = {"mass_per_length": 4.2}
-
-
-def make_scene(stated=ROD):
-    d, *moving = LENGTHS
-    bars = (Bar(length, **stated) for length in moving)
-    motion = fourbar.Motion(np.linspace(0.1, 6.0, 5), 2.0)
-    return fourbar.Scene(fourbar.FourBar(d, *bars), motion)
 
 
 def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
@@ -89,11 +79,3 @@ density = "7850 kg/m^3"
     per_length = text.replace('density = "7850 kg/m^3"', 'mass = "0.25 lb/in"')
     with raises(InputError, match=r'mass_per_length = "0\.25 lb'):
         loads(per_length)
-
-
-@pytest.mark.parametrize("stated", [ROD, PER_LENGTH])
-def test_a_file_keeps_the_material_and_an_engine_is_told_the_mass(stated):
-    scene = make_scene(stated)
-    assert loads(fourbar.dump(scene)).linkage == scene.linkage
-    bars = scene_to_json(scene)["bars"]
-    assert bars["input"] == {"mass": scene.linkage.input.mass}

@@ -214,14 +214,6 @@ def test_a_terminal_gets_some_forty_rows():
     assert lines.index(rows[-1]) < lines.index(shown)
 
 
-@pytest.mark.parametrize("width", [40, 80, 120, 400])
-def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing(width):
-    text = tables.print_positions(solve(crank_rocker()), width)
-    table = [line for line in text.split("\n") if not line.startswith("not shown")]
-    assert max(map(len, table)) <= width and "…" not in text and "T2" in text
-    assert ("not shown: " in text) == (width < 400)
-
-
 def test_the_digits_of_the_torque():
     solution = solve(crank_rocker(), "error")
     columns = tables.list_columns(solution)

@@ -18,7 +18,6 @@ from fourbar.effects import Place
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import command_at
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import crank_rocker
@@ -100,9 +99,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
     for name in ("drive_force", "F12", "power"):
         assert np.isnan(getattr(s, name)[lost]).all(), name
     if drive is CROSSES_O2:
-        assert s.drive_condition[0] < 1e-15 and abs(s.stroke_speed[0]) < 1e-15
-        assert s.stroke[0] == approx(0.1)
-        assert solve(scene, at=command_at(scene, np.zeros(1))).status == ["no_lever"]
+        assert s.drive_condition[0] < 1e-15 and s.stroke[0] == approx(0.1)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import fourbar
 from fourbar import Motion, Springs, equilibrium, solve
 from fourbar.effects import Place, Spring
 from fourbar.errors import InputError
-from fourbar.files import dump, loads
+from fourbar.files import loads
 from fourbar.quantities import NO_DIRECTION
 from tests.support.scenes import crank_rocker
 
@@ -99,7 +99,6 @@ def inertia_of_door(theta):
 def test_the_door_is_held_by_what_its_energy_asks():
     """At 40 deg the spring is longer than its free length, at 120 deg shorter."""
     scene = make_door('theta_2 = ["40 deg", "100 deg", "120 deg"]\nomega_2 = "0 rad/s"')
-    assert loads(dump(scene)) == scene
     s = solve(scene)
     step = 1e-5
     right = [

@@ -32,10 +32,8 @@ def assembled(state):
     "lengths",  # no bars alike, or one pair: one alone never stays parallel
     [
         (0.5, 0.4, 0.3, 0.25),
-        (0.5, 0.3, 0.4, 0.3),
         (0.5, 0.6, 0.5, 0.45),
         (0.5, 0.3, 0.3, 0.25),
-        (0.5, 0.6, 0.45, 0.5),
     ],
 )
 @pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20, 1e-40])
@@ -73,12 +71,10 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1)
     """
     link, step = bare(0.3, 0.3, 0.2, 0.2, theta_1), 2.0**-30
     # on it, and so near that e^2 leaves the range of doubles
-    beside = [side * psi for psi in (1e-170, 1e-157) for side in (1.0, -1.0)]
-    for psi in (0.0, *(beside if theta_1 == 0.0 else ())):
-        towards = math.copysign(step, psi)
+    for psi in (0.0, *((1e-170, -1e-170) if theta_1 == 0.0 else ())):
         on, near = (
             compute_state(link, theta_1 + np.array([at, 0.5]), branch, 2.0, 3.0)
-            for at in (psi, towards)
+            for at in (psi, math.copysign(step, psi))
         )
         assert find_singular(on.position).tolist() == [True, False]
         for bar in (3, 4):

@@ -9,36 +9,14 @@ from functools import partial
 
 import numpy as np
 import pytest
-from pytest import approx
 
 import fourbar
-from fourbar import Friction, Gravity, Motion, Viscous, solve
+from fourbar import Friction, Gravity, Motion, Viscous
 from fourbar.effects import Torsion
 from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
-from fourbar.scene import Command
-from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
-
-NUMBER = r"-?[\d.]+(?:e-?\d+)?"
-
-
-def errors(scene, read):
-    """Of T2 and of the pin force at B, by their greatest value in a turn.
-
-    The formulas are at the simulator's own angle, speed and acceleration, and the file
-    drives bar 2 whatever the scene.
-    """
-    q, v, a, torque, force = read
-    scene = replace(scene, drive_bar=2)
-    state = (q[0], 1, v[0], a[0])
-    command = Command(*(np.array([x]) for x in state))
-    expected, turn = solve(scene, at=command), solve(scene)
-    apart = np.hypot(*(force - expected.F43[0])) / np.hypot(*turn.F43.T).max()
-    of_torque = abs(torque - expected.torque[0]) / np.abs(turn.torque).max()
-    return of_torque, float(apart)
-
 
 JOINTS = (Gravity(), Viscous.at(A=0.05), Friction.at(O4=0.1))
 KEPT = crank_rocker(
@@ -125,29 +103,3 @@ AT_B = (Viscous.at(B=1.0),)
 def test_what_a_file_cannot_hold_is_refused(write, scene, words):
     with pytest.raises(LimitError, match=words):
         write(scene)
-
-
-@pytest.mark.parametrize(
-    "write", [write_sdf, partial(write_sdf, reader="drake"), write_usd]
-)
-def test_without_loads_every_model_is_written_and_says_how_to_start(write):
-    for file in list_model_files():
-        scene = fourbar.load(file)
-        text = write(scene, without_loads=True)
-        assert "loads are left out" in text and f"puts on bar {scene.drive_bar}" in text
-        stated = [float(x) for x in re.findall(rf"({NUMBER}) rad", text)][:6]
-        theta_2, omega_2 = stated[0], stated[3]
-        command = Command(
-            np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0
-        )
-        s = solve(scene, "velocity", at=command)
-        assert omega_2 == scene.motion.omega_2
-        expected = [s.theta_3[0], s.theta_4[0], s.omega_3[0] - omega_2, s.omega_4[0]]
-        written = [*stated[1:3], *stated[4:]]
-        assert (
-            np.abs(
-                np.exp(1j * np.array(written[:2])) - np.exp(1j * np.array(expected[:2]))
-            ).max()
-            < 1e-12
-        )
-        assert written[2:] == approx(expected[2:], rel=1e-9)
