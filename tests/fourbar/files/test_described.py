@@ -16,6 +16,7 @@ from fourbar.files import dump, loads
 from fourbar.scene.numbers import find_unit_of_key
 from fourbar.show.plot.symbols import list_acting
 from fourbar.studies.keys import list_entries, read_number
+from tests.support.rows import read_rows
 
 FILE = '''
 from dataclasses import dataclass
@@ -118,34 +119,19 @@ def test_it_is_read_and_written(scene):
 
 @pytest.mark.parametrize(
     "old, new, line",
-    [
-        ("bar = 4\nturns", "bar = 3\nturns", "magnets.bar = 3: must be 2 (in"),
-        ('"2 mm"', "2", "effects.magnets.gap = 2: the unit is missing"),
-        ("turns = 12.0", "", "effects.magnets.turns: is missing"),
-        (
-            "gap =",
-            "gab =",
-            "magnets.gab = '2 mm': unknown key",
-        ),
-        (
-            '"2 lbf"',
-            '"-2 lbf"',
-            "rows[0].pull = '-2 lbf': must be a fini",
-        ),
-        (
-            '"south"',
-            '"west"',
-            "rows[1].pole = 'west': must be \"north\" o",
-        ),
-        (
-            "to = { bar = 1 }",
-            "to = { bar = 4 }",
-            "magnets.rows[0].to.bar = 4: mu",
-        ),
-        ("from_centre", "at", "rows[1].to.at = ["),
-    ],
+    read_rows(r"""
+bar = 4\nturns | bar = 3\nturns | magnets.bar = 3: must be 2 (in
+"2 mm" | 2 | effects.magnets.gap = 2: the unit is missing
+turns = 12.0 |  | effects.magnets.turns: is missing
+gap = | gab = | magnets.gab = '2 mm': unknown key
+"2 lbf" | "-2 lbf" | rows[0].pull = '-2 lbf': must be a fini
+"south" | "west" | rows[1].pole = 'west': must be "north" o
+to = { bar = 1 } | to = { bar = 4 } | magnets.rows[0].to.bar = 4: mu
+from_centre | at | rows[1].to.at = [
+"""),
 )
 def test_a_mistake_is_named_with_its_key(kind, old, new, line):
+    old, new = (text.replace(r"\n", "\n") for text in (old, new))
     assert TEXT.count(old) == 1
     with pytest.raises(InputError) as caught:
         loads(TEXT.replace(old, new))

@@ -14,6 +14,7 @@ from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import load, loads
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
+from tests.support.rows import read_rows
 
 GOOD = """title = "good"
 [lengths]
@@ -55,159 +56,90 @@ things too.
 """
 
 
-MISTAKES = [
-    # what is replaced, by what, words that the line must hold
-    ('title = "good"', "colour = 1", ["colour", "title, source, lengths"]),
-    (
-        'title = "good"',
-        'branch = "open"',
-        ["branch = 'open'", "write it under [motion]"],
-    ),
-    ("omega_2", "omega2", ["motion.omega2", 'did you mean "omega_2"?']),
-    *(
-        (old, f"{word} =", [f'did you mean "{key}"?'])
-        for word, old, key in (
-            ("omega", "omega_2 =", "omega_2"),
-            ("angle", "theta_2 =", "theta_2"),
-            ("pin", "from_pin =", "from_pin"),
-            ("cg", "mass =", "centre"),
-            ("I", "mass =", "inertia"),
-        )
-    ),
-    ("mass =", "radius_of_gyration =", ["write inertia = m k^2, or m (k^2 - r^2)"]),
-    (
-        'from_pin = ["5 cm", "0 deg"]',
-        'point = "B"',
-        ["loads[0].point = 'B'", "a point of [points]", 'from_pin = ["0 m", "0 deg"]'],
-    ),
-    ("[bars.input]", "[bars.imput]", ["bars.imput", 'did you mean "input"?']),
-    ("gravity", "gravitiy", ["effects.gravitiy", 'did you mean "gravity"?']),
-    ("{ O2 =", "{ O3 =", ["effects.viscous.O3", "O2, A, B, O4"]),
-    ('"0.1 m"', '"48 kg"', ["lengths.input", "48 kg", "does not convert to m"]),
-    ('"3 N"', '"3 kg"', ["loads[0].force[0]", "3 kg", "N"]),
-    ('"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", 'did you mean "10 rev/s"?']),
-    ('"0.01 N m s/rad"', '"0.01 N m s"', ["effects.viscous.O2", "N m s/rad"]),
-    ('"0.1 m"', "9 in", ["line 4, column", 'in quotes, like "9 in"']),
-    ('"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
-    ('"0.1 m"', '"nan m"', ["lengths.input", "nan m", "finite"]),
-    ('"0.1 m"', "nan", ["lengths.input", "nan", "finite"]),
-    ('"0.1 m"', '"1e999 m"', ["lengths.input", "1e999 m", "too large"]),
-    ('"0.1 m"', '"-0.1 m"', ["lengths.input", "-0.1 m", "> 0"]),
-    ('"0.1 m"', '"1e-400 m"', ["lengths.input", "> 0"]),
-    ('"0.2 kg"', '"-1 kg"', ["bars.input.mass", "-1 kg", ">= 0"]),
-    (
-        "viscous =",
-        SPRINGS.format("-0.1 m", 4),
-        ["effects.springs[1].length", "-0.1", ">= 0"],
-    ),
-    (
-        "viscous =",
-        SPRINGS.format("0.1 m", "true"),
-        ["springs[1].to.bar", "True", "1 (ground)"],
-    ),
-    (
-        "viscous =",
-        SPRINGS.format('1 m", gas = "', 3),
-        ["springs[1].stiffness", "from, to, acts, gas"],
-    ),
-    ("viscous =", GAS.format(""), ["effects.springs[0].gas.stroke", "missing", "1 m"]),
-    (
-        GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")],
-        "",
-        ["lengths.ground", "missing"],
-    ),
-    ('output = "0.22 m"\n', "", ["lengths.output", "missing"]),
-    ('"0.1 m"', '"10 m"', ["lengths", "never close"]),
-    (
-        '"open"',
-        '"opne"',
-        ["motion.branch", "opne", 'did you mean "open"?', '"crossed"'],
-    ),
-    ('"open"', "1", ["motion.branch", '"open" or "crossed"']),
-    (
-        "[drive]\nbar = 2",
-        "[drive]\nbar = 1",
-        ["drive.bar", "1", "must be 2 (input), 3 (coupler) or 4"],
-    ),
-    ("[drive]\nbar = 2", '[drive]\nbar = "2"', ["drive.bar", "'2'"]),
-    (
-        'force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n',
-        "",
-        ["loads[0]", "force"],
-    ),
-    (
-        'force = ["3 N", "40 deg"]\nfrom_pin',
-        'moment = "1 N m"\narm',
-        ["loads[0].arm", "needs a force"],
-    ),
-    ('["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
-    ('["3 N", "40 deg"]', '{ x = "1 N" }', ["loads[0].force.y", "is missing"]),
-    (
-        '["3 N", "40 deg"]',
-        '["3 N", "down"]',
-        ["loads[0].force[1]", 'did you mean "-90 deg"?'],
-    ),
-    ('force = ["3 N", "40 deg"]', 'torque = "1 N m"', ["loads[0].torque", '"moment"?']),
-    ('"60 deg"', '"60"', ["motion.theta_2", 'did you mean "60 deg"?']),
-    (
-        '"60 deg"',
-        '"60 Grad"',
-        ["motion.theta_2", '"Grad" is not known; did you mean "60 deg"?'],
-    ),
-    ("[[loads]]", "[loads]", ["loads", "[[loads]]"]),
-    (
-        '["9.81 m/s^2", "-90 deg"]',
-        '"9.81 m/s^2"',
-        ["effects.gravity", 'like gravity = ["9.81 m/s^2", "-90 deg"]'],
-    ),
-    ('"60 deg"', '"0 deg to 360 deg"', ["motion.theta_2", "steps = 360 }"]),
-    (
-        "[drive]",
-        '[drive]\ntorque = "5 N m"',
-        ["drive.torque", "is a load", "motion.free"],
-    ),
+MISTAKES = read_rows(r"""
+title = "good" | colour = 1 | colour | title, source, lengths
+title = "good" | branch = "open" | branch = 'open' | write it under [motion]
+omega_2 | omega2 | motion.omega2 | did you mean "omega_2"?
+omega_2 = | omega = | did you mean "omega_2"?
+theta_2 = | angle = | did you mean "theta_2"?
+from_pin = | pin = | did you mean "from_pin"?
+mass = | cg = | did you mean "centre"?
+mass = | I = | did you mean "inertia"?
+mass = | radius_of_gyration = | write inertia = m k^2, or m (k^2 - r^2)
+[bars.input] | [bars.imput] | bars.imput | did you mean "input"?
+gravity | gravitiy | effects.gravitiy | did you mean "gravity"?
+{ O2 = | { O3 = | effects.viscous.O3 | O2, A, B, O4
+"0.1 m" | "48 kg" | lengths.input | 48 kg | does not convert to m
+"3 N" | "3 kg" | loads[0].force[0] | 3 kg | N
+"10 rad/s" | "10 Hz" | motion.omega_2 | 10 Hz | did you mean "10 rev/s"?
+"0.01 N m s/rad" | "0.01 N m s" | effects.viscous.O2 | N m s/rad
+"0.1 m" | 9 in | line 4, column | in quotes, like "9 in"
+"0.1 m" | 0.1 | lengths.input | 0.1 | with a unit
+"0.1 m" | "nan m" | lengths.input | nan m | finite
+"0.1 m" | nan | lengths.input | nan | finite
+"0.1 m" | "1e999 m" | lengths.input | 1e999 m | too large
+"0.1 m" | "-0.1 m" | lengths.input | -0.1 m | > 0
+"0.1 m" | "1e-400 m" | lengths.input | > 0
+"0.2 kg" | "-1 kg" | bars.input.mass | -1 kg | >= 0
+output = "0.22 m"\n |  | lengths.output | missing
+"0.1 m" | "10 m" | lengths | never close
+"open" | "opne" | motion.branch | opne | did you mean "open"? | "crossed"
+"open" | 1 | motion.branch | "open" or "crossed"
+[drive]\nbar = 2 | [drive]\nbar = "2" | drive.bar | '2'
+force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n |  | loads[0] | force
+["3 N", "40 deg"] | "3 N" | loads[0].force | pair
+["3 N", "40 deg"] | { x = "1 N" } | loads[0].force.y | is missing
+["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force[1] | did you mean "-90 deg"?
+force = ["3 N", "40 deg"] | torque = "1 N m" | loads[0].torque | "moment"?
+"60 deg" | "60" | motion.theta_2 | did you mean "60 deg"?
+"60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known; did you mean "60 deg"?
+[[loads]] | [loads] | loads | [[loads]]
+"60 deg" | "0 deg to 360 deg" | motion.theta_2 | steps = 360 }
+[drive] | [drive]\ntorque = "5 N m" | drive.torque | is a load | motion.free
+bar = 4 | bar = 4\nframe = "body" | loads[0].frame | "world" or "bar"
+"60 deg" | { from = "0 deg", steps = 9 } | motion.theta_2.to | missing
+"60 deg" | { from = "0 deg", to = "9 deg", steps = 1.5 } | motion.theta_2.steps | 1.5
+"60 deg" | { limit = 1, from = "0 deg" } | motion.theta_2.from | limit, offset
+"60 deg" | { limit = 1 } | motion.theta_2.limit | no limit positions
+branch = "open" | free = { steps = 3 } | motion.free.duration | missing
+"good" | "good | TOML | line 1
+from_pin = ["5 cm", "0 deg"] | point = "B" | loads[0].point = 'B' | a point of [points]
+[drive]\nbar = 2 | [drive]\nbar = 1 | drive.bar | must be 2 (input), 3 (coupler) or 4
+force = ["3 N", "40 deg"]\nfrom_pin | moment = "1 N m"\narm | .arm | needs a force
+["9.81 m/s^2", "-90 deg"] | "9.81 m/s^2" | like gravity = ["9.81 m/s^2", "-90 deg"]
+""")
+"""What is replaced, by what, and words that the line must hold."""
+LENGTHS = GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")]
+ACROSS_LINES = [
+    ("viscous =", SPRINGS.format("-0.1 m", 4), "effects.springs[1].length", ">= 0"),
+    ("viscous =", SPRINGS.format("1 m", "true"), "springs[1].to.bar", "1 (ground)"),
+    ("viscous =", SPRINGS.format('1 m", gas = "', 3), "from, to, acts, gas"),
+    ("viscous =", GAS.format(""), "effects.springs[0].gas.stroke", "missing", "1 m"),
     (
         "bar = 4",
         'bar = 4\ntable = { time = ["0 s", "1 s"], factor = [0.0, 1.0] }',
-        ["loads[0].table.time", "follows theta_2, not time", "--drive motor"],
+        "follows theta_2, not time",
+        "--drive motor",
     ),
-    ("bar = 4", 'bar = 4\nframe = "body"', ["loads[0].frame", '"world" or "bar"']),
-    ('"60 deg"', '{ from = "0 deg", steps = 9 }', ["motion.theta_2.to", "missing"]),
-    (
-        '"60 deg"',
-        '{ from = "0 deg", to = "9 deg", steps = 1.5 }',
-        ["motion.theta_2.steps", "1.5"],
-    ),
-    (
-        '"60 deg"',
-        '{ limit = 1, from = "0 deg" }',
-        ["motion.theta_2.from", "limit, offset"],
-    ),
-    ('"60 deg"', "{ limit = 1 }", ["motion.theta_2.limit", "no limit positions"]),
-    ('branch = "open"', "free = { steps = 3 }", ["motion.free.duration", "missing"]),
-    (
-        GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")],
-        "lengths = 3\n",
-        ["lengths", "table"],
-    ),
-    ('"good"', "0x" + "f" * 5000, ["title", "huge whole number"]),
-    ('"good"', "1" * 5000, ["TOML"]),
-    ('"good"', '"good', ["TOML", "line 1"]),
-    ('"good"', "[" * 20000, ["TOML", "deep"]),
-    ('title = "good"', '"a\\nb\\u001b[31m" = 1', ["'a\\nb\\x1b[31m'", "unknown key"]),
-    ('"open"', '"\\n\\u001b[2J\\u202e"', ["motion.branch", "\\x1b", "\\u202e"]),
-    ('title = "good"', "k" * 50000 + " = 1", ["unknown key"]),
-    (GOOD, "<mujoco/>", ["TOML", "line 1, column 1 = '<mujoco/>'"]),
-    (
-        GOOD,
-        'title = "a"\n\n[lengths\nground = "1 m"\n',
-        ["line 3, column 9 = '[lengths'"],
-    ),
+    (LENGTHS, "", "lengths.ground", "missing"),
+    (LENGTHS, "lengths = 3\n", "lengths", "table"),
+    ('"good"', "0x" + "f" * 5000, "title", "huge whole number"),
+    ('"good"', "1" * 5000, "TOML"),
+    ('"good"', "[" * 20000, "TOML", "deep"),
+    ('title = "good"', '"a\\nb\\u001b[31m" = 1', "'a\\nb\\x1b[31m'", "unknown key"),
+    ('"open"', '"\\n\\u001b[2J\\u202e"', "motion.branch", "\\x1b", "\\u202e"),
+    ('title = "good"', "k" * 50000 + " = 1", "unknown key"),
+    (GOOD, "<mujoco/>", "TOML", "line 1, column 1 = '<mujoco/>'"),
+    (GOOD, 'title = "a"\n\n[lengths\nground = 1', "line 3, column 9 = '[lengths'"),
 ]
 
 
-@pytest.mark.parametrize("old, new, words", MISTAKES)
-def test_a_mistake_in_a_scene_file(old, new, words):
+@pytest.mark.parametrize(
+    "mistake",
+    [*([cell.replace(r"\n", "\n") for cell in row] for row in MISTAKES), *ACROSS_LINES],
+)
+def test_a_mistake_in_a_scene_file(mistake):
+    old, new, *words = mistake
     assert GOOD.count(old) >= 1
     started = time.process_time()
     with raises(InputError) as caught:
@@ -271,35 +203,25 @@ def test_hostile_names(name, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "arguments, words",
-    [
-        (["mjcf"], ["scene file or --lengths"]),
-        (["mjcf", "x.toml", "--lengths", "1", "1", "1", "1"], ["one of the two"]),
-        (["mjcf", "x.toml", "--omega", "1"], ["--omega goes with --lengths"]),
-        (["usd"], ["one of the two"]),
-        (["mjcf", "--lengths", "0.3", "0.1", "0.25"], ["Missing option"]),
-        (
-            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "-1"],
-            ["length of output", "> 0"],
-        ),
-        (
-            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "2 kg"],
-            ["length of output", "2 kg"],
-        ),
-        (
-            ["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "1 Hz"],
-            ["--omega", "1 Hz"],
-        ),
-        *(
-            (["classify", *lengths.split()], [])
-            for lengths in ("x", "1 1 1", "1 1 1 1s")
-        ),
-        (["analyse"], ["analyse"]),
-        (["analyze"], ["SCENE"]),
-        (["analyze", "x.toml", "--xml"], ["--xml"]),
-    ],
+    read_rows("""
+mjcf | scene file or --lengths
+mjcf x.toml --lengths 1 1 1 1 | one of the two
+mjcf x.toml --omega 1 | --omega goes with --lengths
+usd | one of the two
+mjcf --lengths 0.3 0.1 0.25 | Missing option
+mjcf --lengths 0.3 0.1 0.25 -1 | length of output
+mjcf --lengths 0.3 0.1 0.25 2kg | length of output
+mjcf --lengths 0.3 0.1 0.25 0.2 --omega 1Hz | --omega
+classify x |
+classify 1 1 1 |
+classify 1 1 1 1s |
+analyse | analyse
+analyze | SCENE
+analyze x.toml --xml | --xml
+"""),
 )
 def test_bad_arguments(arguments, words, tmp_path, capsys):
-    refused(arguments, words, tmp_path, capsys)
+    refused(arguments.split(), [words], tmp_path, capsys)
 
 
 @pytest.mark.parametrize(
@@ -385,23 +307,23 @@ viscous = { O2 = "0.01 N cm s/deg", A = "3 N cm s/deg" }
 
 @pytest.mark.parametrize(
     "old, new, meant",
-    [
-        ('coupler = "40 in"', "coupler = 40", "40 in"),
-        ('coupler = "40 in"', 'coupler = "40"', "40 in"),
-        # the nearest number of its kind stands in another table
-        ('mass = "300 g"', "mass = 300", "300 g"),
-        ('inertia = "3 kg cm^2"', "inertia = 3", "3 kg cm^2"),
-        ('to = "2 rad"', "to = 2", "2 rad"),
-        ('["40 mm", "0.2 rad"]', '[40, "0.2 rad"]', "40 mm"),
-        ('moment = "4 N cm"', "moment = 4", "4 N cm"),
-        # the table's own comes before those of other loads, in the file's order
-        ('["2 lbf", "0.1 rad"]', '[2, "0.1 rad"]', "2 kgf"),
-        ('["2 lbf", "0.1 rad"]', '["2 lbf", 5]', "5 rad"),
-        ('A = "3 N cm s/deg"', "A = 3", "3 N cm s/deg"),
-        ('"lengths.coupler" = "0.02 mm"', '"lengths.coupler" = 0.02', "0.02 mm"),
-        # no number of the file is a speed of rotation
-        ('omega_2 = "2 deg/s"', "omega_2 = 60", "60 rpm"),
-    ],
+    read_rows("""
+coupler = "40 in" | coupler = 40 | 40 in
+coupler = "40 in" | coupler = "40" | 40 in
+# the nearest number of its kind stands in another table
+mass = "300 g" | mass = 300 | 300 g
+inertia = "3 kg cm^2" | inertia = 3 | 3 kg cm^2
+to = "2 rad" | to = 2 | 2 rad
+["40 mm", "0.2 rad"] | [40, "0.2 rad"] | 40 mm
+moment = "4 N cm" | moment = 4 | 4 N cm
+# the table's own comes before those of other loads, in the file's order
+["2 lbf", "0.1 rad"] | [2, "0.1 rad"] | 2 kgf
+["2 lbf", "0.1 rad"] | ["2 lbf", 5] | 5 rad
+A = "3 N cm s/deg" | A = 3 | 3 N cm s/deg
+"lengths.coupler" = "0.02 mm" | "lengths.coupler" = 0.02 | 0.02 mm
+# no number of the file is a speed of rotation
+omega_2 = "2 deg/s" | omega_2 = 60 | 60 rpm
+"""),
 )
 def test_a_number_without_a_unit_is_suggested_in_that_of_its_neighbours(
     old, new, meant

@@ -33,6 +33,7 @@ from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, command_at, with_signs
+from tests.support.rows import read_rows
 from tests.support.scenes import bare
 from tests.support.shares import slow_but
 
@@ -245,29 +246,17 @@ def test_rates_that_belong_to_no_angle_are_refused(motion, said):
 
 @pytest.mark.parametrize(
     "lines, said",
-    [
-        (
-            'theta_2 = "1 rad"\ntheta_4 = "1 rad"',
-            "motion.theta_4 = 1.0: theta_2 commands bar 2; one bar is commanded",
-        ),
-        ('theta_4 = "1 rad"\nomega_2 = "1 rad/s"', "motion.theta_4"),
-        ('theta_3 = "1 m"', "motion.theta_3"),
-        (
-            'theta_4 = "1 rad"\nlaw = { time = ["0 s"], theta_4 = ["0 rad"] }',
-            "motion.law",
-        ),
-        (
-            (
-                'law = { time = ["0 s", "1 s"], theta_2 = ["0 rad", "1 rad"],'
-                ' theta_3 = ["0 rad", "1 rad"] }'
-            ),
-            "motion.law",
-        ),
-    ],
+    read_rows(r"""
+theta_2 = "1 rad"\ntheta_4 = "1 rad" | motion.theta_4 = 1.0: theta_2 commands bar 2; one
+theta_4 = "1 rad"\nomega_2 = "1 rad/s" | motion.theta_4
+theta_3 = "1 m" | motion.theta_3
+theta_4 = "1 rad"\nlaw = { time = ["0 s"], theta_4 = ["0 rad"] } | motion.law
+law = { time = ["0 s"], theta_2 = ["0 rad"], theta_3 = ["0 rad"] } | motion.law
+"""),
 )
 def test_two_commands_of_motion_are_one_line(lines, said):
     with raises(InputError) as refused:
-        fourbar.files.loads(TWO + lines)
+        fourbar.files.loads(TWO + lines.replace(r"\n", "\n"))
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 

@@ -3,6 +3,7 @@ drive. The second derivation is in 40 digits: circles that meet, their first and
 second derivatives, and the moments of one bar about its ground pin.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import mpmath as mp
@@ -32,6 +33,10 @@ LOCATED = 1e-9
 def many_digits():
     with mp.workdps(40):
         yield
+
+
+def solve_at(places):
+    return solve(replace(SCENE, motion=SCENE.motion.replace(angle=places)))
 
 
 def move_output(theta_2):
@@ -81,6 +86,31 @@ def bend_input():
 
 def bend_output(theta_2):
     return float(bend(SCENE.linkage.output, *move_output(mp.mpf(theta_2))))
+
+
+def find_pole(low, high):
+    """Place at which the force of the drive changes its sign."""
+    for _ in range(6):
+        places = np.linspace(low, high, 101)
+        force = solve_at(places).drive_force
+        step = int(np.flatnonzero(force[:-1] * force[1:] < 0.0)[0])
+        low, high = places[step : step + 2]
+    return 0.5 * (low + high)
+
+
+@pytest.mark.parametrize("low, high", [(1.0, 1.1), (3.7, 3.8)])
+def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
+    distances = np.logspace(-2, -12, 11)
+    places = find_pole(low, high) + np.concatenate([-distances, distances])
+    solution = solve_at(places)
+    assert np.hypot(*solution.F12.T).max() > 1e9 and solution.assembled.all()
+    input_bar, output_bar = (
+        np.abs(fourbar.internal_forces(SCENE, solution, bar).largest.moment)
+        for bar in (2, 4)
+    )
+    assert input_bar == approx(bend_input(), rel=ROUNDED, abs=0.0)
+    expected = [bend_output(place) for place in places]
+    assert output_bar == approx(expected, rel=ROUNDED, abs=0.0)
 
 
 @pytest.mark.slow
