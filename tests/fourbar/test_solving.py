@@ -28,6 +28,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.errors import InputError
+from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from fourbar.scene import Scene
@@ -35,7 +36,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.numbers import Point
 from fourbar.show.plot import draw
 from fourbar.solving import solve
-from tests.support.scenes import bare
+from tests.support.scenes import bare, crank_rocker
 
 EXAMPLES = settings(
     max_examples=120,
@@ -298,3 +299,18 @@ def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path):
     with raises(InputError, match=said):
         draw(scene, tmp_path / "figure.svg", "freebody")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_blocks_of_a_sweep_are_solved_like_its_positions():
+    """Ends of two blocks, with error bars too, whose blocks are shorter."""
+    few = crank_rocker(motion=Motion(np.linspace(0.1, 6.0, 7), 10.0, 5.0))
+    for stage in ("force", "error"):
+        n = POSITIONS_OF_A_BLOCK // {"force": 1, "error": 4}[stage]
+        rows = np.resize(np.arange(7), n + 5)
+        many = replace(few, motion=few.motion.replace(angle=few.motion.angle[rows]))
+        ends = np.array([0, n - 1, n, n + 4])
+        blocks, alone = solve(many, stage), solve(few, stage)
+        for name in alone.evaluated():
+            together, right = blocks[name][ends], alone[name][rows[ends]]
+            if not name.startswith("theta"):  # a sweep counts whole turns
+                assert together == approx(right, rel=1e-12, abs=1e-12), name
