@@ -561,6 +561,9 @@ def test_a_weaker_rule_stands_before_a_verdict_that_holds():
     assert summary.good
     summary.overview.weaker = ["mine: factor 1e-14 -> 0.01", "mine: class a -> b"]
     summary.overview.baseline = "last night"
+    summary.overview.gone = ["engine b"]
+    assert summary.headline.startswith("GONE: engine b, against last night. WEAKER")
+    summary.overview.gone = []
     assert not summary.good
     assert summary.headline.startswith(
         "WEAKER RULE: mine: factor 1e-14 -> 0.01, and 1 more, against last night. All 1"

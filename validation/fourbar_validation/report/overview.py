@@ -186,6 +186,8 @@ class Overview:
         """State of the named failure in the run that this one is held against."""
         self.weaker: list[str] = []
         """Rules that are weaker than in that run."""
+        self.gone: list[str] = []
+        """Engines that it had and this run lacks."""
         self.baseline = ""
         """That run in words."""
         self.declared: dict[str, float] = {}

@@ -250,10 +250,16 @@ class Summary:
     def headline(self) -> str:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
         words = self._say_first_cause()
-        if weaker := self.overview.weaker:
-            more = f", and {len(weaker) - 1} more" if len(weaker) > 1 else ""
-            rules = f"{weaker[0]}{more}, against {self.overview.baseline}"
-            return f"WEAKER RULE: {rules}. {words}"
+        overview = self.overview
+        for heading, lost in (
+            ("WEAKER RULE", overview.weaker),
+            ("GONE", overview.gone),
+        ):
+            if lost:
+                more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
+                words = (
+                    f"{heading}: {lost[0]}{more}, against {overview.baseline}. {words}"
+                )
         return words
 
     def _say_first_cause(self) -> str:
@@ -307,9 +313,9 @@ class Summary:
     def good(self) -> bool:
         """Return whether everything that was to be compared holds.
 
-        All was compared, and by no weaker rule.
+        All was compared, by no weaker rule, and no engine is gone.
         """
-        if self.overview.weaker:
+        if self.overview.weaker or self.overview.gone:
             return False
         return self.counts.status == HOLDS and not self.missing
 

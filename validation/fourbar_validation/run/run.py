@@ -20,6 +20,7 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.regression.engines import list_gone
 from fourbar_validation.regression.history import (
     collect_history,
     find_since,
@@ -147,6 +148,7 @@ def write_outcome(
             overview.since = f"It {since[key]}."
         weakened = list_weakened(before.about.rules, about.rules)
         overview.weaker = [f"{rule}" for rule in weakened]
+        overview.gone = list_gone(before.about, about)
         overview.baseline = before.describe()
     write_text(out / "report.md", write_summary_page(summary))
     sections = collect_sections(
