@@ -63,7 +63,7 @@ def find_load(
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
     gear = model.actuator_gear[actuator, :3]
     forces = data.actuator_force
-    return lambda: axes @ gear * forces[actuator]
+    return lambda: axes.dot(gear) * forces[actuator]
 
 
 def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
