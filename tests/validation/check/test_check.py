@@ -767,26 +767,6 @@ def noise(seed, values):
     return np.random.default_rng(seed).normal(size=values.shape)
 
 
-def test_nonsense_and_a_single_number_are_explained_by_nothing(judged, read):
-    """Of one torque every mass and every load would be the cause.
-
-    Without gravity it is 0.292 N m, which two digits tell from nothing.
-    """
-    few = judge_table(OURS, read("theta_2 [deg],torque\n60,0.29\n"))
-    assert few.differing and not few.explanations
-    numbers = right(OURS)
-    wild = numbers | {name: noise(3, numbers[name]) for name in FORCES}
-    assert judged(OURS, wild, FORCES).explanations == []
-    one = {name: values[:1] for name, values in numbers.items()}
-    one["torque"] = 1.01 * one["torque"]
-    judgement = judged(
-        OURS,
-        one,
-        ("torque", "omega_4"),
-    )
-    assert len(judgement.differing) == 1 and not judgement.explanations
-
-
 @pytest.mark.parametrize("row", ["1e308,1e308", "1,1e-99999999", "\n0.8,1"])
 def test_a_number_of_any_size_is_judged_without_a_warning(row, check):
     """The last is a position at which the linkage does not assemble."""

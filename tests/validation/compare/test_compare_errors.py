@@ -122,16 +122,6 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
     for torque in (FORMULAS.torque, moved("torque", FIRST, math.nan)):
         rows = compare(make_answer(np.arange(POSITIONS) != FIRST, torque=torque))
         assert list_failing(rows) == {"assembled"}
-    longer = crank_rocker(linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
-    solution = fourbar.solve(longer, "position")
-    assert not solution.assembled.all() and solution.assembled.any()
-    answer = Answer(
-        "other",
-        "exact",
-        solution.at,
-        np.ones(len(solution), dtype=bool),
-    )
-    assert compare(answer, longer, solution, ())["assembled"].failed
 
 
 def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row():
@@ -148,20 +138,6 @@ def test_neither_side_chooses_what_it_is_allowed(shrunk):
     answer = make_answer(**({"torque": small} if shrunk == "answer" else {}))
     row = compare(answer, SCENE, formulas)["torque"]
     assert row.failed and row.error > 0.9 and row.error / row.allowed > 1e12
-    # an answer without rates has no terms of its own: the reference stands in
-    if shrunk == "formulas":
-        for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
-            del answer.quantities[name]
-        held = Demands(EQUIVALENCE, ("torque",))
-        alone = Comparison(
-            "scene",
-            SCENE,
-            answer,
-            formulas,
-            held,
-            FORMULAS,
-        ).rows()
-        assert [r for r in alone if r.quantity == "torque"] == [row]
 
 
 @pytest.mark.parametrize("left", (1e-1, 1e-2, 1e-4))

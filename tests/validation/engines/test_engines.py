@@ -457,17 +457,6 @@ def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(name, key, monke
     assert shown == set() if key in OWN.get(name, ()) else "torque" in shown
 
 
-@present("exudyn-constraints")
-def test_a_fault_in_an_element_of_exudyn_shows(name, monkeypatch):
-    from fourbar_lab.engines.exudyn_elements import ELEMENT_OF
-
-    assert ELEMENT_OF.keys() == OWN[name]
-    for key in OWN[name]:
-        monkeypatch.setitem(ELEMENT_OF, key, twice(ELEMENT_OF[key]))
-        shown = {quantity for quantity, _ in failures(name, scene(key))}
-        assert {"F43", "torque"} <= shown, key
-
-
 @each_engine
 @pytest.mark.parametrize("index", [63, 97])
 def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):

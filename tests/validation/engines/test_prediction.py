@@ -203,30 +203,16 @@ def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():
     solution = fourbar.solve(driven, "force")
     mask = np.arange(len(command.theta_2)) == 20
     assert solution.drive_condition is not None and solution.drive_condition[20] > 0.1
+
+    def predict(scene, quantity):
+        return predict_from_data(scene, command, quantity, mask)
+
     for quantity in ("theta_3", "omega_4", "a_G3"):
-        predicted = predict_from_data(
-            driven,
-            command,
-            quantity,
-            mask,
-        )
-        np.testing.assert_array_equal(
-            predicted,
-            predict_from_data(
-                turned,
-                command,
-                quantity,
-                mask,
-            ),
-        )
+        both = (predict(scene, quantity) for scene in (driven, turned))
+        np.testing.assert_array_equal(*both)
     for quantity in ("drive_force", "F12", "stroke_speed"):
         size = magnitude(getattr(solution, quantity))[20]
-        predicted = predict_from_data(
-            driven,
-            command,
-            quantity,
-            mask,
-        )[20]
+        predicted = predict(driven, quantity)[20]
         assert 4.0 * EPS * size < predicted < 1e3 * EPS * size, quantity
     engine = next(engine for engine in ENGINES if engine.name == "free-body")
     answer = FreeBody().answer(driven, command)

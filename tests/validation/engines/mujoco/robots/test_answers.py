@@ -47,11 +47,6 @@ def test_a_torque_is_none_because_pin_forces_grow_beside_a_change_point(torque):
     assert scales["torque"] == pytest.approx(max(torque))
 
 
-def test_where_nothing_acts_there_is_no_scale():
-    sizes = dict.fromkeys(("torque", *FORCES), np.zeros(2))
-    assert not any(find_scales(sizes, CONDITIONS, 0.5).values())
-
-
 def test_an_error_is_over_its_scale():
     assert divide(1.0, 4.0) == 0.25
     assert divide(0.0, 0.0) == 0.0

@@ -76,9 +76,8 @@ class WholeRobot:
         for _ in range(50):
             residual, jacobian = self.closure(qpos)
             step = np.linalg.lstsq(jacobian[:, self.others], -residual, rcond=1e-9)[0]
-            for dof, change in zip(self.others, step, strict=True):
-                pin = next(p for p, d in self.dofs.items() if d == dof)
-                qpos[self.addresses[pin]] += change
+            passive = [pin for pin in self.dofs if pin != "O2"]
+            qpos[[self.addresses[pin] for pin in passive]] += step
             if np.abs(step).max() < 1e-14:
                 break
         return qpos
@@ -153,7 +152,7 @@ class WholeRobot:
         forces = {self.loop.cut: multipliers[:3]}
         for pin, joint in self.loop.hinges.items():
             body = int(model.jnt_bodyid[joint])
-            forces[pin] = data.cfrc_int[body, 3:] + data.xfrc_applied[body, :3] * 0.0
+            forces[pin] = data.cfrc_int[body, 3:]
         return {
             pin: float(np.linalg.norm(force - (force @ axis) * axis))
             for pin, force in forces.items()

@@ -95,16 +95,7 @@ def test_a_stated_joint_stays_and_the_loop_closes_around_it():
     ankle = posed.data.qpos[model.joint("ankle").qposadr[0]]
     low, high = model.joint("ankle").range
     assert low <= ankle <= high
-    still = [
-        0,
-        1,
-        2,
-        3,
-        4,
-        5,
-        6,
-        *(model.joint(n).qposadr[0] for n in ("hip_roll", "toe")),
-    ]
+    still = [*range(7), *(model.joint(n).qposadr[0] for n in ("hip_roll", "toe"))]
     assert np.array_equal(posed.data.qpos[still], model.qpos0[still])
     assert any(re.search(r"rod by \S+ deg, ankle by", note) for note in posed.notes)
 
