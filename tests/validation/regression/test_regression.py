@@ -880,7 +880,7 @@ def test_what_is_too_long_for_a_text_and_a_history_is_compared_and_accepted(
                 name = f"random-0-{k:09d}"
                 columns.add([changed(scene=name, condition=1e-3, error=error)])
         write_about(HERE, folder)
-        assert not (folder / TABLE).exists()
+        assert not (folder / TABLE).exists() and len(columns.first_lines) <= 40
     code, lines = compare(old, new)
     assert code == FAILED and lines[-1].startswith("100 regressions against")
     assert accepts(new) == HOLDS
