@@ -24,11 +24,13 @@ from fourbar import Free, Motion, Sweep
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import NO_POSITION, NO_VALUE
 from fourbar_validation.compare.rows import (
     AGREES,
     FAILS,
     FORMULAS,
     REFUSES,
+    UNDECIDED,
     Row,
     write_rows,
 )
@@ -430,6 +432,7 @@ DEAD = Row.unmeasured(
     FAILS,
     "exit status 3 after 4 s",
 )
+ALARM = Row.unmeasured("a", "mine", "", "watch", FAILS, "3 resets")
 UNKNOWN = "no known mistake explains it"
 CAUSES = [
     ([fail(OF_MINE)], f"torque differs, pin forces and motion agree; {UNKNOWN}"),
@@ -456,6 +459,7 @@ CAUSES = [
         "no number at any position",
     ),
     ([fail(OF_MINE, 1e6), DEAD], "no answer: exit status 3 after 4 s"),
+    ([fail(OF_MINE), ALARM], "alarm: 3 resets"),
 ]
 
 
@@ -541,19 +545,33 @@ def refuse(scene, reason):
 
 def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
     """Reasons that differ in their numbers alone are one."""
-    rows = [refuse(f"s{k}", f"2 of {k} signs were predicted") for k in (7, 8, 9)]
+    rows = [refuse(f"s{k}", f"signs {[1] * k} are lost") for k in (2, 3, 4)]
     rows.append(refuse("s", "it reads no cylinder"))
     alike = [refuse(f"s{k}", "4 bars, not 5") for k in (1, 2)]
     for refusals, words in (
         (
             rows,
-            "(3 scenes): 2 of 7 signs were predicted (and 2 more like it, with other"
+            "(3 scenes): signs [1, 1] are lost (and 2 more like it, with other"
             " numbers)",
         ),
         (alike, "(2 scenes): 4 bars, not 5"),
     ):
         summary = summary_of(record_of(row.scene, [row]) for row in refusals)
         assert summary.overview.silent == [f"theirs: nothing compared {words}"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "reason", "kind"),
+    [
+        (REFUSES, "nothing acts", "at declared limits of an engine"),
+        (REFUSES, f"{NO_VALUE}: 1 singular", "where the formulas state no value"),
+        (UNDECIDED, "eps/condition = 0.1", "with no digit left to decide by"),
+        (UNDECIDED, f"{NO_POSITION} both", "at no position that both answer"),
+    ],
+)
+def test_what_was_not_compared_is_counted_by_its_reason(verdict, reason, kind):
+    row = replace(OF_MINE, quantity="torque_inertia", verdict=verdict, reason=reason)
+    assert summary_of([record_of("a", [row])]).overview.not_compared == {kind: 1}
 
 
 def test_a_weaker_rule_stands_before_a_verdict_that_holds():

@@ -113,6 +113,7 @@ speed of the drive vanishes.
 """
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NO_POSITION = "no position at which"
+NO_VALUE = "the formulas state no value"
 NOT_DEMANDED = f"{NO_POSITION} it is demanded"
 NOWHERE = "no number at any position"
 
@@ -395,7 +396,7 @@ class Comparison:
             if counts[i] < closed:
                 unstated = _count(code[self._closed & ~stated[i]])
                 if not counts[i]:
-                    reason = f"the formulas state no value: {unstated}"
+                    reason = f"{NO_VALUE}: {unstated}"
                     judged.rows[quantity] = self._unmeasured(quantity, REFUSES, reason)
                     continue
                 note += f"; not judged: {unstated}"

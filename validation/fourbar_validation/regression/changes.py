@@ -38,7 +38,7 @@ from fourbar_validation.regression.scenes import (
     find_renamed,
     list_scene_changes,
 )
-from fourbar_validation.report.words import NUMBER_IN_A_REASON
+from fourbar_validation.report.words import NUMBERS_IN_A_REASON
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
@@ -271,7 +271,7 @@ class Differences:
             .groupby("engine")
             .scene.nunique()
         )
-        same = lines.cause.str.replace(NUMBER_IN_A_REASON, "#", regex=True)
+        same = lines.cause.str.replace(NUMBERS_IN_A_REASON, "#", regex=True)
         groups = [
             Group(
                 Kind(some.kind.iloc[0]),

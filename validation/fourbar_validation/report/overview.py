@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from fourbar.errors import abbreviate, write_count
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
-from fourbar_validation.compare.compare import NO_POSITION, NOWHERE
+from fourbar_validation.compare.compare import NO_POSITION, NO_VALUE, NOWHERE
 from fourbar_validation.compare.rows import (
     FORMULAS,
     HOLDING_VERDICTS,
@@ -22,7 +22,7 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.report.words import NUMBER_IN_A_REASON, AlikeTexts
+from fourbar_validation.report.words import NUMBERS_IN_A_REASON, AlikeTexts
 
 TORQUE_GROUP = "torque"
 PIN_FORCE_GROUP = "pin forces"
@@ -55,20 +55,23 @@ _MOST_LISTED = len(PIN_FORCES) + 1
 _LONGEST_QUOTE = 60
 """Characters that are printed of what an engine said."""
 OTHER_CAUSES = "other causes"
-NO_ANSWER_PREFIX = "no answer: "
-"""Beginning of the cause of an engine that broke down."""
+_TOLD_BY = {"all": "no answer: ", "watch": "alarm: "}
+"""Quantities whose reason is the cause, and how it begins."""
 ERROR_OF_MISSING_DIGITS = 1e-5
 """Largest error, relative to a quantity's scale, of an engine that lacks digits and not
 an equation.
 """
-AT_A_LIMIT, _NO_VALUE, _NO_DIGITS, _NOWHERE, _DOES_NOT_APPLY = (
-    "at declared limits of an engine",
-    "where the formulas state no value",
-    "with no digit left to decide by",
-    "at no position that both answer",
-    "where a check does not apply",
-)
-"""Kinds of what was not compared."""
+_NOT_COMPARED = {
+    REFUSES: "at declared limits of an engine",
+    UNDECIDED: "with no digit left to decide by",
+}
+"""Kinds of what was not compared, by verdict."""
+_BY_REASON = {
+    NO_VALUE: "where the formulas state no value",
+    NO_POSITION: "at no position that both answer",
+}
+"""Those that the reason tells."""
+_DOES_NOT_APPLY = "where a check does not apply"
 
 
 @dataclass(slots=True)
@@ -221,11 +224,9 @@ class Overview:
         return self._lines.setdefault(engine, OverviewLine(engine, engine))
 
     def _add_row(self, row: Row) -> None:
-        if row.verdict == REFUSES:
-            self.not_compared[AT_A_LIMIT if row.quantity == "all" else _NO_VALUE] += 1
-        elif row.verdict == UNDECIDED:
-            nowhere = row.reason.startswith(NO_POSITION)
-            self.not_compared[_NOWHERE if nowhere else _NO_DIGITS] += 1
+        if usual := _NOT_COMPARED.get(row.verdict):
+            kinds = (kind for why, kind in _BY_REASON.items() if why in row.reason)
+            self.not_compared[next(kinds, usual)] += 1
         if row.engine == FORMULAS:
             self.statements += row.compared
             self.statements_failed += row.failed
@@ -268,9 +269,9 @@ class Overview:
                 failing.setdefault(engine, []).append(row)
         for engine, rows in failing.items():
             # without an answer the rest is a consequence
-            whole = [row for row in rows if row.quantity == "all"]
+            telling = _find_telling(scene, engine, rows)
             named = [row for row in rows if _name_whole(row) in scene.against]
-            shown = whole or (engine == FORMULAS and named) or rows
+            shown = telling or (engine == FORMULAS and named) or rows
             used = [float(find_used(row.error, row.allowed)) for row in shown]
             worst = shown[used.index(max(used))]
             key = (engine, tuple(_name_causes(scene, engine, rows)))
@@ -302,8 +303,9 @@ class Overview:
                 explained = [texts for texts in left if text in texts]
                 kind = max((left[texts] for texts in explained), key=lambda k: k.used)
                 words = text
-                if kind.worst.quantity == "all":
-                    words = NO_ANSWER_PREFIX + "".join(_take_reason(kind.worst))
+                begin = _TOLD_BY.get(kind.worst.quantity)
+                if begin is not None and text.startswith(begin):
+                    words = begin + "".join(_take_reason(kind.worst))
                 of_engine.append(
                     Cause(
                         engine,
@@ -384,7 +386,7 @@ class Overview:
         notes += [
             f"{engine} lists {', '.join(listed)}: compared in no scene"
             for engine, listed in self.listed.items()
-            if listed and self._line(engine).compared
+            if listed and self._line(engine).answered
         ]
         notes += self.silent
         if self.not_compared:
@@ -431,6 +433,16 @@ def _list_ours(scene: Record) -> set[str]:
     }
 
 
+def _find_telling(scene: Record, engine: str, rows: Sequence[Row]) -> list[Row]:
+    """Find the rows whose reason is the cause: without an answer, or of an alarm.
+
+    A known mistake tells more than an alarm.
+    """
+    told_by = [*_TOLD_BY][: 1 if scene.causes.get(engine) else 2]
+    found = ([row for row in rows if row.quantity == name] for name in told_by)
+    return next(filter(None, found), [])
+
+
 def _take_reason(row: Row) -> tuple[str, str]:
     """Return why an engine has no answer, and the beginning of what it said.
 
@@ -450,10 +462,10 @@ def _name_causes(
 
     Without such a mistake the text says what fails.
     """
-    whole = [row for row in rows if row.quantity == "all"]
-    if whole:
-        why, _ = _take_reason(whole[0])
-        return [f"{NO_ANSWER_PREFIX}{NUMBER_IN_A_REASON.sub('#', why)}"]
+    if telling := _find_telling(scene, engine, rows):
+        why, _ = _take_reason(telling[0])
+        begin = _TOLD_BY[telling[0].quantity]
+        return [f"{begin}{NUMBERS_IN_A_REASON.sub('#', why)}"]
     if known := scene.causes.get(engine):
         return known
     if engine == FORMULAS and scene.against:
@@ -497,7 +509,7 @@ def _list_first(names: Sequence[str]) -> str:
 def _name_group(row: Row) -> str:
     """Name what an engine's row is about, where it is said what differs."""
     if _name_whole(row) != row.quantity:
-        return f"inertial part of the {_name_whole(row)}"
+        return f"inertial part of the {_find_group(row)}"
     if row.quantity == "closure":  # an identity of the engine's own angles
         return row.quantity
     if row.quantity == "assembled":

@@ -33,7 +33,7 @@ from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.machine import list_versions, name_machine
 from fourbar_validation.report.overview import Overview, OverviewLine
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.report.words import NUMBER_IN_A_REASON
+from fourbar_validation.report.words import NUMBERS_IN_A_REASON
 
 T = TypeVar("T")
 _ALLOWANCE = attrgetter("allowed")
@@ -180,7 +180,7 @@ class Summary:
             _ALLOWANCE,
         )
         for engine, reason in sorted(_list_left_out(scene)):
-            kind = (engine, NUMBER_IN_A_REASON.sub("#", reason))
+            kind = (engine, NUMBERS_IN_A_REASON.sub("#", reason))
             self._refusals[kind] += 1
             self._first_reason.setdefault(kind, reason)
         worst = _find_worst_row(scene.rows)

@@ -3,8 +3,10 @@
 import re
 from collections import Counter
 
-NUMBER_IN_A_REASON = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-"""Pattern of a number in a reason. Reasons that differ in numbers alone count as one.
+_NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+NUMBERS_IN_A_REASON = re.compile(rf"{_NUMBER}(?:\W+{_NUMBER})*")
+"""Pattern of a number in a reason, or of a list. Reasons that differ in numbers alone
+count as one.
 """
 
 
@@ -21,7 +23,7 @@ class AlikeTexts:
 
     def add(self, text: str) -> None:
         """Take in a text."""
-        words = NUMBER_IN_A_REASON.sub("#", text)
+        words = NUMBERS_IN_A_REASON.sub("#", text)
         self._counts[words] += 1
         if self._first.setdefault(words, text) != text:
             self._differing.add(words)

@@ -66,7 +66,7 @@ def find_causes(
         wrong = {key: find_wrong(judge, key) for key in judge.table.values}
         differing = [key for key, rows in wrong.items() if rows.any()]
         if not differing:
-            return []
+            return None
         wanted: Wanted = always
         most = FIRST_ROWS
         if any(effect.loaded_pins for effect in scene.effects):

@@ -118,7 +118,8 @@ def _note_causes(
     predicted = make_prediction(engine, asked.scene, asked.at, answer)
     causes = find_causes(asked, answer, engine.tolerance, predicted)
     if causes is not None:
-        question.causes[engine.name] = causes
+        where = "without loads and effects: " * (asked is not question)
+        question.causes[engine.name] = [f"{where}{cause}" for cause in causes]
 
 
 def compare_answer(
