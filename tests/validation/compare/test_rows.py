@@ -16,7 +16,6 @@ from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Scene, command
 from fourbar_validation.cli import status
-from fourbar_validation.compare.answer import ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import (
@@ -37,7 +36,6 @@ from fourbar_validation.regression import render
 from fourbar_validation.report.html import write_html as page_of
 from fourbar_validation.report.html import write_summary_page
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import summary_of
@@ -251,30 +249,6 @@ def test_every_form_of_a_report_says_the_same_counts():
         assert sentence in html.unescape(form)
     assert page.count('class="cell refuses"') == 4
     assert ">nothing compared</span>" in page
-
-
-def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch):
-    class Refusing:
-        def __init__(self, step):
-            self.step = step
-
-        def release(self, scene, times):
-            return ReleasedAnswer.refused("refusing", "-", "a declared limit")
-
-    forward = {name: (Refusing, *rest) for name, (_, *rest) in free.FORWARD.items()}
-    monkeypatch.setattr(free, "FORWARD", forward)
-    scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
-    page = judge_for_report(
-        "free",
-        scene,
-        (),
-        draw=False,
-    )
-    sentence = (
-        "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2"
-        " refuse"
-    )
-    assert summary_of([page]).verdict == sentence
 
 
 def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():

@@ -33,7 +33,6 @@ from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, 
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop, tree
-from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
@@ -54,9 +53,6 @@ ENGINE = {
 }
 TREES = ("pinocchio-inverse", "mujoco-inverse", "drake-inverse")
 BARS = (*TREES, "exudyn-constraints", "opensim-constraints")
-LAB = [engine.name for engine in load_further()]
-OWN = {"exudyn-constraints": {"viscous", "torsion", "springs"}}
-"""Effects that an engine has elements for."""
 PRINTED = 5e-10
 """The last digit of the figures, which were computed with ten."""
 
@@ -441,20 +437,6 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
     assert {*MOVED, drive} <= agreeing
     monkeypatch.setattr(loop.Assembler, "find", find_other_branch)
     assert any(row.failed for row in rows())
-
-
-def twice(row):
-    """A row of a table that acts two times."""
-    return lambda effect, bars: (row(effect, bars), row(effect, bars))
-
-
-@present(*LAB)
-@pytest.mark.parametrize("key", sorted(TERM_OF.keys() - {"gravity"}))
-def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(name, key, monkeypatch):
-    """Also in what depends on the load of a pin."""
-    monkeypatch.setitem(TERM_OF, key, twice(TERM_OF[key]))
-    shown = {quantity for quantity, _ in failures(name, scene(key))}
-    assert shown == set() if key in OWN.get(name, ()) else "torque" in shown
 
 
 @each_engine

@@ -472,11 +472,6 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
     assert find_cause(*wrong, *right, causes={"mine": []}) == words
 
 
-def test_where_nobody_looked_the_report_says_so():
-    said = find_cause(fail(OF_MINE), *RIGHT)
-    assert said.endswith("agree; mistakes are not looked for there")
-
-
 def test_what_differs_from_two_engines_is_listed_and_shown_first():
     """The identity that fails with it has the larger error, and is a consequence."""
     names = ("torque", *PIN_FORCES, "theta_3")
