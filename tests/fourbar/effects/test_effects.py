@@ -89,6 +89,13 @@ def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(c1, c2, number
         assert find_least_stretch(sliding.slope)[0] == approx(far, rel=1e-12)
 
 
+def test_jamming_is_a_status_and_leaves_no_force():
+    s = solve(crank_rocker(effects=(PinFriction.at(A=(50.0, 0.01)),)))
+    assert {"jammed", "several"} == set(s.status)
+    jammed = [status == "jammed" for status in s.status]
+    assert np.array_equal(np.isnan(s.torque), jammed)
+
+
 def test_pin_load_friction_needs_the_pin_forces():
     motion = Motion(1.0, 0.0, free=fourbar.Free(1.0, 10))
     friction = PinFriction.at(A=(0.1, 0.01))
@@ -133,6 +140,12 @@ def test_breaks_change_their_sign_where_forces_jump_or_bend():
 
 
 HERE = Place(2, (0.1, 0.0)), Place(4, (0.2, 0.0))
+
+
+def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
+    assert Spring.gas(*HERE, 0.5, 0.3, 40.0) == Spring(*HERE, 0.0, 0.5, -40.0)
+
+
 SAME_BAR = Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0))
 
 

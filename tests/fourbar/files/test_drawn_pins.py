@@ -14,6 +14,7 @@ from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
+from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
 
 EPS = 2.0**-52
@@ -214,22 +215,20 @@ def test_the_default_sweep_holds_the_drawn_position():
 
 
 @pytest.mark.parametrize(
-    "change, says",
-    [
-        (("[pins]", '[lengths]\nground = "1 m"\n[pins]'), "the pins state the lengths"),
-        (('A = ["0 mm", "100 mm"]\n', ""), "pins.A: is missing"),
-        (('"100 mm"', "100"), 'did you mean "100 mm"'),
-        (('"0 mm", "100 mm"', '"0 mm", "0 mm"'), "lies where O2 does"),
-        (('"100 mm"]', '"100 mm", "0 mm"]'), "must be two coordinates"),
-        (
-            ("[pins]", '[motion]\nbranch = "open"\n[pins]'),
-            "the pins state the assembly",
-        ),
-    ],
+    "old, new, says",
+    read_rows(r"""
+[pins] | [lengths]\nground = "1 m"\n[pins] | the pins state the lengths
+A = ["0 mm", "100 mm"]\n |  | pins.A: is missing
+"100 mm" | 100 | did you mean "100 mm"
+"0 mm", "100 mm" | "0 mm", "0 mm" | lies where O2 does
+"100 mm"] | "100 mm", "0 mm"] | must be two coordinates
+[pins] | [motion]\nbranch = "open"\n[pins] | the pins state the assembly
+"""),
 )
-def test_a_drawing_that_is_none_is_refused(change, says):
+def test_a_drawing_that_is_none_is_refused(old, new, says):
+    old, new = (text.replace(r"\n", "\n") for text in (old, new))
     with raises(InputError, match=says):
-        loads(DRAWN.replace(*change))
+        loads(DRAWN.replace(old, new))
 
 
 CRANE = """\
@@ -272,18 +271,19 @@ def test_a_ground_by_coordinates_and_a_place_drawn_on_it():
 
 
 @pytest.mark.parametrize(
-    "change, says",
-    [
-        ((', y = "-70 mm"', ""), "lengths.ground.y: is missing"),
-        (("[drive]", 'ground_angle = "1 deg"\n[drive]'), "x and y of the ground"),
-        (("bar = 1, drawn", "bar = 2, drawn"), "is a place of a moving bar"),
-        (('x = "-120 mm"', 'z = "1 mm", x = "-120 mm"'), "unknown key"),
-        (('"-120 mm", y = "-70 mm"', '"0 mm", y = "0 mm"'), "coordinates of O4"),
-    ],
+    "old, new, says",
+    read_rows(r"""
+, y = "-70 mm" |  | lengths.ground.y: is missing
+[drive] | ground_angle = "1 deg"\n[drive] | x and y of the ground
+bar = 1, drawn | bar = 2, drawn | is a place of a moving bar
+x = "-120 mm" | z = "1 mm", x = "-120 mm" | unknown key
+"-120 mm", y = "-70 mm" | "0 mm", y = "0 mm" | coordinates of O4
+"""),
 )
-def test_a_ground_by_coordinates_that_is_none_is_refused(change, says):
+def test_a_ground_by_coordinates_that_is_none_is_refused(old, new, says):
+    new = new.replace(r"\n", "\n")
     with raises(InputError, match=says):
-        loads(CRANE.replace(*change))
+        loads(CRANE.replace(old, new))
 
 
 def test_a_drawing_on_a_change_point_is_refused():

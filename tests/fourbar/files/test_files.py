@@ -31,6 +31,7 @@ from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.files.scene_text import write_new_scene
 from tests.fourbar.test_solving import scenes
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
@@ -64,14 +65,7 @@ def test_models_read_back_and_assemble_everywhere(path):
 def test_defaults_are_those_of_the_contract():
     scene = loads(LENGTHS)
     assert scene.linkage == FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.0)
-    motion = scene.motion
-    assert (motion.theta_2, motion.omega_2, motion.alpha_2, motion.branch) == (
-        None,
-        None,
-        0.0,
-        1,
-    )
-    assert (motion.free, scene.drive_bar) == (None, 2)
+    assert scene.motion == fourbar.Motion(None, None, 0.0, 1) and scene.drive_bar == 2
     assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
     bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
     assert bar.moment_of_inertia == approx(
@@ -152,16 +146,16 @@ def test_what_a_file_cannot_hold_is_refused():
 
 @pytest.mark.parametrize(
     "key, width, why",
-    [
-        ("bars.input.inertia", 1e-6, "follows the length; state it"),
-        ("bars.input.centre.0", 1e-3, "follows the length; state it"),
-        ("lengths.input", 0.1, "must be less than the number itself, 0.1 m"),
-        ("loads.0.from_pin.0", 1e-3, "no number of the scene has this key"),
-        ("motion.theta_2", 1e-3, "no number of the scene has this key"),
-    ],
+    read_rows("""
+bars.input.inertia | 1e-6 | follows the length; state it
+bars.input.centre.0 | 1e-3 | follows the length; state it
+lengths.input | 0.1 | must be less than the number itself, 0.1 m
+loads.0.from_pin.0 | 1e-3 | no number of the scene has this key
+motion.theta_2 | 1e-3 | no number of the scene has this key
+"""),
 )
 def test_no_tolerance_is_written_that_reading_refuses(key, width, why):
-    scene = crank_rocker(tolerances=(Tolerance(key, width),))
+    scene = crank_rocker(tolerances=(Tolerance(key, float(width)),))
     with raises(InputError, match=why) as refused:
         dump(scene)
     assert key in str(refused.value)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from fourbar import Motion, Scene, solve
 from fourbar.formulas.many_digits import (
     decide_half_angles,
     exact_half_angle,
@@ -125,8 +124,6 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths(lengths, touches):
     assert (bars.E2 == 0.0) == touches
     assert touches or bars[:4] == lengths
     assert bars[:4] == approx(lengths, rel=4.0 * U)
-    status = solve(Scene(uniform(*lengths), Motion(0.0, 1.0))).status
-    assert (status == ["change_point"]) == touches
 
 
 LINKAGES = [

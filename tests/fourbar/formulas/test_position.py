@@ -15,11 +15,6 @@ from tests.support.balls import move_in_balls
 from tests.support.scenes import bare
 
 EPS = 2.0**-52
-FIRST, SECOND = 32.0, 128.0
-"""Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and
-1/sin^4 mu at most: one power of 1/sin^2 mu from the angles, one from the division by
-the root of the area.
-"""
 FEW_ROUNDINGS = 8.0 * EPS
 """Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of
 these and h.

@@ -90,7 +90,6 @@ def opened(scene):
         ((0.1, 0.1, 0.3, 0.3), (0.0,)),
         ((0.4, 0.1, 0.27, 0.23), (pi,)),
     ],
-    ids=["parallelogram", "kite a = b", "kite a = d", "a + d = b + c"],
 )
 def test_the_file_opens_in_the_assembly_beyond_change_points(lengths, points, branch):
     """Pin B lies left of the diagonal from A to O4 in the open assembly's first

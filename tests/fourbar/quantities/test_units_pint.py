@@ -16,7 +16,7 @@ from fourbar.errors import InputError
 from fourbar.quantities.units import PARSED_UNITS, ask_library
 
 ureg = pytest.importorskip("pint").UnitRegistry()
-MM, KG, DEG = ureg.millimeter, ureg.kilogram, ureg.degree
+MM, DEG = ureg.millimeter, ureg.degree
 
 
 def test_lengths_and_masses_are_converted_exactly():

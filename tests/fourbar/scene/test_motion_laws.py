@@ -13,6 +13,7 @@ from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import COMMAND_NAMES, Law, Motion, Rise, Sine
+from tests.support.rows import read_rows
 
 EXACT = 1e-13
 """Relative to the largest term: some ten roundings of a polynomial of degree 5."""
@@ -154,21 +155,30 @@ def test_a_law_that_cannot_be_names_its_key(make, key):
     assert error.value.key.startswith(key)
 
 
-TABLE = 'time = ["0 s", "1 s"], theta_2 = ["0 deg", "60 deg"]'
-RATES = 'omega_2 = ["0 rad/s", "1 rad/s"]'
+TABLE = 'time = ["0 s", "1 s"], theta_2 = ["0 deg", "60 deg"], '
 
 
 @pytest.mark.parametrize(
     "law, words",
     [
-        (f'{TABLE}, alpha_2 = ["0 rad/s^2", "1 rad/s^2"]', ("alpha_2", "omega_2")),
-        (f'{TABLE}, {RATES}, ends = "rest"', ("law.ends", "left out")),
-        (f'{TABLE}, omega_3 = ["0 rad/s", "1 rad/s"]', ("omega_3", "commands bar 2")),
-        (f'{TABLE}, omega_2 = ["0 rad/s"]', ("omega_2", "needs 2")),
-        (SINE[2:-2].replace("0.5 rad/s", "0.5 Hz"), ("frequency", "0.5 rev/s")),
-        (SINE[2:-2].replace("0.5 rad/s", "0 rad/s"), ("frequency", "> 0")),
-        (SINE[2:-2].replace('mean = "1 rad",', ""), ("law.mean", "missing")),
-        (SINE[2:-2].replace("sine", "cosine"), ("law.kind", '"sine"')),
+        *(
+            (TABLE + more, words)
+            for more, *words in read_rows("""
+alpha_2 = ["0 rad/s^2", "1 rad/s^2"] | alpha_2 | omega_2
+omega_2 = ["0 rad/s", "1 rad/s"], ends = "rest" | law.ends | left out
+omega_3 = ["0 rad/s", "1 rad/s"] | omega_3 | commands bar 2
+omega_2 = ["0 rad/s"] | omega_2 | needs 2
+""")
+        ),
+        *(
+            (SINE[2:-2].replace(old, new), words)
+            for old, new, *words in read_rows("""
+0.5 rad/s | 0.5 Hz | frequency | 0.5 rev/s
+0.5 rad/s | 0 rad/s | frequency | > 0
+mean = "1 rad", |  | law.mean | missing
+sine | cosine | law.kind | "sine"
+""")
+        ),
     ],
 )
 def test_a_law_that_states_too_much_or_too_little_is_refused(law, words):

@@ -16,6 +16,7 @@ from fourbar.files import dump, load, loads, save
 from fourbar.scene.pictures import LARGEST_PICTURE, Picture, TracedPicture
 from fourbar.show import animate
 from tests.fourbar.show.test_animate import PNG, embedded
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
@@ -60,24 +61,25 @@ def test_one_given_with_the_command_takes_its_place(tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    (
-        "",
-        ".",
-        "..",
-        "../secret.png",
-        "a/../../secret.png",
-        "/etc/passwd",
-        "//host/x.png",
-        "a//b.png",
-        r"..\\secret.png",
-        "C:/x.png",
-        "C:x.png",
-        "a\\u0000b.png",
-        "a\\nb.png",
+    [
+        *r"""
+.
+..
+../secret.png
+a/../../secret.png
+/etc/passwd
+//host/x.png
+a//b.png
+..\\secret.png
+C:/x.png
+C:x.png
+a\u0000b.png
+a\nb.png
+file:x.png
+./x.png
+""".splitlines(),
         "x" * 300,
-        "file:x.png",
-        "./x.png",
-    ),
+    ],
 )
 def test_a_name_that_leads_elsewhere_is_refused_when_the_file_is_read(name):
     with raises(InputError, match=r"^s.toml: bars\.coupler\.picture .*PNG or JPEG"):
@@ -146,19 +148,19 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
 
 @pytest.mark.parametrize(
     "stated, words",
-    [
-        ('file = "../photo.jpg"', "picture.file .*next to the scene file"),
-        ('file = "photo.jpg"\nscale = "0 mm"', "picture.scale .*> 0 with a unit"),
-        ('file = "photo.jpg"\nscale = "2 kg"', "picture.scale "),
-        ('file = "photo.jpg"\norigin = [1]', r"picture.origin .*pixel \[x, y\]"),
-        ('file = "photo.jpg"\nopacity = 1.5', "picture.opacity .*0 to 1"),
-        ('file = "photo.jpg"\ncolour = "red"', "picture.colour"),
-        ('scale = "1 mm"', "picture.file"),
-    ],
+    read_rows(r"""
+file = "../photo.jpg" | picture.file .*next to the scene file
+file = "photo.jpg"\nscale = "0 mm" | picture.scale .*> 0 with a unit
+file = "photo.jpg"\nscale = "2 kg" | picture.scale
+file = "photo.jpg"\norigin = [1] | picture.origin .*pixel \[x, y\]
+file = "photo.jpg"\nopacity = 1.5 | picture.opacity .*0 to 1
+file = "photo.jpg"\ncolour = "red" | picture.colour
+scale = "1 mm" | picture.file
+"""),
 )
 def test_a_wrong_entry_of_the_picture_is_refused(stated, words):
     with raises(InputError, match=words):
-        loads(f"{LENGTHS}[picture]\n{stated}\n")
+        loads(f"{LENGTHS}[picture]\n{stated}\n".replace(r"\n", "\n"))
 
 
 @pytest.mark.parametrize(
