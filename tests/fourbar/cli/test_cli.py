@@ -400,6 +400,15 @@ def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
 
+def test_the_name_of_a_file_asks_for_its_form(run):
+    for ending, *option in (("csv", "--csv"), ("json", "--json"), ("txt", "--every=9")):
+        printed = run("analyze", CRANK_ROCKER, *option)[1]
+        file = Path(f"a.{ending}")
+        every = option if ending == "txt" else ()
+        assert run("analyze", CRANK_ROCKER, *every, "-o", file) == (HOLDS, "", "")
+        assert file.read_text() == printed
+
+
 @pytest.mark.posix
 def test_a_device_is_written_to_and_stays_one(run):
     pipe = Path("pipe")

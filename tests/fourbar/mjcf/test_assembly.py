@@ -9,9 +9,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
-from fourbar import Friction, Gravity, Motion, Viscous
+from fourbar import Friction, Gravity, Motion, Viscous, solve
 from fourbar.effects import Torsion
 from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf_for
@@ -103,3 +104,16 @@ AT_B = (Viscous.at(B=1.0),)
 def test_what_a_file_cannot_hold_is_refused(write, scene, words):
     with pytest.raises(LimitError, match=words):
         write(scene)
+
+
+@pytest.mark.parametrize(
+    "write", [write_sdf, partial(write_sdf, reader="drake"), write_usd]
+)
+def test_without_loads_a_file_says_so_and_how_to_start(write):
+    scene = crank_rocker(motion=Motion(1.0, 3.0))
+    text = write(scene, without_loads=True)
+    assert "loads are left out" in text and "puts on bar 2" in text
+    s = solve(scene, "velocity")
+    rates = 3.0, s.omega_3[0] - 3.0, s.omega_4[0]
+    stated = [float(number) for number in re.findall(r"(-?[\d.]+) rad", text)[:6]]
+    assert stated == approx([1.0, s.theta_3[0], s.theta_4[0], *rates])

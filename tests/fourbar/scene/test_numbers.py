@@ -14,6 +14,7 @@ from pytest import raises
 from fourbar import InputError, Point, solve, vary
 from fourbar.files import dump, loads
 from fourbar.solution import write_json
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 POINTS = (
@@ -47,33 +48,25 @@ def test_a_study_varies_them_and_lists_its_members():
     assert "2 linkages" in s._repr_html_()
 
 
-WRONG = {
-    "a quantity's name": (
-        'torque = { bar = 3, from_pin = ["1 m", "0 deg"] }',
-        "is the name of a quantity",
-    ),
-    "a quantity's column": ('G = { bar = 3, from_pin = ["1 m"] }', "must be a pair"),
-    "a velocity's name": (
-        'v_P = { bar = 3, from_pin = ["1 m", "0 deg"] }',
-        "not beginning with",
-    ),
-    "a name of two words": (
-        '"two words" = { bar = 3, from_pin = ["1 m", "0 deg"] }',
-        "must be a word",
-    ),
-    "no bar": (
-        'P = { from_pin = ["1 m", "0 deg"] }',
-        "is missing; must be 1 (ground), 2 (input), 3 (coupler) or 4 (output)",
-    ),
-    "a fifth bar": ('P = { bar = 5, from_pin = ["1 m", "0 deg"] }', "1 (ground)"),
-}
+WRONG = read_rows("""
+torque = { bar = 3, from_pin = ["1 m", "0 deg"] } | is the name of a quantity
+G = { bar = 3, from_pin = ["1 m"] } | must be a pair
+v_P = { bar = 3, from_pin = ["1 m", "0 deg"] } | not beginning with
+"two words" = { bar = 3, from_pin = ["1 m", "0 deg"] } | must be a word
+P = { from_pin = ["1 m", "0 deg"] } | is missing; must be 1 (ground), 2 (input), 3
+P = { bar = 5, from_pin = ["1 m", "0 deg"] } | 1 (ground)
+""")
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_point_is_refused_in_one_line(name):
-    line, words = WRONG[name]
+@pytest.mark.parametrize("line, words", WRONG)
+def test_a_wrong_point_is_refused_in_one_line(line, words):
     with raises(InputError) as caught:
         loads(dump(scene()) + f"\n[points]\n{line}\n")
     assert words in str(caught.value)
     assert "points" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_two_points_of_one_name_are_refused():
+    with raises(InputError, match="a name of its own"):
+        scene(POINTS[0], Point("P", 2, (0.1, 0.0)))
