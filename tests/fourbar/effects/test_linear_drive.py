@@ -20,6 +20,7 @@ from fourbar.files.scene_text import dump
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LINE_DRIVEN
 
@@ -102,21 +103,25 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
         assert s.drive_condition[0] < 1e-15 and s.stroke[0] == approx(0.1)
 
 
-@pytest.mark.parametrize(
-    "start, end",
-    [
-        ((1, 0.0, 0.0), (2, 0.05, 0.3)),  # O2
-        ((1, 0.3, 0.0), (4, 0.05, 0.3)),  # O4
-        ((2, 0.1, 0.0), (3, 0.1, 1.0)),  # A
-        ((3, 0.25, 0.0), (4, 0.1, 1.0)),  # B
-        ((1, 0.1, 1.0), (4, 0.0, 1.0)),
-        ((1, 0.0, 0.0), (3, 0.0, 0.0)),  # O2 to A: bar 2 holds both
-        ((2, 0.1, 0.0), (4, 0.22, 0.0)),
-        ((2, 0.0, 0.0), (4, 0.0, 0.0)),
-    ],
-)
-def test_ends_that_keep_their_distance_are_refused_in_one_line(start, end):
-    drive = LinearDrive(Place(start[0], start[1:]), Place(end[0], end[1:]))
+KEEP_THEIR_DISTANCE = read_rows("""
+# O2, O4, A and B
+1 0 0 | 2 0.05 0.3
+1 0.3 0 | 4 0.05 0.3
+2 0.1 0 | 3 0.1 1
+3 0.25 0 | 4 0.1 1
+1 0.1 1 | 4 0 1
+# O2 to A: bar 2 holds both
+1 0 0 | 3 0 0
+2 0.1 0 | 4 0.22 0
+2 0 0 | 4 0 0
+""")
+"""Bar, distance and angle of both ends."""
+
+
+@pytest.mark.parametrize("ends", KEEP_THEIR_DISTANCE)
+def test_ends_that_keep_their_distance_are_refused_in_one_line(ends):
+    rows = (map(float, end.split()) for end in ends)
+    drive = LinearDrive(*(Place(int(bar), tuple(at)) for bar, *at in rows))
     with raises(
         InputError,
         match=r"^drive\.to = .*keeps its distance from `from`",

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
+from fourbar.formulas.arithmetic import power_of_two
 from fourbar.formulas.many_digits import (
     decide_half_angles,
     exact_half_angle,
@@ -236,3 +237,8 @@ def test_the_factor_that_changes_less_gives_the_other_its_digits(psi, lengths):
     changes = 4 * a * d * abs(math.sin(psi)) * psi  # with the last digit of psi
     for ours, factor in zip((half.outer, half.inner), exact, strict=True):
         assert abs(factor - float(ours)) <= PRODUCTS * (4 * b * c + changes)
+
+
+def test_the_power_of_two_above_a_number():
+    assert power_of_two(np.array([0.3, 3.0])).tolist() == [0.5, 4.0]
+    assert power_of_two(0.3) == 0.5

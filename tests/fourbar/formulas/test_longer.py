@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from fourbar.formulas.longer import Pair
+from fourbar.formulas.longer import Pair, change_numbers
+from fourbar.linkage import Bar
 
 DIGITS = 2.0**-98
 """Relative: a few roundings of pairs, 2^-104 each, and what a complex product cancels.
@@ -68,3 +69,9 @@ def test_a_function_keeps_the_digits_of_a_pair(function, reference):
         ]
         for ours, wanted in zip(exact(function(x, y)), expected, strict=True):
             assert abs(ours - wanted) <= DIGITS * max(abs(wanted), 0.1)
+
+
+def test_numbers_are_changed_within_tuples_and_dataclasses():
+    bars = (Bar(0.1, 0.2, 0.3), Bar(0.2)), "m"
+    doubled = change_numbers(bars, lambda number: 2.0 * number)
+    assert doubled == ((Bar(0.2, 0.4, 0.6), Bar(0.4)), "m")

@@ -25,6 +25,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.path import compute_state
 from fourbar.linkage import MOVING_BARS, uniform
+from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage
 
 EPS = 2.0**-52
@@ -83,27 +84,28 @@ THESIS = bare(0.2, 0.48, 0.55, 0.2, math.radians(45.0))
 
 
 @pytest.mark.parametrize(
-    "lengths, barker, code, name",
-    [
-        ((1, 3, 2.5, 3.2), 1, "GCCC", "drag link"),
-        ((3, 1, 2.5, 2.2), 2, "GCRR", "crank-rocker"),
-        ((3, 2.5, 1, 2.2), 3, "GRCR", "double rocker"),
-        ((3, 2.5, 2.2, 1), 4, "GRRC", "rocker-crank"),
-        ((4, 2, 2.5, 2.2), 5, "RRR1", "triple rocker"),
-        ((2, 4, 2.5, 2.2), 6, "RRR2", "triple rocker"),
-        ((2, 2.5, 4, 2.2), 7, "RRR3", "triple rocker"),
-        ((2, 2.5, 2.2, 4), 8, "RRR4", "triple rocker"),
-        ((1, 2, 4, 3), 9, "SCCC", "change-point"),
-        ((2, 1, 4, 3), 10, "SCRR", "change-point"),
-        ((2, 4, 1, 3), 11, "SRCR", "change-point"),
-        ((2, 4, 3, 1), 12, "SRRC", "change-point"),
-        ((2, 1, 2, 1), 13, "S2X", "parallelogram"),
-        ((1, 1, 2, 2), 13, "S2X", "ground and input"),
-        ((2, 1, 1, 2), 13, "S2X", "ground and output"),
-        ((0.1, 0.1, 0.1, 0.1), 14, "S3X", "rhombus"),
-    ],
+    "stated, barker, code, name",
+    read_rows("""
+1 3 2.5 3.2 | 1 | GCCC | drag link
+3 1 2.5 2.2 | 2 | GCRR | crank-rocker
+3 2.5 1 2.2 | 3 | GRCR | double rocker
+3 2.5 2.2 1 | 4 | GRRC | rocker-crank
+4 2 2.5 2.2 | 5 | RRR1 | triple rocker
+2 4 2.5 2.2 | 6 | RRR2 | triple rocker
+2 2.5 4 2.2 | 7 | RRR3 | triple rocker
+2 2.5 2.2 4 | 8 | RRR4 | triple rocker
+1 2 4 3 | 9 | SCCC | change-point
+2 1 4 3 | 10 | SCRR | change-point
+2 4 1 3 | 11 | SRCR | change-point
+2 4 3 1 | 12 | SRRC | change-point
+2 1 2 1 | 13 | S2X | parallelogram
+1 1 2 2 | 13 | S2X | ground and input
+2 1 1 2 | 13 | S2X | ground and output
+0.1 0.1 0.1 0.1 | 14 | S3X | rhombus
+"""),
 )
-def test_barker_classes(lengths, barker, code, name):
+def test_barker_classes(stated, barker, code, name):
+    lengths, barker = [float(length) for length in stated.split()], int(barker)
     for scale in (1.0, 1e-9, 1e9, 1e300):
         kind = classify(uniform(*(scale * length for length in lengths)))
         assert (kind.barker, kind.code) == (barker, code)

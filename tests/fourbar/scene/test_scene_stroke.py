@@ -2,6 +2,7 @@
 commanded alone, and an impossible stroke is refused.
 """
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Sweep
 from fourbar_validation.engines.prediction import compute_reference
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 BARS = 10.0
@@ -86,17 +88,17 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
 
 @pytest.mark.parametrize(
     "motion, says",
-    [
-        ({"stroke": 0.9, "side": "left"}, "0.18 to 0.42 m"),
-        ({"stroke": 0.3}, "left"),
-        ({"stroke": 0.3, "side": "left", "theta_2": 1.0}, "alone"),
-        ({"stroke": -0.3, "side": "left"}, "above 0"),
-    ],
+    read_rows("""
+{"stroke": 0.9, "side": "left"} | 0.18 to 0.42 m
+{"stroke": 0.3} | left
+{"stroke": 0.3, "side": "left", "theta_2": 1} | alone
+{"stroke": -0.3, "side": "left"} | above 0
+"""),
 )
 def test_what_cannot_be_is_refused_in_one_line(motion, says):
     with raises(InputError, match=says) as caught:
         refused = crank_rocker(
-            motion=Motion(**motion),
+            motion=Motion(**json.loads(motion)),
             drive=LinearDrive(GROUND, ENDS[2]),
         )
         solve(refused)

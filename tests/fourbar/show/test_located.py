@@ -188,19 +188,14 @@ def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
 
     Beyond the end of the range it has no value.
     """
-    scene = loads(
+    lengths = (
         '[lengths]\nground = "50 mm"\ninput = "20 mm"\ncoupler = "40 mm"\n'
-        'output = "25 mm"\n[motion]\ntheta_2 = { from = "30 deg", to = "170 deg", '
-        "steps = 20 }\n"
+        'output = "25 mm"\n[motion]\ntheta_2 = '
     )
+    scene = loads(lengths + '{ from = "30 deg", to = "170 deg", steps = 20 }')
     limit = acos((50**2 + 20**2 - 65**2) / (2 * 50 * 20))
     place = limit - radians(0.001)
-    at = solve(
-        loads(
-            '[lengths]\nground = "50 mm"\ninput = "20 mm"\ncoupler = "40 mm"\n'
-            f'output = "25 mm"\n[motion]\ntheta_2 = "{place!r} rad"\n'
-        )
-    )
+    at = solve(loads(f'{lengths}"{place!r} rad"'))
     found = locate(scene, "transmission", f"{float(math.asin(at.sin_mu[0]))!r} rad")
     assert found.places == approx([place], abs=1e-9)
     for name, value in (("A_x", "min"), ("theta_2", "max")):

@@ -31,6 +31,7 @@ the number.
 def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
     """Others count by a hundredth of themselves, angles by a degree."""
     slopes = sensitivity(load(MODELS / "capabilities" / "drawn.toml"))
+    assert slopes.value("A")[0] == pytest.approx([0.095, 0.060])
     longest = max(slopes.solution.scene.linkage.lengths)
     numbers = dict(zip(slopes.keys, slopes.numbers, strict=True))
     for key, step in {
