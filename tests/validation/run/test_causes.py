@@ -750,6 +750,29 @@ def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():
     assert name_wrong({"one": reverse_F43, "two": reverse_y}).keys() == twice.keys()
 
 
+@pytest.mark.parametrize("quantity", ["v_G3", "assembled"])
+def test_what_follows_from_two_answers_alike_is_no_fault_of_theirs(quantity):
+    class Alike(Altered):
+        def answer(self, scene, at):
+            answer = super().answer(scene, at)
+            answer.assembled[:2] &= quantity != "assembled"
+            return answer
+
+    def turn_faster(numbers, at):
+        numbers["omega_3"] = numbers["omega_3"] + (quantity == "v_G3")
+
+    class AlsoAlike(Alike):
+        name = "other"
+
+    engines = [
+        Engine(one.name, partial(one, turn_faster), EQUIVALENCE, ("omega_3", "v_G3"))
+        for one in (Alike, AlsoAlike)
+    ]
+    record = judge("scene", SCENE, engines, order=False)
+    failed = {row.quantity for row in record.rows if row.failed}
+    assert quantity in failed and failed == {*record.against}
+
+
 def test_what_nobody_knows_is_no_known_mistake():
     strange = (TORQUE, '"torque": 1.0 + 0.3 * math.sin(7.0 * theta)')
     assert find_causes(make_guest(replacements=[strange])) == []

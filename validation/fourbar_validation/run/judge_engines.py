@@ -12,11 +12,11 @@ import numpy as np
 
 from fourbar.linkage import copy_with
 from fourbar.mjcf.document import LIGHT_BAR_RATIO
-from fourbar.quantities import COUPLE, FORCE_NAMES, UNITS
+from fourbar.quantities import COUPLE, FORCE_NAMES, UNITS, Array
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
-from fourbar_validation.compare.scales import has_angles
+from fourbar_validation.compare.scales import has_angles, make_reference
 from fourbar_validation.compare.tolerance import compute_difference
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.registry import (
@@ -58,7 +58,8 @@ def find_agreement(question: Question, rows: Sequence[Row]) -> dict[str, list[st
         engine.name: getattr(engine, "stated_name", "") or engine.name
         for engine in question.engines
     }
-    exact = [row for row in rows if row.setting == EXACT and row.quantity in UNITS]
+    quantities = {*UNITS, "assembled"}
+    exact = [row for row in rows if row.setting == EXACT and row.quantity in quantities]
     for quantity in dict.fromkeys(row.quantity for row in exact if row.failed):
         of_quantity = [row for row in exact if row.quantity == quantity]
         right = {versions[row.engine] for row in of_quantity if row.passed}
@@ -80,20 +81,34 @@ def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     larger error that either is allowed.
     """
     values, others = (
-        question.answered[one.engine][0].quantities.get(quantity)
-        for one in (row, other)
+        _read_values(question, one.engine, quantity) for one in (row, other)
     )
     ours = getattr(question.solution, quantity)
     if not math.isfinite(row.error) or ours is None or values is None or others is None:
         return False
     if not len(values) == len(others) == len(ours):
         return False
-    position = np.abs(question.at.angle - row.theta_2).argmin()
+    theta_2 = np.nan_to_num(question.solution.theta_2 - row.theta_2, nan=np.inf)
+    position = np.abs(theta_2).argmin()
     at = slice(position, position + 1)
     apart = compute_difference(quantity, values[at], others[at])
-    from_us = compute_difference(quantity, ours[at], values[at])
+    from_us = compute_difference(quantity, 1.0 * ours[at], values[at])
     allowed = 2.0 * max(row.allowed, other.allowed)
     return bool(apart[0] * row.error <= allowed * from_us[0])
+
+
+def _read_values(question: Question, engine: str, quantity: str) -> Array | None:
+    """Return what an engine answers, or what follows from its answer; None if nothing.
+
+    Where the loop closes is told by 1, elsewhere 0.
+    """
+    answer, _ = question.answered[engine]
+    if quantity == "assembled" and answer.assembled is not None:
+        return np.asarray(answer.assembled, dtype=float)
+    values = answer.quantities.get(quantity)
+    if values is None:
+        values = getattr(make_reference(question.scene, answer), quantity, None)
+    return values
 
 
 def _answer_of_engine(question: Question, engine: Engine) -> Iterator[Row]:
