@@ -122,6 +122,12 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
     for torque in (FORMULAS.torque, moved("torque", FIRST, math.nan)):
         rows = compare(make_answer(np.arange(POSITIONS) != FIRST, torque=torque))
         assert list_failing(rows) == {"assembled"}
+    longer = crank_rocker(linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
+    solution = fourbar.solve(longer, "position")
+    assert not solution.assembled.all()
+    everywhere = np.ones(len(solution), dtype=bool)
+    answer = Answer("other", "exact", solution.at, everywhere)
+    assert compare(answer, longer, solution, ())["assembled"].failed
 
 
 def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row():
