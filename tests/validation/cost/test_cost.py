@@ -307,7 +307,7 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported():
 
 
 def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
-    done: list[str] = []
+    done = []
 
     def units(stop):
         made = work_precision.CostStudy("s", turning(), tmp_path)

@@ -513,6 +513,6 @@ def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(ground_angl
     linkage = FourBar(3.0, *bars, ground_angle=ground_angle)
     folded = Scene(linkage, Motion(ground_angle, 1.0))
     closed = compute_directions(make_balls(folded, ground_angle), 1)
-    assert closed is not None and abs(float(wedge(*closed[1:]).mid())) < 1e-60
+    assert abs(float(wedge(*closed[1:]).mid())) < 1e-60
     apart = replace(folded, linkage=replace(folded.linkage, ground=3.0 - 1e-15))
     assert compute_directions(make_balls(apart, ground_angle), 1) is None

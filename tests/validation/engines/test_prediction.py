@@ -202,7 +202,7 @@ def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():
     command = fourbar.command(driven)
     solution = fourbar.solve(driven, "force")
     mask = np.arange(len(command.theta_2)) == 20
-    assert solution.drive_condition is not None and solution.drive_condition[20] > 0.1
+    assert solution.drive_condition[20] > 0.1
 
     def predict(scene, quantity):
         return predict_from_data(scene, command, quantity, mask)

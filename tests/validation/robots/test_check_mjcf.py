@@ -28,7 +28,7 @@ from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
-from fourbar_validation.engines.description import ModelEntry, Value
+from fourbar_validation.engines.description import ModelEntry
 from fourbar_validation.engines.mujoco.describe import describe_model
 from fourbar_validation.engines.mujoco.robots import examine as examining
 from fourbar_validation.engines.mujoco.robots import measure as measuring
@@ -500,7 +500,7 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
     """
     text = other_plane(closure)
     rocker = re.search(' *<body name="rocker".*?</body>', text)
-    assert rocker is not None  # it comes first in the file
+    # it comes first in the file
     text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
     examination = examine(FEW, text, {})
     bars = "Bars: ground world, input crank, coupler rod, output rocker."
@@ -508,7 +508,7 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
     assert errors(FEW, examination)["theta_4"] < STIFF_ENOUGH
 
 
-COSTLY: list[tuple[str, str, str]] = [
+COSTLY = [
     ("bars.coupler.mass", 'mass="0.5"', 'mass="0.6"'),
     (
         "bars.output.inertia",
@@ -623,7 +623,7 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone():
 
     Who turns the other way round, or closes the loop otherwise, is another file.
     """
-    changes: list[tuple[str, Value | None]] = [
+    changes = [
         ("loads.coupler, axes of the coupler.force", (0.0, 0.0)),
         ("pins.A.positive", "clockwise"),
         ("closure.by", "tendon"),
@@ -631,7 +631,7 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone():
     ]
     scene = replace(CRANK_ROCKER, motion=STILL.motion)
     _, missing, *others = change(scene, changes)
-    assert missing is not None and others == [None] * 3
+    assert others == [None] * 3
     text = re.sub('<general [^>]*name="load_2"[^>]*>', "", GENERATED)
     expected = errors(scene, examine(scene, text, {}))
     priced = {row.quantity: row.error for row in rows_of(scene, missing[:1])}
@@ -641,10 +641,7 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone():
 
 def test_each_entry_is_mended_in_a_model_of_its_own(monkeypatch):
     file = RobotFile(MINE_XML, other_plane())
-    settings: list[tuple[str, Value | None]] = [
-        ("closure.softness", None),
-        ("option.tolerance", 1e-8),
-    ]
+    settings = [("closure.softness", None), ("option.tolerance", 1e-8)]
     stiff, soft = mend(STILL, file, MINE, settings)
     (alone,) = mend(STILL, file, MINE, settings[1:])
     assert stiff and soft and alone

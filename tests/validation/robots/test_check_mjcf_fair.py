@@ -366,7 +366,7 @@ def test_the_cause_that_explains_the_error_stands_first(
     worst = max(
         c.row.error for c in report.errors if c.row.quantity in ("torque", "F12", "F43")
     )
-    assert cost is not None and cost > 0.1 * worst
+    assert cost > 0.1 * worst
 
 
 def test_where_no_force_gives_the_acceleration_is_said():
@@ -515,7 +515,7 @@ def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     assert loop.joint == "theta_2"
     assert find_left_out(loop) < ROUND_OFF
     through = loop.through_time
-    assert through is not None and len(through.rows) > 2
+    assert len(through.rows) > 2
     for answer in (loop.states, through):
         assert answer.find_worst(loop.scales).error < YIELD
 

@@ -14,7 +14,7 @@ import pytest
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command
-from fourbar.scene.motion import CROSSED, OPEN, Sweep
+from fourbar.scene.motion import CROSSED, OPEN
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.robots.answers import (
@@ -77,7 +77,6 @@ def open_loop(name):
 def spread_over_range(inside, made, count):
     """Return angles of bar 2 in the loop's plane within its hinges' range, rad."""
     sweep = made.scene.motion.angle
-    assert isinstance(sweep, Sweep)
     angles = np.linspace(sweep.start, sweep.stop, count + 2)[1:-1]
     angles = angles + _turn_back(inside, made)
     away = inside.loop.angles[1] - angles.mean()
@@ -91,7 +90,6 @@ def ask_again(inside, theta_2, alpha_2):
     accelerations of the driven and the held joints; then bisection on the couple.
     """
     state = inside.state(theta_2, 2.0)
-    assert state is not None
     model, data = inside.model, mujoco.MjData(inside.model)
     moved = [inside.lead, *inside.held]
     wanted = np.zeros(len(moved))
@@ -149,7 +147,6 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     assert inside.flywheel > 1e6
     (row,) = inside.answer_states(motion.thin_out(3)._replace(angle=(2.0,))).rows
     state = inside.state(2.0, row.speed)
-    assert state is not None
     model, data = inside.model, mujoco.MjData(inside.model)
     data.qpos[:], data.qvel[:] = state.qpos, state.qvel
     mujoco.mj_forward(model, data)
@@ -251,7 +248,6 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
     inside = LoopInside(posed.model, closure.loop, bar=bar, branch=branch)
     angle = closure.loop.angles[bar - 1] + math.radians(turned)
     state = inside.state(angle, 1.0)
-    assert state is not None
     crank, _, knee = np.exp(1j * (state.qpos + math.radians(drawn))) * 0.03
     moved, follows = (crank, 0.25 + knee) if bar == 2 else (0.25 + knee, crank)
     wanted = moved + (0.25 if bar == 2 else -0.25)

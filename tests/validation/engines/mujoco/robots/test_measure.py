@@ -267,7 +267,7 @@ def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar():
     assert torque.vanishes
     assert torque.scale == pytest.approx(largest * 0.5, rel=1e-6)
     assert torque.part == torque.error / torque.scale
-    assert loop.influence is not None and loop.influence.worst < 1.0
+    assert loop.influence.worst < 1.0
 
 
 @pytest.mark.slow
@@ -357,7 +357,7 @@ def test_a_state_after_a_turn_is_that_of_the_same_motion():
 def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage():
     loop = past_a_change_point(-1.0)
     through = loop.through_time
-    assert through is not None and through.other_assembly is not None
+    assert through.other_assembly is not None
     beyond = math.degrees(through.other_assembly)
     assert beyond < 120.0 < math.degrees(min(row.joint for row in through.rows)) + 5.0
     assert errors_of(loop)[MEASURED_THROUGH_TIME].part < 0.5
@@ -374,7 +374,7 @@ def test_an_offset_along_the_axes_changes_nothing_in_the_plane(offset):
     for joint, torque in TORQUES.items():
         assert torques[joint].torque == pytest.approx(torque, rel=SAME)
     assert len(loop.states.rows) == POSITIONS_OF_A_LOOP
-    assert loop.through_time is not None and not loop.through_time.lost
+    assert not loop.through_time.lost
     assert max(row.gap for row in loop.states.rows) < 1e-12
 
 
@@ -383,7 +383,7 @@ def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset):
     text = apart_along_the_axes(offset)
     report = list_closures(file_of(text), PoseOptions())
     (closure,) = report.closures
-    assert closure.loop is not None and not report.notes
+    assert not report.notes
     assert closure.gap == pytest.approx(0.0, abs=1e-12)
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)

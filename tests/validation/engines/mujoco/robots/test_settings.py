@@ -37,13 +37,18 @@ LIGHT_LOAD = 0.3
 """rad to either side of the pose."""
 
 
-def search(file):
+def find_loop(file):
+    """Return the model of a robot with one loop, and the loop."""
     posed = pose_robot(compile_robot(file).model, PoseOptions())
-    (loop,) = (one.loop for one in find_closures(posed, PoseOptions()))
-    assert loop is not None
+    (closure,) = find_closures(posed, PoseOptions())
+    return posed.model, closure.loop
+
+
+def search(file):
+    model, loop = find_loop(file)
     middle = loop.angles[1]
     angles = tuple(middle + LIGHT_LOAD * step / 4.0 for step in range(-4, 5))
-    return SettingsSearch(LoopInside(posed.model, loop), LoopMotion(angles, 2.0, 0.0))
+    return SettingsSearch(LoopInside(model, loop), LoopMotion(angles, 2.0, 0.0))
 
 
 def paste(text, advice):
@@ -117,15 +122,13 @@ def write_leg(sense):
 def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     """The range is measured again, and the whole motion is not within the error."""
     wanted = 1e-4
-    posed = pose_robot(compile_robot(write_leg(1)).model, PoseOptions())
-    (loop,) = (one.loop for one in find_closures(posed, PoseOptions()))
-    assert loop is not None
+    model, loop = find_loop(write_leg(1))
     first, last = loop.angles[1], loop.angles[1] + LIMIT - NEAR - math.radians(10.0)
     angles = [first + (last - first) * step / 8 for step in range(9)]
 
     def search(low, high):
         motion = LoopMotion(tuple(angles[low : high + 1]), 2.0, 0.0)
-        return SettingsSearch(LoopInside(posed.model, loop), motion)
+        return SettingsSearch(LoopInside(model, loop), motion)
 
     whole = search(0, 8)
     stiff = replace(whole.own, solimp=STIFFEST_IMPEDANCE)
@@ -135,7 +138,6 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     assert deciding.error == pytest.approx(error, rel=1e-9)
     assert deciding.angle == pytest.approx(last, abs=1e-2)
     within = whole.find_range(stiff, wanted)
-    assert within is not None
     count = min(range(9), key=lambda step: abs(angles[step] - first - within[1]))
     assert within[0] == pytest.approx(0.0, abs=1e-9) and 4 < count < 8
     assert search(0, count).measure(stiff).error <= wanted
@@ -180,13 +182,11 @@ def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
     free = '<joint axis="0 -1 0"'  # without a name
     leg = replace(leg, text=leg.text.replace('<joint name="shank"', "<joint"))
     file = replace(leg, text=leg.text.replace(free, f'{free} frictionloss="{LOSS}"'))
-    posed = pose_robot(compile_robot(file).model, PoseOptions())
-    (loop,) = (one.loop for one in find_closures(posed, PoseOptions()))
-    assert loop is not None
+    model, loop = find_loop(file)
     first = loop.angles[1] + TURN - math.radians(10.0)
     angles = tuple(first + math.radians(6.0 * step - 15.0) for step in range(9))
     motion = LoopMotion(angles, speed, 0.0)
-    search = SettingsSearch(LoopInside(posed.model, loop), motion)
+    search = SettingsSearch(LoopInside(model, loop), motion)
     stiff = replace(search.own, solimp=STIFFEST_IMPEDANCE)
     rows = search._answer(stiff, motion)[0].rows
     assert [bool(row.sticking) for row in rows] == [step == 2 for step in range(9)]
