@@ -250,7 +250,8 @@ class Results:
                 # x and y next to each other: one copy
                 array.view(complex)[*index, 0] = value
             else:
-                array[*index, 0], array[*index, 1] = value.real, value.imag
+                array[*index, 0] = value.real
+                array[*index, 1] = value.imag
 
 
 def _may_sign_differ(case: Case) -> bool:

@@ -590,6 +590,7 @@ def equilibrium_command(scene: Path, as_json: bool, out: Path | None) -> None:
     if as_json:
         text = write_equilibria_json(described.title, rest)
     else:
-        units, width = given.suit_file_units(), given.find_width(out)
+        units = given.suit_file_units()
+        width = given.find_width(out)
         text = write_equilibria(described.title, rest, units, width)
     given.print_to(text, out)

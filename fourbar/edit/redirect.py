@@ -37,7 +37,8 @@ class Redirect:
     """The page of one scene file; whoever holds its lock serves the file."""
 
     def __init__(self, scene: Path) -> None:
-        self.scene, self.path = scene, scene.with_name(scene.name + REDIRECT_ENDING)
+        self.scene = scene
+        self.path = scene.with_name(scene.name + REDIRECT_ENDING)
         self.handle: int | None = None
 
     def claim(self) -> bool:

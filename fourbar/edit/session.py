@@ -498,7 +498,8 @@ def _command_other(session: Session, asked: dict[str, Any]) -> None:
     if commanded == "stroke":
         unit = find_unit(find_length(session.now.plain), "m")
         factor = to_si("1 m", unit)
-        rate_unit, rate_factor = f"{unit}/s", factor
+        rate_unit = f"{unit}/s"
+        rate_factor = factor
     else:
         unit = "deg"
         factor = math.degrees(1.0)

@@ -297,8 +297,10 @@ def _solve_coupled(
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Solve (k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
-    Fx, Fy = F.real, F.imag
-    Cx, Cy = C.real, C.imag
+    Fx = F.real
+    Fy = F.imag
+    Cx = C.real
+    Cy = C.imag
     kC = k * np.abs(C)
     k2 = k * k
     a = (kC - 1.0) * (kC + 1.0)

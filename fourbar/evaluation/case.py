@@ -307,7 +307,8 @@ class Case(NamedTuple):
 
     def half_angle(self, at: Command) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those in many digits."""
-        q, remainder = at.angle, at.remainder
+        q = at.angle
+        remainder = at.remainder
         lengths = self.path.lengths
         half = self.path.half_angle(q)
         close: Any = remainder is not None

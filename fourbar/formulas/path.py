@@ -205,9 +205,17 @@ class LoopPath(NamedTuple):
             return position
         d, _, b, c, _, _ = self.lengths
         if self.bar == 3:
-            u1, u2, u3, u4, a = position.u1, position.u3, position.u2, position.u4, b
+            u1 = position.u1
+            u2 = position.u3
+            u3 = position.u2
+            u4 = position.u4
+            a = b
         else:
-            u1, u2, u3, u4, a = -position.u1, position.u4, -position.u3, position.u2, c
+            u1 = -position.u1
+            u2 = position.u4
+            u3 = -position.u3
+            u4 = position.u2
+            a = c
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
         # the root is NaN where speeds are 0/0; the sine still has its value
         closed = position._replace(

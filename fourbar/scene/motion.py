@@ -90,7 +90,8 @@ class Sweep:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__  # the class is frozen; this is its constructor
-        start, stop = self.start, self.stop
+        start = self.start
+        stop = self.stop
         if isinstance(start, str) or isinstance(stop, str):
             set_field(self, "unit", "m" if is_length(start, stop) else "rad")
         unit = self.unit or "rad"
@@ -198,7 +199,8 @@ class Law(Described, _OverTime):
     def __post_init__(self) -> None:
         Described.__post_init__(self)
         key = self.stated_at
-        time, angles = self.time, self.angle or ()
+        time = self.time
+        angles = self.angle or ()
         self._require_rates()
         fewest = FEWEST_POINTS[self.ends] if self.omega is None else 2
         may_be = range(fewest, MOST_LISTED_POSITIONS + 1)

@@ -516,7 +516,9 @@ class _Triangle(NamedTuple):
         The condition is the lever over the longer of l and r. NaN where the cylinder
         cannot have the stroke. All may be arrays, and numbers with slopes.
         """
-        length, reach, zero = self.length, self.reach, 0.0 * self.length
+        length = self.length
+        reach = self.reach
+        zero = 0.0 * self.length
         sign = SIDES[side]
         beyond_length = exact_difference(stroke, reach, length, zero)
         near = beyond_length * exact_difference(stroke, length, reach, zero)
@@ -682,7 +684,8 @@ def find_stroke_ranges(scene: Scene) -> list[tuple[float, float]]:
         low, high = sorted(sign * (end - triangle.angle) for end in interval)
         turn = TURN * math.floor(low / TURN)
         for start in (turn, turn + TURN):
-            first, last = max(low - start, 0.0), min(high - start, math.pi)
+            first = max(low - start, 0.0)
+            last = min(high - start, math.pi)
             if first < last:
                 ranges.append(triangle.find_strokes(first, last))
     return sorted(ranges)
@@ -698,7 +701,8 @@ def write_stroke_ranges(scene: Scene) -> str:
 
 def command_at(scene: Scene, places: Array) -> Command:
     """Return the command of the scene's motion at other angles, strokes or times."""
-    motion, bar = scene.motion, scene.motion.bar
+    motion = scene.motion
+    bar = scene.motion.bar
     if motion.commanded == "stroke":
         triangle = _triangle_of(scene)
         least = abs(triangle.length - triangle.reach)
@@ -744,7 +748,9 @@ def find_signs(
 def command(scene: Scene) -> Command:
     """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
-    motion, linkage, bar = scene.motion, scene.linkage, scene.motion.bar
+    motion = scene.motion
+    linkage = scene.linkage
+    bar = scene.motion.bar
     stated = motion.angle
     origin = None
     if motion.law is not None:

@@ -95,10 +95,8 @@ class FreeBody:
         asked = command
         if command.moves_stroke:
             command = find_angle(command, scene.motion, *measure_cylinder(scene))
-        bar, closed = (
-            command.bar,
-            close(scene.linkage, command.angle, command.branch, command.bar),
-        )
+        bar = command.bar
+        closed = close(scene.linkage, command.angle, command.branch, command.bar)
         theta = list(closed.theta)
         theta.insert(bar - 2, command.angle)
         answer = Answer(
@@ -459,13 +457,8 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
                 :, row + 1, FORCE_COLUMNS[force] + 1
             ] = 1.0
         u = motion.unit[bar]
-        (
-            matrix[:, row + 2, FORCE_COLUMNS[second]],
-            matrix[:, row + 2, FORCE_COLUMNS[second] + 1],
-        ) = (
-            -u.imag,
-            u.real,
-        )
+        matrix[:, row + 2, FORCE_COLUMNS[second]] = -u.imag
+        matrix[:, row + 2, FORCE_COLUMNS[second] + 1] = u.real
     if (line := _place_line_of_drive(scene, motion)) is None:
         matrix[:, EQUATION_ROWS[scene.drive_bar][0] + 2, DRIVE_COLUMN] = 1.0
     else:

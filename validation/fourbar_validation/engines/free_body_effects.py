@@ -98,7 +98,8 @@ class BodyWrenches:
     def on(self, bar: int) -> "BodyWrenches":
         """Return what acts on one bar alone."""
         alone = BodyWrenches(len(self.moment[bar]))
-        alone.force[bar], alone.moment[bar] = self.force[bar], self.moment[bar]
+        alone.force[bar] = self.force[bar]
+        alone.moment[bar] = self.moment[bar]
         return alone
 
     def push(self, bar: int, force: Any, arm: Any) -> None:

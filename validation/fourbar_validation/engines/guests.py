@@ -190,7 +190,8 @@ def name_by_versions(
     def name(engine: Engine) -> Engine:
         if not isinstance(engine, Guest):
             return engine
-        stated, version = engine.stated_name, engine.version
+        stated = engine.stated_name
+        version = engine.version
         if alone[stated] == 1:
             return engine.renamed(stated)
         if version and versions[stated, version] == 1:

@@ -132,11 +132,17 @@ class Assembler:
             first = phi + branch * alpha
             second = phi + math.pi - branch * beta
             if bar == 2:
-                theta_2, theta_3, theta_4 = theta, first, second
+                theta_2 = theta
+                theta_3 = first
+                theta_4 = second
             elif bar == 3:
-                theta_2, theta_3, theta_4 = first, theta, second
+                theta_2 = first
+                theta_3 = theta
+                theta_4 = second
             else:
-                theta_2, theta_3, theta_4 = second + math.pi, first, theta
+                theta_2 = second + math.pi
+                theta_3 = first
+                theta_4 = theta
             q = (
                 theta_2,
                 math.remainder(theta_3 - theta_2, math.tau),

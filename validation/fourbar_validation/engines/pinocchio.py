@@ -37,7 +37,8 @@ class PinocchioTree(KeptTree):
 
     def __init__(self, scene: Scene) -> None:
         self.model = model = pin.Model()
-        self.joint, self.frame = {1: 0}, dict[str, int]()
+        self.joint = {1: 0}
+        self.frame = dict[str, int]()
         for part in list_moving_parts(scene.linkage):
             joint = model.addJoint(
                 self.joint[part.bearer],
@@ -216,10 +217,8 @@ class ClosedTree:
             1.0 / time_constant**2, 2.0 / time_constant
         )
         closure.setBaumgarteCorrectorParameters(gains)
-        self.models, self.closure_data = (
-            pin.StdVec_RigidConstraintModel(),
-            pin.StdVec_RigidConstraintData(),
-        )
+        self.models = pin.StdVec_RigidConstraintModel()
+        self.closure_data = pin.StdVec_RigidConstraintData()
         self.models.append(closure)
         self.closure_data.append(closure.createData())
         self.data = tree.model.createData()

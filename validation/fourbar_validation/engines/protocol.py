@@ -631,7 +631,8 @@ def read_setting(data: Any) -> dict[str, Any]:
 
 def release_to_json(scene: Scene) -> dict[str, Any]:
     """Write the start and the times of a released motion."""
-    motion, free = scene.motion, scene.motion.free
+    motion = scene.motion
+    free = scene.motion.free
     assert free is not None
     start = {"theta_2": float(motion.theta_2), "omega_2": motion.omega_2 or 0.0}
     sign = with_signs(scene.linkage, command_of(scene)).branch

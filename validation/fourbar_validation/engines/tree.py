@@ -192,7 +192,8 @@ class Tree(Loaded, Protocol):
 
     def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Return speeds, accelerations and forces by name; {} where they are 0/0."""
-        jacobian, commanded = self.jacobian(), self.turns[bar]
+        jacobian = self.jacobian()
+        commanded = self.turns[bar]
         try:
             v = solve_closed(jacobian, speed, commanded)
             a = solve_closed(jacobian, acceleration, commanded, *self.drift(v))

@@ -70,7 +70,10 @@ def compute_worksheet() -> dict[str, float]:
 
     The constant of its real equation is computed too.
     """
-    d, a, b, c = 3.0, 0.8, 2.5, 2.0
+    d = 3.0
+    a = 0.8
+    b = 2.5
+    c = 2.0
     theta_2 = math.pi / 3.0
     linkage = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
     ours = {"real constant": a * math.cos(theta_2) - d}

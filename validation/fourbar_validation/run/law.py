@@ -90,7 +90,10 @@ def _restate_spline(law: Law, time: Array) -> _Restated:
         misfits.append(jumps * shortest * shortest)
     piece = _find_pieces(t, time)
     s = time - t[piece]
-    angle, speed, first, jerk = angle[piece], speed[piece], first[piece], jerk[piece]
+    angle = angle[piece]
+    speed = speed[piece]
+    first = first[piece]
+    jerk = jerk[piece]
     rates = (
         angle + s * (speed + s * (first / 2.0 + s * jerk / 6.0)),
         speed + s * (first + s * jerk / 2.0),

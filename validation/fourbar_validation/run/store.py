@@ -40,11 +40,9 @@ class Store:
         identity: dict[str, Any],
         outcome: Sequence[str] = (),
     ) -> None:
-        self.folder, self.parts, self._written = (
-            folder,
-            folder / "parts",
-            ("lock", UNFINISHED, *outcome),
-        )
+        self.folder = folder
+        self.parts = folder / "parts"
+        self._written = ("lock", UNFINISHED, *outcome)
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
         self._run = hashlib.sha256(self._identity.encode()).hexdigest()
         self.notes: list[str] = []

@@ -388,9 +388,11 @@ class _SceneConversion:
         Read from the other end two bars at A or B change their order.
         """
         pin, stiffness, rest, preload = row
-        sense, line = self.sense, 0.0
+        sense = self.sense
+        line = 0.0
         if self.exchanged:
-            sense, line = -1.0 if pin in ("A", "B") else 1.0, -math.pi
+            sense = -1.0 if pin in ("A", "B") else 1.0
+            line = -math.pi
         couple = self.square * sense * preload
         return self.pin(pin), self.square * stiffness, sense * rest + line, couple
 

@@ -241,7 +241,8 @@ class ResidualMonitor:
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
         """Return F12, F32, F14 in N, from the open tree and the closing force."""
-        bars, d = self.bars, self.bars.data
+        bars = self.bars
+        d = self.bars.data
         if self.drive_bar is None:  # its line crosses the pins, a couple does not
             d.ctrl[bars.ram] = drive
             mujoco.mj_fwdActuation(bars.model, d)

@@ -46,6 +46,8 @@ class MujocoInverseLoop(PlainLoop):
 
     def inverse(self, q: Array, v: Array, a: Array) -> list[float]:
         """Return the generalized forces that the motion needs beside what acts."""
-        self.data.qacc[:], self.tree.v, self.tree.a = a, v, a
+        self.data.qacc[:] = a
+        self.tree.v = v
+        self.tree.a = a
         torques: list[float] = self.tree.torques()
         return torques

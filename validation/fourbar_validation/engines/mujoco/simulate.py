@@ -126,11 +126,9 @@ class MujocoSimulated:
             InputError,
         ) as error:  # anything else is a failure, not a declared limit
             answer = Answer(self.name, self.settings.integrator, refusal=str(error))
-        answer.shared, answer.own, answer.seconds = (
-            SHARED_WITH_SIMULATION,
-            COMPUTED_BY_MUJOCO,
-            time.perf_counter() - began,
-        )
+        answer.shared = SHARED_WITH_SIMULATION
+        answer.own = COMPUTED_BY_MUJOCO
+        answer.seconds = time.perf_counter() - began
         return answer
 
 

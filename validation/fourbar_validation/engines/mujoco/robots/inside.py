@@ -752,7 +752,8 @@ class LoopInside:
                 answer.skipped += 1
                 continue
             # a limit on processor time lets the clock of the process tick coarsely
-            began, done = time.thread_time(), stepper.done
+            began = time.thread_time()
+            done = stepper.done
             stepper.to(instant)
             if stepper.done > done:
                 spent = (time.thread_time() - began) / (stepper.done - done)

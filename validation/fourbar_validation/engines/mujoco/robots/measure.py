@@ -411,7 +411,8 @@ def _take_span(
     cut = ""
     limited = inside.joint is not None and inside.model.jnt_limited[inside.joint]
     if limited or np.ptp(motion.angle) < _WHOLE_TURN:
-        low, high = max(low, min(joints)), min(high, max(joints))
+        low = max(low, min(joints))
+        high = min(high, max(joints))
         moved, wanted = (
             " to ".join(f"{math.degrees(end):.6g}" for end in ends)
             for ends in ((min(joints), max(joints)), span)
@@ -447,7 +448,8 @@ def _compare_at_same_angles(
     worst = 0.0
     median = 0.0
     count = min(len(one.rows), len(other.rows))
-    first, second = one.differences(), other.differences()
+    first = one.differences()
+    second = other.differences()
     for name, scale in scales.items():
         changes = measure_sizes(first[name][:count] - second[name][:count])
         worst = max(worst, divide(float(changes.max()), scale))

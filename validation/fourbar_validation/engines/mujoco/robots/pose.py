@@ -308,7 +308,8 @@ class _Closing:
         moved = []
         for joint in self.joints:
             place = self.model.jnt_qposadr[joint]
-            low, high = self.low[place], self.high[place]
+            low = self.low[place]
+            high = self.high[place]
             if math.isfinite(low):
                 middle[place] = 0.5 * (low + high)
                 moved += [(place, low + part * (high - low)) for part in (0.25, 0.75)]
@@ -326,7 +327,8 @@ class _Closing:
         qpos = start.copy()
         joints = self.model.dof_jntid[self.dofs]
         places = self.model.jnt_qposadr[joints]
-        low, high = self.low[places], self.high[places]
+        low = self.low[places]
+        high = self.high[places]
         qpos[places] = np.clip(qpos[places], low, high)
         if not self.dofs:
             return qpos

@@ -207,7 +207,8 @@ class SettingsSearch:
         ranges = combinations(range(len(places)), 2)
         tried = 0
         for first, last in sorted(ranges, key=lambda ends: ends[0] - ends[1]):
-            low, high = places[first], places[last]
+            low = places[first]
+            high = places[last]
             parts = [
                 InsideAnswer(
                     [row for angle, row in rows.items() if low <= angle <= high]
@@ -287,7 +288,8 @@ class SettingsSearch:
         own = self.own
         constant, ratio = own.solref
         if constant <= 0.0:
-            constant, ratio = _FIRST_CONSTANT, 1.0
+            constant = _FIRST_CONSTANT
+            ratio = 1.0
         shortest = FEWEST_TIMESTEPS * own.timestep
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
