@@ -35,7 +35,7 @@ from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.check.mistakes import Explanation
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FORMULAS
-from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.free_body import FreeBody
@@ -714,7 +714,7 @@ def test_what_acts_may_be_missing_in_some_quantities(names, where):
     assert causes[0] == f"gravity is missing {where}"
 
 
-def name_wrong(changes):
+def name_wrong(changes, tolerance=EQUIVALENCE):
     """Who is called wrong, and why, where engines answer with these changes."""
 
     class Named(Altered):
@@ -723,7 +723,7 @@ def name_wrong(changes):
             self.name = name
 
     engines = [
-        Engine(name, partial(Named, name, change), EQUIVALENCE, ("F43", "torque"))
+        Engine(name, partial(Named, name, change), tolerance, ("F43", "torque"))
         for name, change in changes.items()
     ]
     overview = Overview()
@@ -748,6 +748,13 @@ def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():
     assert outvoted.keys() == twice.keys()
     # nor where each differs in a way of its own
     assert name_wrong({"one": reverse_F43, "two": reverse_y}).keys() == twice.keys()
+
+    def stretch(numbers, at, by):
+        numbers["F43"] = numbers["F43"] * by
+
+    missed = {"one": partial(stretch, by=1.0015), "two": partial(stretch, by=1.002)}
+    declared = ErrorBound("stated", "3 digits", 1e-3, conditioned=False)
+    assert name_wrong(missed, declared).keys() == twice.keys()
 
 
 @pytest.mark.parametrize("quantity", ["v_G3", "assembled"])

@@ -9,7 +9,7 @@ import pytest
 import fourbar
 from fourbar import Bar, FourBar, Friction, Motion, uniform
 from fourbar.formulas.mobility import limit_positions
-from fourbar.quantities import FORCE_NAMES
+from fourbar.quantities import FORCE_NAMES, SINGULAR
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
@@ -131,6 +131,21 @@ def test_what_fails_with_the_loads_is_not_told_again_of_the_inertia(adapter, fai
     rows = rows_of(adapter)
     assert sorted(name for name, row in rows.items() if row.failed) == failing
     assert "torque_inertia" in rows
+
+
+def test_positions_are_singular_only_where_bars_3_and_4_are_in_line(monkeypatch):
+    """Their numbers are there, and no engine is compared with them."""
+    true = fourbar.solve
+
+    def withhold(*arguments, **stated):
+        solution = true(*arguments, **stated)
+        solution.status_code[:2] = SINGULAR
+        return solution
+
+    monkeypatch.setattr("fourbar_validation.run.question.solve", withhold)
+    rows = judge("", crank_rocker(), [FREE_BODY]).rows
+    failed = [(row.quantity, row.error) for row in rows if row.failed]
+    assert ("status", 2.0) in failed
 
 
 def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch):

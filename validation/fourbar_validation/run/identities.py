@@ -412,6 +412,7 @@ def compare_status(
         | (reference.condition < TOO_NEAR_A_TOGGLE)
         | (formulas.condition < TOO_NEAR_A_TOGGLE)
     )
+    differ |= np.isin(formulas.status_code, (SINGULAR, CHANGE_POINT)) & ~close & ~large
     if sines is not None and len(
         near := np.flatnonzero(close)
     ):  # exact arithmetic has to decide there

@@ -29,6 +29,10 @@ from fourbar_validation.run.question import Question
 
 EXACT = "exact"
 """Setting of an engine whose errors are round-off."""
+_TIMES_NEARER = 10.0
+"""Factor by which two engines are nearer to each other than to us if they agree against
+us: two that miss what they declare by as much do not.
+"""
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
@@ -78,7 +82,7 @@ def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     """Return whether two engines that differ from us have one number.
 
     The position is that where the first one is worst, and the two may differ by the
-    larger error that either is allowed.
+    larger error that either is allowed, and by a tenth of what they differ from us.
     """
     values, others = (
         _read_values(question, one.engine, quantity) for one in (row, other)
@@ -94,7 +98,8 @@ def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     apart = compute_difference(quantity, values[at], others[at])
     from_us = compute_difference(quantity, 1.0 * ours[at], values[at])
     allowed = 2.0 * max(row.allowed, other.allowed)
-    return bool(apart[0] * row.error <= allowed * from_us[0])
+    near = apart[0] * row.error <= allowed * from_us[0]
+    return bool(near and apart[0] * _TIMES_NEARER <= from_us[0])
 
 
 def _read_values(question: Question, engine: str, quantity: str) -> Array | None:
