@@ -561,7 +561,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
         (REFUSES, "nothing acts", "at declared limits of an engine"),
         (REFUSES, f"{NO_VALUE}: 1 singular", "where the formulas state no value"),
         (UNDECIDED, "eps/condition = 0.1", "with no digit left to decide by"),
-        (UNDECIDED, f"{NO_POSITION} both", "at no position that both answer"),
+        (UNDECIDED, f"{NO_POSITION} both", "at no position that can be judged"),
     ],
 )
 def test_what_was_not_compared_is_counted_by_its_reason(verdict, reason, kind):

@@ -68,7 +68,7 @@ _NOT_COMPARED = {
 """Kinds of what was not compared, by verdict."""
 _BY_REASON = {
     NO_VALUE: "where the formulas state no value",
-    NO_POSITION: "at no position that both answer",
+    NO_POSITION: "at no position that can be judged",
 }
 """Those that the reason tells."""
 _DOES_NOT_APPLY = "where a check does not apply"
