@@ -20,7 +20,6 @@ from fourbar_validation.compare.tolerance import (
     find_error,
     find_lever,
     find_used,
-    find_worst,
     mark_touching,
     replace_zero_size,
 )
@@ -68,14 +67,6 @@ def test_arrays_of_two_shapes_have_no_error_and_no_size_demands_zero():
 )
 def test_what_is_no_number_uses_more_than_is_allowed(error, allowed, share):
     assert find_used(error, allowed) == share
-
-
-@pytest.mark.parametrize(("second", "worst"), [(NAN, 1), (2.0, 2), (INF, 1)])
-def test_the_worst_error_is_the_one_that_is_no_number(second, worst):
-    errors = np.array([1.0, second, 3.0])
-    assert find_worst(errors) == worst
-    if second != 2.0:
-        assert find_used(errors, np.ones(3))[1] == INF
 
 
 def test_conditions_of_several_quantities_are_those_of_their_units():

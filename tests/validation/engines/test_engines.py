@@ -5,7 +5,6 @@ Published figures, round-off agreement, the right branch, limits, faults that mu
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 from importlib.util import find_spec
 from itertools import combinations, product, starmap
 from typing import ClassVar
@@ -34,11 +33,7 @@ from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop, tree
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
-from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.mujoco.inverse import MujocoTree
-from fourbar_validation.engines.pinocchio import PinocchioTree
 from fourbar_validation.engines.registry import ENGINES, load_further
-from fourbar_validation.engines.tree import keep_tree
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -449,28 +444,6 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
     """
     case = Random(index + 1, 3, tuple(DrawnType)).scene(index)
     assert failures(name, case) == []
-
-
-@pytest.mark.parametrize("kind", [PinocchioTree, MujocoTree])
-def test_a_scene_before_leaves_nothing_behind(kind):
-    """An engine keeps one tree for all its scenes."""
-    motion = Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
-    plain = Scene(CRANK_ROCKER, motion)
-    loaded = Scene(
-        replace(CRANK_ROCKER, ground=0.31),
-        motion,
-        4,
-        LOADS,
-        EFFECTS,
-    )
-    kept = Exact("kept", partial(keep_tree, kind))
-    kept.answer(loaded, command(loaded))
-    after, fresh = (
-        engine.answer(plain, command(plain)).quantities
-        for engine in (kept, Exact("fresh", kind))
-    )
-    for name, values in fresh.items():
-        np.testing.assert_array_equal(after[name], values, err_msg=name)
 
 
 @pytest.mark.parametrize(

@@ -84,34 +84,23 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
         assert not [name for name in modules if not name.startswith(allowed)]
 
 
+NOTHING, LEFT, RIGHT = (0.0, 0.0), (-10.0, 0.0), (10.0, 0.0)
+
+
 @pytest.mark.parametrize(
-    ("drive", "torque", "F12", "F32", "F43", "F14"),
-    [
-        (2, 1.0, (-10, 0), (10, 0), (10, 0), (0, 0)),
-        (4, 1.0, (0, 0), (0, 0), (0, 0), (-10, 0)),
-    ],
+    ("drive", "forces"),
+    [(2, (LEFT, RIGHT, RIGHT, NOTHING)), (4, (NOTHING, NOTHING, NOTHING, LEFT))],
 )
-def test_a_lever_of_an_upright_rectangle(drive, torque, F12, F32, F43, F14):
+def test_a_lever_of_an_upright_rectangle(drive, forces):
     """10 N push bar 4 at B along the coupler.
 
     The bars are upright and 0.1 m long, and the coupler a two-force bar.
     """
     load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
-    got = answered(
-        Scene(
-            RECTANGLE,
-            fourbar.Motion(math.pi / 2, 0.0),
-            drive,
-            (load,),
-        )
-    )
-    assert got["torque"][0] == pytest.approx(torque, abs=1e-14)
-    for name, force in {
-        "F12": F12,
-        "F32": F32,
-        "F43": F43,
-        "F14": F14,
-    }.items():
+    scene = Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,))
+    got = answered(scene)
+    assert got["torque"][0] == pytest.approx(1.0, abs=1e-14)
+    for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
         assert got[name][0] == pytest.approx(force, abs=1e-13), name
 
 

@@ -60,15 +60,6 @@ def test_meshes_beside_it_and_of_the_option_are_read(
     assert compile_robot(file).model.nmesh == 1
 
 
-def test_a_missing_mesh_is_left_out_where_the_inertial_is_stated(
-    tmp_path,
-):
-    robot = compile_robot(read_robot(make(tmp_path, inertial=INERTIAL)))
-    assert robot.model.body("arm").mass[0] == 2.0
-    assert not robot.unknown_masses
-    assert robot.notes == ("meshes that are missing are left out: part.obj",)
-
-
 def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path):
     robot = compile_robot(read_robot(make(tmp_path)))
     body = robot.model.body("arm").id

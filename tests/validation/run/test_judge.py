@@ -301,30 +301,23 @@ def test_positions_without_a_value_are_counted_next_to_those_that_were_compared(
         assert said.startswith("round-off of both sides: 50 eps over the condition")
 
 
-@pytest.fixture
-def asked(monkeypatch):
-    """Scenes and commands that the free bodies are asked, in their order."""
-    asked = []
-    answering = FreeBody.answer
-
-    def note(self, scene, command):
-        asked.append((scene, command))
-        return answering(self, scene, command)
-
-    monkeypatch.setattr(FreeBody, "answer", note)
-    return asked
-
-
-def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(asked):
+def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch):
     """Angle, rates and lever are what the formulas computed from the stroke.
 
     The engine finds its own.
     """
+    asked, answering = [], FreeBody.answer
+
+    def note(self, scene, command):
+        asked.append(command)
+        return answering(self, scene, command)
+
+    monkeypatch.setattr(FreeBody, "answer", note)
     rows = judge("", FAULT_SCENES["stroke"], [FREE_BODY]).rows
     assert not [row for row in rows if row.failed]
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
     assert asked
-    for _, at in asked:
+    for at in asked:
         assert at.moves_stroke and at.condition == 1.0
         assert np.isfinite(at.stated[0]).all()
         assert np.isnan([at.angle, at.speed, at.acceleration]).all()

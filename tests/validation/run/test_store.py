@@ -22,18 +22,6 @@ def list_done(folder, identity):
         return store.done(), [note.rpartition(": ")[2] for note in store.notes]
 
 
-def test_a_run_goes_on_from_its_own_parts(tmp_path):
-    fill(
-        tmp_path,
-        "one",
-        0,
-        2,
-    )
-    assert list_done(tmp_path, "one") == ({0, 2}, [])
-    with Store(tmp_path, {"suite": "one"}).held() as store:
-        assert store.read(2) == [{"task": 2}]
-
-
 WRONG_PARTS = {"is of another run", "is another part", "is no file"}
 
 
