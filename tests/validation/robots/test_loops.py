@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from click import UsageError
 from click.testing import CliRunner
 
 import fourbar
@@ -16,6 +15,11 @@ from tests.whole.test_imports import ROOT
 MODELS = ROOT / "models" / "robots"
 
 
+def call(*arguments):
+    line = [*map(str, arguments)]
+    return CliRunner().invoke(loops_command, line, standalone_mode=False)
+
+
 def unfold(printed):
     """Return the lines of a text whose folds are indented by four blanks."""
     return printed.replace("\n    ", " ").splitlines()
@@ -23,8 +27,7 @@ def unfold(printed):
 
 @pytest.mark.slow
 def test_a_line_for_each_closure():
-    arguments = [str(MODELS / "gripper.xml")]
-    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
+    result = call(MODELS / "gripper.xml")
     assert result.exception is None
     assert max(map(len, result.output.splitlines())) <= 80
     right, left = unfold(result.output)
@@ -39,8 +42,7 @@ def test_a_line_for_each_closure():
 
 @pytest.mark.slow
 def test_the_gap_is_that_of_the_stated_pose():
-    arguments = [str(MODELS / "biped_foot.xml"), "--pose", "crank=20deg,knee=30deg"]
-    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
+    result = call(MODELS / "biped_foot.xml", "--pose", "crank=20deg,knee=30deg")
     line, note = unfold(result.output)
     assert line.startswith("rod: connect; ground ankle_frame; hinges rod, crank, ankle")
     # the crank turned by 20 deg carries the rod's end along: 2 . 0.31905 m sin(10 deg)
@@ -62,10 +64,8 @@ def test_a_pose_is_read_from_pairs():
 @pytest.mark.slow
 def test_a_scene_is_written_that_the_formulas_solve(tmp_path):
     out = tmp_path / "finger.toml"
-    loop = "right_finger-right_follower"
-    arguments = [str(MODELS / "gripper.xml"), "--loop", loop, "-o", str(out)]
-    arguments += ["--speed", "60 rpm"]
-    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
+    loop = "--loop", "right_finger-right_follower"
+    result = call(MODELS / "gripper.xml", *loop, "-o", out, "--speed", "60 rpm")
     assert result.exception is None
     assert result.output.splitlines()[-1] == f"written to {out}"
     text = out.read_text()
@@ -86,19 +86,12 @@ def test_a_scene_is_read_again_however_many_meshes_are_missing(tmp_path):
     robot = tmp_path / "foot.xml"
     robot.write_text(text, encoding="utf-8")
     out = tmp_path / "foot.toml"
-    arguments = [str(robot), "-o", str(out)]
-    result = CliRunner().invoke(loops_command, arguments, standalone_mode=False)
+    result = call(robot, "-o", out)
     assert result.exception is None, result.output
     assert "m149.stl" in out.read_text(encoding="utf-8")
     assert fourbar.load(out).linkage.ground > 0.0
 
 
 def test_a_speed_without_a_scene_is_refused():
-    arguments = [str(MODELS / "gripper.xml"), "--speed", "1"]
-    with pytest.raises(UsageError, match="--speed goes with -o"):
-        CliRunner().invoke(
-            loops_command,
-            arguments,
-            standalone_mode=False,
-            catch_exceptions=False,
-        )
+    refused = call(MODELS / "gripper.xml", "--speed", "1")
+    assert "--speed goes with -o" in str(refused.exception)

@@ -86,16 +86,11 @@ one speed through time; empty where they have one.
 """
 
 
-def measured(drive):
-    scene = loads(f"{SCENE}[drive]\n{DRIVES[drive]}\n")
-    bare = loads(SCENE)
-    return measure(write_mjcf(bare, drive="none"), scene, loop="B")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("drive", DRIVES)
 def test_every_drive_is_that_of_the_formulas_in_a_file_without_it(drive):
-    loop = measured(drive)
+    scene = loads(f"{SCENE}[drive]\n{DRIVES[drive]}\n")
+    loop = measure(write_mjcf(loads(SCENE), drive="none"), scene, loop="B")
     assert find_left_out(loop) < 1e-8
     errors = list_errors_by_method(loop)
     assert {error.quantity for error in errors} >= {name_driving(loop.scene), "F43"}
