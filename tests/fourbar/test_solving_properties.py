@@ -25,6 +25,7 @@ from fourbar.quantities import (
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.engines.exact import find_refusal
 from tests.support.balls import answer_in_balls
+from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage
 
 EPS = 2.0**-52
@@ -48,21 +49,23 @@ LEAST_CONDITION = 1e-4
 OF_A_LINE = 2e-11
 """Relative to the largest value: eps over the conditions of drives along a line, 1e-4.
 """
-LINKAGES = {
-    "crank-rocker": bare(0.3, 0.1, 0.25, 0.22, 0.2),
-    "a = d": bare(0.3, 0.3, 0.25, 0.22, -2.0),
-    "b = c": bare(0.3, 0.1, 0.25, 0.25, 1.0),
-    "input longer than ground": bare(0.1, 0.3, 0.25, 0.32),
-    "short ground": bare(0.01, 0.3, 0.28, 0.31, 1.0),
-    "parallelogram": bare(0.3, 0.1, 0.3, 0.1, 0.4),
-    "kite b = c, a = d": bare(0.3, 0.3, 0.2, 0.2, 0.4),
-    "kite a = b, c = d": bare(0.2, 0.3, 0.3, 0.2),
-    "change point in line": bare(0.3, 0.1, 0.2, 0.2, 0.4),
-    "touching folded": bare(0.2, 0.1, 0.4, 0.3, 0.4),
-    "rocker": bare(0.5, 0.4, 0.3, 0.25, 0.2),
-    "4 a d > 4 b c": bare(0.4, 0.35, 0.1, 0.08),
-    **{f"drawn {n}": draw_linkage(np.random.default_rng(n)) for n in range(4)},
-}
+LENGTHS = read_rows("""
+crank-rocker | 0.3 0.1 0.25 0.22 0.2
+a = d | 0.3 0.3 0.25 0.22 -2
+b = c | 0.3 0.1 0.25 0.25 1
+input longer than ground | 0.1 0.3 0.25 0.32
+short ground | 0.01 0.3 0.28 0.31 1
+parallelogram | 0.3 0.1 0.3 0.1 0.4
+kite b = c, a = d | 0.3 0.3 0.2 0.2 0.4
+kite a = b, c = d | 0.2 0.3 0.3 0.2
+change point in line | 0.3 0.1 0.2 0.2 0.4
+touching folded | 0.2 0.1 0.4 0.3 0.4
+rocker | 0.5 0.4 0.3 0.25 0.2
+4 a d > 4 b c | 0.4 0.35 0.1 0.08
+""")
+"""Lengths, and the ground's angle where it is not 0."""
+LINKAGES = {name: bare(*map(float, stated.split())) for name, stated in LENGTHS}
+LINKAGES |= {f"drawn {n}": draw_linkage(np.random.default_rng(n)) for n in range(4)}
 BODIES = [
     ((0.2, 1e-3, (0.03, 0.4)), (0.5, None, (0.1, -0.2)), (0.4, 2e-3, (0.12, 0.3))),
     ((0.2, None, None), (0.5, 0.004, (0.13, 0.3)), (0.4, None, None)),

@@ -113,50 +113,55 @@ def test_a_mistake_is_one_line(make, words):
 PI = Fraction(314159265358979323846264338327950288419716939937510582097494459, 10**62)
 """To 63 digits (A000796 of the On-Line Encyclopedia of Integer Sequences)."""
 FOOT = Fraction(3048, 10_000)
-POUND = Fraction(45_359_237, 100_000_000)
-GRAVITY = Fraction(980_665, 100_000)
-"""m; kg; m/s^2: exact by definition."""
-OF_NAMES = {
-    "meter m metre": ("m", 1),
-    "inch in inches": ("m", FOOT / 12),
-    "foot ft feet": ("m", FOOT),
-    "yard yd": ("m", 3 * FOOT),
-    "second s sec": ("s", 1),
-    "minute min": ("s", 60),
-    "hour h": ("s", 3600),
-    "gram g": ("kg", Fraction(1, 1000)),
-    "tonne t": ("kg", 1000),
-    "pound lb lbm": ("kg", POUND),
-    "ounce oz": ("kg", POUND / 16),
-    "radian rad": ("rad", 1),
-    "degree deg °": ("rad", PI / 180),
-    "gradian grad gon": ("rad", PI / 200),
-    "revolution rev turn r": ("rad", 2 * PI),
-    "rpm": ("rad/s", 2 * PI / 60),
-    "rps": ("rad/s", 2 * PI),
-    "newton N": ("kg m/s^2", 1),
-    "standard_gravity g_0 g0": ("m/s^2", GRAVITY),
-    "kilogram_force kgf kp": ("N", GRAVITY),
-    "pound_force lbf": ("N", POUND * GRAVITY),
-    "ounce_force ozf": ("N", POUND * GRAVITY / 16),
-    "slug": ("kg", POUND * GRAVITY / FOOT),
-    "blob": ("kg", 12 * POUND * GRAVITY / FOOT),
-    "newton_meter Nm": ("N m", 1),
-    "newton_centimeter Ncm": ("N m", Fraction(1, 100)),
-    "newton_millimeter Nmm": ("N m", Fraction(1, 1000)),
-    "joule J": ("kg m^2/s^2", 1),
-    "watt W": ("kg m^2/s^3", 1),
-    "horsepower hp": ("W", 550 * FOOT * POUND * GRAVITY),
-    "metric_horsepower PS": ("W", 75 * GRAVITY),
-    "pascal Pa": ("N/m^2", 1),
-    "bar": ("N/m^2", 100_000),
-    "psi": ("N/m^2", POUND * GRAVITY * 144 / FOOT**2),
-}
+"""m, exact by definition."""
+OF_NAMES = read_rows("""
+meter m metre | m | 1
+inch in inches | m | 0.0254
+foot ft feet | m | 0.3048
+yard yd | m | 0.9144
+second s sec | s | 1
+minute min | s | 60
+hour h | s | 3600
+gram g | kg | 0.001
+tonne t | kg | 1000
+pound lb lbm | kg | 0.45359237
+ounce oz | kg | 0.028349523125
+radian rad | rad | 1
+newton N | kg m/s^2 | 1
+standard_gravity g_0 g0 | m/s^2 | 9.80665
+kilogram_force kgf kp | N | 9.80665
+pound_force lbf | N | 4.4482216152605
+ounce_force ozf | N | 0.27801385095378125
+newton_meter Nm | N m | 1
+newton_centimeter Ncm | N m | 0.01
+newton_millimeter Nmm | N m | 0.001
+joule J | kg m^2/s^2 | 1
+watt W | kg m^2/s^3 | 1
+horsepower hp | W | 745.69987158227022
+metric_horsepower PS | W | 735.49875
+pascal Pa | N/m^2 | 1
+bar | N/m^2 | 100000
+""")
 """Each unit in SI units: A. Thompson, B. N. Taylor, Guide for the Use of the SI, NIST
 SP 811 (2008), tables 1 to 8 and
 appendix B.8; slug, hp and PS by their definitions there.
 """
-UNITS = {name: exact for names, exact in OF_NAMES.items() for name in names.split()}
+LBF = Fraction("4.4482216152605")
+OF_NAMES += [
+    ("degree deg °", "rad", PI / 180),
+    ("gradian grad gon", "rad", PI / 200),
+    ("revolution rev turn r", "rad", 2 * PI),
+    ("rpm", "rad/s", 2 * PI / 60),
+    ("rps", "rad/s", 2 * PI),
+    ("slug", "kg", LBF / FOOT),
+    ("blob", "kg", 12 * LBF / FOOT),
+    ("psi", "N/m^2", LBF * 144 / FOOT**2),
+]
+UNITS = [
+    (name, unit, Fraction(exact))
+    for names, unit, exact in OF_NAMES
+    for name in names.split()
+]
 POWERS = {
     "nano n": -9,
     "micro \u00b5 \u03bc u": -6,
@@ -172,9 +177,8 @@ POWERS = {
 PREFIXES = {name: power for names, power in POWERS.items() for name in names.split()}
 
 
-@pytest.mark.parametrize("name", UNITS)
-def test_every_unit_is_its_fraction(name):
-    unit, exact = UNITS[name]
+@pytest.mark.parametrize("name, unit, exact", UNITS)
+def test_every_unit_is_its_fraction(name, unit, exact):
     assert to_si(f"1 {name}", unit) == float(exact)
     assert to_si(f"0.7 {name}", unit) == float(exact * Fraction(7, 10))
 

@@ -97,34 +97,29 @@ def test_the_json_holds_the_duty():
         assert printed * unit == approx(number, rel=ROUND_OFF)
 
 
+def collect(solution):
+    duty, load = motor_duty(solution), bearing_load(solution, "A")
+    return shaking_force(solution), shaking_moment(solution), *duty, *load
+
+
 def test_a_study_has_what_each_of_its_members_has():
-    """Closed and open sweeps; one member has another ground, and one never closes."""
+    """Closed and open sweeps; one member never closes."""
     scene = crank_rocker(loads=())
     turn = LISTED.angle
-    values = {
-        "lengths.ground": [0.3, 0.32, 0.31, 3.0],
-        "lengths.ground_angle": [0.2, 0.3, 0.1, 0.0],
-        "motion.theta_2": np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn]),
-    }
-    s = solve(vary(scene, values))
-    duty = motor_duty(s)
-    load = bearing_load(s, "A")
-    arrays = shaking_force(s), shaking_moment(s), *duty, *load
-    for member, ground in enumerate(values["lengths.ground"][:3]):
-        angle = values["lengths.ground_angle"][member]
-        linkage = replace(scene.linkage, ground=ground, ground_angle=angle)
-        motion = scene.motion.replace(angle=values["motion.theta_2"][member])
-        alone = solve(replace(scene, linkage=linkage, motion=motion))
-        numbers = shaking_force(alone), shaking_moment(alone)
-        numbers += (*motor_duty(alone), *bearing_load(alone, "A"))
+    angles = np.array([turn, np.linspace(0.1, 3.0, 61), turn])
+    values = {"lengths.ground": [0.3, 0.32, 3.0], "motion.theta_2": angles}
+    arrays = collect(solve(vary(scene, values)))
+    for member, ground in enumerate((0.3, 0.32)):
+        linkage = replace(scene.linkage, ground=ground)
+        motion = scene.motion.replace(angle=angles[member])
+        numbers = collect(solve(replace(scene, linkage=linkage, motion=motion)))
         for array, number in zip(arrays, numbers, strict=True):
             if number is None:  # a member of a study without a number has NaN
                 assert array is None or np.isnan(array[member]).all()
             else:
                 assert array[member] == approx(number, rel=1e-12, abs=1e-12)
-    lost = load.largest, duty.rms_power, duty.energy_in, shaking_moment(s)
-    assert all(np.isnan(array[3]).all() for array in lost)
-    assert duty.closed.tolist()[:3] == [True, True, False]
+    duty = motor_duty(solve(vary(scene, values)))
+    assert np.isnan(duty.rms_power[2]) and duty.closed.tolist()[:2] == [True, False]
 
 
 def test_a_study_of_a_motion_law_keeps_its_time():
