@@ -138,30 +138,31 @@ def test_a_mistake_is_named_with_its_key(kind, old, new, line):
     assert line in str(caught.value)
 
 
+NUMBERS = read_rows("""
+turns | 12 | 1
+gap | 0.002 | m
+coil.from_pin.0 | 0.05 | m
+coil.from_pin.1 | 0.5 | rad
+rows.0.pull | 8.896443230521 | N
+rows.0.to.from_pin.0 | 0 | m
+rows.0.to.from_pin.1 | 0 | rad
+rows.1.pull | 3 | N
+rows.1.from.from_pin.0 | 0 | m
+rows.1.from.from_pin.1 | 0 | rad
+rows.1.to.from_centre.0 | 0.01 | m
+rows.1.to.from_centre.1 | 0 | rad
+""")
+"""Keys of the magnets, and what the file states."""
+
+
 def test_its_numbers_vary_by_their_keys(scene):
-    entries = list_entries(scene)
-    numbers = {
-        key.removeprefix("effects.magnets."): (read_number(scene, entry), entry.unit)
-        for key, entry in entries.items()
-        if key.startswith("effects.")
-    }
-    pull = 2.0 * 4.4482216152605
-    assert numbers == {
-        "turns": (12.0, "1"),
-        "gap": (0.002, "m"),
-        "coil.from_pin.0": (0.05, "m"),
-        "coil.from_pin.1": (0.5, "rad"),
-        "rows.0.pull": (pull, "N"),
-        "rows.0.to.from_pin.0": (0.0, "m"),
-        "rows.0.to.from_pin.1": (0.0, "rad"),
-        "rows.1.pull": (3.0, "N"),
-        "rows.1.from.from_pin.0": (0.0, "m"),
-        "rows.1.from.from_pin.1": (0.0, "rad"),
-        "rows.1.to.from_centre.0": (0.01, "m"),
-        "rows.1.to.from_centre.1": (0.0, "rad"),
-    }
-    for name, (_, unit) in numbers.items():
-        assert find_unit_of_key(f"effects.magnets.{name}") == unit
+    entries = list_entries(scene).items()
+    of_magnets = {key: entry for key, entry in entries if key.startswith("effects.")}
+    assert of_magnets.keys() == {f"effects.magnets.{name}" for name, *_ in NUMBERS}
+    for name, value, unit in NUMBERS:
+        key = f"effects.magnets.{name}"
+        assert read_number(scene, of_magnets[key]) == approx(float(value), rel=1e-15)
+        assert of_magnets[key].unit == find_unit_of_key(key) == unit
     key = "effects.magnets.rows.1.pull"
     study = fourbar.vary(scene, {key: [3.0, 4.0, 6.0]})
     three, four, six = solve(study).torque.ravel()

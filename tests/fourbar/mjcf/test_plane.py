@@ -123,11 +123,10 @@ def test_the_joints_of_a_usd_meet_wherever_the_plane_is(axis):
         assert found
         return np.array([float(number) for number in found[1].split(",")])
 
+    xforms = re.findall(r'\n    def Xform "(\w+)" \((.*?)\n    }', text, re.S)
     bodies = {
         name: (read("translate", block), rotation(read("orient", block)))
-        for name, block in re.findall(
-            r'\n    def Xform "(\w+)" \((.*?)\n    }', text, re.S
-        )
+        for name, block in xforms
     }
     world = (np.zeros(3), np.eye(3))
     joints = re.findall(r'RevoluteJoint "(\w+)"(.*?)\n    }', text, re.S)

@@ -35,15 +35,13 @@ def test_a_study_varies_them_and_lists_its_members():
     )
     s = solve(study)
     assert_allclose(s.points["P"][0], s.A[0], atol=1e-15)
-    longer = replace(crank_rocker().linkage.coupler, length=0.26)
-    alone = solve(
-        scene(*POINTS, linkage=replace(crank_rocker().linkage, coupler=longer))
-    )
+    coupler = replace(crank_rocker().linkage.coupler, length=0.26)
+    longer = replace(crank_rocker().linkage, coupler=coupler)
+    alone = solve(scene(*POINTS, linkage=longer))
     assert_array_equal(s.acceleration["P"][1], alone.acceleration["P"])
     frame = s.to_pandas()
-    assert len(frame) == s.theta_2.size
     assert frame["member"].tolist() == [0] * 61 + [1] * 61
-    assert np.array_equal(frame["a_P_x"].to_numpy()[61:], alone.acceleration["P"][:, 0])
+    assert_array_equal(frame["a_P_x"][61:], alone.acceleration["P"][:, 0])
     assert np.shape(json.loads(write_json(s))["torque"]) == (2, 61)
     assert "2 linkages" in s._repr_html_()
 

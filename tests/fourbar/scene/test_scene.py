@@ -25,7 +25,6 @@ from fourbar import (
     dump,
     solve,
     uniform,
-    vary,
 )
 from fourbar.effects import Gravity, Viscous
 from fourbar.errors import InputError, LimitError
@@ -101,16 +100,12 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     table = tuple(np.linspace(angle[30], angle[200], 5).tolist())
     law = Law((0.0, 1.0, 2.0, 3.0, 4.0), steps=8, ends="rest", **{theta: table})
     assert law.bar == bar and law.angle == table
-    by_law = replace(LOADED, motion=Motion(law=law))
-    moved = solve(by_law)
-    again = solve(replace(LOADED, motion=Motion()), at=command(by_law))
-    assert np.array_equal(moved.torque, again.torque) and moved.time is not None
+    moved = solve(replace(LOADED, motion=Motion(law=law)))
+    assert np.isfinite(moved.torque).all() and moved.time is not None
     assert getattr(moved, theta)[-1] == approx(table[-1], rel=4 * U)
     assert abs(moved.omega_2[0]) < 1e-12
     with raises(InputError, match=f"gives {theta}, {omega} and {alpha}"):
         Motion(law=law, theta_2=1.0)
-    with raises(InputError, match="one bar is commanded"):
-        Law((0.0, 1.0), (0.0, 1.0), ends="rest", theta_4=(0.0, 1.0))
 
 
 @pytest.mark.parametrize("bar", slow_but({3}, [3, 4]))
@@ -156,11 +151,6 @@ STROKE = Motion(
             Motion(1.0, 2.0, 3.0, -1),
             {"angle": 1.5, "branch": 1},
             Motion(1.5, 2.0, 3.0, 1),
-        ),
-        (
-            Motion(theta_4=1.0, omega_4=2.0),
-            {"speed": 3.0},
-            Motion(theta_4=1.0, omega_4=3.0),
         ),
         (
             STROKE,
@@ -215,8 +205,6 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     again = fourbar.files.loads(dump(of_each))
     assert again.motion == of_each.motion != of_law.motion
     assert hash(again.motion) == hash(of_each.motion)
-    lightened = vary(of_each, {"bars.output.mass": [0.4, 0.2]})
-    assert np.array_equal(solve(lightened).torque[0], expected.torque)
     # positions keep their rates where some are asked for, and no other has any
     some = solve(of_each, at=command_at(of_each, of_each.motion.angle[8:2:-2]))
     assert np.array_equal(some.torque, expected.torque[8:2:-2])

@@ -229,14 +229,15 @@ def test_texts_with_units_are_the_numbers():
     angles = [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]
     assert (from_texts.at.angle == angles).all()
     assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)
-    for key, text, words in (
-        ("lengths.input", "1 deg", 'lengths.input = .*"deg" does not convert to m'),
-        ("effects.viscous.O2", "1 N m", "does not convert to N m s/rad"),
-        ("lengths.x", "1 mm", "unknown key"),
-    ):
-        for make in (Tolerance, lambda key, text: vary(case, {key: [text]})):
-            with raises(InputError, match=words):
-                make(key, text)
+    for key, text, words in read_rows("""
+lengths.input | 1 deg | lengths.input = .*"deg" does not convert to m
+effects.viscous.O2 | 1 N m | does not convert to N m s/rad
+lengths.x | 1 mm | unknown key
+"""):
+        with raises(InputError, match=words):
+            Tolerance(key, text)
+        with raises(InputError, match=words):
+            vary(case, {key: [text]})
 
 
 def test_a_study_is_given_no_other_positions():
