@@ -43,9 +43,7 @@ SAME = [
     ),
     (Table, (("0 deg", "180 deg"), (1.0, 2.0)), ((0.0, np.pi), (1.0, 2.0))),
     (fourbar.Gravity, ("1 g_0", "180 deg"), (9.80665, np.pi)),
-    (fourbar.Flywheel, ("200 kg cm^2",), (0.02,)),
     (fourbar.Viscous, ((("A", "2 N mm s/rad"),),), ((("A", 0.002),),)),
-    (fourbar.Friction, ((("A", "5 N cm"),),), ((("A", 0.05),),)),
     (PinFriction, ((("A", 0.1, "8 mm"),),), ((("A", 0.1, 0.008),),)),
     (
         fourbar.Torsion,
