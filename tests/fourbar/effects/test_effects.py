@@ -30,24 +30,27 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar.solving import solve
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
 
 
-JAMS = math.nan, math.nan
-CONES = [  # (F, C), then x and the distance from jamming, by hand
-    ((1.0, 0.0), (0.5, 0.0), ONE_SOLUTION, 2.0, 0.5),
-    ((1.0, 0.0), (-0.5, 0.0), ONE_SOLUTION, 2.0 / 3.0, 1.0),
-    ((1.0, 0.0), (2.0, 0.0), NO_SOLUTION, *JAMS),
-    ((1.0, 0.0), (-2.0, 0.0), MANY, 1.0 / 3.0, 1.0),
-    ((1.0, 0.0), (0.0, 2.0), NO_SOLUTION, *JAMS),
-    ((1.0, 0.0), (0.0, 0.6), ONE_SOLUTION, 1.25, 0.64),
-    ((0.0, 0.0), (0.5, 0.3), ONE_SOLUTION, 0.0, 1.0),
-    ((3.0, 4.0), (0.0, 0.0), ONE_SOLUTION, 5.0, 1.0),
-    ((1.0, 0.0), (1.0 - 2.0**-20, 0.0), ONE_SOLUTION, 2.0**20, 2.0**-20),
-]
+CONES = read_rows("""
+1 0 | 0.5 0 | one | 2 | 0.5
+1 0 | -0.5 0 | one | 0.6666666666666666 | 1
+1 0 | 2 0 | none | nan | nan
+1 0 | -2 0 | many | 0.3333333333333333 | 1
+1 0 | 0 2 | none | nan | nan
+1 0 | 0 0.6 | one | 1.25 | 0.64
+0 0 | 0.5 0.3 | one | 0 | 1
+3 4 | 0 0 | one | 5 | 1
+# beside jamming, 1 - 2^-20
+1 0 | 0.9999990463256836 0 | one | 1048576 | 9.5367431640625e-07
+""")
+"""F, C, then the number of solutions, x and the distance from jamming, by hand."""
+NUMBERS = {"none": NO_SOLUTION, "one": ONE_SOLUTION, "many": MANY}
 
 
 @pytest.mark.parametrize("F, C, number, x, far", CONES)
@@ -57,12 +60,13 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     The distance from jamming is the slope 1 - k e.C of x - k |F + C x|, e along
     F + C x, at most 1.
     """
-    F, C = np.array([[complex(*F)]]), np.array([[[complex(*C)]]])
-    sliding = solve_sliding(F, C, np.array([[1.0]]))
-    assert sliding.number[0] == number
-    assert sliding.x[0, 0] == approx(x, rel=1e-15, nan_ok=True)
-    if number != NO_SOLUTION:
-        assert find_least_stretch(sliding.slope)[0] == approx(far, rel=LAST_DIGITS)
+    F, C = (complex(*map(float, text.split())) for text in (F, C))
+    sliding = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
+    assert sliding.number[0] == NUMBERS[number]
+    assert sliding.x[0, 0] == approx(float(x), rel=1e-15, nan_ok=True)
+    if number != "none":
+        distance = approx(float(far), rel=LAST_DIGITS)
+        assert find_least_stretch(sliding.slope)[0] == distance
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 Beams of the textbook, equilibrium at the far end, and V as the slope of M.
 """
 
+import json
 import math
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from fourbar import (
     solve,
 )
 from fourbar.errors import InputError
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 ROUNDED = 1e-12
@@ -46,25 +48,26 @@ def load_beam(load, bar=3, stations=None, **parts):
 
 @pytest.mark.parametrize(
     "bar, load, foot",
-    [
-        (4, {}, 0.0),
-        (3, {}, 0.125),
-        (4, {"from_pin": (0.22, 0.0)}, 0.22),
-        (3, {"from_centre": (0.05, math.pi)}, 0.075),
-        (4, {"point": "P"}, 0.05),
-        (4, {"force": (0.0, 0.0), "from_pin": (0.05, 0.0)}, 0.05),
-        (4, {"force": (0.0, 0.0)}, 0.11),
-    ],
-    ids=str,
+    read_rows("""
+4 | {} | 0
+3 | {} | 0.125
+4 | {"from_pin": [0.22, 0]} | 0.22
+3 | {"from_centre": [0.05, 3.141592653589793]} | 0.075
+4 | {"point": "P"} | 0.05
+4 | {"force": [0, 0], "from_pin": [0.05, 0]} | 0.05
+4 | {"force": [0, 0]} | 0.11
+"""),
 )
 def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     """M(x) = T x/L before the place and T (x/L - 1) behind it, on two supports.
 
     Without a place the couple enters the output at O4 and the coupler at G.
     """
+    bar, foot = int(bar), float(foot)
+    load = Load(bar, moment=3.0, **json.loads(load))
     point = fourbar.Point("P", 4, from_pin=(0.05, 0.0))
     x = np.array([0.01, 0.06, 0.12, 0.2])
-    internal = load_beam(Load(bar, moment=3.0, **load), bar, x, points=(point,))
+    internal = load_beam(load, bar, x, points=(point,))
     length = BARE.bar(bar).length
     M = 3.0 * (x / length - (x > foot))
     assert_allclose(internal.M[0], M, atol=3.0 * ROUNDED)
