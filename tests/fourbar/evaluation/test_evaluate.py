@@ -171,6 +171,18 @@ def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar():
     assert (error <= BARS * solution.torque_error).all()
 
 
+@pytest.mark.parametrize("angle", [2.0**24, 2.0**40])
+def test_an_error_bar_grows_with_the_angle(angle):
+    """A crank under its weight, m g r cos(theta): theta less the ground's angle has 64
+    bits.
+    """
+    linkage = FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22), 0.2)
+    scene = Scene(linkage, Motion(angle, 1.0), effects=(Gravity(),))
+    slope = abs(9.80665 * 0.05 * np.sin(angle))
+    lost = 0.5 * angle * np.finfo(np.longdouble).eps * slope
+    assert solve(scene, "error").torque_error[0] >= lost
+
+
 def test_an_error_bar_at_the_end_of_a_table_of_a_load():
     """The slope of the forces would be taken beyond the table."""
     table = Table((0.5, 1.0), (1.0, 2.0))

@@ -94,3 +94,10 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     of_4 = -c * cross(position.u4, forces.F43) + w.M4 + couple
     assert np.all(abs(of_3) <= 16.0 * EPS * (b * size + w.M3 + couple))
     assert np.all(abs(of_4) <= 16.0 * EPS * (c * size + w.M4 + couple))
+
+
+def test_what_friction_of_pins_misses_is_a_rounding():
+    friction = fourbar.PinFriction.at(O2=(0.1, 0.02), A=(0.1, 0.02), B=(0.1, 0.02))
+    s = solve(replace(scene(2), effects=(Gravity(), friction)))
+    forces = [np.hypot(*s[name].T).max() for name in ("F12", "F32", "F43")]
+    assert 0.0 < s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * max(forces)
