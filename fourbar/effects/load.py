@@ -131,7 +131,7 @@ class Table(Described):
             bad = math.degrees(np.extract(beyond & ~round_, theta_2)[0])
             allowed = (
                 f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g}"
-                " deg lies outside"
+                " deg lies outside: state a motion within, for equilibria a sweep"
             )
             raise InputError("loads.table.theta_2", None, allowed)
         return np.where(round_, first, place)

@@ -22,7 +22,7 @@ from fourbar.formulas.mobility import (
     name_assembly,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, PIN_FORCE
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import (
     JAMMED,
     LINE,
@@ -96,6 +96,8 @@ _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 _WITHOUT_FORCES = (WOUND, JAMMED, SEVERAL)
 """Statuses of positions between which no forces exist either."""
+_BENDING = [f"bending_{bar}" for bar in MOVING_BARS]
+"""Names of the curves of the bending moments."""
 BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
@@ -198,7 +200,8 @@ class _SceneBlock:
         yield sheet.write_bars()
         yield sheet.write_points()
         if self.solution.F12 is not None and acts(self.scene):
-            yield [*self._write_drive(), *sheet.write_pin_forces()]
+            forces = [*sheet.write_pin_forces(), *self._write_pins_from_rest()]
+            yield [*self._write_drive(), *forces]
             yield [*self._write_bending()]
         else:
             yield [*self._write_stroke()]
@@ -520,7 +523,8 @@ class _SceneBlock:
         """Write between which torques or forces dry friction holds, and where."""
         held = self.facts.held
         parts = []
-        for low, high, (first, last), varies in held[:_MOST_HELD]:
+        for least, most, (first, last), varies in held[:_MOST_HELD]:
+            low, high = map(self._without_rounding, (least, most))
             size = max(abs(low), abs(high))
             holds = f"{self._value(low, unit, size)} to {self._value(high, unit, size)}"
             if len(self.solution) == 1:
@@ -684,9 +688,7 @@ class _SceneBlock:
             yield _row("bore", "none is enough, as the force grows without bound")
             return
         panels = facts.motion.panels
-        solution = self.solution
-        if facts.held and panels.located:
-            solution = facts.motion.solve_at(panels.list_nodes().ravel())
+        solution = facts.motion.solve_between() if facts.held else self.solution
         parts = []
         for sense, end, does in (
             (1, LINE.high, " to push"),
@@ -713,18 +715,38 @@ class _SceneBlock:
         means = [load.rms for load in pins.values()]
         if any(mean is not None for mean in means):
             rows.append(("  RMS", self._cells(means, "N")))
+        rows += self._list_from_rest([*PIN_FORCES], "N")
         yield from _align(rows, self.width)
         if self.facts.kind in ("list", "released"):
             yield "  peak and RMS are those of these positions"
 
+    def _write_pins_from_rest(self) -> Iterator[str]:
+        """Write the loads of the pins as the linkage begins to move from a position."""
+        if rows := self._list_from_rest([*PIN_FORCES], "N"):
+            yield from _align([("pins", [*self.facts.pins]), *rows], self.width)
+
+    def _list_from_rest(
+        self, names: list[str], unit: str
+    ) -> list[tuple[str, list[str]]]:
+        """List the row of what a linkage at rest bears as it begins to move.
+
+        It is empty where dry friction does not hold it, or adds nothing.
+        """
+        if not self.facts.held or np.any(self.solution.at.speed):
+            return []
+        from_rest = self.facts.motion.from_rest
+        cells = self._cells([from_rest[name] for name in names], unit)
+        adds = cells != self._write_peaks(names, unit)[0]
+        return [("  to move", cells)] if adds else []
+
     def _write_bending(self) -> Iterator[str]:
         """Write the largest bending moment of each bar, with its place and position."""
         bending = self.facts.bending
-        if all(bar.peak is not None and not bar.peak.value for bar in bending.values()):
+        from_rest = self._list_from_rest(_BENDING, "N m")
+        peaks = [bar.peak for bar in bending.values()]
+        if not from_rest and all(peak and not peak.value for peak in peaks):
             return
-        moments, places = self._write_peaks(
-            [f"bending_{bar}" for bar in bending], "N m"
-        )
+        moments, places = self._write_peaks(_BENDING, "N m")
         stresses = list[float | None]()
         for index, (bar, (peak, x, *_)) in enumerate(bending.items()):
             if peak is not None and peak.value:
@@ -746,6 +768,7 @@ class _SceneBlock:
         ]
         if any(stress is not None for stress in stresses):
             rows.append(("  stress", self._cells(stresses, "Pa")))
+        rows += from_rest
         yield from _align(rows, self.width)
         yield from list_couple_notes(self.scene)
 
@@ -798,6 +821,12 @@ class _SceneBlock:
             yield (
                 "dry friction reverses, and the pin forces jump, at"
                 f" {self.symbol} = {places}"
+            )
+        pins_from_rest = self._list_from_rest([*PIN_FORCES], "N")
+        if pins_from_rest or self._list_from_rest(_BENDING, "N m"):
+            yield (
+                "to move: the largest as it begins to move, against the whole of dry "
+                "friction; the rows above take friction at rest as 0"
             )
         yield from self._warn()
         yield from list_drawn_notes(scene, self.units)

@@ -35,6 +35,10 @@ _BESIDE_A_POLE = 1e-4
 """Distance from a listed position without a lever at which its forces are compared with
 those at a quarter of it, rad. Positions have some 12 digits there.
 """
+_BEGINNING = 1e-150
+"""Speed of a linkage that begins to move, rad/s. Its square is zero; dry friction has
+its sign.
+"""
 _POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
 _NO_BENDING = 1e-13
 """Bending moment that is round-off, over the pin forces times the longest bar."""
@@ -68,6 +72,14 @@ class MotionCurves:
         """Solve at commanded angles or strokes, or at the times of a motion law."""
         return solve(self.scene, stage, at=command_at(self.scene, places))
 
+    def solve_between(self) -> Solution:
+        """Solve at the ends and the nodes of all panels, or take the positions."""
+        panels = self.panels
+        if not panels.located:
+            return self.solution
+        nodes = panels.list_nodes().ravel()
+        return self.solve_at(np.concatenate([panels.start, nodes, panels.stop[-1:]]))
+
     def solve_with_peaks(self) -> Solution:
         """Solve at the positions of the sweep and at what its steps pass over.
 
@@ -89,6 +101,24 @@ class MotionCurves:
         if panels.start[0] > panels.stop[-1]:
             places = places[::-1]
         return self.solve_at(places)
+
+    @cached_property
+    def from_rest(self) -> dict[str, float]:
+        """Largest pin forces and bending moments as the linkage begins to move.
+
+        They are those of either way, against the whole of dry friction.
+        """
+        at = self.solve_between().at
+        largest = dict[str, float]()
+        for speed in (_BEGINNING, -_BEGINNING):
+            begun = solve(self.scene, at=at._replace(speed=speed))
+            loads = compute_pin_loads(begun)
+            for bar, bending in compute_bending(self.scene, begun).items():
+                loads[f"bending_{bar}"] = np.abs(bending.moment)
+            for name, load in loads.items():
+                least = largest.get(name, 0.0)
+                largest[name] = float(np.nanmax(load, initial=least))
+        return largest
 
     @property
     def is_steady(self) -> bool:

@@ -114,7 +114,7 @@ def test_a_table_is_linear_between_its_points_and_periodic():
     assert table.at(angles) == approx(right, abs=1e-14)
     quarter = Table(("0 deg", "90 deg"), (0.0, 1.0))
     covered = "covers 0 to 90 deg; the position at 480 deg lies outside"
-    with raises(InputError, match=covered):
+    with raises(InputError, match=f"{covered}: state .*, for equilibria a sweep"):
         quarter.at(np.radians([45.0, 480.0, 125.0]))
 
 

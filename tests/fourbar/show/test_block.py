@@ -25,6 +25,7 @@ from fourbar import (
     uniform,
 )
 from fourbar.files.scene_file import read_tables
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene.motion import Law
 from fourbar.show.block import write_block, write_facts
 from fourbar.show.lines import BLOCK_WIDTH
@@ -518,6 +519,27 @@ def test_a_bore_at_rest_moves_the_linkage_against_its_friction():
     bore = 1e3 * sqrt(4.0 * force / (pi * 210e5))
     text = block(crank_rocker(motion=motion, **rubbing), pressure=210e5)
     assert re.search(rf"{bore:.4g} mm\b[^;]* to pull {force:.4g} N", text)
+
+
+@pytest.mark.parametrize("angle", (Sweep(1.0, 2.6, 8), 1.7))
+def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
+    """The peaks of the motion either way, slow enough for its inertia not to show."""
+    effects = (*WEIGHT, fourbar.PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
+    rubbing = {"loads": (SPIKE,), "effects": effects, "drive": CYLINDER}
+    ways = [
+        summarize(scene, solve(scene))
+        for speed in (1e-9, -1e-9)
+        for scene in [crank_rocker(motion=Motion(angle, speed), **rubbing)]
+    ]
+    scene = crank_rocker(motion=Motion(angle, 0.0), **rubbing)
+    lines = write_block(scene, solve(scene), fourbar.units("N N.m"))
+    rows = [line for line in lines if line.startswith("  to move")]
+    names = [*PIN_FORCES], ["bending_2", "bending_3", "bending_4"]
+    for row, group in zip(rows, names, strict=True):
+        peaks = [max(way.find_peak(name).value for way in ways) for name in group]
+        printed = [float(size) for size in re.findall(r"\d[\d.]*", row)]
+        assert printed == approx(peaks, rel=2e-4)
+    assert "to move" not in block(crank_rocker(motion=Motion(angle, 0.0)))
 
 
 @pytest.mark.slow
