@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from rich.measure import Measurement
 from rich.table import Column, Table
 
-from fourbar.show.lines import BLOCK_WIDTH
-
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
@@ -16,7 +14,7 @@ _ANY_WIDTH = 10_000
 
 
 class FoldedTable(Table):
-    """A table that is printed as several where a terminal is narrower than a block.
+    """A table that is printed as several where it is wider than its console.
 
     Each of them begins with the first column, so that no number is broken or cut.
     """
@@ -27,10 +25,7 @@ class FoldedTable(Table):
         options: "ConsoleOptions",
     ) -> "RenderResult":
         """Yield the table, or below each other tables of some of its columns."""
-        parts = [self]
-        if options.max_width < BLOCK_WIDTH:
-            parts = self._split(console, options)
-        for number, part in enumerate(parts):
+        for number, part in enumerate(self._split(console, options)):
             if number:
                 yield ""
             yield from Table.__rich_console__(part, console, options)

@@ -36,8 +36,8 @@ from fourbar.quantities import (
 from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
-from fourbar.show.driving import read_drive_demand
-from fourbar.show.lines import wrap_line
+from fourbar.show.driving import name_places, read_drive_demand
+from fourbar.show.lines import BLOCK_WIDTH, wrap_line
 from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.shown_units import COMMON, choose_unit, write_cell
 from fourbar.show.tables import (
@@ -46,7 +46,7 @@ from fourbar.show.tables import (
     write_cells,
     write_table,
 )
-from fourbar.solution import Conversion, find_unit_in, find_unit_of_quantity
+from fourbar.solution import DEGREES, Conversion, find_unit_in, find_unit_of_quantity
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
@@ -206,12 +206,12 @@ _SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
 
 
 def list_shown(derivatives: Sensitivity) -> list[str]:
-    """List torque, pin forces and the scene's points.
+    """List torque, with friction at rest what it holds, pin forces and points.
 
     If the scene states no speed, angles replace torque and forces.
     """
     points = [point.name for point in derivatives.scene.points]
-    drive = [name for name in (COUPLE.value, LINE.value) if name in derivatives.by]
+    drive = [name for name in (*COUPLE, *LINE) if name in derivatives.by]
     if drive:
         return [*drive, *PIN_FORCES, *points]
     return ["theta_3", "theta_4", *points]
@@ -237,12 +237,15 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
         f"largest change over the positions {derivatives.describe_steps()};"
         " pin forces by their magnitude"
     ]
+    symbol, si = name_places(derivatives.solution)
+    unit, factor = find_unit_in(si, DEGREES)
     for name, ranked in influences.items():
         most = dict[bool, str]()
         for row in ranked:
-            place = f"(at theta_2 = {math.degrees(row.theta_2):.6g} deg)"
+            place = factor * derivatives.solution.at.places[row.row]
             most.setdefault(
-                derivatives.keys[row.key].unit == "rad", f"{row.key} {place}"
+                derivatives.keys[row.key].unit == "rad",
+                f"{row.key} (at {symbol} = {place:.6g} {unit})",
             )
         if most:
             named = ", of the angles on ".join(most[key] for key in sorted(most))
@@ -266,13 +269,10 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     for key in rank_numbers(derivatives, names):
         moved = (changes[name].get(key, others[name]) for name in names)
         rows.append([key, *(write_cell(change, ".3g") for change in moved)])
-    table = make_plain_table(
-        ["", *(f"{name}\n{find_unit_of_quantity(name)}" for name in names)],
-        rows,
-        left=("",),
-    )
+    heads = [f"{name}\n{find_unit_of_quantity(name)}" for name in names]
+    table = make_plain_table(["", *heads], rows, left=("",), gap=0)
     title = derivatives.solution.title
-    return write_table(title, lines, table, width=width)
+    return write_table(title, lines, table, width=width or BLOCK_WIDTH)
 
 
 def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
@@ -503,7 +503,7 @@ def _write_equilibrium(equilibrium: Equilibrium, units: Conversion) -> list[str]
         equilibrium.angle,
         f"{slope:.6g}",
         f"{inertia:.6g}",
-        "-" if frequency is None else f"{frequency:.9g}",
+        "-" if frequency is None else f"{frequency:.6g}",
     ]
 
 

@@ -57,14 +57,14 @@ def list_shown_parts(spreads: Tolerances) -> list[str]:
 
 
 def list_drawn_parts(spreads: Tolerances) -> list[str]:
-    """List torque, magnitudes of pin forces and the scene's points.
+    """List torque (with friction at rest what it holds), pin forces and points.
 
-    If the scene states no speed, or nothing loads its drive at any position, angles
-    replace torque and forces.
+    Pin forces are magnitudes. If the scene states no speed, or nothing loads its drive
+    at any position, angles replace torque and forces.
     """
     parts = [
         name
-        for name in (COUPLE.value, LINE.value)
+        for name in (*COUPLE, *LINE)
         if name in spreads.spreads
         and np.nan_to_num(spreads.spreads[name].nominal).any()
     ]
@@ -121,7 +121,7 @@ def write_spreads(
         written = write_table("", [], table)
         if max(map(len, written.split("\n"))) <= BLOCK_WIDTH:
             break
-    return write_table(title, lines, table, width=width)
+    return write_table(title, lines, table, width=width or BLOCK_WIDTH)
 
 
 def _tabulate_parts(

@@ -16,10 +16,17 @@ from fourbar.effects.effect import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
-from fourbar.formulas.arithmetic import Number, polar, vector, without_slopes
+from fourbar.formulas.arithmetic import (
+    Number,
+    polar,
+    select,
+    vector,
+    without_slopes,
+)
 from fourbar.formulas.path import LoopPath
 from fourbar.formulas.position import HalfAngle, compute_factors, find_root_sign
 from fourbar.quantities import (
+    DRY_FRICTION_QUANTITIES,
     FORCE_NAMES,
     NOT_ASSEMBLED,
     OK,
@@ -63,6 +70,8 @@ _HUNDREDTH, _DEGREE = 0.01, math.radians(1.0)
 """Change of a number for which its influence is reported. It is relative, or in rad for
 an angle.
 """
+_ROUNDING = 1e-13
+"""Change over the largest value of its quantity that is rounding."""
 AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest. Its couple, and all that follows from
 it, jumps with the motion. A linkage that stands has its couple 0 and the derivatives of
@@ -86,6 +95,8 @@ class _Influence(NamedTuple):
     """
     theta_2: float
     """rad."""
+    row: int
+    """Index of the position."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +122,9 @@ class Sensitivity:
     NaN.
     """
     by: dict[str, Array]
-    """Derivatives by quantity, (p, n) or (p, n, 2)."""
+    """Derivatives by quantity, (p, n) or (p, n, 2). Of a linkage that stands they
+    include what dry friction holds, torque_low and torque_high.
+    """
 
     def of(self, quantity: str, key: str) -> Array:
         """Return d(quantity)/d(key), (n,) or (n, 2).
@@ -191,6 +204,8 @@ class Sensitivity:
         A pin force counts by its magnitude.
         """
         value = self.value(quantity)
+        size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
+        rounding = _ROUNDING * np.nanmax(size, initial=0.0)
         rows = []
         for (key, entry), number in zip(
             self.keys.items(),
@@ -205,13 +220,10 @@ class Sensitivity:
                 change = np.hypot(*change.T)
             if np.isfinite(change).any():
                 worst = int(np.nanargmax(np.abs(change)))
-                rows.append(
-                    _Influence(
-                        key, float(change[worst]), float(self.solution.theta_2[worst])
-                    )
-                )
+                theta_2 = float(self.solution.theta_2[worst])
+                rows.append(_Influence(key, float(change[worst]), theta_2, worst))
         return sorted(
-            (row for row in rows if row.change != 0.0),
+            (row for row in rows if abs(row.change) > rounding),
             key=lambda row: -abs(row.change),
         )
 
@@ -335,6 +347,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
         forces = FORCE_NAMES
     else:
         forces = (*FORCE_NAMES, "drive_condition")
+    if not np.any(at.stated[1]):  # what holds a linkage that stands
+        forces = (*forces, *DRY_FRICTION_QUANTITIES)
     names = [
         name
         for name in solution.evaluated()
@@ -365,8 +379,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
             if key.startswith("motion."):
                 continue
             # what is left out carries the slope of its length too
-            sloped = read_number(seeded, entry) + _make_unit_slope(number, p)
-            seeded = replace_number(seeded, entry, sloped)
+            seeded = replace_number(
+                seeded, entry, read_number(seeded, entry) + _make_unit_slope(number, p)
+            )
         for start in range(0, len(regular), POSITIONS_AT_ONCE):
             index = regular[start : start + POSITIONS_AT_ONCE]
             derived, marks = _compute_derivatives(
@@ -478,6 +493,14 @@ def _compute_derivatives(
         }
         quantities["power"] = dynamics.generalized_force * speed
         quantities["drive_condition"] = case.drive_condition(state)
+        low, high = case.drive_names.low, case.drive_names.high
+        if low in names:
+            still = state._replace(speed=0.0)
+            ahead = case.dynamics(still, acceleration, 1).effort
+            back = case.dynamics(still, acceleration, -1).effort
+            falls = take_values(back) < take_values(ahead)
+            quantities[low] = select(falls, back, ahead)
+            quantities[high] = select(falls, ahead, back)
     origin = vector(*scene.origin)  # places are those of the drawing
     for name in names:
         if find_unit_of_quantity(name) == "m" and not is_scalar(name):

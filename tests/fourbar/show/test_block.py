@@ -542,6 +542,13 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     assert "to move" not in block(crank_rocker(motion=Motion(angle, 0.0)))
 
 
+def test_a_torque_that_friction_just_holds_is_zero_within_rounding():
+    load = Load(2, (100.0, 0.0), from_pin=(0.0, 0.0), moment=-0.3)
+    held = Friction.at(O2=0.1 + 0.2)
+    scene = Scene(MASSLESS, Motion(1.0, 0.0), loads=(load,), effects=(held,))
+    assert "at rest 0 mN m to 600 mN m" in block(scene)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("bar", (2, 3))
 def test_a_cylinder_assembles_from_where_its_ends_meet(bar):

@@ -15,6 +15,8 @@ from fourbar.cli import status
 from fourbar.effects import Friction, Gravity, PinFriction
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, FromLimit, Motion
+from fourbar.show.lines import BLOCK_WIDTH
+from fourbar.show.studies import write_sensitivity
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.keys import list_entries, read_place
 from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
@@ -71,21 +73,41 @@ def test_where_there_is_no_derivative_a_status_says_why():
 @pytest.mark.parametrize("dry", [Friction.at(B=0.05), RUBBING[1]])
 def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
     """Torque and pin forces are those with friction 0; the speed makes them jump."""
-    rest = sensitivity(scene((Gravity(), dry), omega_2=0.0))
+    nominal = scene((Gravity(), dry), omega_2=0.0)
+    rest = sensitivity(nominal)
     smooth = sensitivity(scene((Gravity(),), omega_2=0.0))
     assert rest.status == ["at_rest"] * len(ANGLES)
     for name in ("torque", "F12", "F43", "power"):
         assert np.isnan(rest.of(name, "motion.omega_2")).all()
         for key in smooth.keys.keys() - {"motion.omega_2"}:
             assert_allclose(rest.of(name, key), smooth.of(name, key), atol=1e-13)
+    for name in ("torque_low", "torque_high"):
+        for key in (key for key in rest.keys if "friction" in key):
+            differences = differ_by_a_study(nominal, key, name)
+            assert np.abs(differences).max() > 0.0
+            assert_allclose(rest.of(name, key), differences, rtol=1e-6, atol=1e-9)
+    text = write_sensitivity(rest, None)
+    assert max(map(len, text.split("\n"))) <= BLOCK_WIDTH and "torque_low" in text
 
 
-def differ_by_a_study(nominal, key):
-    """Difference theta_3 of the members of a study on both sides of a number."""
+def test_the_command_names_the_place_and_rounding_is_no_influence():
+    """The coupler of a parallelogram does not turn: its load may act at any place."""
+    motion = Motion(theta_4=np.array([0.5, 0.9]), omega_4=1.0)
+    load = fourbar.Load(3, (5.0, -1.0), from_pin=(0.1, 0.2))
+    slopes = sensitivity(Scene(uniform(*PARALLELOGRAM), motion, loads=(load,)))
+    moving = {row.key for row in slopes.influences("torque")}
+    assert "loads.0.force.0" in moving and "loads.0.from_pin.0" not in moving
+    assert re.search(
+        r"torque depends .*\(at theta_4 = ", write_sensitivity(slopes, None)
+    )
+
+
+def differ_by_a_study(nominal, key, name="theta_3"):
+    """Difference a quantity of the members of a study on both sides of a number."""
     step = 1e-6
     number = read_place(nominal, list_entries(nominal)[key].place)
     beside = {key: np.array([number - step, number + step])}
-    below, above = solve(fourbar.vary(nominal, beside), "position").theta_3
+    below, above = solve(fourbar.vary(nominal, beside))[name]
     return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
 
 

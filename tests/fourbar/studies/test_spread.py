@@ -17,9 +17,12 @@ from scipy.stats import norm
 
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
 from fourbar.cli import status
+from fourbar.effects import Friction, Gravity
 from fourbar.files import loads
 from fourbar.formulas.mobility import choose_range, limit_positions
-from fourbar.show.tolerances import describe_parted
+from fourbar.show.lines import BLOCK_WIDTH
+from fourbar.show.tolerances import describe_parted, write_spreads
+from fourbar.solution import DEGREES
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
 from tests.support.rows import read_rows
@@ -65,6 +68,20 @@ def test_a_number_that_the_torque_is_proportional_to():
     assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
     assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
+
+
+def test_friction_at_rest_moves_what_it_holds_and_no_torque():
+    stated = {"tolerances": (Tolerance("effects.friction.O2", 0.01),)}
+    rubbing = {"effects": (Gravity(), Friction.at(O2=0.05))}
+    angles = np.array([0.4, 1.9])
+    study = tolerances(crank_rocker(motion=Motion(angles, 0.0), **rubbing, **stated))
+    for name, width in (("torque", 0.0), ("torque_low", 0.01), ("torque_high", 0.01)):
+        assert_allclose(study.spreads[name].worst, width, rtol=1e-9, atol=1e-12)
+        sigma = study.spreads[name].deviation
+        assert_allclose(sigma, width / math.sqrt(3), rtol=QUASI, atol=1e-12)
+    lines = write_spreads(study, DEGREES, None).split("\n")
+    assert "  torque_high: 100 % effects.friction.O2" in lines
+    assert max(map(len, lines)) <= BLOCK_WIDTH
 
 
 def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go():
