@@ -173,47 +173,27 @@ def assert_refused(path, words):
     assert "\n" not in str(caught.value)
 
 
-def test_a_text_has_a_limit_alone_and_with_its_includes(
-    tmp_path,
-    monkeypatch,
-):
-    path = make(tmp_path, inertial=INERTIAL)
-    sizes = [len(p.read_bytes()) for p in (path, tmp_path / "options.xml")]
-    monkeypatch.setattr(files, "LARGEST_TEXT", sum(sizes))
-    assert read_robot(path).text
-    monkeypatch.setattr(files, "LARGEST_TEXT", sum(sizes) - 1)
-    assert_refused(path, f"'options.xml': and its includes exceed {sum(sizes) - 1} B")
-    monkeypatch.setattr(files, "LARGEST_TEXT", sizes[0] - 1)
-    assert_refused(path, f"must not exceed {sizes[0] - 1}")
-
-
-def test_meshes_have_a_limit_together(
-    tmp_path,
-    monkeypatch,
-):
+def test_what_a_file_reads_is_limited_together(tmp_path, monkeypatch):
+    """Its text with three includes, and two meshes."""
     path = make(tmp_path, meshdir="", inertial=INERTIAL)
+    include = '<include file="options.xml"/>'
+    text = path.read_text().replace(include, 3 * include)
+    path.write_text(text.replace("</asset>", '<mesh file="other.obj"/></asset>'))
     for name in ("part.obj", "other.obj"):
         (tmp_path / name).write_text(TETRAHEDRON)
-    text = path.read_text().replace("</asset>", '<mesh file="other.obj"/></asset>')
-    path.write_text(text)
-    monkeypatch.setattr(files, "LARGEST_ASSETS", 2 * len(TETRAHEDRON))
-    assert len(read_robot(path).assets) == 2
-    limit = 2 * len(TETRAHEDRON) - 1
-    monkeypatch.setattr(files, "LARGEST_ASSETS", limit)
-    assert_refused(path, f"'other.obj': and other meshes exceed {limit} B")
-
-
-def test_includes_have_a_limit_in_number(
-    tmp_path,
-    monkeypatch,
-):
-    path = make(tmp_path, inertial=INERTIAL)
-    include = '<include file="options.xml"/>'
-    path.write_text(path.read_text().replace(include, 3 * include))
-    monkeypatch.setattr(files, "MOST_INCLUDES", 3)
-    assert read_robot(path).text
-    monkeypatch.setattr(files, "MOST_INCLUDES", 2)
-    assert_refused(path, "more than 2 files are included")
+    alone, included = (p.stat().st_size for p in (path, tmp_path / "options.xml"))
+    for limit, most, words in (
+        ("LARGEST_TEXT", alone + 3 * included, "xml': and its includes exceed {} B"),
+        ("LARGEST_ASSETS", 2 * len(TETRAHEDRON), "obj': and other meshes exceed {} B"),
+        ("MOST_INCLUDES", 3, "more than {} files are included"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(files, limit, most)
+            assert len(read_robot(path).assets) == 2
+            patch.setattr(files, limit, most - 1)
+            assert_refused(path, words.format(most - 1))
+    monkeypatch.setattr(files, "LARGEST_TEXT", alone - 1)
+    assert_refused(path, f"must not exceed {alone - 1}")
 
 
 @pytest.mark.parametrize("rows", ["file='hills.png'", "nrow='60000' ncol='60000'"])
