@@ -126,15 +126,24 @@ class Table(Described):
             return place
         # a position just below the first angle has come round to a whole turn above it
         round_ = beyond & (first + TURN - place < 1e-12 * TURN)
-        if not (round_ == beyond).all():
-            ends = np.degrees((first, last))
-            bad = math.degrees(np.extract(beyond & ~round_, theta_2)[0])
-            allowed = (
-                f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g}"
-                " deg lies outside: state a motion within, for equilibria a sweep"
-            )
-            raise InputError("loads.table.theta_2", None, allowed)
+        outside = beyond & ~round_
+        if outside.any():
+            there = self.replace_outside(np.extract(outside, theta_2))
+            place = np.where(outside, there, place)
         return np.where(round_, first, place)
+
+    def replace_outside(self, theta_2: Any) -> float:
+        """Raise InputError for angles that the table does not cover.
+
+        A table that states NaN there, in place of an error, returns NaN.
+        """
+        ends = np.degrees((self.theta_2[0], self.theta_2[-1]))
+        bad = math.degrees(theta_2[0])
+        allowed = (
+            f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g}"
+            " deg lies outside: state a motion within, for equilibria a sweep"
+        )
+        raise InputError("loads.table.theta_2", None, allowed)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Friction, Load, Motion, Sweep, Torsion
 from fourbar.cli import status as fourbar_status
+from fourbar.effects.load import Table
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.quantities import OK, UNITS, VECTORS
-from fourbar.scene import Scene, command
-from fourbar.scene.motion import Law
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import Law, Rise
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.check.check import judge_table
@@ -682,6 +684,46 @@ def test_the_other_branch_is_named_where_the_torque_has_a_slip_besides(check):
     assert code == FAILED and out.count("looks like") == 1
     assert "looks like: the other branch (explains theta_4)" in out
     assert "no single known mistake explains the rest" in out
+
+
+RISE = Rise("cycloidal", (2.0, 0.35), 0.2, dwell=0.25, fall=0.3, rest=0.1, steps=40)
+RUBBED = replace(OURS, motion=Motion(law=RISE), effects=(Friction.at(B=0.1),))
+LATE = RISE.at(np.linspace(0.0, 1.0, 41) - 1e-3)
+STROKE = fourbar.load(MODELS / "capabilities/stroke_input.toml")
+COVERED = replace(
+    OURS,
+    motion=Motion(Sweep(0.5, 1.5, 12), 10.0),
+    loads=(Load(4, moment=-3.0, table=Table((0.5, 1.0, 1.5), (0.5, 1.0, 0.3))),),
+)
+OTHERS = {
+    "load 1 (bar 4) 1.1 times ours (fitted)": (
+        COVERED,
+        solve(replace(COVERED, loads=(replace(COVERED.loads[0], moment=-3.3),))),
+    ),
+    "ground_angle is left out": (
+        STROKE,
+        solve(replace(STROKE, linkage=replace(STROKE.linkage, ground_angle=0.0))),
+    ),
+    "the torsion springs are missing": (
+        replace(OURS, effects=(Torsion((("O4", 2.0, 1.0, 0.5),)),)),
+        solve(replace(OURS, effects=())),
+    ),
+    "each row has the numbers of the time 0.001 s before its own (fitted)": (
+        RUBBED,
+        solve(RUBBED, at=Command(LATE[0], np.ones(41, np.int8), *LATE[1:])),
+    ),
+}
+
+
+@pytest.mark.parametrize("words", OTHERS)
+def test_the_table_of_another_scene_has_one_explanation(words, read):
+    scene, numbers = OTHERS[words]
+    name = scene.motion.commanded if scene.motion.law is None else "time"
+    at = solve(scene)[name]
+    text = tabulate({name: at, "F12_x": numbers.F12[:, 0], "F14_y": numbers.F14[:, 1]})
+    motion = {"commanded": scene.motion.commanded, "law": scene.motion.law}
+    judgement = judge_table(scene, read(text, **motion))
+    assert [one.text for one in judgement.explanations] == [words]
 
 
 @pytest.mark.parametrize("letter", "xy")

@@ -22,6 +22,7 @@ from fourbar import (
     Gravity,
     Load,
     Motion,
+    PinFriction,
     Place,
     Spring,
     Springs,
@@ -593,7 +594,7 @@ def with_forces(angle, moment, **table):
 
 PLACE = (0.05, 1.0)
 TABLE = {"table": Table((0.0, 2.0, 2.0 * math.pi), (1.0, 3.0, 1.0))}
-PULLING = replace(SLACK, acts="pull")
+PULLING, PUSHING = (replace(SLACK, acts=acts) for acts in ("pull", "push"))
 SLIDING = replace(SCENE, motion=Motion(Sweep(3.5, 5.0, 12), 10.0, 5.0))
 (SLIP,) = {
     math.copysign(0.5, slip)
@@ -655,6 +656,22 @@ OTHER_SCENES = {
     "no inertial forces (statics), with friction": (
         replace(RUBBED, effects=(*RUBBED.effects, Gravity(9.81))),
         replace(RUBBED, linkage=with_bars(**LIGHT).linkage, loads=WEIGHTS),
+    ),
+    "the free length of every spring is missing": (
+        with_effects(Springs((PULLING, PUSHING))),
+        with_effects(Springs((replace(PULLING, length=0.0, acts=None),))),
+    ),
+    "the stiffness of spring 1 is missing": (
+        with_effects(Springs((replace(SPRING, preload=-4.0),))),
+        with_effects(Springs((replace(SPRING, stiffness=0.0, preload=-4.0),))),
+    ),
+    "the stiffness of torsion spring 1 1.3 times ours (fitted)": (
+        with_effects(Torsion((("O2", 2.0, 1.0, 0.3),))),
+        with_effects(Torsion((("O2", 2.6, 1.0, 0.3),))),
+    ),
+    "all dry friction is missing": (
+        replace(RUBBED, effects=(*RUBBED.effects, PinFriction((("A", 0.2, 0.01),)))),
+        replace(SLIDING, effects=()),
     ),
     "the springs act both ways": (
         with_effects(Springs((PULLING,))),

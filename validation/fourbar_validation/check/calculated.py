@@ -7,6 +7,7 @@ all changes at once.
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,6 +103,8 @@ _EFFECT_NAMES = {
     "flywheel": "the flywheel",
 }
 """Names of the effects of the package, by their keys."""
+DRY = ("friction", "pin_friction")
+"""Keys of the effects of dry friction."""
 _PART_FIELDS = {
     "springs": "springs",
     "torsion": "springs",
@@ -123,7 +126,7 @@ _WHERE = {
     " in what drives alone": tuple(set(FORCE_NAMES) - set(PIN_FORCES)),
 }
 """Quantities in which that was done."""
-_SHIFTS = {
+_NUMBERS = {
     "springs": ("preload", "free length"),
     "torsion": ("preload", "rest angle", "rest angle, its turn counted from 0,"),
 }
@@ -401,6 +404,9 @@ class Calculation:
                     where=_WHERE,
                     friction=dict.fromkeys(pins, factor),
                 )
+        for factor, done in _SCALED.items():
+            for name, more in self._list_numbers(factor):
+                yield Change(f"{name} is {done}", more, where=_WHERE)
         for effect in self.scene.effects:
             yield from self._change_effect(effect)
         every = (*self.scene.loads, *self.scene.effects)
@@ -427,7 +433,10 @@ class Calculation:
             more = self.apply(other).plus(self.apply(effect), -1.0)
             yield Change(f"{name} {text}", more)
         if effect.key in ("viscous", "torsion"):
-            linear = self.apply(_relax(effect, "preload") or effect)
+            parts = _list_parts(effect)
+            if effect.key == "torsion":
+                parts = [_change_number(part, "preload", 0.0) for part in parts]
+            linear = self.apply(*parts)
             for factor, done in _IN_DEGREES.items():
                 yield self._scale(name, done, linear, factor)
         if effect.key == "viscous":
@@ -437,9 +446,12 @@ class Calculation:
             how = "is of the second bar's own speed"
             yield Change(f"{name} {how}", more)
         verb = "act" if _is_plural(name) else "acts"
+        parts = _list_parts(effect)
+        if all(1 in _list_bars(part) for part in parts):
+            return  # on the ground nothing is missed
         for left_out, words in enumerate(("second", "first")):
             less = self.none()
-            for part in _list_parts(effect):
+            for part in parts:
                 bar = _list_bars(part)[left_out]
                 if bar in MOVING_BARS:
                     less = less.plus(self.apply(part).on(bar), -1.0)
@@ -448,7 +460,7 @@ class Calculation:
     def _list_acting(self) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
         """List what acts besides inertia, with pins whose friction depends on loads."""
         scene = self.scene
-        if scene.loads:
+        if len(scene.loads) > 1:
             yield "the loads", self.apply(*scene.loads), []
         for number, load in enumerate(scene.loads, 1):
             name = f"load {number} (bar {load.bar})"
@@ -457,30 +469,47 @@ class Calculation:
             if load.force is not None and load.moment:
                 force_alone = self.apply(replace(load, moment=0.0))
                 yield f"the couple of {name}", acting.plus(force_alone, -1.0), []
+        dry = [effect for effect in scene.effects if effect.key in DRY]
+        if len(dry) > 1:
+            yield "all dry friction", self.apply(*dry), list(list_sliding_pins(scene))
         for effect in scene.effects:
             name = _name_effect(effect)
             acting = self.apply(effect)
             yield name, acting, list(effect.loaded_pins)
             parts = _list_parts(effect)
-            several = len(parts) > 1
-            for number, part in enumerate(parts, 1):
-                if several:
+            if len(parts) > 1:
+                for number, part in enumerate(parts, 1):
                     pins = list(part.loaded_pins)
                     yield f"part {number} of {name}", self.apply(part), pins
-                yield from self._list_shifts(part, f"{{}} {number}")
-            if several:
-                yield from self._list_shifts(effect, "every {}")
 
-    def _list_shifts(
-        self, effect: Any, which: str
-    ) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
-        """List what each number shifts of the force of springs, by their name."""
-        springs = which.format(_SPRINGS.get(effect.key, ""))
-        for number in _SHIFTS.get(effect.key, ()):
-            relaxed = _relax(effect, number)
-            if relaxed is not None:
-                shift = self.apply(effect).plus(self.apply(relaxed), -1.0)
-                yield f"the {number} of {springs}", shift, []
+    def _list_numbers(self, factor: float) -> Iterator[tuple[str, BodyWrenches]]:
+        """List what acts besides where a number of springs has a factor."""
+        for effect in self.scene.effects:
+            springs = _SPRINGS.get(effect.key)
+            if springs is None:
+                continue
+            every: dict[str, list[BodyWrenches]] = {}
+            for i, part in enumerate(_list_parts(effect), 1):
+                for number, more in self._change_spring(part, factor):
+                    yield f"the {number} of {springs} {i}", more
+                    every.setdefault(number, []).append(more)
+            for number, changes in every.items():
+                if len(changes) > 1:
+                    together = reduce(BodyWrenches.plus, changes)
+                    yield f"the {number} of every {springs}", together
+
+    def _change_spring(
+        self, effect: Any, factor: float
+    ) -> Iterator[tuple[str, BodyWrenches]]:
+        """List each number of one spring with what its factor lets act besides."""
+        right = self.apply(effect)
+        for number in _NUMBERS[effect.key]:
+            changed = _change_number(effect, number, factor)
+            if changed != effect:
+                yield number, self.apply(changed).plus(right, -1.0)
+        relaxed = _change_number(effect, "preload", 0.0)
+        if relaxed != effect:  # else the stiffness scales the whole force
+            yield "stiffness", self.none().plus(self.apply(relaxed), factor - 1.0)
 
     def _velocity_terms(self) -> Iterator[Change]:
         """Leave out (dJ/dt) v, or reverse it, in the accelerations of the other bars.
@@ -563,6 +592,8 @@ class Calculation:
                 yield f"{name}: {what}", self.none().plus(less, -1.0)
         for name, wrenches, _ in self._list_acting():
             yield name, wrenches
+        for name, less in self._list_numbers(0.0):
+            yield name, self.none().plus(less, -1.0)
 
     def _list_bar_mistakes(self) -> Iterator[tuple[str, str, BodyWrenches]]:
         """List mistakes in mass and inertia of each bar, then of every bar."""
@@ -713,37 +744,30 @@ def _list_parts(effect: Any) -> list[Any]:
     return [replace(effect, **{field: (part,)}) for part in parts]
 
 
-def _relax(effect: Any, number: str) -> Any:
-    """Return springs without one of their numbers; None if that changes none.
+def _change_number(effect: Any, number: str, factor: float) -> Any:
+    """Return an effect of one spring with a factor on one of its numbers.
 
-    A free length or a rest angle that is left out pulls as more preload does.
+    A rest angle that is left out turns as more preload does. A length has no sign.
     """
-    if effect.key not in _SHIFTS:
-        return None
-    relaxed: list[Any] = []
-    for spring in effect.springs:
-        if effect.key == "torsion":
-            pin, k, rest, preload = spring
-            ways = {
-                "preload": (rest, 0.0),
-                "rest angle": (rest, preload + k * rest),
-            }
-            relaxed.append((pin, k, *ways.get(number, (0.0, preload))))
-            continue
-        changes: dict[str, Any] = {
-            "preload": {"preload": 0.0},
-            "free length": {
-                "preload": spring.preload + spring.stiffness * spring.length
-            },
-            "acts": {"acts": None},
+    (spring,) = effect.springs
+    if effect.key == "torsion":
+        pin, k, rest, preload = spring
+        ways = {
+            "preload": (rest, factor * preload),
+            "rest angle": (rest, preload + (1.0 - factor) * k * rest),
         }
-        try:
-            relaxed.append(replace(spring, **changes[number]))
-        except FourBarError:  # one that acts one way comes off nowhere without it
-            relaxed.append(spring)
-    if tuple(relaxed) == effect.springs:
-        return None
-    return replace(effect, springs=tuple(relaxed))
+        changed = (pin, k, *ways.get(number, (factor * rest, preload)))
+        return replace(effect, springs=(changed,))
+    changes = {"preload": factor * spring.preload}
+    if number == "free length":
+        changes = {"length": abs(factor) * spring.length, "stroke": None}
+    try:
+        changed = replace(spring, **changes)
+    except FourBarError:  # it pulls at every length
+        changed = replace(spring, **changes, acts=None)
+        if spring.acts == "push":
+            changed = replace(changed, stiffness=0.0, preload=0.0)
+    return replace(effect, springs=(changed,))
 
 
 def _list_other_forms(effect: Any, ground_angle: float) -> Iterator[tuple[str, Any]]:
@@ -760,8 +784,9 @@ def _list_other_forms(effect: Any, ground_angle: float) -> Iterator[tuple[str, A
     elif isinstance(effect, Flywheel):
         other = {2: 4, 4: 2}[effect.bar]
         yield f"is on bar {other}", replace(effect, bar=other)
-    elif effect.key == "springs" and (both := _relax(effect, "acts")):
-        yield "act both ways", both
+    elif effect.key == "springs" and any(spring.acts for spring in effect.springs):
+        both = tuple(replace(spring, acts=None) for spring in effect.springs)
+        yield "act both ways", replace(effect, springs=both)
 
 
 def find_miscalculated(judge: Judge, wanted: Wanted) -> Iterator[Mistake]:

@@ -385,15 +385,17 @@ def _try_motions(judge: Judge, *, lengths: bool) -> Iterator[Mistake]:
             for predict in predict_all(0.0, FIT_STEP, -FIT_STEP)
         ]
         before = least
-        least = min(float(np.linalg.norm(here)) for here in residuals[::3])
+        least = float(np.fmin.reduce([np.linalg.norm(here) for here in residuals[::3]]))
         if not least < 0.5 * before:
             break  # nothing fits better, or only by rounding
         for name, here, more, less in zip(
             varied, residuals[::3], residuals[1::3], residuals[2::3], strict=True
         ):
-            slope = (less - more) / (2.0 * FIT_STEP)
+            # a number that jumps beside the position, as friction does, has no slope
+            smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
+            slope = ((less - more) / (2.0 * FIT_STEP))[smooth]
             squares = float(slope @ slope)
-            step = float(slope @ here) / squares if squares else math.nan
+            step = float(slope @ here[smooth]) / squares if squares else math.nan
             if 0.0 < factors[name] + step < math.inf:
                 factors[name] += step
     for name, predict in zip(varied, predict_all(0.0), strict=True):

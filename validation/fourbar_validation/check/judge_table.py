@@ -22,6 +22,7 @@ from fourbar_validation.check.row_commands import (
     find_row_commands,
 )
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, name_quantity
+from fourbar_validation.check.variants import open_tables
 from fourbar_validation.compare.scales import Scale, TermSizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -125,7 +126,7 @@ class Judge:
         rows: RowCommands | None = None,
         slack: float = 0.0,
     ) -> None:
-        self.scene, self.tolerance, self.slack = scene, tolerance, slack
+        self.scene, self.tolerance, self.slack = open_tables(scene), tolerance, slack
         if rows is None:
             rows = find_row_commands(scene, table)
         self.rows = rows

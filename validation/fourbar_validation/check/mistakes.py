@@ -17,6 +17,7 @@ from fourbar.quantities import FORCE_NAMES, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.check.calculated import (
+    DRY,
     ENOUGH_POSITIONS,
     find_miscalculated,
     find_single_precision,
@@ -191,9 +192,13 @@ def _difference(
 def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
     """List the problems that differ by numbers of the scene, or by the command."""
     yield from _list_other_commands(command)
-    if scene.linkage.ground_angle:
-        yield Variant("ground_angle is left out", {"lengths.ground_angle": 0.0})
-    dry = any(effect.key in ("friction", "pin_friction") for effect in scene.effects)
+    if ground := scene.linkage.ground_angle:
+        at = command
+        if command.moves_stroke:  # its cylinder turns the bar with the ground
+            at = command._replace(angle=command.angle - ground)
+        numbers = {"lengths.ground_angle": 0.0}
+        yield Variant("ground_angle is left out", numbers, at)
+    dry = any(effect.key in DRY for effect in scene.effects)
     if dry and command.speed is not None:
         slow = command._replace(speed=_SLOW * command.speed, acceleration=0.0)
         text = "no inertial forces (statics), with friction"

@@ -4,13 +4,14 @@ A mistake in what was solved is another number of the scene or another command: 
 member of a study, whose members together take a tenth of the time of one by one.
 """
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Gravity
+from fourbar.effects import Gravity, Table
 from fourbar.quantities import UNITS, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
@@ -84,6 +85,25 @@ class Variant(NamedTuple):
     mirror: float = 0.0
     """Factor on y where angles, their rates and torques are reversed; 0: they are not.
     """
+
+
+class OpenTable(Table):
+    """Table whose factor is NaN, and no error, at an angle that it does not cover."""
+
+    def replace_outside(self, theta_2: Any) -> float:
+        """Return NaN: what acts there is not known."""
+        return math.nan
+
+
+def open_tables(scene: Scene) -> Scene:
+    """Let positions of hypotheses lie beyond the tables of loads, and have no force."""
+    loads = tuple(
+        load
+        if load.table is None
+        else replace(load, table=OpenTable(load.table.theta_2, load.table.factor))
+        for load in scene.loads
+    )
+    return replace(scene, loads=loads)
 
 
 def state_all(scene: Scene) -> Scene:
