@@ -635,6 +635,14 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": text}
 
 
+def test_an_angle_of_more_than_half_a_turn_is_that_of_the_sweep(run):
+    """The output of a drag-link turns with its input, by 233.8 deg at 300 deg."""
+    file = MODELS / "drag_link.toml"
+    shown = strict(run("analyze", file, "--json", "--degrees", "--at", "300 deg"))
+    assert shown["theta_4"] == approx([degrees(solve(load(file)).theta_4[300])])
+    assert shown["theta_4"] == approx([233.8003], abs=1e-4)
+
+
 def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
     """The limit is that of the sides 5, 4.5 and 6; 0.1 s at 10 rad/s are 1 rad."""
     lengths = '{ ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }'

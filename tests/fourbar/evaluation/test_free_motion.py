@@ -189,6 +189,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
         right = [t for t in right if t < 1.5]
         assert released.change_points == approx(right, abs=1e-9)
         assert np.abs(released.command.omega_2 - speed).max() < 1e-9
+        assert set(released.command.branch) == {1}
 
 
 @pytest.mark.slow
