@@ -359,8 +359,11 @@ class Rise(Described, _OverTime):
         first = getattr(self, f"theta_{self.bar}")
         place, speed, acceleration = _rise(self.kind, time, duration)
         if self.fall is not None:
-            late = time - (duration + self.dwell)
-            fallen, fall_speed, fall_acceleration = _rise(self.kind, late, self.fall)
+            start = duration + self.dwell
+            # the end is that of `time`, so that nothing moves there by rounding
+            lasts = (start + self.fall) - start
+            late = time - start
+            fallen, fall_speed, fall_acceleration = _rise(self.kind, late, lasts)
             place = place - fallen
             speed = speed - fall_speed
             acceleration = acceleration - fall_acceleration

@@ -813,15 +813,9 @@ class _SceneBlock:
             )
         if facts.pins and not facts.motion.is_steady:
             yield "the positions are passed at no one speed: no RMS values, no energies"
-        if facts.motion.reversals:
-            places = ", ".join(
-                f"{self._place(place, named=False)} ({pin})"
-                for place, pin in facts.motion.reversals
-            )
-            yield (
-                "dry friction reverses, and the pin forces jump, at"
-                f" {self.symbol} = {places}"
-            )
+        yield from facts.motion.list_jumps(
+            self.symbol, lambda place: self._place(place, named=False)
+        )
         pins_from_rest = self._list_from_rest([*PIN_FORCES], "N")
         if pins_from_rest or self._list_from_rest(_BENDING, "N m"):
             yield (

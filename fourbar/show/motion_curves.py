@@ -6,6 +6,7 @@ follows on another. Between listed positions nothing is searched, and between th
 instants of a released motion only where its angles are largest or smallest.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -31,6 +32,10 @@ commanded.
 """
 _SAME_EDGE = 1e-9
 """Part of the motion within which two ends of panels are one."""
+_BESIDE_A_BREAK = 1e-6
+"""Part of the motion from a break to where its sides are shown. A law that comes to
+rest by a square still moves there.
+"""
 _BESIDE_A_POLE = 1e-4
 """Distance from a listed position without a lever at which its forces are compared with
 those at a quarter of it, rad. Positions have some 12 digits there.
@@ -46,6 +51,8 @@ _AS_WIDE = 1e-6
 """Difference below which ranges of angles are equally wide, rad. An end in its last
 digits leaves some 1e-8.
 """
+_Named = list[tuple[float, str]]
+"""Places with the name of what happens there."""
 
 
 @dataclass
@@ -63,10 +70,12 @@ class MotionCurves:
     """
     reversals: list[tuple[float, str]]
     """Place, and the pin at which dry friction reverses, in the order of the motion.
-    Pin forces jump there.
+    Torque or pin forces jump there.
     """
+    rests: list[tuple[float, str]]
+    """Place, and the pin with dry friction that stops or starts there, likewise."""
     breaks: Array
-    """Places at which forces jump or bend."""
+    """Places at which forces jump or bend: those of effects, and the times of a law."""
 
     def solve_at(self, places: Array, stage: str = "force") -> Solution:
         """Solve at commanded angles or strokes, or at the times of a motion law."""
@@ -79,6 +88,20 @@ class MotionCurves:
             return self.solution
         nodes = panels.list_nodes().ravel()
         return self.solve_at(np.concatenate([panels.start, nodes, panels.stop[-1:]]))
+
+    def list_jumps(self, symbol: str, write: Callable[[float], str]) -> Iterator[str]:
+        """Say where dry friction makes forces jump, places as `write` has them."""
+        for cause, jumps in (
+            ("dry friction reverses", self.reversals),
+            ("pins with dry friction stop or start", self.rests),
+        ):
+            pins: dict[str, list[str]] = {}
+            for place, pin in jumps:
+                pins.setdefault(write(place), []).append(pin)
+            places = [f"{place} ({', '.join(names)})" for place, names in pins.items()]
+            if places:
+                at = f"{symbol} = {', '.join(places)}"
+                yield f"{cause}, and torque or pin forces jump, at {at}"
 
     def solve_with_peaks(self) -> Solution:
         """Solve at the positions of the sweep and at what its steps pass over.
@@ -93,7 +116,7 @@ class MotionCurves:
         peaks = [
             panels.find_peak(name).place for name in names if panels.has_value(name)
         ]
-        away = _SAME_EDGE * panels.length
+        away = _BESIDE_A_BREAK * panels.length
         found = [peaks, self.breaks - away, self.breaks + away]
         places = np.unique(np.concatenate([self.solution.at.places, *found]))
         ends = np.sort(self.solution.at.places[[0, -1]])
@@ -198,10 +221,11 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         curves = _list_position_curves(extremes)
         positions = _take_positions(extremes, curves, np.ones(len(extremes)))
         _mark_poles(scene, solution, panels)
-        return MotionCurves(scene, solution, positions, panels, [], np.zeros(0))
+        return MotionCurves(scene, solution, positions, panels, [], [], np.zeros(0))
     exact, even = _cut(scene, solution)
-    located = _locate_breaks(scene, solution, _join_edges(exact, even))
-    breaks = np.array([place for place, _ in located])
+    zeros, rests = _locate_breaks(scene, solution, _join_edges(exact, even))
+    corners = exact[: 0 if scene.motion.law is None else None]
+    breaks = np.unique([*corners, *(place for place, _ in zeros)])
     exact = np.unique(np.concatenate([exact, breaks]))
     edges = _join_edges(exact, even)
     stage = "acceleration" if solution.F12 is None else "force"
@@ -222,8 +246,11 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     if solution.omega_4 is not None:
         panels = fit_panels(compute, edges, wanted, SHALLOW)
         panels = panels.with_points(exact, compute(exact))
-    reversals = [(place, name) for place, name in located if name in PINS]
-    return MotionCurves(scene, solution, positions, panels, reversals, breaks)
+    reversals, rests = (
+        [(place, name) for place, name in found if name in PINS]
+        for found in (zeros, rests)
+    )
+    return MotionCurves(scene, solution, positions, panels, reversals, rests, breaks)
 
 
 def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
@@ -305,10 +332,13 @@ def _locate_breaks(
     scene: Scene,
     solution: Solution,
     edges: Array,
-) -> list[tuple[float, str]]:
-    """Locate where forces jump or bend, with the names of what breaks there."""
+) -> tuple[_Named, _Named]:
+    """Locate where forces jump or bend, with the names of what breaks there.
+
+    The second places are those at which a name comes to rest or leaves it.
+    """
     if solution.F12 is None:
-        return []
+        return [], []
     settled = scene.settled()
 
     def compute(places: Array) -> dict[str, Array]:
@@ -320,10 +350,11 @@ def _locate_breaks(
 
     names = compute(edges[:1])
     if not names:
-        return []
+        return [], []
     panels = fit_panels(compute, edges, dict.fromkeys(names, Wanted(zeros=True)))
     width = _SAME_EDGE * panels.length
-    breaks = []
+    breaks: _Named = []
+    rests: _Named = []
     for name in names:
         zeros = panels.find_zeros(name)
         away = np.abs(zeros[:, None] - edges[[0, -1]])
@@ -333,7 +364,9 @@ def _locate_breaks(
         if is_once_round(solution) and first * last < 0.0:
             places.append(float(edges[0]))
         breaks += [(place, name) for place in places]
-    return sorted(breaks, reverse=bool(edges[0] > edges[-1]))
+        rests += [(place, name) for place in panels.find_rests(name).tolist()]
+    backwards = bool(edges[0] > edges[-1])
+    return sorted(breaks, reverse=backwards), sorted(rests, reverse=backwards)
 
 
 def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:

@@ -246,18 +246,16 @@ class Panels:
         return np.concatenate(integrals)
 
     def find_zeros(self, name: str) -> Array:
-        """Find the places at which a curve changes its sign, in order.
-
-        Where it is zero for a while it is the first end of a panel there.
-        """
+        """Find the places at which a curve changes its sign, in order."""
         series = self.curves[name].series[..., 0]
         values = (series @ _TO_GRID.T).ravel()
+        is_zero = np.repeat(self._are_zero(name), len(_GRID))
         least = TIED * np.nanmax(np.abs(values), initial=0.0)
         rows = np.flatnonzero(np.abs(values) > least)
         changes = np.flatnonzero(values[rows[1:]] * values[rows[:-1]] < 0.0)
         zeros = []
         for before, after in zip(rows[changes], rows[changes + 1], strict=True):
-            if np.isnan(values[before:after]).any():
+            if np.isnan(values[before:after]).any() or is_zero[before:after].any():
                 continue
             panel, point = divmod(before + 1, len(_GRID))
             if after == before + 1 and point > 0:
@@ -270,6 +268,15 @@ class Panels:
             panel, point = divmod(edges[0] if len(edges) else before + 1, len(_GRID))
             zeros.append(self._place(panel, _GRID[point]))
         return np.array(zeros)
+
+    def find_rests(self, name: str) -> Array:
+        """Find the places at which a curve begins or ceases to be zero for a while."""
+        is_zero = self._are_zero(name)
+        return np.asarray(self.start[1:][is_zero[1:] != is_zero[:-1]])
+
+    def _are_zero(self, name: str) -> NDArray[np.bool_]:
+        """Mark the panels in which a curve is zero, (p,)."""
+        return np.asarray((self.curves[name].values == 0.0).all(axis=(1, 2)))
 
     def list_nodes(self) -> Array:
         """List the places of the nodes, (p, N)."""

@@ -206,15 +206,10 @@ def _look_between(shown: View) -> None:
     """
     motion = describe_motion(shown.sweep)
     shown.sweep = motion.solve_with_peaks()
-    if motion.reversals:
-        axis = shown.axis
-        places = ", ".join(
-            f"{axis.write(place)} ({pin})" for place, pin in motion.reversals
-        )
-        shown.notes.append(
-            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} ="
-            f" {places}."
-        )
+    shown.notes += [
+        f"{jumps[0].upper()}{jumps[1:]}."
+        for jumps in motion.list_jumps(shown.axis.symbol, shown.axis.write)
+    ]
 
 
 def draw(

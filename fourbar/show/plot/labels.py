@@ -92,7 +92,12 @@ class Labels:
         rooms = {}
         for axes in figure.findobj(Axes):
             room = _Room(axes, figure.dpi / 72.0)
-            texts = [text for text in axes.texts if text.get_text()]
+            # an arrow between places of the plane is kept off as a line
+            texts = [
+                text
+                for text in axes.texts
+                if text.get_text() or getattr(text, "xycoords", "data") != "data"
+            ]
             room.boxes += [
                 _read_box(text.get_window_extent(renderer)) for text in texts
             ]

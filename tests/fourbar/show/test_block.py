@@ -487,7 +487,7 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_time():
     """A sine of 0.5 Hz that begins at 30 deg of its turn turns back at 1/3 s."""
     law = fourbar.Sine(1.0, 0.7, pi, 0.6, pi / 6.0, steps=30)
     scene = crank_rocker(motion=Motion(law=law), effects=(Friction.at(O2=0.05),))
-    said = "reverses, and the pin forces jump, at t = "
+    said = "reverses, and torque or pin forces jump, at t = "
     assert f"{said}0.3333 s (O2)" in block(scene)
     figure = draw_figure(scene, "kinematics").figure
     assert f"{said}333.3 ms (O2)" in figure.subfigs[0].get_supxlabel()
@@ -496,11 +496,14 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_time():
 def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero():
     """Friction of 5 N m at O2 holds; the law comes to rest at 0.3 and 0.8 rad."""
     torques = solve(crank_rocker(motion=Motion([0.3, 0.8], 0.0))).torque
-    law = fourbar.Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, steps=30)
+    law = fourbar.Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, fall=0.1, steps=40)
     effects = (*WEIGHT, Friction.at(O2=5.0))
     text = block(crank_rocker(motion=Motion(law=law), effects=effects))
     first, last = (f"{x - 5.0:.4g} N m to {x + 5.0:.4g} N m" for x in torques)
-    assert f"{first} at t = 0 s, {last} over t = 0.2 s to 0.3 s: dry" in text
+    at_rest = f"{first} at t = 0 s, {last} over t = 0.2 s to 0.3 s"
+    assert f"at rest {at_rest}, {first} at t = 0.4 s: dry" in text
+    said = "stop or start, and torque or pin forces jump, at t = "
+    assert f"{said}0.2 s (O2), 0.3 s (O2)" in text and "reverses" not in text
     angles = (radians(10.0), radians(70.0))
     lifts = Motion(law=Law((0.0, 2.5), angles, omega_2=(0.0, 0.0)))
     assert "over the motion given, 0 mJ taken back" in block(crank_rocker(motion=lifts))

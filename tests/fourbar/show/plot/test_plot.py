@@ -429,6 +429,14 @@ def test_what_stands_at_an_axis_is_whole():
     assert "Linkage at θ₂ = 0°" in figure.axes[0].get_title("left")
 
 
+def test_a_label_keeps_off_the_arrow_of_gravity():
+    scene = crank_rocker(points=(Point("tip", 4, (0.2, -0.3)),))
+    (axes,) = composed(scene, "linkage").axes
+    boxes = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    arrow = boxes.pop("")
+    assert "tip" in boxes and not arrow.count_overlaps(boxes.values())
+
+
 def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
     shown = make_view(crank_rocker(drive=CYLINDER))
     stands = np.flatnonzero(np.diff(np.sign(shown.sweep.stroke_speed)))
