@@ -161,10 +161,6 @@ def outcome(posed, engines):
     }
 
 
-def failing(posed, engines):
-    return outcome(posed, engines)[0]
-
-
 def test_every_effect_of_the_registry_is_here():
     assert set(list_kinds()) <= set(ACTING)
 
@@ -177,16 +173,11 @@ def test_exact_engines_agree(names):
     assert outcome(scene(*names), EXACT) == ([], set())
 
 
-SIMULABLE = tuple(
-    name for name in ACTING if name not in NO_COUNTERPART["mujoco-simulated"]
-)
-
-
 @pytest.mark.parametrize(
     "names",
     [
         *ALONE,
-        SIMULABLE,
+        tuple(one for one in ACTING if one not in NO_COUNTERPART["mujoco-simulated"]),
         pytest.param(tuple(ACTING), marks=pytest.mark.slow),
     ],
     ids="+".join,
@@ -200,7 +191,7 @@ def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names):
 def fail_with(name, engines):
     """Engines and quantities that fail with one effect."""
     chosen = [engine for engine in EXACT if engine.name in engines]
-    failed = failing(scene(name), chosen)
+    failed, _ = outcome(scene(name), chosen)
     return {engine for engine, _, _ in failed}, {quantity for _, quantity, _ in failed}
 
 

@@ -14,6 +14,7 @@ from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import Edit, TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.second_loop import LoopSettings, measure
+from tests.support.shares import slow_but
 
 AGREES = 0.05
 """Part by which two loops may differ that read the same run at positions of their own.
@@ -53,7 +54,6 @@ CASES = {
         LoopSettings(160, "Euler", 20.0, pad=1e-3),
     ),
 }
-QUICK = ("defaults, Euler", "no pads", "pads")
 
 
 def make_scene(drive):
@@ -76,8 +76,14 @@ def make_scene(drive):
     return replace(fourbar.load(MODELS / f"{name}.toml"), drive_bar=int(bar))
 
 
-def compare(drive, case):
-    """Compare the errors of both loops, quantity by quantity."""
+@pytest.mark.parametrize(
+    "name", slow_but({"defaults, Euler", "no pads", "pads"}, CASES)
+)
+@pytest.mark.parametrize(
+    "drive", ["crank_rocker 2", "drag_link 3", "drag_link 4", "cylinder"]
+)
+def test_the_plotted_error_is_that_of_a_second_loop(drive, name):
+    case = CASES[name]
     scene = make_scene(drive)
     setup = TrialSetup(scene, command(scene))
     settings = replace(case.settings, steps_per_revolution=float(case.steps))
@@ -91,19 +97,3 @@ def compare(drive, case):
     right = measure(scene, again)
     for quantity in ERROR_NAMES:
         assert getattr(plotted, quantity) == pytest.approx(right[quantity], rel=AGREES)
-
-
-DRIVES = ("crank_rocker 2", "drag_link 3", "drag_link 4", "cylinder")
-
-
-@pytest.mark.parametrize("case", QUICK)
-@pytest.mark.parametrize("drive", DRIVES)
-def test_the_plotted_error_is_that_of_a_second_loop(drive, case):
-    compare(drive, CASES[case])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", [name for name in CASES if name not in QUICK])
-@pytest.mark.parametrize("drive", DRIVES)
-def test_so_is_that_of_every_integrator_and_softness(drive, case):
-    compare(drive, CASES[case])
