@@ -13,7 +13,6 @@ import pytest
 
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
-from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Scene, command
 from fourbar_validation.cli import status
 from fourbar_validation.compare.compare import Comparison, Demands
@@ -41,10 +40,9 @@ from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import summary_of
 from tests.support.runs import HERE, ROW, changed, compare_rows
 from tests.support.scenes import crank_rocker
-from tests.validation.run.test_judge import Echo, Refuses
+from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, Refuses
 
 NAN = math.nan
-ROCKER = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
 
 
 def rows(**counts):
@@ -281,17 +279,9 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
 
 
 def test_numbers_without_a_digit_do_not_agree(tmp_path, capsys):
-    """1e-13 rad from a limit of theta_2 that is the condition of the accelerations."""
-    limit = limit_positions(ROCKER)[0].theta_2
-    scene, *_ = (
-        near
-        for side in (1.0, -1.0)
-        for near in [Scene(ROCKER, fourbar.Motion(limit + side * 1e-13, 1.0))]
-        if fourbar.solve(near).assembled.all()
-    )
     file, theirs = tmp_path / "scene.toml", tmp_path / "theirs.csv"
-    fourbar.save(scene, file)
-    theirs.write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
+    fourbar.save(NEAR_ITS_LIMIT, file)
+    theirs.write_text(f"theta_2, torque\n{NEAR_ITS_LIMIT.motion.theta_2!r}, 17.0\n")
     assert status(["check", str(file), str(theirs)]) == FAILED
     told = "Nothing was compared; no digit left to judge 1 more by"
     assert told in capsys.readouterr().out

@@ -196,16 +196,17 @@ ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 LIMIT = limit_positions(ROCKER)[0].theta_2
 
 
+NEAR_ITS_LIMIT = next(
+    scene
+    for away in (1e-13, -1e-13)
+    for scene in [Scene(ROCKER, Motion(LIMIT + away, 1.0))]
+    if fourbar.solve(scene).assembled.all()
+)
+"""The condition of its accelerations is about 1e-13."""
+
+
 def test_where_no_digit_is_left_nothing_is_judged():
-    # 1e-13 rad from a limit of theta_2 the condition of the accelerations is about
-    # 1e-13
-    near, *_ = (
-        scene
-        for side in (1.0, -1.0)
-        for scene in [Scene(ROCKER, Motion(np.array([LIMIT + side * 1e-13]), 1.0))]
-        if fourbar.solve(scene).assembled.all()
-    )
-    torque = rows_of(Echo, near)["torque"]
+    torque = rows_of(Echo, NEAR_ITS_LIMIT)["torque"]
     assert torque.verdict == UNDECIDED and not torque.passed
     assert "eps/condition" in torque.reason
 

@@ -80,6 +80,16 @@ POSED = {
 }
 
 
+def test_the_suite_is_made_from_its_parameters_alone():
+    first, second = Hard(), Hard()
+    names = [first.name(i) for i in range(len(first))]
+    assert names == sorted(set(names)) == [second.name(i) for i in range(len(second))]
+    for i in (0, len(first) // 2, len(first) - 1):
+        assert first.scene(i) == second.scene(i)
+    sources = {first.scene(i).source for i in range(len(first))}
+    assert sources == {family.statement for family in HARD_FAMILIES}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", POSED)
 def test_a_hard_scene_holds(name):
