@@ -11,10 +11,11 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene, solve
+from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene, solve, vary
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import Wrenches, pin_forces
+from fourbar.linkage import PIN_FORCE, PINS
 from tests.support.scenes import bare
 
 EPS = 2.0**-52
@@ -101,3 +102,41 @@ def test_what_friction_of_pins_misses_is_a_rounding():
     s = solve(replace(scene(2), effects=(Gravity(), friction)))
     forces = [np.hypot(*s[name].T).max() for name in ("F12", "F32", "F43")]
     assert 0.0 < s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * max(forces)
+
+
+ANGLES = np.linspace(0.1, 6.0, 13)
+
+
+@pytest.mark.parametrize(
+    "pins",
+    [("O2",), ("A",), ("B",), ("O4",), ("O2", "A", "B", "O4")],
+    ids="-".join,
+)
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
+    pins, drive_bar
+):
+    """With the couples mu r |F| as loads the forces are the same."""
+    friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
+    motion = Motion(ANGLES, 10.0)
+    case = replace(scene(drive_bar), motion=motion, loads=())
+    s = solve(replace(case, effects=(Gravity(), friction)))
+    largest = max(np.hypot(*s[name].T).max() for name in PIN_FORCE.values())
+    assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest
+    assert s.friction_residual.any() or len(pins) == 1
+    rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
+    moments, loads = {}, []
+    for pin in pins:
+        i, j = PINS[pin]
+        couple = 0.1 * 0.02 * np.hypot(*s[PIN_FORCE[pin]].T)
+        couple = couple * np.sign(rate[j] - rate[i])
+        for bar, moment in ((i, couple), (j, -couple)):
+            if bar > 1:
+                moments[f"loads.{len(loads)}.moment"] = moment
+                loads.append(Load(bar, moment=1.0))
+    one = replace(case, loads=tuple(loads), effects=(Gravity(),))
+    given = solve(vary(one, {**moments, "motion.theta_2": ANGLES[:, None]}))
+    for name in (*PIN_FORCE.values(), "torque"):
+        apart = np.abs(s[name] - given[name][:, 0]).reshape(len(ANGLES), -1)
+        allowed = GROWN * largest / s.drive_condition
+        assert (apart.max(axis=1) <= allowed).all(), name
