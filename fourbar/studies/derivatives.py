@@ -26,8 +26,10 @@ from fourbar.formulas.arithmetic import (
 from fourbar.formulas.path import LoopPath
 from fourbar.formulas.position import HalfAngle, compute_factors, find_root_sign
 from fourbar.quantities import (
+    COUPLE,
     DRY_FRICTION_QUANTITIES,
     FORCE_NAMES,
+    LINE,
     NOT_ASSEMBLED,
     OK,
     PIN_FORCES,
@@ -251,7 +253,7 @@ class Sensitivity:
         rows = []
         for name in (
             name
-            for name in ("torque", "theta_3", "theta_4", *PIN_FORCES)
+            for name in (*COUPLE, *LINE, "theta_3", "theta_4", *PIN_FORCES)
             if name in self.by
         ):
             part = f"|{name}|" if name in PIN_FORCES else name
@@ -270,7 +272,7 @@ class Sensitivity:
         )
 
     def __repr__(self) -> str:
-        """Say in ten lines what it holds."""
+        """Say in a dozen lines what it holds."""
         rows = [
             f"{part}, {value}: changes most with {most or 'nothing'}"
             for part, value, most in self._list_rows()

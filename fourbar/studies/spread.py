@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect, needing
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import require_whole
-from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, Array
+from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Scene, command
 from fourbar.solution import find_values, is_scalar, split_parts
 from fourbar.solving import solve
@@ -156,7 +156,7 @@ class Tolerances:
         """
         rows = []
         sizes = [f"|{name}|" for name in PIN_FORCES]
-        for name in ("torque", "theta_3", "theta_4", *sizes):
+        for name in (*COUPLE, *LINE, "theta_3", "theta_4", *sizes):
             if name not in self.spreads:
                 continue
             spread = self.spreads[name]
@@ -168,7 +168,7 @@ class Tolerances:
         return rows
 
     def __repr__(self) -> str:
-        """Say in ten lines what it holds."""
+        """Say in a dozen lines what it holds."""
         rows = [
             f"{name}, {value}: sigma up to {sigma}, worst case {worst}"
             for name, value, sigma, worst in self._list_rows()
