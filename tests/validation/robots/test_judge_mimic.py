@@ -375,6 +375,50 @@ def test_the_tree_tells_which_bars_a_follower_joins(
     assert measure_mimic(path, "F", GRIPPER).equality.bars == bars
 
 
+KNUCKLE = """<mujoco><worldbody>
+<body pos="-.024112 .136813 0"><joint name="lead" axis="0 0 -1" range="-36 36"/>
+<geom type="capsule" fromto="0 0 0 -.047335 .064495 0" size=".003"/></body>
+<body pos="-.01272 .1595 0"><joint name="knuckle" axis="0 0 1"/><geom size=".004"/>
+</body></worldbody><equality><joint joint1="knuckle" joint2="lead"
+polycoef="0 -1 0 0 0"/></equality></mujoco>"""
+"""A finger without its output, whose leader is seen from behind in the file's plane."""
+PINS = (
+    (-0.024112, 0.136813),
+    (-0.071447, 0.201308),
+    (-0.061, 0.2242),
+    (-0.01272, 0.1595),
+)
+AT_36 = fourbar.Motion(np.radians(np.linspace(90.276, 162.276, 73)), 1.0)
+BEHIND = {"theta_2": "126.2761691 deg"}
+
+
+@pytest.mark.parametrize(
+    ("change", "angles", "told"),
+    [
+        ({}, {}, "126.276 deg - lead, from 90.2762 to 162.276 deg, the range of the"),
+        ({"motion": AT_36, "drawing": None}, {}, "126.276 deg - lead, from 90.276 to"),
+        ({"drawing": None}, BEHIND, "126.276 deg - lead, from 90.2762 to 162.276 deg,"),
+        ({"drawing": None}, {}, '--pose "theta_2=126.276169 deg" states the other'),
+    ],
+)
+def test_the_side_of_a_scene_is_that_of_its_drawing_its_range_or_stated(
+    change, angles, told, tmp_path, capsys
+):
+    """The errors are those of pins B at the intersection of two circles."""
+    path = tmp_path / "knuckle.xml"
+    path.write_text(KNUCKLE)
+    drawn = fourbar.from_pins(*PINS)
+    scene = replace(drawn, **{"motion": drawn.motion.replace(angle=None), **change})
+    report = measure_mimic(path, "knuckle", scene, angles=angles)
+    show_mimic(report)
+    assert told in " ".join(capsys.readouterr().out.split())
+    if "other" not in told:
+        errors = np.degrees([report.file.angle, report.centred])
+        assert errors == pytest.approx([1.0203, 0.69427], abs=1e-4)
+        # even powers tell the sense of theta_2
+        assert report.fitted[1].coefficients[2] == pytest.approx(0.01616, abs=1e-5)
+
+
 @pytest.mark.parametrize("option", ["--key", "--hold", "--error"])
 def test_an_option_that_would_be_ignored_is_refused(option, tmp_path, capsys):
     line = ["check-mjcf", "scene.toml", str(write(tmp_path)), "--mimic", "s"]

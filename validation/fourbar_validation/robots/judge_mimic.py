@@ -16,7 +16,7 @@ from fourbar.linkage import require
 from fourbar.quantities import CHANGE_POINT, OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
-from fourbar_validation.engines.mujoco.robots.mimic import JointEquality
+from fourbar_validation.engines.mujoco.robots.mimic import JointEquality, is_same_angle
 from fourbar_validation.report.sentences import print_sentence
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
@@ -35,8 +35,6 @@ squares with an error to tell.
 FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio")
 _WHOLE_TURN = math.tau * (1.0 - 1e-9)
 """rad; scenes state their ends with twelve digits."""
-_SAME_ANGLE = 1e-3
-"""rad; files state angles with three or four digits."""
 _FITS = ("least squares", "smallest largest error")
 """Names of the fits of `_MimicReport.squares` and `_MimicReport.fitted`."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}"
@@ -102,8 +100,8 @@ def measure_mimic(
 
     The leader's zero is the theta_2 at which the file has the input. The follower's is
     the angle between its two bars there: that of the loop, or that of the bars in the
-    file, whichever the polynomial fits better. Of a scene over a whole turn the motion
-    is the range of the leader, if the file has one.
+    file, whichever the polynomial fits better. Of a scene over a whole turn, or without
+    a range, the motion is the range of the leader, if the file has one.
 
     Parameters
     ----------
@@ -117,21 +115,18 @@ def measure_mimic(
         over the motion.
     """
     file = read_robot(path, assets)
+    theta = {
+        name: require(f"--pose {name}", text, "rad")
+        for name, text in (angles or {}).items()
+    }
     with examine_guarded(file) as examined:
-        equality: JointEquality = examined(READ, file, joint, scene)
-    equality, stated = _state_angles(equality, angles or {})
-    positions = np.unique(command(scene).theta_2)
-    if equality.swing is not None and np.ptp(positions) >= _WHOLE_TURN:
-        positions = np.linspace(*equality.swing, len(positions))
+        equality: JointEquality = examined(
+            READ, file, joint, scene, theta.get("theta_2")
+        )
+    equality, stated = _state_angles(equality, theta)
+    positions = _list_positions(scene, equality)
     low = float(positions[0])
     high = float(positions[-1])
-    if len(positions) < FEWEST_POSITIONS:
-        raise InputError(
-            "motion.theta_2",
-            low if low == high else f"{len(positions)} positions",
-            f"must be a range of at least {FEWEST_POSITIONS} positions:"
-            " a ratio is of a motion",
-        )
     branch = int(command(scene).branch[0])
     theta_2 = np.union1d(np.linspace(low, high, POSITIONS_FITTED), positions)
     angle, ratio = _follow(scene, theta_2, branch, equality)
@@ -146,7 +141,7 @@ def measure_mimic(
         if not stated:
             zeros += _find_in_loop(scene, rest, branch, equality)
         drawn = equality.follower_zero
-        if drawn is not None and not any(_is_same_angle(one, drawn) for one in zeros):
+        if drawn is not None and not any(is_same_angle(one, drawn) for one in zeros):
             zeros.append(drawn)
     turned = side * angle
     own = _measure_polynomial(equality.coefficients, x, turned, equality.sense * ratio)
@@ -186,11 +181,42 @@ def measure_mimic(
     )
 
 
+def _list_positions(scene: Scene, equality: JointEquality) -> Array:
+    """List the angles of bar 2 over the motion, rad.
+
+    A scene that states no range, or a whole turn, has that of the leader's limits, as
+    far as the loop closes.
+
+    Raises InputError where they are too few.
+    """
+    motion = scene.motion
+    positions = np.unique(command(scene).theta_2)
+    ends = positions[[0, -1]]
+    named = motion.angle is not None or motion.law is not None
+    turns = np.ptp(ends) >= _WHOLE_TURN
+    if equality.swing is not None and (turns or not named):
+        low, high = equality.swing
+        if not turns:
+            away = ends.mean() - equality.theta_2
+            closed = ends - math.tau * np.round(away / math.tau)
+            low, high = np.clip(equality.swing, *closed)
+        positions = np.unique(np.linspace(low, high, len(positions)))
+    if len(positions) < FEWEST_POSITIONS:
+        one = len(positions) == 1
+        raise InputError(
+            "motion.theta_2",
+            float(positions[0]) if one else f"{len(positions)} positions",
+            f"must be a range of at least {FEWEST_POSITIONS} positions:"
+            " a ratio is of a motion",
+        )
+    return positions
+
+
 def _state_angles(
     equality: JointEquality,
-    angles: Mapping[str, str],
+    angles: Mapping[str, float],
 ) -> tuple[JointEquality, bool]:
-    """Return an equality with the stated angles, and whether they state its follower.
+    """Return an equality with its follower where angles state it, and whether they do.
 
     Raises
     ------
@@ -202,7 +228,7 @@ def _state_angles(
     theta = {1: 0.0}
     if equality.theta_2 is not None:
         theta[2] = equality.theta_2
-    for name, text in angles.items():
+    for name, angle in angles.items():
         if name not in allowed:
             raise InputError(
                 "--pose",
@@ -210,8 +236,7 @@ def _state_angles(
                 f"must be {' or '.join(allowed)} beside --mimic, the angle of a bar in"
                 " the rest pose of the file",
             )
-        theta[int(name[-1])] = require(f"--pose {name}", text, "rad")
-    equality = replace(equality, theta_2=theta.get(2))
+        theta[int(name[-1])] = angle
     if not any(name in angles for name in of_follower):
         return equality, False
     for name in allowed:
@@ -219,10 +244,6 @@ def _state_angles(
             raise InputError(f"--pose {name}", None, "is needed beside the other angle")
     turned, bearer = (theta[bar] for bar in equality.bars)
     return replace(equality, follower_zero=turned - bearer), True
-
-
-def _is_same_angle(one: float, other: float) -> bool:
-    return abs(math.remainder(one - other, math.tau)) <= _SAME_ANGLE
 
 
 def _drop_turns(angles: Array) -> Array:
@@ -359,6 +380,8 @@ def show_mimic(report: _MimicReport) -> None:
         f" {equality.leader} by polycoef"
         f" {_write_coefficients(equality.coefficients)}; {_write_theta_2(report)}"
     )
+    if equality.other_side is not None:
+        print_sentence(_write_side(equality))
     print_sentence(_write_errors(report))
     other_error, zero = report.other
     if math.isfinite(other_error):
@@ -417,6 +440,20 @@ def _write_theta_2(report: _MimicReport) -> str:
     )
 
 
+def _write_side(equality: JointEquality) -> str:
+    """Say from which side the scene is taken to be drawn, and what states another."""
+    other = equality.other_side
+    assert other is not None and equality.theta_2 is not None
+    said = (
+        "nothing tells from which side the scene is drawn: the tip of the axis of"
+        f" {equality.leader} is assumed"
+    )
+    if is_same_angle(other, equality.theta_2):
+        return said
+    angle = f"{math.degrees(math.remainder(other, math.tau)):.9g}"
+    return f'{said}; --pose "theta_2={angle} deg" states the other side'
+
+
 def _write_errors(report: _MimicReport) -> str:
     """Write the errors of the polynomial of the file that the known zeros tell."""
     equality = report.equality
@@ -427,7 +464,7 @@ def _write_errors(report: _MimicReport) -> str:
     missing = ""
     if report.has_zeros:
         drawn = equality.follower_zero
-        in_file = drawn is not None and _is_same_angle(report.zero, drawn)
+        in_file = drawn is not None and is_same_angle(report.zero, drawn)
         through_zero = (
             f"{_deg(report.file.angle)} deg through the zero of the file, where {angle}"
             f"{'' if in_file else ' of the loop'} is"

@@ -1,8 +1,8 @@
 """An equality by whose polynomial one joint of a robot's file follows another."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import mujoco
@@ -11,7 +11,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import Bar
 from fourbar.quantities import Array
-from fourbar.scene import Scene
+from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     Follower,
     find_parent,
@@ -28,6 +28,8 @@ _SAME_LENGTH = 1e-3
 """Relative difference of a length in a file from that in a scene: files state three or
 four digits.
 """
+_SAME_ANGLE = 1e-3
+"""rad; files state angles with three or four digits."""
 _SAME_CENTRE = 0.05
 """Relative difference of a mass centre's distance: files state two digits."""
 
@@ -58,6 +60,10 @@ class JointEquality:
     """
     side: float
     """+1 if theta_2 grows with the leader, -1 if it falls."""
+    other_side: float | None
+    """theta_2 in the rest pose of a scene drawn from the other side, rad, if nothing
+    tells the side; None if it is known, or theta_2 is not.
+    """
     bars: tuple[int, int]
     """Bar that the follower turns, and the one that it turns against: 1 to 4."""
     limits: tuple[float, float] | None
@@ -76,12 +82,17 @@ def read_joint_equality(
     file: RobotFile,
     name: str,
     scene: Scene,
+    theta_2: float | None = None,
 ) -> JointEquality:
     """Read the equality by which a joint follows another, in the loop of a scene.
 
     The leader turns the input. The tree of bodies tells which bars the follower joins.
     Where the bars point in the rest pose is read from what the file has at their ends,
     or from their mass centres.
+
+    Parameters
+    ----------
+    theta_2 : in the rest pose, rad; it wins over what is read.
 
     Raises
     ------
@@ -93,7 +104,7 @@ def read_joint_equality(
     for number in range(model.neq):
         for tie in list_followers(model, number):
             if tie.joint == joint:
-                return _describe_follower(model, tie, scene)
+                return _describe_follower(model, tie, scene, theta_2)
     needed = {
         "MJCF": f'<joint joint1="{name}" joint2="..."> and no equality of a fixed'
         " tendon over it and one other joint"
@@ -107,6 +118,7 @@ def _describe_follower(
     model: mujoco.MjModel,
     tie: Follower,
     scene: Scene,
+    stated: float | None,
 ) -> JointEquality:
     follower, leader, coefficients = tie
     for joint in (follower, leader):
@@ -119,20 +131,21 @@ def _describe_follower(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = float(data.xaxis[follower] @ data.xaxis[leader])
-    theta_2, follower_zero, side = _measure_bars(model, data, tie, scene)
     low, high = model.jnt_range[leader].tolist()
-    return JointEquality(
+    equality = JointEquality(
         name_joint(model, follower),
         name_joint(model, leader),
         coefficients,
         float(model.qpos0[model.jnt_qposadr[leader]]),
         math.copysign(1.0, along),
-        theta_2,
-        follower_zero,
-        side,
+        stated,
+        None,
+        1.0,
+        stated,
         _find_bars(model, leader, follower),
         (low, high) if model.jnt_limited[leader] else None,
     )
+    return _measure_bars(model, data, tie, scene, equality)
 
 
 def _find_bars(model: mujoco.MjModel, leader: int, follower: int) -> tuple[int, int]:
@@ -155,11 +168,11 @@ def _measure_bars(
     data: mujoco.MjData,
     tie: Follower,
     scene: Scene,
-) -> tuple[float | None, float | None, float]:
-    """Return theta_2 and the follower's angle in the rest pose, and the leader's sense.
+    equality: JointEquality,
+) -> JointEquality:
+    """Return an equality with the angles of the rest pose and the side of the scene.
 
-    The plane is seen from the tip of the leader's axis, or from behind where the output
-    of the scene is then that of the file. None if the ground or the bar is not found.
+    It stays as it is where the ground or the input is not found.
     """
     follower, leader, coefficients = tie
     linkage = scene.linkage
@@ -170,29 +183,82 @@ def _measure_bars(
         if _is_same_number(float(np.linalg.norm(line)), linkage.lengths[0]):
             break
     else:
-        return None, None, 1.0
+        return equality
     x = line / np.linalg.norm(line)
     axes = (x, np.cross(normal, x))
     input_angle = _find_angle_of_bar(model, data, leader, linkage.input, axes)
     output_angle = _find_angle_of_bar(model, data, rocker, linkage.output, axes)
     if input_angle is None:
-        return None, None, 1.0
-    behind = False
+        return equality
+    angles = None
     if output_angle is not None:
         # where the equality turns the output while the leader is at its zero
         turn = coefficients[0] * float(data.xaxis[follower] @ normal)
         turned = output_angle + (turn if rocker == follower else 0.0)
-        behind = is_seen_from_behind(scene, (0.0, input_angle, math.nan, turned))
-    side = -1.0 if behind else 1.0
+        angles = (0.0, input_angle, math.nan, turned)
+    rests = {side: linkage.ground_angle + side * input_angle for side in (1.0, -1.0)}
+    told = _find_side(scene, rests, angles, equality)
+    side = told or 1.0
     follower_zero = None
-    bars = _find_bars(model, leader, follower)
-    if bars == (4, 1) and rocker == follower and output_angle is not None:
+    if equality.bars == (4, 1) and rocker == follower and output_angle is not None:
         follower_zero = linkage.ground_angle + side * output_angle
-    elif bars == (3, 2):
+    elif equality.bars == (3, 2):
         coupler = _find_angle_of_bar(model, data, follower, linkage.coupler, axes)
         if coupler is not None:
             follower_zero = side * (coupler - input_angle)
-    return linkage.ground_angle + side * input_angle, follower_zero, side
+    stated = equality.theta_2
+    return replace(
+        equality,
+        theta_2=rests[side] if stated is None else stated,
+        follower_zero=follower_zero,
+        side=side,
+        other_side=None if told else rests[-side],
+    )
+
+
+def _find_side(
+    scene: Scene,
+    rests: Mapping[float, float],
+    angles: Sequence[float] | None,
+    equality: JointEquality,
+) -> float | None:
+    """Return +1 if a scene sees the leader's axis from its tip, -1 from behind.
+
+    That side is the one from which theta_2 is the stated or the drawn one, else the
+    output is where the scene has it, else the range of the leader meets the scene's.
+    None if neither tells.
+
+    Parameters
+    ----------
+    rests : theta_2 in the rest pose by sides, rad.
+    angles : theta_1 to theta_4 in the file, seen from the tip, rad, if it tells them.
+    """
+    shown = equality.theta_2
+    if shown is None and scene.drawing is not None:
+        shown = scene.drawing.angle(2)
+    positions = command(scene).theta_2
+    evidence: list[list[float]] = [[], [], []]
+    for side, rest in rests.items():
+        if shown is not None and is_same_angle(rest, shown):
+            evidence[0].append(side)
+        if angles and is_seen_from_behind(scene, [-side * angle for angle in angles]):
+            evidence[1].append(side)
+        swing = replace(equality, side=side, theta_2=rest).swing
+        if swing is not None and _meet(swing, (positions.min(), positions.max())):
+            evidence[2].append(side)
+    return next((sides[0] for sides in evidence if len(sides) == 1), None)
+
+
+def _meet(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Tell whether two ranges of an angle have a common one, whole turns apart."""
+    (low, high), (first, last) = one, other
+    apart = math.remainder((low + high - first - last) / 2.0, math.tau)
+    return abs(apart) <= (high - low + last - first) / 2.0
+
+
+def is_same_angle(one: float, other: float) -> bool:
+    """Tell whether two angles are the same but for whole turns and what is rounded."""
+    return abs(math.remainder(one - other, math.tau)) <= _SAME_ANGLE
 
 
 def _list_rockers(model: mujoco.MjModel, leader: int, follower: int) -> list[int]:
