@@ -24,7 +24,8 @@ from tests.support.runs import changed, save_run
 from tests.support.unlucky import Few
 
 ROW = changed(scene="a", engine="mine", quantity="F32")
-MINE = describe_run([Engine("mine", FreeBody, EQUIVALENCE)], "suite")
+OF_MINE = Engine("mine", FreeBody, EQUIVALENCE)
+MINE = describe_run([OF_MINE], "suite")
 FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 
 
@@ -51,6 +52,34 @@ def test_a_rule_that_is_weaker_than_before_stands_first(tmp_path, monkeypatch):
     assert not summary.good
     page = (tmp_path / "now" / "report.html").read_text("utf-8")
     assert '<h1 class="bad">WEAKER RULE: mine' in page
+
+
+@pytest.mark.parametrize(
+    ("before", "error", "words"),
+    [
+        ([ROW, replace(ROW, scene="b")], 1e-15, "GONE: scene b is gone (1 row), "),
+        ([replace(ROW, quantity="F12"), ROW], 1e-15, "GONE: a / mine / exact / F12: "),
+        ([ROW], 8e-13, "WORSE: a / mine / exact / F32: error 1.00e-15 -> 8.00e-13; "),
+        ([ROW], 1.0, "FAILS: mine is wrong"),
+    ],
+)
+def test_what_got_worse_stands_before_comparisons_that_hold(
+    before, error, words, tmp_path, monkeypatch
+):
+    judge_here(monkeypatch)
+    row = replace(ROW, error=error, allowed=1e-2) if error < 1.0 else FAILED
+    monkeypatch.setattr(
+        "fourbar_validation.run.jobs.judge_job",
+        lambda job: Record(job.name, rows=[row]),
+    )
+    same_suite = replace(MINE, settings=MINE.settings | {"scenes of": "few"})
+    saved = open_run(save_run(tmp_path / "before", before, about=same_suite))
+    options = RunOptions(drawn=False, against=saved.table.parent)
+    plan = Plan(Few(("a",)), (OF_MINE,), options, suite_name="few")
+    summary = run(plan, tmp_path / "now")
+    assert summary.headline.startswith(words) and not summary.good
+    held = f"against {saved.describe()}. All 1 comparison"
+    assert (held in summary.headline) == (row is not FAILED)
 
 
 def test_the_verdict_says_since_when_of_the_failure_that_it_names(

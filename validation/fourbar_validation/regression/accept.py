@@ -73,6 +73,18 @@ def _add_choosing_options(command: CommandFunction) -> CommandFunction:
     return command
 
 
+def find_differences(
+    before: Recorded,
+    after: Recorded,
+    chosen: dict[str, str | None],
+) -> Differences:
+    """Compare two runs, by the rows that options choose."""
+    bound_memory()  # a table of somebody else may ask for any
+    rows = before.frame(), after.frame()
+    choice = _read_choice(chosen, rows)
+    return compare_runs((before.about, rows[0]), (after.about, rows[1]), choice)
+
+
 def report_differences(
     old: Path,
     new: Path,
@@ -83,15 +95,9 @@ def report_differences(
 
     Return 1 on a regression, or if nothing was compared.
     """
-    bound_memory()  # a table of somebody else may ask for any
     before = open_run(old, "OLD")
     after = open_run(new, "NEW")
-    rows = before.frame(), after.frame()
-    differences = compare_runs(
-        (before.about, rows[0]),
-        (after.about, rows[1]),
-        _read_choice(chosen or {}, rows),
-    )
+    differences = find_differences(before, after, chosen or {})
     differences.baseline = before.describe()
     unproven = [str(run.table) for run in (before, after) if not run.verified]
     differences.notes += [

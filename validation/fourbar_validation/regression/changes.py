@@ -226,14 +226,15 @@ class Differences:
     @property
     def gone(self) -> list[str]:
         """Name what is missing as a whole: engines, scenes, and scenes now refused."""
-        return self._name_whole(*WHOLE)
+        return self.name_whole(*WHOLE)
 
     @property
     def left_out(self) -> list[str]:
         """Name the engines and scenes that the new run does not have."""
-        return self._name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
+        return self.name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
 
-    def _name_whole(self, *kinds: Kind) -> list[str]:
+    def name_whole(self, *kinds: Kind) -> list[str]:
+        """Name what is missing as a whole, by the kinds of WHOLE."""
         lines = self.of(*kinds)
         names = np.select(
             [lines.kind == Kind.ENGINE_GONE, lines.kind == Kind.SCENE_GONE],

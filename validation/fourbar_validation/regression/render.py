@@ -63,7 +63,7 @@ def write_verdict(diff: Differences) -> str:
     return f"{head}{moved}. New run: {diff.counts.sentence()}"
 
 
-def _write_change_line(row: Any) -> str:
+def write_change_line(row: Any) -> str:
     """Write one line of the table of differences in one line of text."""
     name = " / ".join(filter(None, (row.scene, row.engine, row.setting, row.quantity)))
     old, new = write_error(row.error_old), write_error(row.error_new)
@@ -110,7 +110,7 @@ def _list_worst(diff: Differences, kind: Kind) -> list[str]:
     rows = diff.of(kind)
     more = len(rows) - MOST_ROWS_IN_TEXT
     return [
-        *map(_write_change_line, rows[:MOST_ROWS_IN_TEXT].itertuples()),
+        *map(write_change_line, rows[:MOST_ROWS_IN_TEXT].itertuples()),
         *([f"and {more} more"] if more > 0 else []),
     ]
 
@@ -208,7 +208,7 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
     failures = diff.of(*bad)[:MOST_PASSING_CASES]
     others = diff.of(*(kind for kind in Kind if kind not in bad))[:MOST_PASSING_CASES]
     for row in failures.itertuples():
-        yield JunitCase(*_name_case(row), "failure", row.kind, _write_change_line(row))
+        yield JunitCase(*_name_case(row), "failure", row.kind, write_change_line(row))
     for row in others.itertuples():
         if row.verdict_new in COMPARED_VERDICTS and row.verdict_new != FAILS:
             yield JunitCase(*_name_case(row), "passed")
@@ -216,7 +216,7 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
             why = f"{row.verdict_new}: {row.reason_new}"
             yield JunitCase(*_name_case(row), "skipped", row.kind, why)
         else:
-            why = _write_change_line(row)
+            why = write_change_line(row)
             yield JunitCase(*_name_case(row), "skipped", row.kind, why)
     for weakening in diff.weakened:
         name = (weakening.name, weakening.name, f"rule: {weakening.what}")

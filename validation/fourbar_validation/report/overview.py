@@ -190,7 +190,9 @@ class Overview:
         self.weaker: list[str] = []
         """Rules that are weaker than in that run."""
         self.gone: list[str] = []
-        """Engines that it had and this run lacks."""
+        """Engines, scenes and rows that it had and this run lacks."""
+        self.worse: list[str] = []
+        """Rows that got worse, of a run without a failure."""
         self.baseline = ""
         """That run in words."""
         self.declared: dict[str, float] = {}

@@ -252,6 +252,7 @@ class Summary:
         words = self._say_first_cause()
         overview = self.overview
         for heading, lost in (
+            ("WORSE", overview.worse),
             ("WEAKER RULE", overview.weaker),
             ("GONE", overview.gone),
         ):
@@ -313,9 +314,9 @@ class Summary:
     def good(self) -> bool:
         """Return whether everything that was to be compared holds.
 
-        All was compared, by no weaker rule, and no engine is gone.
+        All was compared, by no weaker rule, and nothing is gone or got worse.
         """
-        if self.overview.weaker or self.overview.gone:
+        if self.overview.weaker or self.overview.gone or self.overview.worse:
             return False
         return self.counts.status == HOLDS and not self.missing
 

@@ -5,10 +5,11 @@ The results are streamed to disk, and the pictures drawn.
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
 
+from fourbar.errors import InputError
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.results_file import ResultsWriter, read_columns
 from fourbar_validation.compare.rows import (
@@ -20,6 +21,8 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.regression.accept import find_differences
+from fourbar_validation.regression.changes import Differences, Kind
 from fourbar_validation.regression.engines import list_gone
 from fourbar_validation.regression.history import (
     collect_history,
@@ -30,10 +33,12 @@ from fourbar_validation.regression.record import (
     ABOUT_FILE,
     CSV_FILE,
     PARQUET_FILE,
+    Recorded,
     describe_run,
     open_run,
     write_about,
 )
+from fourbar_validation.regression.render import write_change_line
 from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_summary_page
@@ -150,6 +155,13 @@ def write_outcome(
         overview.weaker = [f"{rule}" for rule in weakened]
         overview.gone = list_gone(before.about, about)
         overview.baseline = before.describe()
+        with suppress(InputError):  # raised again where the differences are printed
+            after = Recorded(about, out / PARQUET_FILE)
+            differences = find_differences(before, after, {})
+            overview.gone += differences.name_whole(Kind.SCENE_GONE, Kind.REFUSED)
+            if not summary.counts[FAILS]:  # its cause stands first
+                overview.gone += _list_rows(differences, Kind.GONE)
+                overview.worse = _list_rows(differences, Kind.VERDICT_WORSE, Kind.WORSE)
     write_text(out / "report.md", write_summary_page(summary))
     sections = collect_sections(
         read_columns(out / PARQUET_FILE) if isinstance(suite, Hard) else None, out
@@ -160,6 +172,11 @@ def write_outcome(
     page = write_html(summary, first_lines, sections)
     write_text(out / "report.html", page)
     return summary
+
+
+def _list_rows(differences: Differences, *kinds: Kind) -> list[str]:
+    """Write the rows of some kinds, the worst first."""
+    return [write_change_line(row) for row in differences.of(*kinds).itertuples()]
 
 
 def _collect_tasks(
