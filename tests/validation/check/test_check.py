@@ -726,6 +726,28 @@ def test_the_table_of_another_scene_has_one_explanation(words, read):
     assert [one.text for one in judgement.explanations] == [words]
 
 
+@pytest.mark.parametrize(
+    ("part", "code", "words"),
+    [
+        (0.0, HOLDS, "24 of 24 numbers agree"),
+        (-0.7, HOLDS, "friction, not judged: F12_x 12 of 12 numbers agree"),
+        (1.0, HOLDS, "12 of torque lie within and agree, 12 of them at torque_high"),
+        (1.01, FAILED, "no single known mistake"),
+    ],
+)
+def test_dry_friction_holds_a_range_of_torques_at_rest(part, code, words, check):
+    still = OURS.motion.replace(speed=0.0)
+    scene = replace(OURS, motion=still, effects=(Friction.at(O2=0.5),))
+    numbers = right(scene)
+    columns = {
+        "theta_2": numbers["theta_2"],
+        "torque": numbers["torque"] + 0.5 * part,  # O2 turns with the driven bar
+        "F12_x": numbers["F12"][:, 0],
+    }
+    result, out, _ = check(scene, tabulate(columns))
+    assert result == code and words in out
+
+
 @pytest.mark.parametrize("letter", "xy")
 def test_one_component_is_judged_by_itself(letter, read):
     name = f"F12_{letter}"

@@ -182,7 +182,8 @@ def judge_table(
     is held to it too.
     """
     judge = Judge(scene, table, tolerance)
-    read, findings = judge.table, judge.findings()
+    findings = judge.findings()
+    read = replace(judge.table, notes=(*judge.table.notes, *judge.describe_held()))
     precisions = judge.list_precisions()
     differing_quantities = {
         finding.quantity

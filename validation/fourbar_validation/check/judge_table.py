@@ -4,6 +4,7 @@ A number gets its error, the allowed error, and what may explain the difference.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
-from fourbar.quantities import OK, Array
+from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -108,6 +109,11 @@ class _Allowed(NamedTuple):
     """True if the table has a number in every row and component."""
 
 
+def _is_shared(key: str) -> bool:
+    """Return True for a force that depends on how pins at rest share the friction."""
+    return name_quantity(key) in (*PIN_FORCES, "guide_force")
+
+
 class Judge:
     """Numbers of a table against the formulas at its positions.
 
@@ -154,6 +160,8 @@ class Judge:
         self._allowed: dict[str, _Allowed] = {}
         self._where: dict[str, Mask] = {}
         self._judged: dict[str, tuple[Array, Array, Array]] = {}
+        self._nearest: dict[str, Array] = {}
+        self._drive = COUPLE if scene.drive is None else LINE
         self._right_columns: dict[str, Array] = {}
         for key in table.values:
             name = name_quantity(key)
@@ -183,10 +191,71 @@ class Judge:
             return magnitude(values)
         return values
 
+    def nearest(self, key: str) -> Array:
+        """Give the right number of a key that is nearest to that of the table.
+
+        A drive that dry friction holds at rest has a range of them.
+        """
+        if key not in self._nearest:
+            self._nearest[key] = self._approach(key, self.ours(key), self._holds)
+        return self._nearest[key]
+
+    def _approach(self, key: str, ours: Array, rows: Mask) -> Array:
+        """Give a drive the number nearest to theirs that dry friction holds in rows."""
+        if key != self._drive.value or not rows.any():
+            return ours
+        low, high = (
+            ours + (getattr(self.right, end) - self.ours(key))
+            for end in self._drive[2:]
+        )
+        return np.where(rows, np.clip(self.table.values[key], low, high), ours)
+
+    @cached_property
+    def _holds(self) -> Mask:
+        """Mark the rows in which dry friction holds a range of drives, (n,)."""
+        low, high = (getattr(self.right, name) for name in self._drive[2:])
+        if low is None:
+            return np.zeros(len(self.at.angle), dtype=bool)
+        return np.asarray(low < high)
+
+    @cached_property
+    def held(self) -> Mask:
+        """Mark the rows that state another drive within that range, (n,)."""
+        key = self._drive.value
+        if key not in self.table.values or not self._holds.any():
+            return np.zeros(len(self.at.angle), dtype=bool)
+        at_middle, at_nearest = (
+            error <= allowed
+            for error, allowed, _ in (
+                self.judged(key, self.ours(key)),
+                self.judged_right(key),
+            )
+        )
+        return np.asarray(self._holds & ~at_middle & at_nearest)
+
+    def describe_held(self) -> Iterator[str]:
+        """Say which numbers of a drive agree since friction holds, and what follows."""
+        name, _, *ends = self._drive
+        if not (n := np.count_nonzero(self.held)):
+            return
+        text = f"at rest dry friction holds any {name} from {ends[0]} to {ends[1]}: "
+        text += f"{n} of {name} lie within and agree"
+        for end in ends:
+            error, allowed, _ = self.judged(name, getattr(self.right, end))
+            if at_end := np.count_nonzero(self.held & (error <= allowed)):
+                text += f", {at_end} of them at {end}"
+        yield text
+        if pins := [key for key in self.table.values if _is_shared(key)]:
+            names = ", ".join(dict.fromkeys(map(self.table.label, pins)))
+            yield f"there pin forces depend on each pin's friction, not judged: {names}"
+
     def where(self, key: str) -> Mask:
-        """Mark the rows in which both have a number, (n,)."""
+        """Mark the rows in which both have a number that is judged, (n,)."""
         if key not in self._where:
-            self._where[key] = np.asarray(self._answer(key) & self.table.stated(key))
+            where = self._answer(key) & self.table.stated(key)
+            if _is_shared(key):
+                where &= ~self.held
+            self._where[key] = np.asarray(where)
         return self._where[key]
 
     @cached_property
@@ -239,7 +308,7 @@ class Judge:
     def judged_right(self, key: str) -> tuple[Array, Array, Array]:
         """Return (error, allowed, apart) of the table against the right numbers."""
         if key not in self._judged:
-            self._judged[key] = self.judged(key, self.ours(key))
+            self._judged[key] = self.judged(key, self.nearest(key))
         return self._judged[key]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
@@ -256,7 +325,7 @@ class Judge:
         # the number a mistake would have printed is rounded at its own size, however
         # much larger
         larger = 1.0
-        if ours is not self.ours(key):
+        if ours is not self.nearest(key):
             usual = TURN if quantity.startswith("theta") else limits.size
             shares = (magnitude(ours) / usual)[self.ok]
             larger = float(np.nanmax(shares, initial=1.0))
@@ -311,6 +380,7 @@ class Judge:
         Within `times` the allowed error, or the part `left` of the largest.
         """
         mask = self.where(key)
+        predicted = self._approach(key, predicted, self.held)
         error, allowed, apart = (values[mask] for values in self.judged(key, predicted))
         within = error <= np.maximum(times * allowed, left)
         permitted = self.permitted(key, predicted)
@@ -322,7 +392,7 @@ class Judge:
         """List every number that the table states where the formulas have one."""
         findings = []
         for key, theirs in self.table.values.items():
-            ours = self.ours(key)
+            ours = self.nearest(key)
             label = self.table.label(key)
             error, allowed, apart = self.judged_right(key)
             permitted = self.permitted(key, ours)
