@@ -22,7 +22,7 @@ from fourbar.solving import solve
 from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.csv_columns import MADE_OF, list_names_of_points
-from fourbar_validation.check.judge_table import Judge
+from fourbar_validation.check.judge_table import Allowance, Judge
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
 from fourbar_validation.check.theirs import NOT_JUDGED, read_table
 from fourbar_validation.cli import status
@@ -812,6 +812,26 @@ def noise(seed, values):
     return np.random.default_rng(seed).normal(size=values.shape)
 
 
+def test_nonsense_and_a_single_number_are_explained_by_nothing(judged, read):
+    """Of one torque every mass and every load would be the cause.
+
+    Without gravity it is 0.292 N m, which two digits tell from nothing.
+    """
+    few = judge_table(OURS, read("theta_2 [deg],torque\n60,0.29\n"))
+    assert few.differing and not few.explanations
+    numbers = right(OURS)
+    wild = numbers | {name: noise(3, numbers[name]) for name in FORCES}
+    assert judged(OURS, wild, FORCES).explanations == []
+    one = {name: values[:1] for name, values in numbers.items()}
+    one["torque"] = 1.01 * one["torque"]
+    judgement = judged(
+        OURS,
+        one,
+        ("torque", "omega_4"),
+    )
+    assert len(judgement.differing) == 1 and not judgement.explanations
+
+
 @pytest.mark.parametrize("row", ["1e308,1e308", "1,1e-99999999", "\n0.8,1"])
 def test_a_number_of_any_size_is_judged_without_a_warning(row, check):
     """The last is a position at which the linkage does not assemble."""
@@ -992,6 +1012,27 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     assert report["agree"] == count
     codes = [judge(one)[0] for one in ("--atol=1e-9", "--atol=1.0", "--rtol=-1")]
     assert codes == [FAILED, HOLDS, BAD_INPUT]
+
+
+def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_tolerance(
+    judged,
+):
+    """A simulation's torque, a ten-thousandth off, under the wrong unit."""
+    numbers = units("torque", factor=1e3)(OURS)
+    numbers["torque"] *= 1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"])))
+    first = judged(OURS, numbers, tolerance=Allowance(rtol=1e-3)).explanations[0]
+    assert "N mm where N m" in first.text and first.complete
+
+
+def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(read):
+    parallelogram = fourbar.FourBar(
+        0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2)
+    )
+    scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0))
+    solution = fourbar.solve(scene)
+    assert {*solution.branch.tolist()} == {1, -1}
+    judgement = judge_table(scene, read(solution.to_csv()))
+    assert judgement.status == HOLDS and judgement.compared > 100
 
 
 @pytest.mark.slow

@@ -3,6 +3,8 @@
 No other size than that of the quantity itself, where it has one.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.compare.scales import (
     Scale,
+    find_scale_of_answer,
     scale_of,
 )
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED, magnitude
@@ -117,6 +120,24 @@ def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar():
         terms = a * 107.0 + b * s.omega_3**2 + c * s.omega_4**2
         expected = terms / (length * s.condition * np.abs(s[name]))
         np.testing.assert_allclose(scale.cancellation, expected)
+
+
+def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
+    """Accelerations of mass centres that it lacks follow from its own motion."""
+    scene = balance(1e-2, 5.0)
+    solution = solve(scene)
+    names = ("torque", "F12")
+    expected = find_scale_of_answer(names, scene, solution)
+    bare = replace(
+        solution,
+        a_G2=None,
+        a_G3=None,
+        a_G4=None,
+    )
+    scale = find_scale_of_answer(names, scene, bare)
+    assert expected is not None and scale is not None
+    np.testing.assert_allclose(scale.cancellation, expected.cancellation, rtol=1e-12)
+    assert find_scale_of_answer(names, scene, replace(bare, alpha_4=None)) is None
 
 
 def test_the_pair_that_allows_less_of_an_error_is_taken_whole():

@@ -263,6 +263,19 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping):
     assert "torque, F12, F32, F14: holds, 1.00" in line
 
 
+def test_each_quantity_has_its_own_order_and_floor():
+    ladder = [
+        change(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3)
+        for k in range(8)
+    ]
+    curves = {"RK4, tc held": ladder}
+    laws_found = fit_by_quantity(curves)
+    assert laws_found["torque"].holds and not laws_found["F14"].holds
+    assert laws_found["F14"].exponent == pytest.approx(1.0)
+    warning = "RK4, tc held: F32: 1.0e-03 from 20 steps a revolution on"
+    assert laws.list_warnings(curves) == [warning]
+
+
 def test_no_order_is_expected_where_sag_and_softness_mix():
     """A part of the error that does not depend on the time constant flattens the slope.
 

@@ -661,6 +661,17 @@ def test_another_plane_and_a_reversed_axis_change_no_number(axis):
     assert ("pins.A.positive" in keys) == (axis == "0 1 0")
 
 
+def test_body_anchors_on_an_open_rest_state_build_another_linkage():
+    examination = examine(
+        FEW, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE
+    )
+    assert (
+        "in the pose of the file"
+        in differences(FEW, examination)["lengths.output"].remark
+    )
+    assert values(examination)["lengths.output"] == pytest.approx(0.05)
+
+
 def test_lengths_of_another_linkage_come_before_what_costs_more():
     """A length that is off by its rounding is no cause of what a soft closure costs."""
     entries = [

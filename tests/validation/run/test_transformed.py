@@ -31,6 +31,7 @@ from fourbar_validation.run.transformed import (
     TRANSFORMATIONS,
     check_transformed,
 )
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
 EVERYTHING = (
@@ -201,6 +202,11 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
         question, rows = ask(Scene(linkage, motion, effects=(springs,)))
         assert bool(rows) == (many == 0)
         assert sum("wound" in line for line in question.left_out) == many
+
+
+@pytest.mark.parametrize("index", range(6))
+def test_random_scenes_have_the_same_numbers(index):
+    assert list_held(draw_random_scene(3, index, tuple(DrawnType)))
 
 
 @pytest.mark.parametrize("name", TRANSFORMATIONS)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.scene import find_signs
 from fourbar.solving import solve
@@ -223,6 +224,11 @@ HALVES = Planar(
     by="weld",
 )
 """A parallelogram whose coupler is two halves."""
+
+
+def test_a_loop_that_is_not_there_is_refused():
+    with pytest.raises(InputError, match="no such closure"):
+        measure(read_robot(ROBOTS / "gripper.xml"), loop="tail")
 
 
 def errors_of(loop, quantity="torque"):
