@@ -21,6 +21,7 @@ from fourbar.show.plot.style import (
     POINT,
     RING_MARK,
     Points,
+    join_points,
     largest_magnitude,
     plot_points,
     split_points,
@@ -291,7 +292,7 @@ def draw_linkage(
     factor, unit, size = choose_drawing_scale(view)
     draw_paths(axes, view, labels)
     if not moving:
-        _mark_paths(axes, view, factor)
+        _mark_paths(axes, view, factor, labels)
     if view.dimensions:
         pins = locate_pins(view, factor)
         middle = 0.5 * (pins["O2"] + pins["O4"])
@@ -306,12 +307,13 @@ def draw_linkage(
     write_path_legend(axes)
 
 
-def _mark_paths(axes: "Axes", view: View, factor: float) -> None:
+def _mark_paths(axes: "Axes", view: View, factor: float, labels: Labels) -> None:
     """Draw stroke and straightness of the points' paths as rectangles about them."""
     for path in measure_paths(view.sweep).values():
-        corners = factor * (path.corners - view.scene.origin)
-        x, y = np.append(corners, corners[:1], axis=0).T
-        axes.plot(x, y, color=POINT, lw=0.6, zorder=2)
+        corners = factor * join_points(path.corners - view.scene.origin)
+        outline = [*corners, corners[0]]
+        plot_points(axes, outline, color=POINT, lw=0.6, zorder=2)
+        labels.keep_off(axes, *outline)
 
 
 def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
