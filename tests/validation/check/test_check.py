@@ -700,6 +700,10 @@ OTHERS = {
         COVERED,
         solve(replace(COVERED, loads=(replace(COVERED.loads[0], moment=-3.3),))),
     ),
+    "load 2 (bar 4): its table is left out": (
+        replace(COVERED, loads=(FORCE, *COVERED.loads)),
+        solve(replace(COVERED, loads=(FORCE, replace(COVERED.loads[0], table=None)))),
+    ),
     "ground_angle is left out": (
         STROKE,
         solve(replace(STROKE, linkage=replace(STROKE.linkage, ground_angle=0.0))),

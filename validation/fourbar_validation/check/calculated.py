@@ -493,10 +493,8 @@ class Calculation:
                 for number, more in self._change_spring(part, factor):
                     yield f"the {number} of {springs} {i}", more
                     every.setdefault(number, []).append(more)
-            for number, changes in every.items():
-                if len(changes) > 1:
-                    together = reduce(BodyWrenches.plus, changes)
-                    yield f"the {number} of every {springs}", together
+            for number, together in _sum_several(every):
+                yield f"the {number} of every {springs}", together
 
     def _change_spring(
         self, effect: Any, factor: float
@@ -629,15 +627,14 @@ class Calculation:
 
     def _change_loads(self) -> Iterator[Change]:
         """Let each load, and every load, act elsewhere or in another direction."""
-        every: dict[str, BodyWrenches] = {}
+        every: dict[str, list[BodyWrenches]] = {}
         loads = zip(self.stated.loads, self.scene.loads, strict=True)
         for number, (stated, load) in enumerate(loads, 1):
             for text, more in self._list_load_mistakes(stated, load):
                 yield Change(f"load {number} (bar {load.bar}): {text}", more)
-                every[text] = every.get(text, self.none()).plus(more)
-        if len(self.scene.loads) > 1:
-            for text, more in every.items():
-                yield Change(f"every load: {text}", more)
+                every.setdefault(text, []).append(more)
+        for text, together in _sum_several(every):
+            yield Change(f"every load: {text}", together)
 
     def _list_load_mistakes(
         self, stated: Load, load: Load
@@ -727,6 +724,15 @@ def _name_effect(effect: Any) -> str:
 
 def _is_plural(name: str) -> bool:
     return name.startswith("the ") and name.endswith("s")
+
+
+def _sum_several(
+    every: Mapping[str, list[BodyWrenches]],
+) -> Iterator[tuple[str, BodyWrenches]]:
+    """Sum what a mistake lets act, by its text, where it can be made of several."""
+    for text, wrenches in every.items():
+        if len(wrenches) > 1:
+            yield text, reduce(BodyWrenches.plus, wrenches)
 
 
 def _list_bars(part: Any) -> tuple[int, int]:
