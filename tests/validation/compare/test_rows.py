@@ -37,9 +37,9 @@ from fourbar_validation.report.html import write_summary_page
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.judge import judge, judge_for_report
 from fourbar_validation.run.question import FREE_BODY
-from tests.support.here import summary_of
+from tests.support.here import judge_here, summary_of
 from tests.support.runs import HERE, ROW, changed, compare_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import bare, crank_rocker
 from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, Refuses
 
 NAN = math.nan
@@ -228,6 +228,26 @@ def test_formulas_without_an_answer_fail():
     ).rows()
     (row,) = [row for row in rows if row.quantity == "torque"]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
+
+
+@pytest.mark.slow
+def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
+    tmp_path, monkeypatch, capsys
+):
+    """A simulation needs more than one position."""
+    judge_here(monkeypatch)
+    file, out = tmp_path / "scene.toml", tmp_path / "out"
+    linkage = bare(4.0, 1.0, 3.0, 3.0)
+    fourbar.save(Scene(linkage, fourbar.Motion(math.radians(10.0), 1.0)), file)
+    line = ["run", str(file), "--no-pictures", "--out", str(out), "--engines"]
+    assert status([*line, "mujoco-simulated"]) == FAILED
+    sentence = "Nothing was compared on 1 scene: 9 of the formulas' own identities hold"
+    assert sentence in " ".join(capsys.readouterr().out.split())
+    assert sentence in (out / "report.md").read_text()
+    page = html.unescape((out / "report.html").read_text())
+    assert f'<h1 class="bad">{sentence}</h1>' in page
+    assert '<span class="bad">nothing compared</span>' in page
+    assert status([*line, "mujoco-simulated,free-body"]) == HOLDS
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.interpolate import make_interp_spline
 
 import fourbar
 from fourbar.scene import command
@@ -32,6 +33,7 @@ from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import TrialSetup
+from fourbar_validation.scenes.suites import MODELS
 from tests.support.costs import point
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 from tests.support.shares import slow_but
@@ -455,3 +457,36 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     assert trial.readings == trial.steps + 1
     seconds = step * trial.steps + reading * trial.readings
     assert cost_point.seconds_per_revolution == pytest.approx(seconds, rel=1e-12)
+
+
+@pytest.mark.parametrize(("drive", "column"), [(2, 1), (4, 3)])
+def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
+    page = (MODELS.parent / "docs" / "cost.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)
+    assert len(rows) == 3
+    scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), drive_bar=drive)
+    for count, cells in rows:
+        printed = [float(cell) for cell in cells.split("|")][column - 1 : column + 1]
+        missed = [miss_between(scene, int(count), degree) for degree in (3, 7)]
+        # the least of them is the rounding of the torque
+        assert missed == pytest.approx(printed, rel=0.05, abs=2e-13)
+
+
+def miss_between(scene, count, degree):
+    """Return the worst error between samples where the driven bar is far from rest."""
+    fine = np.linspace(0.0, 2.0 * math.pi, 4 * count + 1)
+    command_of_fine = command(scene)._replace(
+        angle=fine, branch=np.ones(fine.shape, np.int8)
+    )
+    exact = fourbar.solve(scene, at=command_of_fine)
+    speed = np.abs(exact.omega_4 if scene.drive_bar == 4 else np.ones(fine.shape))
+    far = speed > 0.1 * speed.max()
+    sampled = np.flatnonzero(far[::4])
+    worst = 0.0
+    for stretch in np.split(sampled, np.flatnonzero(np.diff(sampled) > 1) + 1):
+        rows = np.arange(4 * stretch[0], 4 * stretch[-1] + 1)
+        curve = make_interp_spline(
+            fine[::4][stretch], exact.torque[::4][stretch], degree
+        )
+        worst = max(worst, float(np.abs(curve(fine[rows]) - exact.torque[rows]).max()))
+    return worst / float(np.abs(exact.torque[far]).max())

@@ -6,6 +6,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import fourbar
 from fourbar.errors import InputError
@@ -86,6 +87,9 @@ CLOSING = (
     '<joint name="B" type="revolute"><parent>rocker</parent><child>rod</child>'
     f"<pose>{B} 0 0 0 0 0</pose>{AXIS}</joint>"
 )
+UNIVERSAL = '"A" type="universal"'
+
+
 MODEL = f"""<model name="linkage">
 {CRANK}{COUPLER}{OUTPUT}
 <joint name="O2" type="revolute"><parent>world</parent><child>crank</child>{AXIS}
@@ -314,8 +318,36 @@ def compile_text(folder, text):
     return robot.model, robot.notes
 
 
+@pytest.mark.parametrize("way", ["plain", "joints from the other side"])
+def test_angles_of_a_joint_turn_the_child_against_the_parent(way, tmp_path):
+    text = STATED[way].replace(CLOSING, "").replace('"A" type="revolute"', UNIVERSAL)
+    text = text.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
+    model, _ = compile_text(tmp_path, text)
+    data = mujoco.MjData(model)
+    angles = (0.2, 0.3)
+    relative = []
+    for turned in ((0.0, 0.0), angles):
+        data.joint("A").qpos[0], data.joint("A::axis2").qpos[0] = turned
+        mujoco.mj_kinematics(model, data)
+        ends = ("crank", "rod") if way == "plain" else ("rod", "crank")
+        parent, child = (data.body(name).xmat.reshape(3, 3) for name in ends)
+        relative.append(parent.T @ child)
+    expected = relative[0] @ Rotation.from_euler("ZX", angles).as_matrix()
+    np.testing.assert_allclose(relative[1], expected, atol=AGREES)
+
+
 def closes(folder, text):
     return compile_text(folder, text)[0].eq(0).name
+
+
+def test_the_joint_farthest_from_the_world_closes_the_loop(tmp_path):
+    last = put((PIN_OF_CRANK, ""), (CRANK, PIN_OF_CRANK + CRANK))
+    assert closes(tmp_path, last) == "B"
+    both = last.replace(CLOSING, "").replace(CRANK, CLOSING + CRANK)
+    assert closes(tmp_path, both) in ("A", "B")
+    mimic = '<mimic joint="O2"><multiplier>0</multiplier></mimic></axis>'
+    follows = CLOSING.replace("</axis>", mimic)
+    assert compile_text(tmp_path, put((CLOSING, follows)))[0].eq("A").id == 0
 
 
 DAMPED = "<dynamics><damping>0.1</damping></dynamics></axis>"
@@ -352,6 +384,24 @@ def test_the_joint_that_loses_least_closes_the_loop(kinds, closing, tmp_path):
     assert lengths == pytest.approx(sorted((D, A, B, C)), rel=AGREES)
     lost = [note.partition("; lost: ")[2] for note in robot.notes]
     assert lost == ([] if closing == "halves" else ["range" * (closing in kinds)])
+
+
+def test_a_tensor_is_turned_with_its_frame(tmp_path):
+    stated = (
+        "<inertial><pose>0 0 0 0.3 0.4 0.5</pose><mass>1</mass><inertia><ixx>2</ixx>"
+        "<iyy>3</iyy><izz>4</izz><ixy>0.1</ixy><ixz>0.2</ixz><iyz>0.3</iyz></inertia>"
+        "</inertial>"
+    )
+    model, _ = compile_text(tmp_path, put((write_inertial(A), stated)))
+    body = model.body("crank")
+    principal = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
+    turned = Rotation.from_euler("xyz", (0.3, 0.4, 0.5)).as_matrix()
+    own = np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
+    np.testing.assert_allclose(
+        principal @ np.diag(body.inertia) @ principal.T,
+        turned @ own @ turned.T,
+        atol=AGREES,
+    )
 
 
 @pytest.mark.parametrize(
@@ -479,6 +529,16 @@ def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
     )
 
 
+def test_a_slide_begins_at_its_initial_position(tmp_path):
+    joint = PIN_OF_CRANK.replace("revolute", "prismatic")
+    text = put((PIN_OF_CRANK, start_at(joint, 0.07)), (CLOSING, ""))
+    model, _ = compile_text(tmp_path, text)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    assert data.body("rod").xpos[2] == pytest.approx(0.07, rel=AGREES)
+    assert model.joint("A").qpos0[0] == 0.07
+
+
 @pytest.mark.parametrize("starts", [(0.0, 0.0), (0.2, 0.5)])
 def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path):
     """MuJoCo's own residual of the line is zero where SDF's line goes through."""
@@ -499,6 +559,16 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path
     data.joint("A").qpos[0] = -2.0 * (0.7 - 0.1) + 0.3
     mujoco.mj_forward(model, data)
     assert data.efc_pos[:1] == pytest.approx([0.0], abs=AGREES)
+
+
+def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path):
+    text = put(
+        ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
+        (CLOSING, "<drake:linear_bushing_rpy/>"),
+    )
+    notes = compile_text(tmp_path, text)[1]
+    assert "left out of the SDF: drake:linear_bushing_rpy" in notes
+    assert any("put <drake:ball_constraint> in its place" in note for note in notes)
 
 
 def test_what_stands_and_what_floats(tmp_path):

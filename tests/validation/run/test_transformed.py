@@ -229,6 +229,19 @@ def test_one_number_that_differs_fails_its_row(name, monkeypatch):
     assert row.failed and row.reason.endswith("worst in torque")
 
 
+def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
+    """As a fault would: gravity from the ground's line in place of the world's."""
+    field = Gravity.field.fget
+    held = crank_rocker().linkage.ground_angle
+
+    def turn(load):
+        return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))
+
+    monkeypatch.setattr(Gravity, "field", property(turn))
+    _, rows = ask(crank_rocker())
+    assert rows["turned"].failed and rows["mirrored"].failed
+
+
 def test_every_effect_of_the_package_can_be_stated_otherwise():
     """Without a conversion, scenes with the effect would silently lose the check."""
     stated = {type(effect) for scene in SCENES.values() for effect in scene.effects}

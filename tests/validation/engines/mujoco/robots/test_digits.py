@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -135,6 +136,22 @@ def test_what_the_digits_tell_apart_stays(text):
     assert made.loop.rounding == 0.0
     assert made.scene.linkage.lengths == pytest.approx(made.loop.lengths, rel=1e-11)
     assert classify(made.scene.linkage).name != "parallelogram"
+
+
+def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
+    """Exact lengths and a turn of all digits, of which MuJoCo writes six."""
+    half = 0.5 * math.radians(21.51)
+    exact = FREE.replace(QUATERNION, f"{math.cos(half)!r} 0 {math.sin(half)!r} 0")
+    x, z = 0.06 * math.cos(2.0 * half), 0.06 * math.sin(2.0 * half)
+    exact = exact.replace(ROD, f"{-x!r} 0 {z!r}")
+    assert not list_equal(read(exact))
+    assert classify(read(exact).scene.linkage).name == "parallelogram"
+    saved = tmp_path / "saved.xml"
+    mujoco.mj_saveLastXML(str(saved), mujoco.MjModel.from_xml_string(exact))
+    made = read(saved.read_text(encoding="utf-8"))
+    assert list_equal(made)
+    assert made.scene.linkage.lengths == pytest.approx((0.14, 0.06) * 2, rel=2e-6)
+    assert classify(made.scene.linkage).name == "parallelogram"
 
 
 @pytest.mark.parametrize("text", slow_but({FIVE_DIGITS}, [FREE, FIVE_DIGITS, LARGE]))

@@ -96,3 +96,28 @@ def test_the_listing_of_the_guide_reads_what_the_harness_reads(monkeypatch):
     np.testing.assert_allclose(
         names["pin"] - names["force"], inertia, atol=SOLVED * np.abs(inertia).max()
     )
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.3])
+def test_a_weld_exerts_force_and_moment_as_the_guide_has_them(scale):
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 0" tolerance="0"/><worldbody>
+        <body name="one" pos=".1 0 0"><freejoint/><geom size=".1"/></body>
+        <body name="two" pos=".3 .2 .1" euler="20 40 60"><geom size=".1"/></body>
+        </worldbody><equality><weld body1="one" body2="two" torquescale="{scale}"
+        solimp="0.9999 0.9999 .001 .5 2" solref=".01 1"/></equality></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    force, moment = np.array([1.0, 2.0, 3.0]), np.array([0.3, -0.5, 0.2])
+    data.xfrc_applied[1] = [*force, *moment]
+    mujoco.mj_forward(model, data)
+    turned = data.xmat[2].reshape(3, 3)
+    exerted = 0.5 * scale * turned @ data.efc_force[3:6]
+    about = np.cross(data.xpos[2] - data.xpos[1], data.efc_force[:3])
+    # Newton and Euler for a ball at rest: what its acceleration does not take
+    left = model.body_mass[1] * data.qacc[:3] - force
+    left_moment = model.body_inertia[1] * data.qacc[3:] - moment
+    np.testing.assert_allclose(data.efc_force[:3], left, atol=SOLVED)
+    np.testing.assert_allclose(exerted + about, left_moment, atol=SOLVED)
+    assert np.abs(exerted).max() > 0.05

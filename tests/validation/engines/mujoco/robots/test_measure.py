@@ -66,6 +66,22 @@ SINGLE = """
 <actuator><motor joint="j2"/></actuator></mujoco>
 """
 """400, 100, 200 and 300 mm, with one change point at 180 deg."""
+RHOMBUS = """
+<mujoco><option gravity="0 0 0"/><worldbody>
+<body name="one" pos="0 0 4"><joint name="h1" axis="1 0 0"/>
+ <geom type="cylinder" size=".2 2" pos="0 2 0" euler="90 0 0" contype="0"
+   conaffinity="0"/>
+ <body name="two" pos="0 4 0"><joint name="h2" axis="1 0 0"/>
+  <geom type="cylinder" size=".2 2" pos="0 0 -2" contype="0" conaffinity="0"/>
+  <site name="end" pos="0 0 -4"/></body></body>
+<body name="three" pos="0 0 0"><joint name="h3" axis="1 0 0"/>
+ <geom type="cylinder" size=".2 2" pos="0 2 0" euler="90 0 0" contype="0"
+   conaffinity="0"/>
+ <site name="tip" pos="0 4 0"/></body>
+</worldbody><equality><connect name="pin" site1="end" site2="tip"/></equality></mujoco>
+"""
+
+
 FILE = """
 <mujoco><compiler angle="degree"/><option gravity="0 -9.81 0"/><worldbody>{}{}
 </worldbody><equality>{}</equality><actuator><motor joint="j2"/></actuator></mujoco>
@@ -285,6 +301,23 @@ def test_a_torque_beside_a_change_point_is_judged_by_itself():
     for torque in torques:
         assert not torque.vanishes
         assert torque.scale == pytest.approx(largest, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_one_scale_for_a_column_where_the_torque_is_rounding():
+    """The torque is a sum that cancels: 12.6 % of 8042 N m, not 1e6 %."""
+    loop = measure(RHOMBUS, speed=1.0)
+    torques = errors_of(loop)
+    force = max(np.hypot(*row.rigid.forces["F12"]) for row in loop.states.rows)
+    for torque in torques.values():
+        assert torque.vanishes
+        assert torque.scale == pytest.approx(4.0 * force, rel=1e-9)
+        assert torque.scale == pytest.approx(8042.0, abs=0.5)
+        assert torque.part == torque.error / torque.scale
+        assert torque.median < torque.part
+    assert torques[MEASURED_THROUGH_TIME].part == pytest.approx(0.126, abs=0.002)
+    assert torques[STATES].part == pytest.approx(0.0674, abs=1e-4)
+    assert loop.influence is not None and loop.influence.worst < 0.01
 
 
 @pytest.mark.slow
