@@ -94,7 +94,7 @@ _IN_LINE = 1e-9
 """Sine below which two bars are in line: places are located to some 1e-12."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
-_WITHOUT_FORCES = (WOUND, JAMMED, SEVERAL)
+_NOT_IN_PEAKS = (WOUND, JAMMED, SEVERAL)
 """Statuses of positions between which no forces exist either."""
 _BENDING = [f"bending_{bar}" for bar in MOVING_BARS]
 """Names of the curves of the bending moments."""
@@ -314,10 +314,7 @@ class _SceneBlock:
         ]
         total = write_count(len(self.solution), "position")
         yield f"{total}: {', '.join(parts)}"
-        if (
-            self.facts.pins
-            and np.isin(self.solution.status_code, _WITHOUT_FORCES).any()
-        ):
+        if self.facts.pins and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
             yield "    peaks and means are without the positions that have no forces"
 
     def _find_beside_change_points(self) -> Array:

@@ -42,14 +42,14 @@ def _list_facts(scene: Scene) -> list[tuple[str, str]]:
     facts = [("type", classify(scene.linkage).name)]
     bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     for number, (name, length) in enumerate(bars, 1):
-        text = _write_number(length, "m")
+        text = _write_in_si(length, "m")
         if number in MOVING_BARS and (mass := scene.linkage.bar(number).mass):
-            text = f"{text}, {_write_number(mass, 'kg')}"
+            text = f"{text}, {_write_in_si(mass, 'kg')}"
         facts.append((name, text))
     speed = "positions only"
     if motion.speed is not None:
-        omega = write_ends(motion.speed, lambda x: _write_number(x, "rad/s"))
-        alpha = write_ends(motion.acceleration, lambda x: _write_number(x, "rad/s^2"))
+        omega = write_ends(motion.speed, lambda x: _write_in_si(x, "rad/s"))
+        alpha = write_ends(motion.acceleration, lambda x: _write_in_si(x, "rad/s^2"))
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [
         effect.key for effect in scene.effects
@@ -62,7 +62,7 @@ def _list_facts(scene: Scene) -> list[tuple[str, str]]:
     ]
 
 
-def _write_number(number: float, unit: str) -> str:
+def _write_in_si(number: float, unit: str) -> str:
     return f"{number + 0.0:.6g} {unit}"
 
 

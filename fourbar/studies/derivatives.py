@@ -72,7 +72,7 @@ _HUNDREDTH, _DEGREE = 0.01, math.radians(1.0)
 """Change of a number for which its influence is reported. It is relative, or in rad for
 an angle.
 """
-_ROUNDING = 1e-13
+_NO_INFLUENCE = 1e-13
 """Change over the largest value of its quantity that is rounding."""
 AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest. Its couple, and all that follows from
@@ -207,7 +207,7 @@ class Sensitivity:
         """
         value = self.value(quantity)
         size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-        rounding = _ROUNDING * np.nanmax(size, initial=0.0)
+        rounding = _NO_INFLUENCE * np.nanmax(size, initial=0.0)
         rows = []
         for (key, entry), number in zip(
             self.keys.items(),

@@ -211,7 +211,7 @@ class Benchmark:
         row.hello = hello
         for name, problem in self.problems.items():
             cell = _MatrixCell(script=entry.adapter or shlex.join(entry.command))
-            lacking = sorted(_list_needs(problem) - set(hello.get("effects", [])))
+            lacking = sorted(_list_effects_of(problem) - set(hello.get("effects", [])))
             if problem["mechanism"] not in hello.get("mechanisms", ["four-bar"]):
                 lacking = [problem["mechanism"]]
             if lacking:
@@ -476,7 +476,7 @@ def draw_panels(lines: Mapping[str, list[TimedWork]]) -> Any:
     return figure
 
 
-def _list_needs(problem: JsonObject) -> set[str]:
+def _list_effects_of(problem: JsonObject) -> set[str]:
     """List what a problem asks of an engine, in the words of hello's `effects`."""
     scene = problem["scene"]
     needs = set(scene.get("effects", {}))

@@ -53,7 +53,7 @@ from fourbar_validation.robots.options import (
 from fourbar_validation.robots.report import (
     describe_advice,
     show_block,
-    write_range,
+    write_driven_range,
 )
 
 PART_OF_THE_ERROR = 0.7
@@ -459,7 +459,7 @@ def _advise_robot(
     measurement = measure_robot(files[-1], options, scene, assets)
     reached = True
     for measured in measurement.loops:
-        print_sentence(f"{measured.name}, driven by {write_range(measured)}")
+        print_sentence(f"{measured.name}, driven by {write_driven_range(measured)}")
         assert measured.advice is not None
         for block in describe_advice(measured, measured.advice):
             show_block(block)

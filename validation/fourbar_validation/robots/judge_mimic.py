@@ -16,6 +16,7 @@ from fourbar.linkage import require
 from fourbar.quantities import CHANGE_POINT, OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
+from fourbar_validation.engines.mujoco.robots.measure import WHOLE_TURN
 from fourbar_validation.engines.mujoco.robots.mimic import JointEquality, is_same_angle
 from fourbar_validation.report.sentences import print_sentence
 from fourbar_validation.robots.files import read_robot
@@ -33,8 +34,6 @@ FEWEST_POSITIONS = 6
 squares with an error to tell.
 """
 FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio")
-_WHOLE_TURN = math.tau * (1.0 - 1e-9)
-"""rad; scenes state their ends with twelve digits."""
 _FITS = ("least squares", "smallest largest error")
 """Names of the fits of `_MimicReport.squares` and `_MimicReport.fitted`."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}"
@@ -193,7 +192,7 @@ def _list_positions(scene: Scene, equality: JointEquality) -> Array:
     positions = np.unique(command(scene).theta_2)
     ends = positions[[0, -1]]
     named = motion.angle is not None or motion.law is not None
-    turns = np.ptp(ends) >= _WHOLE_TURN
+    turns = np.ptp(ends) >= WHOLE_TURN
     if equality.swing is not None and (turns or not named):
         low, high = equality.swing
         if not turns:

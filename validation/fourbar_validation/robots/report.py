@@ -166,7 +166,7 @@ def _describe_differences(judgement: LoopJudgement) -> Iterator[ReportBlock]:
         yield TextTable(JUDGED_HEADINGS, errors)
 
 
-def write_range(loop: LoopMeasurement) -> str:
+def write_driven_range(loop: LoopMeasurement) -> str:
     """Write the driven joint of a loop and the range in which it is measured."""
     joints = [row.joint for row in loop.states.rows]
     first, last = (write_degrees(end) for end in (min(joints), max(joints)))
@@ -184,7 +184,9 @@ def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
         if loop.as_it_is:
             how = "with the file as it is against the formulas"
     given = f" (stated by {stated})" if stated else ""
-    return f"{loop.name}: {write_range(loop)} at {speed} rad/s{given}, MuJoCo {how}"
+    return (
+        f"{loop.name}: {write_driven_range(loop)} at {speed} rad/s{given}, MuJoCo {how}"
+    )
 
 
 def _describe_loop(

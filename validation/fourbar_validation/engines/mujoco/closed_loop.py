@@ -49,7 +49,7 @@ WARNINGS = (
 )
 
 
-def find_load(
+def find_site_load(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     actuator: int,
@@ -99,7 +99,7 @@ class ClosedLoop(Assembled):
             if name.startswith("load_"):
                 body = model.site_bodyid[model.actuator_trnid[load, 0]]
                 bearers = _CARRIED_BY[model.body(body).name]
-                self._loads.append((find_load(model, self.data, load), bearers))
+                self._loads.append((find_site_load(model, self.data, load), bearers))
         # MuJoCo's own memory, as that of the loads
         self._carried = {}
         for name, body in self.body.items():

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from fourbar.quantities import Array
-from fourbar_validation.engines.mujoco.closed_loop import find_load
+from fourbar_validation.engines.mujoco.closed_loop import find_site_load
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     list_lifted_masses,
@@ -35,7 +35,7 @@ class BearerForces:
         loads, lift = self.find_borne(body)
         force = data.cfrc_int[body, 3:] - lift
         for load in loads:
-            force -= find_load(self.model, data, load)()
+            force -= find_site_load(self.model, data, load)()
         return np.asarray(force)
 
     def _find_borne(self, body: int) -> tuple[list[int], Array]:

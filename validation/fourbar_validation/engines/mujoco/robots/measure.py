@@ -75,7 +75,7 @@ _CONSTANTS = 10.0
 """Time constants of the closure during which the torque acts. The loop has then yielded
 as far as it does.
 """
-_WHOLE_TURN = math.tau * (1.0 - 1e-9)
+WHOLE_TURN = math.tau * (1.0 - 1e-9)
 """rad; motions state their ends with twelve digits."""
 _LIGHTER = 0.1
 """Factor on what holds the other joints, to see what it matters."""
@@ -410,7 +410,7 @@ def _take_span(
     low, high = span
     cut = ""
     limited = inside.joint is not None and inside.model.jnt_limited[inside.joint]
-    if limited or np.ptp(motion.angle) < _WHOLE_TURN:
+    if limited or np.ptp(motion.angle) < WHOLE_TURN:
         low = max(low, min(joints))
         high = min(high, max(joints))
         moved, wanted = (
