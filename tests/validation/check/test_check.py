@@ -696,13 +696,9 @@ COVERED = replace(
     loads=(Load(4, moment=-3.0, table=Table((0.5, 1.0, 1.5), (0.5, 1.0, 0.3))),),
 )
 OTHERS = {
-    "load 1 (bar 4) 1.1 times ours (fitted)": (
+    "the loads 1.1 times ours (fitted)": (
         COVERED,
         solve(replace(COVERED, loads=(replace(COVERED.loads[0], moment=-3.3),))),
-    ),
-    "load 2 (bar 4): its table is left out": (
-        replace(COVERED, loads=(FORCE, *COVERED.loads)),
-        solve(replace(COVERED, loads=(FORCE, replace(COVERED.loads[0], table=None)))),
     ),
     "ground_angle is left out": (
         STROKE,
@@ -720,14 +716,15 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("words", OTHERS)
-def test_the_table_of_another_scene_has_one_explanation(words, read):
+def test_the_table_of_another_scene_is_explained(words, read):
     scene, numbers = OTHERS[words]
     name = scene.motion.commanded if scene.motion.law is None else "time"
     at = solve(scene)[name]
     text = tabulate({name: at, "F12_x": numbers.F12[:, 0], "F14_y": numbers.F14[:, 1]})
     motion = {"commanded": scene.motion.commanded, "law": scene.motion.law}
     judgement = judge_table(scene, read(text, **motion))
-    assert [one.text for one in judgement.explanations] == [words]
+    first, *more = (one.text for one in judgement.explanations)
+    assert first == words and not any("of two bars" in text for text in more)
 
 
 @pytest.mark.parametrize(

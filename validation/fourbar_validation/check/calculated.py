@@ -7,7 +7,6 @@ all changes at once.
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
-from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -460,7 +459,7 @@ class Calculation:
     def _list_acting(self) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
         """List what acts besides inertia, with pins whose friction depends on loads."""
         scene = self.scene
-        if len(scene.loads) > 1:
+        if scene.loads:
             yield "the loads", self.apply(*scene.loads), []
         for number, load in enumerate(scene.loads, 1):
             name = f"load {number} (bar {load.bar})"
@@ -488,13 +487,15 @@ class Calculation:
             springs = _SPRINGS.get(effect.key)
             if springs is None:
                 continue
-            every: dict[str, list[BodyWrenches]] = {}
-            for i, part in enumerate(_list_parts(effect), 1):
+            every: dict[str, BodyWrenches] = {}
+            parts = _list_parts(effect)
+            for i, part in enumerate(parts, 1):
                 for number, more in self._change_spring(part, factor):
                     yield f"the {number} of {springs} {i}", more
-                    every.setdefault(number, []).append(more)
-            for number, together in _sum_several(every):
-                yield f"the {number} of every {springs}", together
+                    every[number] = every.get(number, self.none()).plus(more)
+            if len(parts) > 1:
+                for number, more in every.items():
+                    yield f"the {number} of every {springs}", more
 
     def _change_spring(
         self, effect: Any, factor: float
@@ -627,14 +628,15 @@ class Calculation:
 
     def _change_loads(self) -> Iterator[Change]:
         """Let each load, and every load, act elsewhere or in another direction."""
-        every: dict[str, list[BodyWrenches]] = {}
+        every: dict[str, BodyWrenches] = {}
         loads = zip(self.stated.loads, self.scene.loads, strict=True)
         for number, (stated, load) in enumerate(loads, 1):
             for text, more in self._list_load_mistakes(stated, load):
                 yield Change(f"load {number} (bar {load.bar}): {text}", more)
-                every.setdefault(text, []).append(more)
-        for text, together in _sum_several(every):
-            yield Change(f"every load: {text}", together)
+                every[text] = every.get(text, self.none()).plus(more)
+        if len(self.scene.loads) > 1:
+            for text, more in every.items():
+                yield Change(f"every load: {text}", more)
 
     def _list_load_mistakes(
         self, stated: Load, load: Load
@@ -724,15 +726,6 @@ def _name_effect(effect: Any) -> str:
 
 def _is_plural(name: str) -> bool:
     return name.startswith("the ") and name.endswith("s")
-
-
-def _sum_several(
-    every: Mapping[str, list[BodyWrenches]],
-) -> Iterator[tuple[str, BodyWrenches]]:
-    """Sum what a mistake lets act, by its text, where it can be made of several."""
-    for text, wrenches in every.items():
-        if len(wrenches) > 1:
-            yield text, reduce(BodyWrenches.plus, wrenches)
 
 
 def _list_bars(part: Any) -> tuple[int, int]:
