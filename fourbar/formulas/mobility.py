@@ -487,7 +487,7 @@ def name_assembly(linkage: FourBar, bar: int, branch: int) -> str:
 
     >>> from fourbar import uniform
     >>> linkage = uniform(3, 1, 3, 1)
-    >>> name_assembly(linkage), name_assembly(linkage, branch=-1)
+    >>> name_assembly(linkage, 2, 1), name_assembly(linkage, 2, -1)
     ('parallelogram', 'antiparallelogram')
     """
     name = classify(linkage).name
