@@ -125,7 +125,7 @@ _WHERE = {
     " in what drives alone": tuple(set(FORCE_NAMES) - set(PIN_FORCES)),
 }
 """Quantities in which that was done."""
-_NUMBERS = {
+_SPRING_NUMBERS = {
     "springs": ("preload", "free length"),
     "torsion": ("preload", "rest angle", "rest angle, its turn counted from 0,"),
 }
@@ -432,7 +432,7 @@ class Calculation:
             more = self.apply(other).plus(self.apply(effect), -1.0)
             yield Change(f"{name} {text}", more)
         if effect.key in ("viscous", "torsion"):
-            parts = _list_parts(effect)
+            parts = _split_effect(effect)
             if effect.key == "torsion":
                 parts = [_change_number(part, "preload", 0.0) for part in parts]
             linear = self.apply(*parts)
@@ -445,7 +445,7 @@ class Calculation:
             how = "is of the second bar's own speed"
             yield Change(f"{name} {how}", more)
         verb = "act" if _is_plural(name) else "acts"
-        parts = _list_parts(effect)
+        parts = _split_effect(effect)
         if all(1 in _list_bars(part) for part in parts):
             return  # on the ground nothing is missed
         for left_out, words in enumerate(("second", "first")):
@@ -475,7 +475,7 @@ class Calculation:
             name = _name_effect(effect)
             acting = self.apply(effect)
             yield name, acting, list(effect.loaded_pins)
-            parts = _list_parts(effect)
+            parts = _split_effect(effect)
             if len(parts) > 1:
                 for number, part in enumerate(parts, 1):
                     pins = list(part.loaded_pins)
@@ -488,7 +488,7 @@ class Calculation:
             if springs is None:
                 continue
             every: dict[str, BodyWrenches] = {}
-            parts = _list_parts(effect)
+            parts = _split_effect(effect)
             for i, part in enumerate(parts, 1):
                 for number, more in self._change_spring(part, factor):
                     yield f"the {number} of {springs} {i}", more
@@ -502,7 +502,7 @@ class Calculation:
     ) -> Iterator[tuple[str, BodyWrenches]]:
         """List each number of one spring with what its factor lets act besides."""
         right = self.apply(effect)
-        for number in _NUMBERS[effect.key]:
+        for number in _SPRING_NUMBERS[effect.key]:
             changed = _change_number(effect, number, factor)
             if changed != effect:
                 yield number, self.apply(changed).plus(right, -1.0)
@@ -736,7 +736,7 @@ def _list_bars(part: Any) -> tuple[int, int]:
     return PINS[one[0]]
 
 
-def _list_parts(effect: Any) -> list[Any]:
+def _split_effect(effect: Any) -> list[Any]:
     """List the effects of one part each that an effect consists of."""
     field = _PART_FIELDS.get(effect.key, "")
     parts = getattr(effect, field, ())

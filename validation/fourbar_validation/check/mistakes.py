@@ -55,7 +55,7 @@ _OF_SPEEDS = {
 }
 """The same of a speed."""
 _OTHER_BRANCH = "the other branch"
-_SLOW = 1e-18
+_NEARLY_AT_REST = 1e-18
 """Factor on a speed of which only the sign is left."""
 _CLOCKWISE = "counted clockwise, with all angles and torques"
 MOST_EXPLANATIONS = 5
@@ -200,7 +200,7 @@ def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
         yield Variant("ground_angle is left out", numbers, at)
     dry = any(effect.key in DRY for effect in scene.effects)
     if dry and command.speed is not None:
-        slow = command._replace(speed=_SLOW * command.speed, acceleration=0.0)
+        slow = command._replace(speed=_NEARLY_AT_REST * command.speed, acceleration=0.0)
         text = "no inertial forces (statics), with friction"
         yield Variant(text, at=slow, names=FORCE_NAMES)
     yield from _exchange_bars(scene)

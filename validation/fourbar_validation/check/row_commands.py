@@ -26,7 +26,7 @@ is found they differ by the square root of round-off.
 """
 _BY_CHANCE = 0.05
 """Probability of rounded times at which the law has every angle as it is printed."""
-_SAMPLES = 32
+_TIMES_TO_A_SIDE = 32
 """Times to either side of a rounded one at which a law is looked at."""
 _HALVINGS = 60
 """Halvings after which an interval of doubles is none."""
@@ -204,7 +204,7 @@ def _follow_law(
     passed = np.maximum(np.abs(law.at(time)[1]) * half, rounding)
     if fits_stated.all() and np.prod(rounding / passed) < _BY_CHANCE:
         return RowCommands(at, by_time=True)  # nobody rounded these times
-    near = tuple(command_at(_bisect(fits, time, end)) for end in ends)
+    near = tuple(command_at(_find_last_that_holds(fits, time, end)) for end in ends)
     moved = np.flatnonzero(~fits_stated)
     notes = [
         f"at {write_count(len(moved), 'row')} the time is taken that rounds to the"
@@ -224,7 +224,7 @@ def _find_nearest_time(
 
     Marked are the rows with several such times between the ends.
     """
-    shares = np.linspace(-1.0, 1.0, 2 * _SAMPLES + 1)[:, None]
+    shares = np.linspace(-1.0, 1.0, 2 * _TIMES_TO_A_SIDE + 1)[:, None]
     early, late = ends
     times = stated + np.where(
         shares < 0.0, -shares * (early - stated), shares * (late - stated)
@@ -237,13 +237,15 @@ def _find_nearest_time(
     chosen = np.argmin(np.where(changes, away, np.inf), axis=0)
     start, end = times[chosen, rows], times[chosen + 1, rows]
     above = measure(start) > 0.0
-    root = _bisect(lambda time: (measure(time) > 0.0) == above, start, end)
+    root = _find_last_that_holds(
+        lambda time: (measure(time) > 0.0) == above, start, end
+    )
     smallest = times[np.argmin(np.abs(apart), axis=0), rows]
     counts = changes.sum(axis=0)
     return np.where(counts > 0, root, smallest), counts > 1
 
 
-def _bisect(
+def _find_last_that_holds(
     holds: Callable[[Array], NDArray[np.bool_]],
     inside: Array,
     outside: Array,

@@ -123,7 +123,7 @@ def measure_mimic(
             READ, file, joint, scene, theta.get("theta_2")
         )
     equality, stated = _state_angles(equality, theta)
-    positions = _list_positions(scene, equality)
+    positions = _place_leader(scene, equality)
     low = float(positions[0])
     high = float(positions[-1])
     branch = int(command(scene).branch[0])
@@ -180,7 +180,7 @@ def measure_mimic(
     )
 
 
-def _list_positions(scene: Scene, equality: JointEquality) -> Array:
+def _place_leader(scene: Scene, equality: JointEquality) -> Array:
     """List the angles of bar 2 over the motion, rad.
 
     A scene that states no range, or a whole turn, has that of the leader's limits, as

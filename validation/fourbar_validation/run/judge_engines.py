@@ -85,7 +85,7 @@ def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     larger error that either is allowed, and by a tenth of what they differ from us.
     """
     values, others = (
-        _take_values(question, one.engine, quantity) for one in (row, other)
+        _values_of(question, one.engine, quantity) for one in (row, other)
     )
     ours = getattr(question.solution, quantity)
     if not math.isfinite(row.error) or ours is None or values is None or others is None:
@@ -102,7 +102,7 @@ def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     return bool(near and apart[0] * _TIMES_NEARER <= from_us[0])
 
 
-def _take_values(question: Question, engine: str, quantity: str) -> Array | None:
+def _values_of(question: Question, engine: str, quantity: str) -> Array | None:
     """Return what an engine answers, or what follows from its answer; None if nothing.
 
     Where the loop closes is told by 1, elsewhere 0.
