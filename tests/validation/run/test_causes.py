@@ -697,6 +697,11 @@ OTHER_SCENES = {
         with_forces(0.7, 0.0),
         with_forces(-0.7, 0.0),
     ),
+    "the forces of the loads are reversed": (
+        with_forces(0.7, 0.4),
+        replace(SCENE, loads=(Load(4, moment=0.4),)),
+        -1.0,
+    ),
     "the couple of load 1 (bar 4) is reversed": (
         with_forces(0.7, 0.4),
         with_forces(0.7, -0.4),

@@ -466,8 +466,12 @@ class Calculation:
             acting = self.apply(load)
             yield name, acting, []
             if load.force is not None and load.moment:
-                force_alone = self.apply(replace(load, moment=0.0))
-                yield f"the couple of {name}", acting.plus(force_alone, -1.0), []
+                force = self.apply(replace(load, moment=0.0))
+                yield f"the force of {name}", force, []
+                yield f"the couple of {name}", acting.plus(force, -1.0), []
+        forces = [replace(one, moment=0.0) for one in scene.loads if one.force]
+        if len(forces) > 1 and forces != list(scene.loads):
+            yield "the forces of the loads", self.apply(*forces), []
         dry = [effect for effect in scene.effects if effect.key in DRY]
         if len(dry) > 1:
             yield "all dry friction", self.apply(*dry), list(list_sliding_pins(scene))
