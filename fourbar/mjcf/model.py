@@ -220,7 +220,7 @@ def make_constant_motor(force: float) -> dict[str, str]:
 def make_servo(gain: float, omega: float) -> dict[str, str]:
     """Return the attributes of a drive that exerts the couple gain (omega - speed).
 
-    It needs no control.
+    The drive needs no control.
     """
     return {
         **_UNCONTROLLED,

@@ -727,7 +727,7 @@ class _SceneBlock:
     ) -> list[tuple[str, list[str]]]:
         """List the row of what a linkage at rest bears as it begins to move.
 
-        It is empty where dry friction does not hold it, or adds nothing.
+        The list is empty where dry friction does not hold the linkage, or adds nothing.
         """
         if not self.facts.held or np.any(self.solution.at.speed):
             return []

@@ -129,7 +129,7 @@ class MotionCurves:
     def from_rest(self) -> dict[str, float]:
         """Largest pin forces and bending moments as the linkage begins to move.
 
-        They are those of either way, against the whole of dry friction.
+        Both directions count, each against the whole of dry friction.
         """
         at = self.solve_between().at
         largest = dict[str, float]()

@@ -431,11 +431,12 @@ class Calculation:
         for text, other in _list_other_forms(effect, self.scene.linkage.ground_angle):
             more = self.apply(other).plus(self.apply(effect), -1.0)
             yield Change(f"{name} {text}", more)
+        parts = _split_effect(effect)
         if effect.key in ("viscous", "torsion"):
-            parts = _split_effect(effect)
+            linear_parts = parts
             if effect.key == "torsion":
-                parts = [_change_number(part, "preload", 0.0) for part in parts]
-            linear = self.apply(*parts)
+                linear_parts = [_change_number(part, "preload", 0.0) for part in parts]
+            linear = self.apply(*linear_parts)
             for factor, done in _IN_DEGREES.items():
                 yield self._scale(name, done, linear, factor)
         if effect.key == "viscous":
@@ -445,7 +446,6 @@ class Calculation:
             how = "is of the second bar's own speed"
             yield Change(f"{name} {how}", more)
         verb = "act" if _is_plural(name) else "acts"
-        parts = _split_effect(effect)
         if all(1 in _list_bars(part) for part in parts):
             return  # on the ground nothing is missed
         for left_out, words in enumerate(("second", "first")):
@@ -535,7 +535,8 @@ class Calculation:
         for factor, done in _VELOCITY_TERM.items():
             added = {k: factor * (motion.alpha[k] - alone[k]) for k in speeds}
             added[bar] = np.zeros(len(right))
-            of_A, of_B = 1j * added[2] * a * u[2], 1j * added[4] * c * u[4]
+            of_A = 1j * added[2] * a * u[2]
+            of_B = 1j * added[4] * c * u[4]
             moved: MistakenNumbers = {
                 **{f"alpha_{k}": motion.alpha[k] + added[k] for k in speeds},
                 "a_A": right.a_A + stack_components(of_A),

@@ -259,8 +259,8 @@ def _list_other_angles(command: Command) -> Iterator[Variant]:
 def _list_other_strokes(command: Command, origin: StrokeOrigin) -> Iterator[Variant]:
     """List accelerations of the bar of a cylinder without one of their two terms.
 
-    They are the acceleration of the stroke times omega over its speed, and what the
-    speed makes.
+    One term is the acceleration of the stroke times omega over its speed; the other
+    is what the speed makes.
     """
     if command.speed is None or not np.all(origin.speed):
         return

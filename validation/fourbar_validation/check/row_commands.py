@@ -76,7 +76,7 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     else:
         same = _has_positions_of(scene, table)
     varies = scene.motion.law is not None or scene.motion.has_rate_of_each
-    if varies and not same and commanded and table.times is not None:
+    if varies and not same and commanded:
         along = _follow_law(scene, table, base)
         if along is not None:
             return along
@@ -149,7 +149,7 @@ def _follow_law(
     table: TheirTable,
     base: Command,
 ) -> RowCommands | None:
-    """Command the law at the times of the rows; None if there is no law.
+    """Command the law at the times of the rows; None without a law or times.
 
     Time and angle of a row are each within half a unit of its last digit. A row is
     judged at its time, or if its angle does not fit that, at the nearest time that

@@ -1,6 +1,6 @@
 """Sensitivities in 320-bit arithmetic, and the error that rounding makes.
 
-These sensitivities predict the error:
+The predicted error of a result is
 
     predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 

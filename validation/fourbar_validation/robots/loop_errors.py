@@ -208,7 +208,7 @@ def _subtract_formulas(
 def list_without_value(loop: LoopMeasurement) -> dict[str, list[float]]:
     """List the positions of the driven joint without a value of the formulas, rad.
 
-    They are listed by the status of the formulas there.
+    The key of each list is the status of the formulas there.
     """
     _, formulas = _solve_formulas(loop, loop.states)
     places: dict[str, list[float]] = {}

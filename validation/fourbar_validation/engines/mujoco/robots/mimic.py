@@ -172,7 +172,7 @@ def _measure_bars(
 ) -> JointEquality:
     """Return an equality with the angles of the rest pose and the side of the scene.
 
-    It stays as it is where the ground or the input is not found.
+    An equality stays as it is where the ground or the input is not found.
     """
     follower, leader, coefficients = tie
     linkage = scene.linkage
@@ -224,9 +224,9 @@ def _find_side(
 ) -> float | None:
     """Return +1 if a scene sees the leader's axis from its tip, -1 from behind.
 
-    That side is the one from which theta_2 is the stated or the drawn one, else the
-    output is where the scene has it, else the range of the leader meets the scene's.
-    None if neither tells.
+    The stated or the drawn theta_2 decides. Where it does not, the scene's output
+    does, and last the side from which the leader's range meets the scene's. The
+    result is None if none of them tells.
 
     Parameters
     ----------
