@@ -77,7 +77,10 @@ let aimed = null;   // what the next click places
 const NEW_POINT = "a new point of the coupler";
 function offerPlaces(places) {
   const names = ["", ...places.map(([name]) => name).filter(name => !name.startsWith("arrow")), NEW_POINT], select = byId("place");
-  if (names.join() !== [...select.options].map(option => option.value).join()) select.replaceChildren(...names.map(name => new Option(name || "choose", name)));
+  // what is still offered stays in place, so that an open list stays open
+  for (const option of [...select.options]) if (!names.includes(option.value)) option.remove();
+  names.forEach((name, i) => { if (select.options[i]?.value !== name) select.add(new Option(name || "choose", name), i); });
+  select.length = names.length;
 }
 function aim(name) {
   aimed = name || null;
