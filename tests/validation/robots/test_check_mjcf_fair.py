@@ -37,7 +37,7 @@ from fourbar_validation.robots.judge_loop import (
     FILE_THROUGH_TIME,
 )
 from fourbar_validation.robots.loop_errors import find_left_out
-from fourbar_validation.run.transformed import _convert
+from fourbar_validation.run.transformed import read_from_other_end
 from tests.support.robots import Planar, answer_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine
 
@@ -503,7 +503,7 @@ def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     few = in_pose + np.linspace(-0.3, 0.3, 9)
     moved = scene.motion.replace(angle=few)
     there = solve(replace(scene, motion=moved), "position")
-    other = _convert(scene.settled(), exchanged=True)
+    other = read_from_other_end(scene.settled())
     other = replace(other, drive_bar=drive_bar)
     ways = [
         replace(other, motion=Motion(np.asarray(there.theta_4), 2.0, branch=branch))

@@ -7,8 +7,8 @@ two changes no digit at all.
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -23,17 +23,24 @@ from fourbar.effects import (
     PinFriction,
     Place,
     PointDrive,
-    Spring,
     Springs,
     Torsion,
     Viscous,
 )
-from fourbar.linkage import MOVING_BARS, Bar, FourBar, copy_with
+from fourbar.effects.effect import PinRows
+from fourbar.linkage import ANY_NUMBER, MOVING_BARS, Bar, FourBar, copy_with
 from fourbar.quantities import OK, PIN_FORCES, UNITS, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
+from fourbar.studies.keys import (
+    SceneNumber,
+    list_entries,
+    read_number,
+    read_place,
+    replace_number,
+)
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -72,35 +79,50 @@ is in radii of gyration of the bar.
 """
 _AT_A_REVERSAL = 1e-3
 """Part of its speeds below which a pin with dry friction may reverse."""
-SCALED_FORCES = (*PIN_FORCES, "torque", "drive_force")
+_FORCES = (*PIN_FORCES, "torque", "drive_force")
 _TRANSFORMED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
-    *SCALED_FORCES,
+    *_FORCES,
     "power",
 )
 """Quantities that are compared, as far as the scene has them."""
-_OTHER_BAR = {1: 1, 2: 4, 3: 3, 4: 2}
-OTHER_PIN = {"O2": "O4", "A": "B", "B": "A", "O4": "O2"}
-"""Bars and pins by their names in a linkage read from its other end."""
-_OTHER_FORCE = {
-    "F12": ("F14", 1.0),
-    "F14": ("F12", 1.0),
-    "F32": ("F43", -1.0),
-    "F43": ("F32", -1.0),
+_SCALES = {
+    "m": SCALE,
+    "m/s^2": SCALE,
+    "N": SCALE,
+    "W": SCALE**2,
+    "N m": SCALE**2,
+    "N m/rad": SCALE**2,
+    "N m s/rad": SCALE**2,
+    "kg m^2": SCALE**2,
 }
-"""Pin forces there: F34 = -F43, F23 = -F32."""
-
-
-class _QuantitySizes(NamedTuple):
-    """Scale, condition and sum of the terms of several quantities, (q, n) each."""
-
-    scale: Array
-    condition: Array
-    terms: Array
-
-    def select(self, rows: slice) -> "_QuantitySizes":
-        """Select the sizes of some of the quantities."""
-        return _QuantitySizes(*(sizes[rows] for sizes in self))
+"""Factors of numbers where every length and acceleration has SCALE, by their units."""
+_IN_THE_WORLD = {"ground_angle", "angle", "force", "arm", "direction"}
+"""Fields whose angle counts from +x, of a force unless it is of the bar's frame."""
+_WITH_A_COUNTERPART = (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    PinFriction,
+    Springs,
+    Torsion,
+    Viscous,
+)
+_ENDS = (
+    (2, 4),
+    ("O2", "O4"),
+    ("A", "B"),
+    ("F12", "F14"),
+    ("F32", "F43"),
+    ("theta_2", "theta_4"),
+    ("omega_2", "omega_4"),
+    ("alpha_2", "alpha_4"),
+)
+_OTHER_END: dict[Any, Any] = {a: b for ends in _ENDS for a, b in (ends, ends[::-1])}
+"""Bars, pins and quantities by their names in a linkage read from its other end. The
+pin forces of bar 3 turn their signs there: F34 = -F43, F23 = -F32.
+"""
 
 
 @dataclass(frozen=True)
@@ -109,7 +131,6 @@ class _Few:
 
     scene: Scene
     command: Command
-    solution: Solution
     question: Question
     fit: Mask
     """Positions that are compared. The first, from which springs count their turns,
@@ -117,98 +138,90 @@ class _Few:
     """
 
     @cached_property
-    def quantities(self) -> list[str]:
-        """List the quantities that the scene has, those of forces in one piece."""
-        return [
-            name
-            for name in _TRANSFORMED_QUANTITIES
-            if getattr(self.solution, name, None) is not None
-        ]
+    def solution(self) -> Solution:
+        """Solve the scene."""
+        return self.solve(self.scene)
 
     @cached_property
-    def forces(self) -> slice:
-        """Return which of the quantities are forces and torques."""
-        of_forces = [
-            self.quantities.index(name)
-            for name in SCALED_FORCES
-            if name in self.quantities
-        ]
-        return slice(of_forces[0], of_forces[-1] + 1)
+    def numbers(self) -> dict[str, Array]:
+        """Return the numbers of each quantity that the scene has."""
+        found = {
+            name: getattr(self.solution, name, None) for name in _TRANSFORMED_QUANTITIES
+        }
+        return {name: values for name, values in found.items() if values is not None}
 
-    @cached_property
-    def numbers(self) -> list[Array]:
-        """Return the numbers of each quantity."""
-        return [getattr(self.solution, name) for name in self.quantities]
+    def solve(self, scene: Scene, sense: int = 0, **changed: Any) -> Solution:
+        """Solve another scene at the same positions, the first of which it begins at.
 
-    @cached_property
-    def sizes(self) -> _QuantitySizes:
-        """Return the sizes of all quantities."""
-        sizes = TermSizes(self.scene, self.solution)
-        linkage = self.scene.linkage
-        conditions = find_conditions(self.quantities, linkage, self.solution)
-        return _QuantitySizes(
-            sizes.scales(self.quantities, self.numbers).of_terms,
-            np.minimum(conditions, 1.0),
-            sizes.sum_terms_of(self.quantities),
-        )
-
-    def solve(self, scene: Scene, **changed: Any) -> Solution:
-        """Solve another scene at the same positions.
-
-        Some entries of the command are changed.
-        """
-        return _solve_from_first(scene, self.command._replace(**changed))
-
-    def solve_alike(self, scene: Scene, sense: int, **changed: Any) -> Solution:
-        """Solve another scene whose loop lies on the same side, or on the other.
-
-        The side is that at each position.
+        Springs count their turns from there. Some entries of the command are changed.
 
         An assembly of a linkage with change points has another sign beyond each of
         them, and the rounding of the lengths decides whether there are any: the sign is
         the same in both scenes, the name of the assembly need not be.
-        """
-        signs = with_signs(self.scene.linkage, self.command).branch
-        signed = self.command._replace(branch=sense * signs, **changed)
-        return _solve_from_first(scene, with_signs(scene.linkage, signed))
 
-    def compare(self, convert: Callable[[str], Array]) -> Array:
-        """Compare all quantities with those of another scene, converted; (q, n)."""
-        theirs = [convert(name) for name in self.quantities]
-        apart = compute_differences(self.quantities, self.numbers, theirs)
-        return divide(apart, self.sizes.scale) * self.sizes.condition
+        `sense`: 1 if the loop lies on the same side at each position, -1 if on the
+        other; 0: of an assembly of the same name.
+        """
+        command = self.command
+        if sense:
+            signs = with_signs(self.scene.linkage, command).branch
+            command = command._replace(branch=sense * signs, **changed)
+            command = with_signs(scene.linkage, command)
+        else:
+            command = command._replace(**changed)
+        if scene.counts_turns:
+            begin: Any = {f"theta_{command.bar}": float(command.angle[0])}
+            motion = Motion(**begin, branch=int(command.branch[0]))
+            scene = copy_with(scene, motion=motion)
+        return solve(scene, "force", at=command)
+
+    def compare(self, theirs: dict[str, Array], parts: Any = None) -> dict[str, Array]:
+        """Compare quantities with those of another scene, in parts of their size.
+
+        Errors (n,) are returned, times the condition of their quantity.
+
+        `parts`: sizes of the numbers that were summed to these, (q, n).
+        """
+        names = list(theirs)
+        ours = [self.numbers[name] for name in names]
+        terms = TermSizes(self.scene, self.solution)
+        sizes = terms.scales(names, ours).of_terms
+        if parts is not None:
+            # what cancels within a part is among the terms of the whole
+            sizes = np.maximum(sizes, np.maximum(parts, terms.sum_terms_of(names)))
+        conditions = find_conditions(names, self.scene.linkage, self.solution)
+        apart = compute_differences(names, ours, list(theirs.values()))
+        errors = divide(apart, sizes) * np.minimum(conditions, 1.0)
+        return dict(zip(names, errors, strict=True))
 
     def row(self, name: str, transformation: "_Transformation") -> Row:
         """Make the row of a transformation, of the quantity that is worst."""
+        theta_2 = self.solution.theta_2
         errors = transformation.measure(self)
-        first = 0
-        if transformation.of_forces:
-            first = self.forces.start
         theta_1 = self.scene.linkage.ground_angle
         condition = 1.0 / count_half_turns(theta_1, self.command.angle)
-        if transformation.exact:
-            allowed = 0.0
-        else:
-            allowed = EQUIVALENCE.factor / condition
-        worst = find_worst(errors[:, self.fit].max(axis=1))
+        allowed = 0.0 if transformation.exact else EQUIVALENCE.factor / condition
+        largest = [error[self.fit].max() for error in errors.values()]
+        worst = list(errors)[find_worst(np.array(largest))]
+        reason = f"identity: {transformation.reason}; times the condition; worst in"
         return self.question.row(
             name,
             errors[worst],
             allowed,
-            f"identity: {transformation.reason}; times the condition; worst in"
-            f" {self.quantities[first + worst]}",
+            f"{reason} {worst}",
             self.fit,
             condition,
-            self.solution.theta_2,
+            theta_2,
         )
 
 
 def check_transformed(question: Question) -> Iterator[Row]:
     """Hold a scene to what it is when it is stated otherwise."""
+    name = "scenes stated otherwise"
     try:
         few = _take_plain_positions(question)
     except NotAskedError as reason:
-        question.leave_out("scenes stated otherwise", reason)
+        question.leave_out(name, reason)
         return
     for name, transformation in TRANSFORMATIONS.items():
         try:
@@ -225,379 +238,220 @@ def _take_plain_positions(question: Question) -> _Few:
     solution = question.solution
     at = question.at
     scene = question.scene
+    link = scene.linkage
     if at.speed is None:
         raise NotAskedError("the scene states positions only")
     if at.moves_stroke or at.time is not None:
         raise NotAskedError("a stroke or a motion law is commanded")
     placed = state_from_pins(scene)
-    convert = _SceneConversion(scene.linkage).term
     for term in (*placed.loads, *placed.effects):
         if isinstance(term, Load) and term.table is not None:
             raise NotAskedError("a load over a table has no counterpart")
-        if convert(term) is None:
+        if not isinstance(term, _WITH_A_COUNTERPART):
             raise NotAskedError(f"the effect {term.key!r} has no counterpart")
-    in_line = scene.linkage.ground_angle + np.array([0.0, math.pi])
-    if scene.counts_turns and mark_touching(scene.linkage, in_line).any():
+    in_line = link.ground_angle + np.array([0.0, math.pi])
+    if scene.counts_turns and mark_touching(link, in_line).any():
         raise NotAskedError("rounding decides how far its torsion springs are wound")
     fit = (
         (solution.status_code == OK)
         & (solution.condition >= WELL_CONDITIONED)
         & (solution.drive_condition >= WELL_CONDITIONED)
         & ~question.reversing(_AT_A_REVERSAL)
-        & _mark_long_springs(placed, solution)
     )
+    theta = {bar: getattr(solution, f"theta_{bar}") for bar in MOVING_BARS}
+    for effect in placed.effects:
+        for spring in effect.springs if isinstance(effect, Springs) else ():
+            # where its ends nearly meet rounding turns its line, whatever the loop's
+            # condition
+            line = place_line(link, LinearDrive(spring.start, spring.end), theta)
+            fit &= line.stroke >= WELL_CONDITIONED * sum_lengths(link)
     indices = np.flatnonzero(fit)
     if not len(indices):
         raise NotAskedError("no position is well-conditioned")
     begin = int(np.argmax(solution.assembled))
     chosen = spread_evenly(indices, POSITIONS_STATED_OTHERWISE)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
-    command = at.part(positions).as_doubles()
-    link = scene.linkage
     bars = [
-        Bar(
-            bar.length,
-            find_mass(bar),
-            find_inertia(bar),
-            find_centre(bar),
-        )
+        Bar(bar.length, find_mass(bar), find_inertia(bar), find_centre(bar))
         for bar in link.moving
     ]
     few = Scene(
-        _put_bars(link, bars, link.ground, link.ground_angle),
+        _put_bars(link, bars),
         Motion(),
         scene.drive_bar,
         placed.loads,
         placed.effects,
         drive=placed.drive,
     )
-    return _Few(
-        few,
-        command,
-        _solve_from_first(few, command),
-        question,
-        fit[positions],
-    )
+    command = at.part(positions).as_doubles()
+    return _Few(few, command, question, fit[positions])
 
 
-def _mark_long_springs(scene: Scene, solution: Solution) -> Mask:
-    """Mark where the ends of each spring lie apart, (n,).
-
-    Where they nearly meet rounding turns its line, whatever the loop's condition. The
-    places are pairs from first pins.
-    """
-    least = WELL_CONDITIONED * sum_lengths(scene.linkage)
-    theta = {bar: getattr(solution, f"theta_{bar}") for bar in MOVING_BARS}
-    long = np.ones(len(solution), dtype=bool)
-    for effect in scene.effects:
-        if not isinstance(effect, Springs):
-            continue
-        for spring in effect.springs:
-            line = place_line(
-                scene.linkage,
-                LinearDrive(spring.start, spring.end),
-                theta,
-            )
-            long &= line.stroke >= least
-    return long
+def _put_bars(linkage: FourBar, bars: Iterable[Bar], **ground: float) -> FourBar:
+    """Put other moving bars on the ground, or on another one."""
+    names = ("input", "coupler", "output")
+    return copy_with(linkage, **dict(zip(names, bars, strict=True)), **ground)
 
 
-def _solve_from_first(scene: Scene, command: Command) -> Solution:
-    """Solve a scene whose motion begins at the first position.
-
-    Springs count their turns from there.
-    """
-    if scene.counts_turns:
-        branch = int(command.branch[0])
-        begin: Any = {
-            f"theta_{command.bar}": float(command.angle[0]),
-            "branch": branch,
-        }
-        scene = copy_with(scene, motion=Motion(**begin))
-    return solve(scene, "force", at=command)
+def _convert_numbers(scene: Scene, convert: Callable[[SceneNumber, Any], Any]) -> Scene:
+    """Convert each number of a scene, given with its place, unit and bound."""
+    for number in list_entries(scene).values():
+        if number.place[0] != "motion":
+            value = convert(number, read_number(scene, number))
+            scene = replace_number(scene, number, value)
+    return scene
 
 
-@dataclass(frozen=True)
-class _SceneConversion:
-    """Conversion of each number of a scene."""
+def _measure_mirrored(few: _Few) -> dict[str, Array]:
+    """Mirror at the x-axis: the sine, angles and couples of a sense change signs."""
 
-    linkage: FourBar
-    """Linkage of the scene."""
-    length: float = 1.0
-    """Factor of lengths, accelerations and forces. Of couples and inertias it is its
-    square.
-    """
-    sense: float = 1.0
-    """-1: angles and couples change their signs."""
-    turn: float = 0.0
-    """Angle that is added to directions in the world, rad."""
-    exchanged: bool = False
-    """Read from the other end."""
+    def mirror(number: SceneNumber, value: float) -> float:
+        has_sense = number.unit in ("rad", "N m") and number.bound == ANY_NUMBER
+        return -value if has_sense else value
 
-    @property
-    def square(self) -> float:
-        """Return the factor of couples and inertias."""
-        return self.length * self.length
-
-    def number(self, bar: int | None) -> int | None:
-        """Convert the number of a bar."""
-        return _OTHER_BAR.get(bar or 0, bar) if self.exchanged else bar
-
-    def pin(self, pin: str) -> str:
-        """Convert the name of a pin."""
-        return OTHER_PIN[pin] if self.exchanged else pin
-
-    def pair(self, pair: tuple[float, float]) -> tuple[float, float]:
-        """Convert a place or an arm of fixed direction from its bar's line."""
-        return self.length * pair[0], self.sense * pair[1]
-
-    def direction(self, angle: float, frame: str = "world", bar: int = 0) -> float:
-        """Convert the direction of a force, in the world or from a bar's line."""
-        if frame == "world":
-            return self.sense * angle + self.turn
-        # the coupler's line points the other way
-        return self.sense * angle + math.pi * (self.exchanged and bar == 3)
-
-    def place(self, place: Place) -> Place:
-        """Convert a place, which is a pair from the first pin of its bar."""
-        assert place.from_pin is not None
-        if not self.exchanged:
-            return Place(place.bar, self.pair(place.from_pin))
-        if place.bar in (2, 4):
-            return Place(_OTHER_BAR[place.bar], place.from_pin)
-        length = self.linkage.lengths[place.bar - 1]
-        return Place(place.bar, _from_other_end(length, place.from_pin))
-
-    def bar(self, number: int) -> Bar:
-        """Convert a bar; the coupler is read from its second pin."""
-        bar = self.linkage.bar(number)
-        assert bar.inertia is not None and bar.centre is not None
-        centre = bar.centre
-        if self.exchanged and number == 3:
-            centre = _from_other_end(bar.length, centre)
-        return copy_with(
-            bar,
-            length=self.length * bar.length,
-            inertia=self.square * bar.inertia,
-            centre=self.pair(centre),
-        )
-
-    def torsion(self, row: tuple[str, float, float, float]) -> tuple[Any, ...]:
-        """Convert the spring at a pin.
-
-        Read from the other end two bars at A or B change their order.
-        """
-        pin, stiffness, rest, preload = row
-        sense = self.sense
-        line = 0.0
-        if self.exchanged:
-            sense = -1.0 if pin in ("A", "B") else 1.0
-            line = -math.pi
-        couple = self.square * sense * preload
-        return self.pin(pin), self.square * stiffness, sense * rest + line, couple
-
-    def load(self, load: Load) -> Load:
-        """Convert a load that is no table."""
-        force = None
-        places: dict[str, Any] = {}
-        if load.force is not None:
-            size, angle = load.force
-            direction = self.direction(angle, load.frame, load.bar)
-            force = (self.length * size, direction)
-        if load.arm is not None:
-            distance, angle = load.arm
-            places["arm"] = (self.length * distance, self.direction(angle))
-        elif load.place is not None:
-            places["from_pin"] = self.place(load.place).from_pin
-        moment = self.square * self.sense * load.moment
-        bar = self.number(load.bar) or load.bar
-        return Load(bar, force, **places, moment=moment, frame=load.frame)
-
-    def term(self, term: Any) -> Any:
-        """Convert a load, an effect or the drive; None if it has no counterpart."""
-        match term:
-            case Load(table=None):
-                return self.load(term)
-            case Gravity():
-                size = self.length * term.magnitude
-                return Gravity(size, self.direction(term.angle))
-            case Viscous() | Friction():  # their couples have no sense of their own
-                rows = {self.pin(pin): self.square * x for pin, x in term.rows}
-                return type(term).at(**rows)
-            case PinFriction():
-                pins = (
-                    (self.pin(pin), mu, self.length * r) for pin, mu, r in term.pins
-                )
-                return PinFriction(tuple(pins))
-            case Springs():
-                return Springs(tuple(map(self.term, term.springs)))
-            case Spring():
-                return replace(
-                    term,
-                    start=self.place(term.start),
-                    end=self.place(term.end),
-                    length=self.length * term.length,
-                    preload=self.length * term.preload,
-                    stroke=None if term.stroke is None else self.length * term.stroke,
-                )
-            case Torsion():
-                return Torsion(tuple(map(self.torsion, term.springs)))
-            case Flywheel():
-                return Flywheel(self.square * term.inertia, self.number(term.bar) or 2)
-            case LinearDrive():
-                return LinearDrive(self.place(term.start), self.place(term.end))
-            case PointDrive(place, direction, frame):
-                turned = self.direction(direction, frame, place.bar)
-                return PointDrive(self.place(place), turned, frame)
-        return None
-
-
-def _from_other_end(length: float, pair: tuple[float, float]) -> tuple[float, float]:
-    """Return a place of a bar, (distance, angle), seen from its second pin."""
-    return cmath.polar(length - cmath.rect(*pair))
-
-
-_NOT_IN_PARTS = (Friction, PinFriction)
-"""Effects that are not the sum of what each adds."""
-
-
-def _convert(scene: Scene, **how: Any) -> Scene:
-    """State a scene otherwise."""
-    link = scene.linkage
-    to = _SceneConversion(link, **how)
-    bars = [to.bar(number) for number in MOVING_BARS]
-    theta_1 = to.sense * link.ground_angle + to.turn
-    if to.exchanged:
-        bars = bars[::-1]
-        theta_1 = theta_1 + math.pi
-    return copy_with(
-        scene,
-        linkage=_put_bars(link, bars, to.length * link.ground, theta_1),
-        drive_bar=to.number(scene.drive_bar),
-        loads=tuple(map(to.term, scene.loads)),
-        effects=tuple(map(to.term, scene.effects)),
-        drive=to.term(scene.drive),
-    )
-
-
-def _put_bars(
-    linkage: FourBar,
-    bars: Sequence[Bar],
-    ground: float,
-    ground_angle: float,
-) -> FourBar:
-    """Put other moving bars on another ground."""
-    two, three, four = bars
-    return copy_with(
-        linkage,
-        ground=ground,
-        input=two,
-        coupler=three,
-        output=four,
-        ground_angle=ground_angle,
-    )
-
-
-def _measure_mirrored(few: _Few) -> Array:
-    """Mirror at the x-axis: the sine changes its sign."""
     command = few.command
-    other = few.solve_alike(
-        _convert(few.scene, sense=-1.0),
+    other = few.solve(
+        _convert_numbers(few.scene, mirror),
         -1,
         angle=-command.angle,
         speed=-np.asarray(command.speed),
         acceleration=-np.asarray(command.acceleration),
     )
-
-    def convert(name: str) -> Array:
-        values: Array = getattr(other, name)
-        if name in PIN_FORCES:
-            return values * [1.0, -1.0]
-        if name in ("drive_force", "power"):
-            return values
-        return -values
-
-    return few.compare(convert)
+    theirs = {name: -getattr(other, name) for name in few.numbers}
+    for name in theirs.keys() & {*PIN_FORCES}:
+        theirs[name] = theirs[name] * [-1.0, 1.0]
+    for name in theirs.keys() & {"drive_force", "power"}:
+        theirs[name] = -theirs[name]
+    return few.compare(theirs)
 
 
-def _measure_turned(few: _Few) -> Array:
+def _measure_turned(few: _Few) -> dict[str, Array]:
     """Turn about O2."""
-    other = few.solve(
-        _convert(few.scene, turn=TURNED),
-        angle=few.command.angle + TURNED,
-    )
+    scene = few.scene
 
-    def convert(name: str) -> Array:
-        values: Array = getattr(other, name)
+    def turn(number: SceneNumber, value: float) -> float:
+        holder = read_place(scene, number.place[: 1 + (number.place[0] != "drive")])
+        of_bar = (
+            getattr(holder, "frame", "world") == "bar" and "arm" not in number.place
+        )
+        turns = number.unit == "rad" and not _IN_THE_WORLD.isdisjoint(number.place)
+        return value + TURNED if turns and not of_bar else value
+
+    other = few.solve(_convert_numbers(scene, turn), angle=few.command.angle + TURNED)
+    theirs = {name: getattr(other, name) for name in few.numbers}
+    for name, values in theirs.items():
         if name in PIN_FORCES:
             turned = (values @ [1.0, 1j]) * np.exp(-1j * TURNED)
-            return join_components(turned.real, turned.imag)
-        if name.startswith("theta"):
-            return values - TURNED
-        return values
-
-    return few.compare(convert)
+            theirs[name] = join_components(turned.real, turned.imag)
+        elif name.startswith("theta"):
+            theirs[name] = values - TURNED
+    return few.compare(theirs)
 
 
-def _measure_scaled(few: _Few) -> Array:
+def _measure_scaled(few: _Few) -> dict[str, Array]:
     """Multiply lengths, and what grows with them, by a power of two.
 
     Return what differs at all.
     """
-    other = few.solve(_convert(few.scene, length=SCALE))
-    power = {"N": SCALE, "N m": SCALE**2, "W": SCALE**2}
-    differences = []
-    for name, ours in zip(few.quantities, few.numbers, strict=True):
-        theirs = getattr(other, name) / power.get(UNITS[name], 1.0)
-        differences.append(theirs - ours)
-    return magnitudes(differences)
+
+    def scale(number: SceneNumber, value: float) -> float:
+        return value * _SCALES.get(number.unit, 1.0)
+
+    other = few.solve(_convert_numbers(few.scene, scale))
+    differences = {}
+    for name, ours in few.numbers.items():
+        theirs = getattr(other, name) / _SCALES.get(UNITS[name], 1.0)
+        differences[name] = magnitude(theirs - ours)
+    return differences
 
 
-def _measure_exchanged(few: _Few) -> Array:
+def _measure_exchanged(few: _Few) -> dict[str, Array]:
     """Read the linkage from O4.
 
     At its other end the ground points the other way, theta_1 + pi, and so does bar 3,
     with which sin(theta_4 - theta_2), the sine of a command of bar 3, changes its sign.
     """
     command = few.command
-    bar = _OTHER_BAR[command.bar]
-    reversed_ = bar == 3
-    other = few.solve_alike(
-        _convert(few.scene, exchanged=True),
-        -1 if reversed_ else 1,
-        angle=command.angle + math.pi if reversed_ else command.angle,
-        bar=bar,
+    bar = _OTHER_END.get(command.bar, command.bar)
+    angle = command.angle + math.pi if bar == 3 else command.angle
+    scene = read_from_other_end(few.scene)
+    other = few.solve(scene, -1 if bar == 3 else 1, angle=angle, bar=bar)
+    theirs = {}
+    for name in few.numbers:
+        values = getattr(other, _OTHER_END.get(name, name))
+        if name in ("F32", "F43"):
+            values = -values
+        theirs[name] = values - math.pi if name == "theta_3" else values
+    return few.compare(theirs)
+
+
+def read_from_other_end(scene: Scene) -> Scene:
+    """State a scene, its places from first pins, with bar 4 as the input."""
+    link = scene.linkage
+
+    def exchange(place: Place) -> Place:
+        pair = place.from_pin
+        if place.bar in _OTHER_END:
+            return Place(_OTHER_END[place.bar], pair)
+        length = link.lengths[place.bar - 1]
+        return Place(place.bar, _from_other_end(length, pair))
+
+    def exchange_term(term: Any) -> Any:
+        if isinstance(term, PinRows):
+            return type(term).at(**dict(map(exchange_row, term.rows)))
+        changed: dict[str, Any] = {}
+        place = getattr(term, "place", None)
+        if place is None and hasattr(term, "bar"):
+            changed["bar"] = _OTHER_END.get(term.bar, term.bar)
+        turned = math.pi * (getattr(term, "bar", place and place.bar) == 3)
+        if getattr(term, "frame", "world") == "bar":
+            # the coupler's line points the other way
+            if isinstance(term, PointDrive):
+                changed["direction"] = term.direction + turned
+            elif term.force is not None:
+                changed["force"] = (term.force[0], term.force[1] + turned)
+        return copy_with(term.with_places(exchange), **changed)
+
+    def exchange_row(row: tuple[Any, ...]) -> tuple[str, tuple[float, ...]]:
+        pin, *numbers = row
+        if len(numbers) == 3:  # a spring; two bars at A or B change their order
+            stiffness, rest, preload = numbers
+            sense = -1.0 if pin in ("A", "B") else 1.0
+            numbers = [stiffness, sense * rest - math.pi, sense * preload]
+        return _OTHER_END[pin], tuple(numbers)
+
+    two, three, four = link.moving
+    three = copy_with(three, centre=_from_other_end(three.length, three.centre))
+    theta_1 = link.ground_angle + math.pi
+    return copy_with(
+        scene,
+        linkage=_put_bars(link, (four, three, two), ground_angle=theta_1),
+        drive_bar=_OTHER_END.get(scene.drive_bar, scene.drive_bar),
+        loads=tuple(map(exchange_term, scene.loads)),
+        effects=tuple(map(exchange_term, scene.effects)),
+        drive=None if scene.drive is None else exchange_term(scene.drive),
     )
 
-    def convert(name: str) -> Array:
-        if name in PIN_FORCES:
-            same, sign = _OTHER_FORCE[name]
-            return np.asarray(sign * getattr(other, same))
-        values: Array
-        if name[:6] in ("theta_", "omega_", "alpha_"):
-            values = getattr(other, f"{name[:6]}{_OTHER_BAR[int(name[6])]}")
-            return values - math.pi if name == "theta_3" else values
-        values = getattr(other, name)
-        return values
 
-    return few.compare(convert)
+def _from_other_end(length: float, pair: Any) -> tuple[float, float]:
+    """Return a place of a bar, (distance, angle), seen from its second pin."""
+    return cmath.polar(length - cmath.rect(*pair))
 
 
-def _measure_superposed(few: _Few) -> Array:
+def _measure_superposed(few: _Few) -> dict[str, Array]:
     """Sum what each load and effect adds to the forces of inertia alone."""
     scene = few.scene
-    _require_linear(scene)
-    if len(scene.loads) + len(scene.effects) < 2:
-        raise NotAskedError("the scene has fewer than two loads and effects")
     bare = copy_with(scene, loads=(), effects=())
-    alone = [
-        *(copy_with(bare, loads=(load,)) for load in scene.loads),
-        *(copy_with(bare, effects=(effect,)) for effect in scene.effects),
-    ]
-    return _measure_sum(few, alone, bare)
+    alone = [copy_with(bare, loads=(load,)) for load in scene.loads]
+    alone += [copy_with(bare, effects=(effect,)) for effect in scene.effects]
+    _require_linear(scene)
+    if len(alone) < 2:
+        raise NotAskedError("the scene has fewer than two loads and effects")
+    # inertia acts in each of them, and once in the scene
+    return _measure_sum(few, [(1, part) for part in alone] + [(1 - len(alone), bare)])
 
 
-def _measure_split_masses(few: _Few) -> Array:
+def _measure_split_masses(few: _Few) -> dict[str, Array]:
     """Sum the forces of two bodies that make up each bar.
 
     All but gravity acts with one of them.
@@ -609,83 +463,51 @@ def _measure_split_masses(few: _Few) -> Array:
     if not any(bar.mass for bar in scene.linkage.moving):
         raise NotAskedError("no bar has a mass")
     weight = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
-    loaded = scene
     bare = copy_with(scene, loads=(), effects=weight)
-    parts = [
-        copy_with(part, linkage=_take_part(scene.linkage, share))
-        for part, share in ((loaded, PART), (bare, 1.0 - PART))
-    ]
+    bodies = ((scene, PART, 1.0 - PART), (bare, 1.0 - PART, -PART))
+    parts = []
+    for body, part, away in bodies:
+        bars = [_take_part(bar, part, away) for bar in scene.linkage.moving]
+        parts.append((1, copy_with(body, linkage=_put_bars(scene.linkage, bars))))
     return _measure_sum(few, parts)
 
 
-def _take_part(linkage: FourBar, part: float) -> FourBar:
-    """Take a part of each bar's mass: 0.3 on one side of the centre, or 0.7."""
-    bars = []
-    for bar in linkage.moving:
-        assert bar.inertia is not None and bar.centre is not None
-        mass = part * bar.mass
-        if bar.mass:
-            apart = MASSES_APART * math.sqrt(bar.inertia / bar.mass)
-        else:
-            apart = 0.0
-        # the inertia of both parts about the common centre, less what their distance
-        # makes
-        rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
-        away = apart * ((1.0 - PART) if part == PART else -PART)
-        centre = cmath.polar(cmath.rect(*bar.centre) + away)
-        bars.append(copy_with(bar, mass=mass, inertia=part * rest, centre=centre))
-    return _put_bars(linkage, bars, linkage.ground, linkage.ground_angle)
+def _take_part(bar: Bar, part: float, away: float) -> Bar:
+    """Take a part of a bar's mass, so many times MASSES_APART from the centre."""
+    assert bar.inertia is not None and bar.centre is not None
+    gyration = math.sqrt(bar.inertia / bar.mass) if bar.mass else 0.0
+    apart = MASSES_APART * gyration
+    # the inertia of both parts about the common centre, less what their distance makes
+    rest = bar.inertia - PART * (1.0 - PART) * bar.mass * apart * apart
+    centre = cmath.polar(cmath.rect(*bar.centre) + apart * away)
+    return copy_with(bar, mass=part * bar.mass, inertia=part * rest, centre=centre)
 
 
 def _require_linear(scene: Scene) -> None:
-    """Raise NotAskedError where forces are not the sum of their parts.
-
-    A part is what a load or an effect adds.
-    """
-    if any(isinstance(effect, _NOT_IN_PARTS) for effect in scene.effects):
+    """Raise NotAskedError where forces are not the sum of what each effect adds."""
+    if any(isinstance(effect, Friction | PinFriction) for effect in scene.effects):
         raise NotAskedError("forces with dry friction are no sum of what each adds")
 
 
-def _measure_sum(
-    few: _Few,
-    parts: Sequence[Scene],
-    bare: Scene | None = None,
-) -> Array:
-    """Compare the forces with the sum of what scenes have, (q, n).
-
-    What a bare scene has, if there is one, is taken off.
-    """
-    names = few.quantities[few.forces]
-    solved = [few.solve(part) for part in parts]
-    none = None if bare is None else few.solve(bare)
-    totals = []
-    summed = []
-    for name in names:
-        of_parts = np.array([getattr(part, name) for part in solved])
-        total = of_parts.sum(axis=0)
-        size = magnitudes(of_parts).sum(axis=0)
-        if none is not None:
-            nothing = getattr(none, name)
-            total = total - (len(parts) - 1) * nothing
-            size = size + len(parts) * magnitude(nothing)
-        totals.append(total)
-        summed.append(size)
-    scale, condition, terms = few.sizes.select(few.forces)
-    # what cancels within a part is among the terms of the whole
-    sizes = np.maximum(scale, np.maximum(summed, terms))
-    apart = compute_differences(names, few.numbers[few.forces], totals)
-    return divide(apart, sizes) * condition
+def _measure_sum(few: _Few, parts: list[tuple[int, Scene]]) -> dict[str, Array]:
+    """Compare the forces with the sum of multiples of those of scenes."""
+    solved = [(times, few.solve(part)) for times, part in parts]
+    totals = {}
+    sizes = []
+    for name in filter(_FORCES.__contains__, few.numbers):
+        of_parts = [times * getattr(part, name) for times, part in solved]
+        totals[name] = np.sum(of_parts, axis=0)
+        sizes.append(magnitudes(of_parts).sum(axis=0))
+    return few.compare(totals, sizes)
 
 
 class _Transformation(NamedTuple):
     """A way of stating a scene otherwise."""
 
-    measure: Callable[[_Few], Array]
-    """Errors of all quantities, or of forces alone, times their conditions, (q, n)."""
+    measure: Callable[[_Few], dict[str, Array]]
+    """Errors of each quantity that is compared, times its condition, (n,)."""
     reason: str
     """Why nothing may change, as the report prints it."""
-    of_forces: bool = False
-    """True if it compares forces alone."""
     exact: bool = False
     """True if no digit may change."""
 
@@ -709,12 +531,9 @@ TRANSFORMATIONS = {
     "superposed": _Transformation(
         _measure_superposed,
         "the forces of all loads and effects are the sum of what each adds",
-        of_forces=True,
     ),
     "split masses": _Transformation(
-        _measure_split_masses,
-        "a bar of two bodies has the forces of both",
-        of_forces=True,
+        _measure_split_masses, "a bar of two bodies has the forces of both"
     ),
 }
 """Ways of stating a scene otherwise, by the names of their rows."""
