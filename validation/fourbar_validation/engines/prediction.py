@@ -19,9 +19,8 @@ would excuse too much.
 
 import cmath
 import math
-from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -42,7 +41,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.description import find_unknown, list_speeds
 
 if TYPE_CHECKING:
-    from fourbar_validation.engines.balls import Ball, BallValues
+    from fourbar_validation.engines.balls import BallValues
 
 DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""
@@ -63,46 +62,74 @@ def predict_from_data(
     command: Command,
     quantity: str,
     mask: Mask | None = None,
+    *,
+    reach: float = 0.0,
+    carried: float = 0.0,
 ) -> Array:
-    """Predict for a derivation that works in angles and lengths themselves."""
-    return _predict_error(scene, command, quantity, 0.0, mask)
+    """Predict the absolute error of a quantity at each position, (n,).
+
+    As it stands it is that of a derivation that works in angles and lengths themselves.
+    NaN where the loop does not close. Infinite at a singular position, where the
+    equations have no answer, and where rounding decides whether the loop closes; but
+    there angles and places are bounded by how far the loop opens, and what the input
+    alone decides loses nothing.
+
+    Parameters
+    ----------
+    mask : chooses positions.
+    reach : length of the coordinates of which lever arms are differences, m.
+    carried : moment of inertia, kg m^2, that is accelerated as the fastest bar is, and
+        back again.
+    """
+    n = len(command.theta_2)
+    rates = list_speeds(command)
+    command = with_signs(scene.linkage, command)
+    errors = np.full(n, np.nan)
+    touching = mark_touching(scene.linkage, command.theta_2)
+    if quantity in OF_THE_INPUT:
+        touching[:] = False
+    for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
+        theta_2 = float(command.theta_2[i])
+        branch = int(command.branch[i])
+        moved = _compute_sensitivity(
+            scene, theta_2, branch, *(float(rate[i]) for rate in rates)
+        )
+        if touching[i]:
+            errors[i] = _bound_touching(scene.linkage, theta_2, quantity)
+        if moved is None:
+            continue
+        error = moved.first_order(quantity, reach, carried)
+        errors[i] = min(error, errors[i]) if touching[i] else error
+        if quantity in DRIVE_QUANTITIES:
+            turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
+            pulled = max(
+                moved.first_order(force, reach, carried) for force in PIN_FORCES
+            )
+            lever = sum_lengths(scene.linkage) if quantity == COUPLE.value else 1.0
+            errors[i] += pulled * turned * lever
+    return errors
 
 
-def predict_in_world_axes(
-    scene: Scene,
-    command: Command,
-    quantity: str,
-    mask: Mask | None = None,
-) -> Array:
+def predict_in_world_axes(scene: Scene, *asked: Any) -> Array:
     """Predict for an engine that differences points in world axes.
 
     Pinocchio's frame Jacobians do so.
     """
-    return _predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
+    return predict_from_data(scene, *asked, reach=sum_lengths(scene.linkage))
 
 
-def predict_for_free_bodies(
-    scene: Scene,
-    command: Command,
-    quantity: str,
-    mask: Mask | None = None,
-) -> Array:
+def predict_for_free_bodies(scene: Scene, *asked: Any) -> Array:
     """Predict for bodies in angles and lengths, with the line of a cylinder by points.
 
     The direction of that line is the difference of its ends in world axes, and its
     moments on two bars cancel where it nearly passes their common pin.
     """
-    by_points = isinstance(scene.drive, LinearDrive)
-    predict = predict_in_world_axes if by_points else predict_from_data
-    return predict(scene, command, quantity, mask)
+    if isinstance(scene.drive, LinearDrive):
+        return predict_in_world_axes(scene, *asked)
+    return predict_from_data(scene, *asked)
 
 
-def predict_about_mass_centre(
-    scene: Scene,
-    command: Command,
-    quantity: str,
-    mask: Mask | None = None,
-) -> Array:
+def predict_about_mass_centre(scene: Scene, *asked: Any) -> Array:
     """Predict for an engine that moves a tree about the common mass centre.
 
     MuJoCo moves it so; the mass centre is that of all bodies. Every bar is accelerated
@@ -113,83 +140,17 @@ def predict_about_mass_centre(
     furthest = max(abs(find_centre(bar)[0]) for bar in bars)
     reach = sum_lengths(scene.linkage) + furthest
     inertias = (max(find_mass(bar) * reach * reach, find_inertia(bar)) for bar in bars)
-    return _predict_error(scene, command, quantity, reach, mask, max(inertias))
+    return predict_from_data(scene, *asked, reach=reach, carried=max(inertias))
 
 
-def predict_for_any_method(
-    scene: Scene,
-    command: Command,
-    quantity: str,
-    mask: Mask | None = None,
-) -> Array:
+def predict_for_any_method(*asked: Any) -> Array:
     """Predict for an engine whose method nobody states: the worst of those above.
 
     Newton and Euler with moments about the mass centres are right, and lose the digits
     that a centre far from its pins takes.
     """
     methods = (predict_from_data, predict_in_world_axes, predict_about_mass_centre)
-    errors = [predict(scene, command, quantity, mask) for predict in methods]
-    return np.asarray(np.maximum.reduce(errors))
-
-
-def _predict_error(
-    scene: Scene,
-    command: Command,
-    quantity: str,
-    reach: float,
-    mask: Mask | None,
-    carried: float = 0.0,
-) -> Array:
-    """Predict the absolute error of a quantity at each position, (n,).
-
-    A mask chooses positions. `carried` is the moment of inertia, kg m^2, that is
-    accelerated as the fastest bar is, and back again. NaN where the loop does not
-    close. Infinite at a singular position, where the equations have no answer,
-    and where rounding decides whether the loop closes; but there angles and places are
-    bounded by how far the loop opens, and what the input alone decides loses nothing.
-    """
-    n = len(command.theta_2)
-    omega, alpha = list_speeds(command)
-    command = with_signs(scene.linkage, command)
-    errors = np.full(n, np.nan)
-    touching = mark_touching(scene.linkage, command.theta_2)
-    for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
-        theta_2 = float(command.theta_2[i])
-        branch = int(command.branch[i])
-        moved = _compute_sensitivity(
-            scene,
-            theta_2,
-            branch,
-            float(omega[i]),
-            float(alpha[i]),
-        )
-        if quantity in OF_THE_INPUT:
-            if moved is not None and moved.states(quantity):
-                errors[i] = moved.first_order(quantity, reach, carried)
-            continue
-        bound = math.inf
-        if touching[i]:
-            bound = _bound_touching(scene.linkage, theta_2, quantity)
-        if moved is None:
-            if touching[i]:
-                errors[i] = bound
-            continue
-        lost = RANDOM_WALK * EPS * moved.data["theta_4"] >= LARGEST_FIRST_ORDER * float(
-            moved.data["condition"]
-        )
-        if lost and STAGE_OF.get(quantity) != "position":
-            errors[i] = math.inf
-            continue
-        first = moved.first_order(quantity, reach, carried)
-        errors[i] = min(first, bound)
-        if quantity in DRIVE_QUANTITIES:
-            turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
-            pulled = max(
-                moved.first_order(force, reach, carried) for force in PIN_FORCES
-            )
-            lever = sum_lengths(scene.linkage) if quantity == COUPLE.value else 1.0
-            errors[i] += pulled * turned * lever
-    return errors
+    return np.asarray(np.maximum.reduce([predict(*asked) for predict in methods]))
 
 
 def _bound_touching(
@@ -239,13 +200,6 @@ class Sensitivities(NamedTuple):
     carried: dict[str, float]
     """Change by couples on the bars: 1 kg m^2 at the fastest bar's acceleration."""
 
-    def states(self, name: str) -> bool:
-        """Return whether the output has a value.
-
-        Where the linkage is singular only angles have one.
-        """
-        return (f"{name}_x" if name in VECTORS else name) in self.data
-
     def first_order(
         self,
         name: str,
@@ -254,13 +208,21 @@ class Sensitivities(NamedTuple):
     ) -> float:
         """Return the predicted error of an output; of a vector, the norm.
 
-        The error is infinite if the output has no prediction.
+        The error is infinite if the output has no prediction, NaN if the input alone
+        decides it: where the linkage is singular only angles have a value.
         """
+        missing = math.inf
+        if name in OF_THE_INPUT:
+            missing = math.nan
+        elif STAGE_OF.get(name) != "position":
+            of_angle = RANDOM_WALK * EPS * self.data["theta_4"]
+            if of_angle >= LARGEST_FIRST_ORDER * self.data["condition"]:
+                return math.inf
         parts = []
         name = "sin_mu" if name == "condition" else name
         for axis in ("_x", "_y") if name in VECTORS else ("",):
             component = name + axis
-            part = RANDOM_WALK * self.data.get(component, math.inf)
+            part = RANDOM_WALK * self.data.get(component, missing)
             part += reach * self.loop.get(component, 0.0)
             part += carried * self.carried.get(component, 0.0)
             parts.append(part)
@@ -276,24 +238,21 @@ def _compute_sensitivity(
     alpha_2: float,
 ) -> Sensitivities | None:
     """Compute the sensitivities at one position; None where the loop does not close."""
-    from flint import acb, arb
+    from flint import acb
 
-    from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, make_balls
+    from fourbar_validation.engines.balls import Responses, make_balls
 
     exact = make_balls(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
-    base = compute_outputs(scene, branch, exact)
+    responses = Responses(scene, branch, exact)
+    base = responses.base
     if base is None:
         return None
-    step = arb(2) ** -STEP_BITS
-
-    def move(**changed: "Ball") -> "BallValues | None":
-        return compute_outputs(scene, branch, exact | changed)
-
+    step = responses.step
     data = {}
     for name, value in base.items():
         data[name] = 1.0 if name.startswith("theta") else abs(float(value.mid()))
-    weights = _weigh_inputs({name: float(value) for name, value in exact.items()})
-    _add_responses(data, base, move, exact, weights)
+    stored = {name: float(value) for name, value in exact.items()}
+    responses.add_of_inputs(data, _weigh_inputs(stored))
     data["condition"] = float(base["condition"].mid())
     loop: dict[str, float] = {}
     carried: dict[str, float] = {}
@@ -303,11 +262,11 @@ def _compute_sensitivity(
         hardest += fastest * fastest
         for name in VECTORS:  # points of the bars, by their places in world axes
             if name.startswith("a_"):
-                loop[f"{name}_x"] = float(hardest)
-                loop[f"{name}_y"] = float(hardest)
+                loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for direction in (acb(1), acb(0, 1)):
-                _add_response(loop, base, move(**{name: most * step * direction}))
+                moved = responses.move(**{name: most * step * direction})
+                responses.add(loop, moved)
     drive = next((name for name in DRIVE_QUANTITIES if name in base), None)
     if drive is not None:
         strongest = max(
@@ -317,10 +276,9 @@ def _compute_sensitivity(
         lever = sum_lengths(scene.linkage) if drive == COUPLE.value else 1.0
         strongest += abs(base[drive]) / lever
         for bar in MOVING_BARS:
-            rounded = move(**{f"couple_{bar}": strongest * step})
-            _add_response(loop, base, rounded)
-            misplaced = move(**{f"couple_{bar}": hardest * step})
-            _add_response(carried, base, misplaced)
+            for total, size in ((loop, strongest), (carried, hardest)):
+                moved = responses.move(**{f"couple_{bar}": size * step})
+                responses.add(total, moved)
     return Sensitivities(data, loop, carried)
 
 
@@ -352,73 +310,16 @@ def compute_reference(
     """
     from flint import arb
 
-    from fourbar_validation.engines.balls import OF_PIECE, compute_outputs, make_balls
+    from fourbar_validation.engines.balls import OF_PIECE, Responses, make_balls
 
     exact = make_balls(scene, angle)
-    exact |= {
-        f"{name}_{k}": arb(1)
-        for k, load in enumerate(scene.loads)
-        if load.table
-        for name in OF_PIECE
-    }
-
-    def move(**changed: "Ball") -> "BallValues | None":
-        return compute_outputs(scene, branch, exact | changed)
-
-    base = move()
-    if base is None:
+    for k, load in enumerate(scene.loads):
+        if load.table:
+            exact |= {f"{name}_{k}": arb(1) for name in OF_PIECE}
+    responses = Responses(scene, branch, exact)
+    if responses.base is None:
         return None
-    sensitivity = dict.fromkeys(base, 0.0)
+    sensitivity = dict.fromkeys(responses.base, 0.0)
     weights = {name: abs(float(value)) for name, value in exact.items() if value != 0}
-    _add_responses(sensitivity, base, move, exact, weights)
-    return base, sensitivity
-
-
-def _add_responses(
-    total: dict[str, float],
-    base: "BallValues",
-    move: "Callable[..., BallValues | None]",
-    inputs: "BallValues",
-    weights: dict[str, float],
-) -> None:
-    """Add how far each output moves as each input moves by its weight.
-
-    The side is one on which the loop closes.
-    """
-    from flint import arb
-
-    from fourbar_validation.engines.balls import STEP_BITS
-
-    for name, weight in weights.items():
-        step = weight * arb(2) ** -STEP_BITS
-        sides = (move(**{name: inputs[name] + side * step}) for side in (1, -1))
-        _add_response(
-            total,
-            base,
-            next((moved for moved in sides if moved is not None), None),
-        )
-
-
-def _add_response(
-    total: dict[str, float],
-    base: "BallValues",
-    moved: "BallValues | None",
-) -> None:
-    """Add how far each output moves, in parts of 2^-STEP_BITS.
-
-    An output that has become singular moves infinitely far.
-    """
-    from flint import arb
-
-    from fourbar_validation.engines.balls import STEP_BITS
-
-    if moved is None:
-        return
-    for output, y in base.items():
-        rate = math.inf
-        if output in moved:
-            change = abs(moved[output] - y)
-            if output.startswith("theta") and change > 3:
-                change = 2 * arb.pi() - change
-            rate = abs(float((change * arb(2) ** STEP_BITS).mid()))
-        total[output] = total.get(output, 0.0) + rate
+    responses.add_of_inputs(sensitivity, weights)
+    return responses.base, sensitivity

@@ -268,10 +268,9 @@ def hold_fully(engine: Engine) -> Engine:
     """
     if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return engine
+    unstated: Predictor = predict_for_any_method
     if engine.answers_nearby:
         unstated = predict_from_data
-    else:
-        unstated = predict_for_any_method
     return replace(
         engine,
         tolerance=FULL_ACCURACY,
