@@ -221,9 +221,9 @@ def find_length(document: Mapping[str, Any]) -> object:
 def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
     """Choose the factor from SI and the unit, or a suitable prefix.
 
-    The prefix suits the largest magnitude; a rate has none.
+    The prefix suits the largest magnitude; a rate has none, and no pure number "1".
     """
-    if unit in units or "/" in unit:
+    if unit in units or unit == "1" or "/" in unit:
         name, factor = find_unit_in(unit, units)
         return factor, name.replace("^2", "²")
     if not math.isfinite(largest) or largest <= 0.0:

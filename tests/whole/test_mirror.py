@@ -48,9 +48,7 @@ JUDGED_BY = {
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
-    "fourbar/show/plot/test_curves.py": (
-        "fourbar/show/plot: derived_curves traced_paths"
-    ),
+    "fourbar/show/plot/test_curves.py": "fourbar/show/plot: traced_paths",
     "fourbar/show/plot/test_plot.py": (
         "fourbar/show/plot: figures freebody labels linkage_figure style"
         " tolerance_figures view"

@@ -1,10 +1,11 @@
 """Curves over what is commanded or over time.
 
-Angles and rates, points, torque, energy and transmission angle are drawn.
+Angles and rates, points, torque, energy, transmission angle, shaking force and moment,
+and ratios are drawn.
 """
 
 import math
-import re
+from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import cycle
 from operator import itemgetter
@@ -54,7 +55,6 @@ CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
 _Indices = NDArray[np.intp]
 _SUBSCRIPTS = {2: "₂", 3: "₃", 4: "₄"}
-_BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 _POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
@@ -79,22 +79,14 @@ def draw_axes(axes: "Axes", view: View) -> Array:
         set_degree_ticks(axes.xaxis, high - low)
     edges = np.flatnonzero(np.diff([False, *~view.sweep.assembled, False]))
     between = np.array([low, *0.5 * (over[:-1] + over[1:]), high])
-    look: dict[str, Any] = {"fc": "#f1f1f1", "ec": FAINT, "hatch": "////", "lw": 0.0}
     for start, stop in between[edges].reshape(-1, 2):
-        axes.axvspan(start, stop, zorder=0, **look)
+        axes.axvspan(start, stop, zorder=0, fc="#f1f1f1", ec=FAINT, hatch="////", lw=0)
     if edges.size:
-        note(view, "Hatched: the linkage does not assemble.")
+        view.note("Hatched: the linkage does not assemble.")
     if low < here < high:
         axes.axvline(here, color=MUTED, lw=0.8, ls=(0, (2, 2)), zorder=1)
-        note(view, f"Dashed upright line: {view.at}.")
+        view.note(f"Dashed upright line: {view.at}.")
     return over
-
-
-def note(view: View, text: str) -> None:
-    """Add a note to the caption, once; its numbers stay on one line with units."""
-    text = _BINDING.sub("\u00a0", text)
-    if text not in view.notes:
-        view.notes.append(text)
 
 
 def find_poles(view: View) -> _Indices:
@@ -126,20 +118,9 @@ def break_at_poles(values: Array, poles: _Indices) -> Array:
     return np.insert(np.where(np.isfinite(values), values, np.nan), poles + 1, np.nan)
 
 
-def plot_between_poles(
-    axes: "Axes",
-    over: Array,
-    values: Array,
-    poles: _Indices,
-    **look: Any,
-) -> None:
-    """Plot a curve that no line takes across a pole."""
-    axes.plot(break_at_poles(over, poles), break_at_poles(values, poles), **look)
-
-
-def choose_limit(values: list[Array]) -> float | None:
+def choose_limit(values: Iterable[Array]) -> float | None:
     """Choose the end of a clipped axis; None if no value stands far out."""
-    sizes = np.abs(np.concatenate(values))
+    sizes = np.abs(np.concatenate([*values]))
     sizes = sizes[np.isfinite(sizes)]
     ordinary = float(np.percentile(sizes, ORDINARY_PERCENTILE)) if sizes.size else 0.0
     if sizes.max(initial=0.0) > OUTLIER * ordinary > 0.0:
@@ -147,46 +128,75 @@ def choose_limit(values: list[Array]) -> float | None:
     return None
 
 
-def choose_scale(
-    values: list[Array], unit: str, view: View
-) -> tuple[float | None, float, str]:
-    """Choose the end of a clipped axis, the factor to its unit, and the unit."""
-    limit = choose_limit(values)
-    return limit, *choose_unit(limit or largest_magnitude(*values), unit, view.units)
+class _Chart:
+    """Curves of one SI unit in axes that end short of what diverges.
 
+    Parameters
+    ----------
+    curves : values by the name that a note gives them.
+    sized : name of the one that scales the axis; left out: all do.
+    """
 
-def clip(
-    axes: "Axes",
-    view: View,
-    curves: dict[str, Array],
-    limit: float | None,
-    what: str,
-    unit: str,
-) -> None:
-    """End the axis short of what diverges, and say so; `unit` is that of SI."""
-    if limit is None:
-        return
-    factor, name_of_unit = choose_unit(limit, unit, view.units)
-    lowest = min(float(np.nanmin(value)) for value in curves.values())
-    axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
-    name = max(curves, key=lambda name: largest_magnitude(curves[name]))
-    worst = curves[name]
-    index = find_peak_index(worst)
-    if abs(worst[index]) <= limit:
-        return
-    words = view.axis.words(view.sweep.at.places[index], 5)
-    if view.time is not None:
-        words = f"t = {view.time[index]:.4g} s"
-    edge = f"{write_number(limit * factor)} {name_of_unit}"
-    largest = write_labelled_quantity(worst[index], unit, view.units)
-    if unit == "1":
-        edge = edge.removesuffix(" 1")
-        largest = largest.removesuffix(" 1")
-    note(
-        view,
-        f"{what} clipped at {edge}; the largest evaluated, {name} = {largest}, is at"
-        f" {words}.",
-    )
+    def __init__(
+        self,
+        axes: "Axes",
+        view: View,
+        si: str,
+        curves: dict[str, Array],
+        sized: str | None = None,
+    ) -> None:
+        self.axes = axes
+        self.view = view
+        self.si = si
+        self.curves = curves
+        self.over = draw_axes(axes, view)
+        values = [curves[sized]] if sized else [*curves.values()]
+        self.limit = choose_limit(values)
+        largest = self.limit or largest_magnitude(*values)
+        self.factor, self.unit = choose_unit(largest, si, view.units)
+
+    def plot(self, values: Array, poles: _Indices | None = None, **look: Any) -> None:
+        """Plot a curve that no line takes across a pole."""
+        if poles is None:
+            poles = np.empty(0, dtype=np.intp)
+        over = break_at_poles(self.over, poles)
+        self.axes.plot(over, break_at_poles(self.factor * values, poles), **look)
+
+    def finish(self, symbol: str, title: str, what: str, *, sizes: bool) -> None:
+        """Name the axis, and clip it.
+
+        `what`: is clipped. `sizes`: the axis begins at zero.
+        """
+        if sizes:
+            self.axes.set_ylim(bottom=0.0)
+        else:
+            draw_zero_line(self.axes)
+        named = symbol if self.si == "1" else f"{symbol} ({self.unit})"
+        self.axes.set(ylabel=named, title=title)
+        if self.limit is not None:
+            self._clip(what, self.limit)
+
+    def _clip(self, what: str, limit: float) -> None:
+        """End the axis at a limit, and say what lies beyond."""
+        view = self.view
+        lowest = min(float(np.nanmin(values)) for values in self.curves.values())
+        edge = limit * self.factor
+        self.axes.set_ylim(0.0 if lowest >= 0.0 else -edge, edge)
+        sizes = {name: largest_magnitude(one) for name, one in self.curves.items()}
+        name = max(sizes, key=lambda name: sizes[name])
+        if sizes[name] <= limit:
+            return
+        worst = self.curves[name]
+        index = find_peak_index(worst)
+        words = view.axis.words(view.sweep.at.places[index], 5)
+        if view.time is not None:
+            words = f"t = {view.time[index]:.4g} s"
+        end = f"{write_number(edge)} {self.unit}".removesuffix(" 1")
+        largest = write_labelled_quantity(worst[index], self.si, view.units)
+        view.note(
+            f"{what} clipped at {end}; the largest evaluated, {name} ="
+            f" {largest.removesuffix(' 1')}, is at {words}."
+        )
 
 
 def draw_angles(axes: "Axes", view: View) -> None:
@@ -217,23 +227,18 @@ def _draw_rates(
     what: str,
 ) -> None:
     """Draw the rates of the bars; those of the commanded bar are left out if zero."""
-    over = draw_axes(axes, view)
     driven = view.sweep.at.bar
+    rates = {bar: getattr(view.sweep, f"{letter}_{bar}") for bar in MOVING_BARS}
+    commanded = rates.pop(driven)
     name = {"omega": "ω", "alpha": "α"}[letter]
-    factor, shown_unit = choose_unit(0.0, unit, view.units)
-    curves = {}
-    for bar in sorted(MOVING_BARS, key=lambda bar: bar != driven):
-        values = getattr(view.sweep, f"{letter}_{bar}")
-        look = choose_bar_line(bar)
-        if bar == driven:
-            look |= {"ls": "-", "lw": 1.0}
-        else:
-            curves[f"{name}{_SUBSCRIPTS[bar]}"] = values
-        if bar != driven or np.any(values):
-            axes.plot(over, factor * values, label=rf"$\{letter}_{bar}$", **look)
-    draw_zero_line(axes)
-    axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
-    clip(axes, view, curves, choose_limit([*curves.values()]), what, unit)
+    curves = {f"{name}{_SUBSCRIPTS[bar]}": rate for bar, rate in rates.items()}
+    chart = _Chart(axes, view, unit, curves)
+    if np.any(commanded):
+        look = {**choose_bar_line(driven), "ls": "-", "lw": 1.0}
+        chart.plot(commanded, label=rf"$\{letter}_{driven}$", **look)
+    for bar, rate in rates.items():
+        chart.plot(rate, label=rf"$\{letter}_{bar}$", **choose_bar_line(bar))
+    chart.finish(rf"$\{letter}$", title, what, sizes=False)
     place_legend(axes)
 
 
@@ -261,23 +266,21 @@ def _draw_point_sizes(
     title: str,
 ) -> None:
     """Draw the sizes at A, B, the mass centres and the scene's own points."""
-    over = draw_axes(axes, view)
     vectors = collect_point_vectors(view.scene, view.sweep, letter)
     curves = {name: np.hypot(*vector.T) for name, vector in vectors.items()}
-    limit, factor, shown_unit = choose_scale([*curves.values()], unit, view)
+    chart = _Chart(axes, view, unit, curves)
     colours = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4]}
     colours |= {f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}
     all_dashes = cycle(("-", "--", "-.", ":"))
     for (name, values), dashes in zip(curves.items(), all_dashes, strict=False):
-        look: dict[str, Any] = {
-            "color": colours.get(name, FORCE_COLOURS["F43"]),
-            "ls": ":" if name[0] == "G" else dashes,
-            "lw": 2.0 if name in view.sweep.points else 1.2,
-        }
-        axes.plot(over, factor * values, label=name, **look)
-    axes.set_ylim(bottom=0.0)
-    axes.set(ylabel=f"$|{letter}|$ ({shown_unit})", title=title)
-    clip(axes, view, curves, limit, title, unit)
+        chart.plot(
+            values,
+            label=name,
+            color=colours.get(name, FORCE_COLOURS["F43"]),
+            ls=":" if name[0] == "G" else dashes,
+            lw=2.0 if name in view.sweep.points else 1.2,
+        )
+    chart.finish(f"$|{letter}|$", title, title, sizes=True)
     place_legend(axes, 6)
 
 
@@ -304,11 +307,7 @@ def _draw_drive(
     what: str,
 ) -> None:
     """Draw a quantity of the drive, with its poles."""
-    over = draw_axes(axes, view)
     bar = view.scene.drive_bar
-    poles = find_poles(view)
-    values = getattr(view.sweep, name)
-    limit, factor, shown_unit = choose_scale([values], unit, view)
     symbol = f"${letter}$"
     curve_name = letter
     on_bar = ""
@@ -318,18 +317,18 @@ def _draw_drive(
         curve_name = f"{letter}{_SUBSCRIPTS[bar]}"
         on_bar = f" on bar {bar}"
         poles_of = f"torque{on_bar} ({_POLE_REASON[bar]})"
-    plot_between_poles(axes, over, factor * values, poles, color=INK, label=symbol)
+    values = getattr(view.sweep, name)
+    chart = _Chart(axes, view, unit, {curve_name: values})
+    poles = find_poles(view)
+    chart.plot(values, poles, color=INK, label=symbol)
     for index in poles:
-        middle = 0.5 * float(over[index] + over[index + 1])
+        middle = 0.5 * float(chart.over[index] + chart.over[index + 1])
         axes.axvline(middle, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if poles.size:
-        note(view, f"Dotted: poles of the {poles_of}.")
-    draw_zero_line(axes)
-    title = f"{what} of the drive{on_bar}"
-    axes.set(ylabel=f"{symbol} ({shown_unit})", title=title)
-    if limit is None:  # a clipped axis says its largest value in the caption
-        mark_peak(axes, over, factor * values, shown_unit)
-    clip(axes, view, {curve_name: values}, limit, what, unit)
+        view.note(f"Dotted: poles of the {poles_of}.")
+    chart.finish(symbol, f"{what} of the drive{on_bar}", what, sizes=False)
+    if chart.limit is None:  # a clipped axis says its largest value in the caption
+        mark_peak(axes, chart.over, chart.factor * values, chart.unit)
 
 
 def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
@@ -376,16 +375,12 @@ def draw_stroke(axes: "Axes", view: View) -> None:
 
 def draw_forces(axes: "Axes", view: View) -> None:
     """Draw the magnitudes of the four pin forces."""
-    over = draw_axes(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
-    limit, factor, unit = choose_scale([*sizes.values()], "N", view)
+    chart = _Chart(axes, view, "N", sizes)
     poles = find_poles(view)
     for name, values in sizes.items():
-        look = choose_force_line(name)
-        plot_between_poles(axes, over, factor * values, poles, **look)
-    axes.set_ylim(bottom=0.0)
-    axes.set(ylabel=f"$|F|$ ({unit})", title="Pin forces")
-    clip(axes, view, sizes, limit, "Pin forces", "N")
+        chart.plot(values, poles, **choose_force_line(name))
+    chart.finish("$|F|$", "Pin forces", "Pin forces", sizes=True)
     place_legend(axes)
 
 
@@ -399,20 +394,81 @@ def draw_energy(axes: "Axes", view: View) -> None:
     for number, (name, values) in enumerate(energies.work.items()):
         # after all colours with their dashes, the colours with the next ones
         turn, column = divmod(number, len(PIN_FORCES))
-        dashes = PIN_FORCES[(column + turn) % len(PIN_FORCES)]
-        look: dict[str, Any] = {
-            "color": FORCE_COLOURS[PIN_FORCES[column]],
-            "ls": FORCE_DASHES[dashes],
-        }
-        axes.plot(over, factor * values, label=name.replace("_", " "), **look)
+        colour = FORCE_COLOURS[PIN_FORCES[column]]
+        dashes = FORCE_DASHES[PIN_FORCES[(column + turn) % len(PIN_FORCES)]]
+        label = name.replace("_", " ")
+        axes.plot(over, factor * values, label=label, color=colour, ls=dashes)
     draw_zero_line(axes)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy and work")
     place_legend(axes, 3)
-    note(
-        view,
+    view.note(
         "The kinetic energy has grown by the work that loads and effects have done"
-        " since the release.",
+        " since the release."
     )
+
+
+_FORCE_LOOKS: dict[str, dict[str, Any]] = {
+    "|F|": {"color": INK, "ls": "-"},
+    "F_x": {"color": BAR_COLOURS[2], "ls": (0, (4, 1.5))},
+    "F_y": {"color": BAR_COLOURS[4], "ls": (0, (1, 1))},
+}
+
+
+def draw_shaking_force(axes: "Axes", view: View) -> None:
+    """Draw the force on the frame: its size and its components."""
+    x, y = derive(view.sweep, "shaking_force").T
+    curves = {"|F|": np.hypot(x, y), "F_x": x, "F_y": y}
+    chart = _Chart(axes, view, "N", curves, "|F|")
+    poles = find_poles(view)
+    for name, look in _FORCE_LOOKS.items():
+        chart.plot(curves[name], poles, label=f"${name}$", **look)
+    chart.finish("$F$", "Shaking force on the frame", "Shaking force", sizes=False)
+    place_legend(axes)
+
+
+def draw_shaking_moment(axes: "Axes", view: View) -> None:
+    """Draw the moment on the frame about O2."""
+    moment = derive(view.sweep, "shaking_moment")
+    chart = _Chart(axes, view, "N m", {"M": moment})
+    chart.plot(moment, find_poles(view), color=INK)
+    title = "Shaking moment about $O_2$"
+    chart.finish("$M$", title, "Shaking moment", sizes=False)
+
+
+def draw_speed_ratios(axes: "Axes", view: View) -> None:
+    """Draw the ratios of the speeds of coupler and output to that of the input."""
+    ratios = {3: ("ω₃/ω₂", "omega_3/omega_2"), 4: ("ω₄/ω₂", "omega_4/omega_2")}
+    _draw_ratios(axes, view, ratios, "ratio", "Speed ratios")
+    place_legend(axes)
+
+
+def draw_advantage(axes: "Axes", view: View) -> None:
+    """Draw the mechanical advantage, the torque of the output to that of the input."""
+    ratio = {2: ("T₄/T₂", "mechanical_advantage")}
+    _draw_ratios(axes, view, ratio, "T₄/T₂", "Mechanical advantage")
+
+
+def _draw_ratios(
+    axes: "Axes",
+    view: View,
+    ratios: dict[int, tuple[str, str]],
+    symbol: str,
+    title: str,
+) -> None:
+    """Draw ratios, with label and name, by the bars whose colours they have.
+
+    No line goes on beyond a pole.
+    """
+    curves = {label: derive(view.sweep, name) for label, name in ratios.values()}
+    chart = _Chart(axes, view, "1", curves)
+    for bar, (label, values) in zip(ratios, curves.items(), strict=True):
+        before = values[:-1]
+        after = values[1:]
+        # a ratio changes its sign at a pole, where it is large, or at zero
+        is_large = np.minimum(np.abs(before), np.abs(after)) > 1.0
+        poles = np.flatnonzero((before * after < 0.0) & is_large)
+        chart.plot(values, poles, label=label, **choose_bar_line(bar))
+    chart.finish(symbol, title, "Ratio", sizes=False)
 
 
 _RECOMMENDED = 40.0
@@ -434,14 +490,15 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     axes.plot(over, mu, color=INK)
     axes.axhline(_RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = find_free_place(mu)
-    corner = (over[0] + place * (over[-1] - over[0]), _RECOMMENDED)
-    look: dict[str, Any] = {
-        "textcoords": "offset points",
-        "ha": "center",
-        "size": 7.0,
-        "color": MUTED,
-    }
-    axes.annotate(f"{_RECOMMENDED:g}° recommended", corner, xytext=(0, 2), **look)
+    axes.annotate(
+        f"{_RECOMMENDED:g}° recommended",
+        (over[0] + place * (over[-1] - over[0]), _RECOMMENDED),
+        xytext=(0, 2),
+        textcoords="offset points",
+        ha="center",
+        size=7.0,
+        color=MUTED,
+    )
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
     ring: dict[str, Any] = {"ms": 6.0, "mew": 1.1, "clip_on": False, **RING_MARK}
     for theta, height, marker, name in _list_marked(view):
@@ -469,26 +526,26 @@ def find_free_place(mu: Array) -> float:
     return best[1]
 
 
-def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
+def _list_marked(view: View) -> Iterator[tuple[list[float], list[float], str, str]]:
     """List limits of the commanded bar and dead centres, on the axis.
 
     An entry has place, mu (degrees), mark and name.
     """
     if view.time is not None:
-        return []
+        return
     positions = view.sweep.at
     linkage = view.scene.linkage
+    commanded = positions.bar
     degrees = np.degrees(positions.angle)
-    order = np.argsort(degrees)
-    margin = 0.0
+    beside = 0.0
     if len(degrees) > 1:
-        margin = 1.5 * float(np.median(np.abs(np.diff(degrees))))
-    one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
-    signs = find_signs(linkage, positions.angle, positions.branch, positions.bar)
-
-    marked = list[tuple[list[float], list[float], str, str]]()
-    for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):
-        is_commanded = bar == positions.bar
+        beside = 1.5 * float(np.median(np.abs(np.diff(degrees))))
+    one, follower = (bar for bar in MOVING_BARS if bar != commanded)
+    signs = find_signs(linkage, positions.angle, positions.branch, commanded)
+    for bar in dict.fromkeys((commanded, 2, 4)):
+        margin = beside if bar == commanded else 0.0
+        low = float(degrees.min()) - margin
+        high = float(degrees.max()) + margin
         places = list[float]()
         heights = list[float]()
         for limit in limit_positions(linkage, bar):
@@ -496,28 +553,20 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
             sign = math.copysign(1.0, math.sin(theta[follower] - theta[one]))
             difference = theta[4] - theta[3]
             mu = math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))
-            angle = theta[positions.bar]
-            for place in _list_inside(degrees, angle, margin if is_commanded else 0.0):
+            start = math.degrees(theta[commanded])
+            first = math.ceil((low - start) / 360.0)
+            last = math.floor((high - start) / 360.0)
+            for turn in range(first, last + 1):
+                place = start + 360.0 * turn
                 nearest = np.argmin(np.abs(degrees - place))
-                if is_commanded or signs[nearest] == sign:
+                if bar == commanded or signs[nearest] == sign:
                     places.append(place)
                     heights.append(math.degrees(mu))
         # over a stroke its bar's angle rises or falls throughout
         if positions.moves_stroke:
+            order = np.argsort(degrees)
             places = np.interp(places, degrees[order], view.axis.values[order]).tolist()
-        if not places:
-            continue
-        pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
-        mark, word = ("s", "limit") if is_commanded else ("D", "dead centre")
-        marked.append((places, heights, mark, f"{word}: bars {pair} in line"))
-    return marked
-
-
-def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
-    """List an angle (rad) and its full turns that lie in the sweep, degrees."""
-    low = float(angles.min()) - margin
-    high = float(angles.max()) + margin
-    start = math.degrees(angle)
-    first = math.ceil((low - start) / 360.0)
-    last = math.floor((high - start) / 360.0)
-    return [start + 360.0 * turn for turn in range(first, last + 1)]
+        if places:
+            mark, word = ("s", "limit") if bar == commanded else ("D", "dead centre")
+            pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
+            yield places, heights, mark, f"{word}: bars {pair} in line"

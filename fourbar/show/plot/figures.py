@@ -11,7 +11,7 @@ from fourbar.linkage import require
 from fourbar.scene import Scene
 from fourbar.show.columns import explain_static
 from fourbar.show.motion_curves import describe_motion
-from fourbar.show.plot import curves, derived_curves, freebody, linkage_figure
+from fourbar.show.plot import curves, freebody, linkage_figure
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION_STYLE,
@@ -35,7 +35,7 @@ _DRAWINGS: dict[str, Callable[["Axes", View, Labels], None]] = {
     "linkage": linkage_figure.draw_linkage,
     "moving linkage": partial(linkage_figure.draw_linkage, moving=True),
     "coupler": linkage_figure.draw_coupler_curves,
-    "centres": derived_curves.draw_centres,
+    "centres": linkage_figure.draw_centres,
 }
 """Panels that are drawn to scale."""
 _CURVES: dict[str, Callable[["Axes", View], None]] = {
@@ -50,10 +50,10 @@ _CURVES: dict[str, Callable[["Axes", View], None]] = {
     "stroke": curves.draw_stroke,
     "forces": curves.draw_forces,
     "mu": curves.draw_transmission,
-    "shaking force": derived_curves.draw_shaking_force,
-    "shaking moment": derived_curves.draw_shaking_moment,
-    "ratios": derived_curves.draw_speed_ratios,
-    "advantage": derived_curves.draw_advantage,
+    "shaking force": curves.draw_shaking_force,
+    "shaking moment": curves.draw_shaking_moment,
+    "ratios": curves.draw_speed_ratios,
+    "advantage": curves.draw_advantage,
 }
 """Panels of curves, in the order in which their notes are written."""
 

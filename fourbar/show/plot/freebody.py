@@ -15,7 +15,6 @@ from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import Scene
 from fourbar.show.motion_curves import describe_motion
-from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage_figure import (
     draw_mass_centre,
@@ -205,7 +204,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     windows = [_find_window(view, bar, arrows, scale) for bar, arrows, _ in freed]
     # one window size: the bars, too, are to one scale
     span = LABEL_SPACE * max(float(np.ptp(window, axis=0).max()) for window in windows)
-    note(view, f"At {view.at}.")
+    view.note(f"At {view.at}.")
     for axes, text, (bar, arrows, couples), window in zip(
         panels, below, freed, windows, strict=True
     ):
@@ -214,8 +213,7 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)
-    note(
-        view,
+    view.note(
         "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a"
         " at G (d'Alembert), with which the forces and the moments on each bar add up"
         " to zero.",
@@ -269,9 +267,8 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
         foot = write_labelled_quantity(worst.x, "m", view.units)
         spread = "as a uniform bar's" if forces.uniform else "at G"
         spread = f"weight and inertia {spread}"
-        note(view, f"Bar {bar}: largest |M| {largest} at x = {foot}, {spread}.")
-    note(
-        view,
+        view.note(f"Bar {bar}: largest |M| {largest} at x = {foot}, {spread}.")
+    view.note(
         "x runs along the line between the pins, y to its left; N > 0 is tension.",
     )
 
@@ -341,7 +338,7 @@ def _draw_one(
         text = f"{arrow.text} = {value}"
         labels.add(Label(axes, text, tip, arrow.at, arrow.colour, 7.5))
     if short:
-        note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
+        view.note(f"Too short to draw on bar {bar}: {', '.join(short)}.")
     described = view.scene.linkage.bar(bar)
     if described.mass > 0.0:
         G = _take_one(described.to_centre * view.state().direction(bar))

@@ -1,4 +1,4 @@
-"""The linkage drawn to scale over the paths of its points; coupler curves.
+"""The linkage drawn to scale over the paths of its points; coupler curves, centres.
 
 Plots and films draw it alike.
 """
@@ -12,6 +12,7 @@ import numpy as np
 
 from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.quantities import Array
+from fourbar.show.derived import derive
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import (
     BAR_COLOURS,
@@ -23,6 +24,7 @@ from fourbar.show.plot.style import (
     Points,
     join_points,
     largest_magnitude,
+    place_legend,
     plot_points,
     split_points,
     write_labelled_quantity,
@@ -426,3 +428,32 @@ def _list_coupler_points(
     yield "$B$", sweep.A + along
     for name, v in {"0.5, +0.5": 0.5, "0.5, −0.5": -0.5}.items():
         yield name, sweep.A + 0.5 * along + v * across
+
+
+FARTHEST_CENTRE = 1.5
+"""Instant centres are drawn up to this multiple of the linkage's size from it."""
+
+
+def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
+    """Draw the paths of the instant centres I13 and I24 near the linkage."""
+    factor, unit, _ = choose_drawing_scale(view)
+    middle = sum(locate_pins(view).values()) / 4.0
+    reach = FARTHEST_CENTRE * max(view.scene.linkage.lengths)
+    for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
+        path, here = (
+            join_points(derive(solution, name)) for solution in (view.sweep, view.here)
+        )
+        near = factor * np.where(np.abs(path - middle) <= reach, path, np.nan)
+        label = f"$I_{{{name[1:]}}}$"
+        plot_points(axes, near, color=colour, ls=dashes, lw=1.2, label=label)
+        if np.abs(here - middle) <= reach:
+            plot_points(axes, factor * here, "o", ms=4.5, color=colour, zorder=6)
+    draw_mechanism(axes, view, view.here, 0, labels)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(color=MUTED, alpha=0.2)
+    title = f"Instant centres at {view.at}"
+    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
+    place_legend(axes)
+    view.note(
+        f"Centres further than {FARTHEST_CENTRE:g} longest bars away are left out.",
+    )

@@ -4,6 +4,7 @@ The position is shown in detail.
 """
 
 import math
+import re
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -20,6 +21,8 @@ from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
 
+_BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
+"""Blanks of a note that stay on one line with what stands beside them."""
 CLEAR = 0.3
 """Motion and drive condition that the drawn position should have. Next to a pole forces
 dwarf all others.
@@ -91,6 +94,12 @@ class View:
     def branch_name(self) -> str:
         """Return "open" or "crossed", the assembly that the scene states."""
         return BRANCH_NAMES[self.scene.motion.branch]
+
+    def note(self, text: str) -> None:
+        """Add a note to the caption, once; its numbers stay on one line with units."""
+        text = _BINDING.sub("\u00a0", text)
+        if text not in self.notes:
+            self.notes.append(text)
 
     def state(self) -> State:
         """Return the kinematics at the position drawn."""
