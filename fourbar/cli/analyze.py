@@ -400,7 +400,7 @@ def _write_summary(
     from fourbar.studies.course import follow
 
     if not asked:
-        block = write_block(scene, solution, units, pressure=pressure, width=width)
+        block = write_block(solution, units, pressure=pressure, width=width)
         return "\n".join([*block, *write_paths(solution, units), ""])
     lines: list[str] = []
     headed = True
@@ -410,9 +410,7 @@ def _write_summary(
             continue
         one = solve(scene, find_last_stage(scene), at=at)
         follow(scene, one)
-        block = write_block(
-            scene, one, units, pressure=pressure, headed=headed, width=width
-        )
+        block = write_block(one, units, pressure=pressure, headed=headed, width=width)
         headed = False
         lines += [*block, ""]
     return "\n".join(lines)
@@ -433,8 +431,8 @@ def _write_positions(
         list_spring_notes,
         list_torsion_notes,
     )
-    from fourbar.show.block import list_duty
     from fourbar.show.columns import choose_columns
+    from fourbar.show.duty import list_duty
     from fourbar.show.path_rows import collect_paths
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json

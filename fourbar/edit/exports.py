@@ -32,7 +32,7 @@ from fourbar.show.animate import collect_live_data
 from fourbar.show.block import write_facts
 from fourbar.show.shown_units import COMMON
 from fourbar.show.studies import write_type
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts
 from fourbar.solution import Conversion, write_csv
 from fourbar.solving import find_last_stage, solve
 from fourbar.studies.passing import say_nowhere
@@ -95,7 +95,7 @@ def evaluate_scene(
     shown_units = {**COMMON, **units}
     facts = None
     if settled:  # what `analyze` and `classify` print
-        facts = summarize(scene, solution)
+        facts = Facts(solution)
         block = write_facts(facts, shown_units, pressure=pressure)
         limits = write_type(scene.linkage, shown_units, everything=True)
         data["summary"] = [*block, "", *limits]

@@ -38,7 +38,7 @@ from fourbar.scene.motion import (
 )
 from fourbar.scene.pictures import TracedPicture
 from fourbar.show.shown_units import find_length, units, units_of_scene
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_number
@@ -280,7 +280,7 @@ class Session:
         if text not in self.located:
             scene = self.read(text).scene
             solution = solve(scene)
-            self.located = {text: list_peaks(solution, summarize(scene, solution))}
+            self.located = {text: list_peaks(solution, Facts(solution))}
         return self.located[text]
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:

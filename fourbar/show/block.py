@@ -1,11 +1,9 @@
-"""Output of `analyze`: one block of aligned lines, at most 80 columns wide.
-
-The duty of the drive in the JSON of `analyze` is made here too.
-"""
+"""Output of `analyze`: one block of aligned lines, at most 80 columns wide."""
 
 import math
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -22,17 +20,17 @@ from fourbar.formulas.mobility import (
     name_assembly,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import (
     JAMMED,
     LINE,
     OK,
     PIN_FORCES,
     SEVERAL,
+    STATUS_NAMES,
     WOUND,
     Array,
 )
-from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
     list_arm_notes,
@@ -45,7 +43,7 @@ from fourbar.show.acting import (
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.columns import explain_static
 from fourbar.show.driving import describe_drive, name_places
-from fourbar.show.duty import DUTY_UNITS, MotorDuty, bearing_load, motor_duty
+from fourbar.show.duty import MotorDuty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import acts, find_drive_rounding
 from fourbar.show.panels import TIED
@@ -61,8 +59,8 @@ from fourbar.show.shown_units import (
     write_ends,
     write_short,
 )
-from fourbar.show.summary import Facts, summarize
-from fourbar.solution import Conversion, Solution, find_unit_in
+from fourbar.show.summary import Facts
+from fourbar.solution import Conversion, Solution
 from fourbar.studies.passing import move_inside_limit
 
 _NBSP = "\u00a0"
@@ -81,6 +79,7 @@ OF_ONE_PREFIX = 1e-4
 """Part of the largest of its kind below which a quantity has a prefix of its own."""
 FAR_BELOW_PEAK = 0.1
 """Part of its peak below which a mean has a prefix of its own: it would begin with 0.0.
+In a table all of one kind have one prefix, to be compared at a glance.
 """
 _BESIDE_CHANGE_POINT = 1e-9
 """rad; an angle nearer to a change point is rounded from it: files state angles with
@@ -103,13 +102,13 @@ BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 
 
 def write_block(
-    scene: Scene, solution: Solution, units: Conversion = COMMON, **options: Any
+    solution: Solution, units: Conversion = COMMON, **options: Any
 ) -> list[str]:
     """Write the summary of a solved scene line by line; of one position, everything.
 
     The options are those of `write_facts`.
     """
-    return write_facts(summarize(scene, solution), units, **options)
+    return write_facts(Facts(solution), units, **options)
 
 
 def write_facts(
@@ -157,18 +156,17 @@ class _SceneBlock:
 
     def write(self, *, headed: bool = True) -> list[str]:
         """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
-        head = [*self._write_head()] if headed else []
+        paragraphs = [self._write_motion(), self._write_loads()]
         if self.facts.kind == "position":
-            paragraphs = [*self._write_position(head)]
-        else:
-            paragraphs = [[*head, *self._write_motion()], [*self._write_loads()]]
+            paragraphs = self._list_paragraphs_of_position()
+        if headed:
+            paragraphs[0] = chain(self._write_head(), paragraphs[0])
         lines: list[str] = []
-        for paragraph in filter(None, paragraphs):
-            if lines:
-                lines.append("")
+        for paragraph in filter(None, map(list, paragraphs)):
+            lines.append("")
             for line in paragraph:
                 lines += wrap_line(line, self.width)
-        return [line.replace(_NBSP, " ") for line in lines]
+        return [line.replace(_NBSP, " ") for line in lines[1:]]
 
     def _write_loads(self) -> Iterator[str]:
         """Write the drive, the loads of pins and bars, and remarks.
@@ -193,20 +191,26 @@ class _SceneBlock:
             yield from _align(rows, self.width)
             yield "no mass, load or effect: nothing loads pins and drive"
 
-    def _write_position(self, head: list[str]) -> Iterator[list[str]]:
-        """Write the paragraphs of one position: motion, forces, ratios."""
-        sheet = PositionSheet(self.scene, self.solution, self.units)
-        yield [*head, self._write_place(), *self._write_statuses()]
-        yield sheet.write_bars()
-        yield sheet.write_points()
+    def _list_paragraphs_of_position(self) -> list[Iterator[str]]:
+        """List the paragraphs of one position: motion, forces, ratios."""
+        sheet = PositionSheet(self.solution, self.units)
+        motion = chain([self._write_place()], self._write_statuses())
+        loads = [self._write_stroke()]
         if self.solution.F12 is not None and acts(self.scene):
-            forces = [*sheet.write_pin_forces(), *self._write_pins_from_rest()]
-            yield [*self._write_drive(), *forces]
-            yield [*self._write_bending()]
-        else:
-            yield [*self._write_stroke()]
-        yield [*sheet.write_ratios(), *self._write_static_hint()]
-        yield [*self._write_remarks()]
+            from_rest = self._list_from_rest([*PIN_FORCES], "N")
+            forces = sheet.write_pin_forces()
+            if from_rest:
+                rows = [("pins", [*self.facts.pins]), *from_rest]
+                forces += _align(rows, self.width)
+            loads = [chain(self._write_drive(), forces), self._write_bending()]
+        return [
+            motion,
+            iter(sheet.write_bars()),
+            iter(sheet.write_points()),
+            *loads,
+            chain(sheet.write_ratios(), self._write_static_hint()),
+            self._write_remarks(),
+        ]
 
     def _write_place(self) -> str:
         """Write what is commanded at the position, and which bar is at a limit there.
@@ -218,38 +222,36 @@ class _SceneBlock:
         text = f"at {one.commanded} = {place}"
         if one.time is not None:
             text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
-        gaps = {2: one.theta_4 - one.theta_3, 3: one.theta_4 - one.theta_2}
-        gaps[4] = one.theta_3 - one.theta_2
-        for bar, gap in gaps.items():
+        for bar, pair in BARS_IN_LINE.items():
+            first, second = (one[f"theta_{word}"] for word in pair.split(" and "))
             theta = f"theta_{bar}"
             _, is_limit = move_inside_limit(self.scene, bar, float(one[theta][0]))
             # at a change point each bar moves on
             is_alone = bar != one.at.bar and one.status_code[0] == OK
-            if is_limit and is_alone and abs(math.sin(gap[0])) <= _IN_LINE:
-                meeting = _name_meeting(BARS_IN_LINE[bar])
-                bars = f"bars {BARS_IN_LINE[bar]} are {meeting}"
+            sine = math.sin((second - first)[0])
+            if is_limit and is_alone and abs(sine) <= _IN_LINE:
+                bars = f"bars {pair} are {_name_meeting(pair)}"
                 return f"{text}, where {theta} is at a limit: {bars}"
         return text
 
-    def _value(self, value: float, unit: str, largest: float | None = None) -> str:
+    def _value(
+        self,
+        value: float,
+        unit: str,
+        largest: float | None = None,
+        least: float = OF_ONE_PREFIX,
+    ) -> str:
         """Write a quantity of an SI unit, with a prefix that suits it.
 
-        `largest`: of its kind, which then chooses the prefix unless the quantity lies
-        far below it; None: the quantity does.
+        `largest`: of its kind, which then chooses the prefix unless the quantity is
+        below this part of it, `least`; None: the quantity does.
         """
-        if largest is not None and 0.0 < abs(value) < OF_ONE_PREFIX * abs(largest):
-            largest = None
+        if largest is not None:
+            largest = abs(largest)
+            if 0.0 < abs(value) < least * largest:
+                largest = None
         text = write_short(value, unit, self.units, largest, self.digits)
         return text.replace(" ", _NBSP)
-
-    def _beside(self, value: float, unit: str, peak: float | None) -> str:
-        """Write a mean of a line, with the prefix of its peak unless it is far below.
-
-        In a table all of one kind have one prefix, to be compared at a glance.
-        """
-        if peak is not None and 0.0 < abs(value) < FAR_BELOW_PEAK * abs(peak):
-            peak = None
-        return self._value(value, unit, peak and abs(peak))
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
@@ -297,7 +299,8 @@ class _SceneBlock:
 
     def _write_statuses(self) -> Iterator[str]:
         """Write how many positions have which status, where one is not ok."""
-        counts = dict(self.facts.counts)
+        codes = np.bincount(self.solution.status_code)
+        counts = {STATUS_NAMES[code]: codes[code] for code in np.flatnonzero(codes)}
         beside = self._find_beside_change_points()
         parts = []
         if len(beside):
@@ -346,7 +349,17 @@ class _SceneBlock:
         linkage = self.linkage
         bar = self.motion.bar
         points = change_points(linkage, bar)
-        yield from self._write_met_equalities()
+        met = self.scene.met_lengths
+        if met is not None and met[1] == linkage.lengths:
+            equal = [
+                f"{first} and {second}, which differ by {self._value(gap, 'm')}"
+                for first, second, gap in list_met_equalities(*met)
+            ]
+            if equal:
+                yield (
+                    "lengths read as equal within the last decimals of what is stated:"
+                    f" {'; '.join(equal)}"
+                )
         if (miss := find_miss(linkage)) is not None:
             has = "one change point, not two" if points else "no change point"
             yield f"misses a {miss[1]} by {self._value(miss[0], 'm')}: it has {has}"
@@ -362,21 +375,6 @@ class _SceneBlock:
                 "motion, a turn apart"
             )
         yield line
-
-    def _write_met_equalities(self) -> Iterator[str]:
-        """Write what lengths are read as equal, and by how much they differ."""
-        met = self.scene.met_lengths
-        if met is None or met[1] != self.linkage.lengths:
-            return
-        equal = [
-            f"{first} and {second}, which differ by {self._value(gap, 'm')}"
-            for first, second, gap in list_met_equalities(*met)
-        ]
-        if equal:
-            yield (
-                "lengths read as equal within the last decimals of what is stated:"
-                f" {'; '.join(equal)}"
-            )
 
     def _write_ranges(self) -> str:
         """Write how far the commanded bar goes, or the stroke, and the output.
@@ -500,7 +498,8 @@ class _SceneBlock:
         if rms is None:
             return row
         rms = self._without_rounding(rms)
-        return f"{row}, RMS {self._beside(rms, drive.unit, facts.peak.value)}"
+        mean = self._value(rms, drive.unit, facts.peak.value, FAR_BELOW_PEAK)
+        return f"{row}, RMS {mean}"
 
     def _write_growth(self, name: str) -> str:
         """Write where a quantity grows without bound."""
@@ -563,7 +562,7 @@ class _SceneBlock:
         duty = self.facts.duty
         power = self.solution.power
         if duty is None:
-            idle = facts.peak is not None and self._is_rounding(facts.peak.value)
+            idle = facts.peak and not self._without_rounding(facts.peak.value)
             if power is not None and power[0] and not idle:
                 yield _row("power", self._value(float(power[0]), "W"))
             return
@@ -596,7 +595,9 @@ class _SceneBlock:
         speed = self._value(duty.peak_speed, "rad/s")
         mean = ""
         if duty.rms_torque is not None:
-            mean = f" (RMS {self._beside(duty.rms_torque, 'N m', duty.peak_torque)})"
+            peak = duty.peak_torque
+            rms = self._value(duty.rms_torque, "N m", peak, FAR_BELOW_PEAK)
+            mean = f" (RMS {rms})"
         power = self._write_peak_power(duty.peak_power)
         return f"at least {torque} at {speed}{mean}, {power}"
 
@@ -617,7 +618,9 @@ class _SceneBlock:
         mean = ""
         if duty.mean_torque is not None:
             torque = self._without_rounding(duty.mean_torque)
-            mean = f"mean torque {self._beside(torque, 'N m', duty.peak_torque)}; "
+            peak = duty.peak_torque
+            mean = self._value(torque, "N m", peak, FAR_BELOW_PEAK)
+            mean = f"mean torque {mean}; "
         energy = self._value(duty.energy_swing, "J")
         yield _row("cycle", f"{mean}energy swings by {energy} about the mean")
 
@@ -717,11 +720,6 @@ class _SceneBlock:
         if self.facts.kind in ("list", "released"):
             yield "  peak and RMS are those of these positions"
 
-    def _write_pins_from_rest(self) -> Iterator[str]:
-        """Write the loads of the pins as the linkage begins to move from a position."""
-        if rows := self._list_from_rest([*PIN_FORCES], "N"):
-            yield from _align([("pins", [*self.facts.pins]), *rows], self.width)
-
     def _list_from_rest(
         self, names: list[str], unit: str
     ) -> list[tuple[str, list[str]]]:
@@ -774,7 +772,7 @@ class _SceneBlock:
 
         A curve may grow without bound there.
         """
-        peaks = [self.facts.find_peak(name) for name in names]
+        peaks = [self.facts.motion.find_peak(name) for name in names]
         sizes = _drop_small([peak and peak.value for peak in peaks])
         places = []
         for peak, size, name in zip(peaks, sizes, names, strict=True):
@@ -854,7 +852,7 @@ class _SceneBlock:
             reference = np.maximum(sizes, np.nanmedian(sizes))
             reference[reference == 0.0] = np.nan
             share = drive.error / reference
-        if self._is_rounding(float(np.nanmax(sizes, initial=0.0))):
+        if not self._without_rounding(float(np.nanmax(sizes, initial=0.0))):
             return  # nothing has digits to lose
         if not np.nanmax(share, initial=0.0) > _FEW_DIGITS:
             return
@@ -876,10 +874,6 @@ class _SceneBlock:
         gap = math.asin(min(sines[bars], 1.0))
         apart = write_short(gap, "rad", self.units, digits=2)
         yield f"{start}: bars {bars} are {apart} from being {_name_meeting(bars)}"
-
-    def _is_rounding(self, value: float) -> bool:
-        """Return True for a torque or force of the drive within its rounding."""
-        return self._without_rounding(value) == 0.0
 
 
 def _row(label: str, text: str) -> str:
@@ -911,32 +905,3 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
         for label, cells in rows
         if (part := cells[first : first + fitting])
     ]
-
-
-def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
-    """Return the duty and the loads of the pins as the JSON has them.
-
-    Numbers have the units of the output, and the keys are those of `motor_duty`.
-    """
-    duty = motor_duty(solution)
-    if duty is None:
-        return None
-    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
-
-    def convert(number: float | None, unit: str) -> float | None:
-        return None if number is None else number * find_unit_in(unit, units)[1]
-
-    loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-    return {
-        "closed": duty.closed,
-        **{name: convert(getattr(duty, name), unit) for name, unit in si.items()},
-        "pins": {
-            pin: {
-                "peak": convert(load.largest, "N"),
-                "rms": convert(load.rms, "N"),
-                "theta_2": convert(load.where, "rad"),
-            }
-            for pin, load in loads.items()
-        },
-        "units": {name: find_unit_in(unit, units)[0] for name, unit in si.items()},
-    }

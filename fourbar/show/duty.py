@@ -1,6 +1,6 @@
 """Loads of frame and pins over a motion, and the duty of the drive.
 
-Bearings and a motor are chosen by them.
+Bearings and a motor are chosen by them; the JSON of `analyze` has them.
 """
 
 import warnings
@@ -17,7 +17,7 @@ from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
 from fourbar.show.motion_curves import describe_motion
-from fourbar.solution import Solution, where_assembled
+from fourbar.solution import Conversion, Solution, find_unit_in, where_assembled
 
 
 class BearingLoad(NamedTuple):
@@ -400,6 +400,35 @@ def _reduce_to_number(value: Any) -> Any:
     if np.ndim(value) == 0:
         return float(value)
     return value
+
+
+def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
+    """Return the duty and the loads of the pins as the JSON has them.
+
+    Numbers have the units of the output, and the keys are those of `motor_duty`.
+    """
+    duty = motor_duty(solution)
+    if duty is None:
+        return None
+    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
+
+    def convert(number: float | None, unit: str) -> float | None:
+        return None if number is None else number * find_unit_in(unit, units)[1]
+
+    loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
+    return {
+        "closed": duty.closed,
+        **{name: convert(getattr(duty, name), unit) for name, unit in si.items()},
+        "pins": {
+            pin: {
+                "peak": convert(load.largest, "N"),
+                "rms": convert(load.rms, "N"),
+                "theta_2": convert(load.where, "rad"),
+            }
+            for pin, load in loads.items()
+        },
+        "units": {name: find_unit_in(unit, units)[0] for name, unit in si.items()},
+    }
 
 
 class _Energies(NamedTuple):

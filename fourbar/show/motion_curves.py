@@ -19,7 +19,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
-from fourbar.show.panels import SHALLOW, Panels, Wanted, fit_panels, split_runs
+from fourbar.show.panels import SHALLOW, Panels, Peak, Wanted, fit_panels, split_runs
 from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution, where_assembled
 from fourbar.solving import solve, split
@@ -113,9 +113,7 @@ class MotionCurves:
             return self.solution
         drive = read_drive_demand(self.solution)
         names = [drive.keys.value, "power", "speed", *PIN_FORCES]
-        peaks = [
-            panels.find_peak(name).place for name in names if panels.has_value(name)
-        ]
+        peaks = [peak.place for name in names if (peak := self.find_peak(name))]
         away = _BESIDE_A_BREAK * panels.length
         found = [peaks, self.breaks - away, self.breaks + away]
         places = np.unique(np.concatenate([self.solution.at.places, *found]))
@@ -136,7 +134,7 @@ class MotionCurves:
         for speed in (_BEGINNING, -_BEGINNING):
             begun = solve(self.scene, at=at._replace(speed=speed))
             loads = compute_pin_loads(begun)
-            for bar, bending in compute_bending(self.scene, begun).items():
+            for bar, bending in compute_bending(begun).items():
                 loads[f"bending_{bar}"] = np.abs(bending.moment)
             for name, load in loads.items():
                 least = largest.get(name, 0.0)
@@ -159,6 +157,10 @@ class MotionCurves:
         if not self.is_steady or motion.has_rate_of_each:
             return None
         return abs(float(motion.speed or 0.0))
+
+    def find_peak(self, name: str) -> Peak | None:
+        """Find the largest size of a curve; None if it grows without bound."""
+        return self.panels.find_peak(name) if self.panels.has_value(name) else None
 
     def find_rms(self, name: str) -> float | None:
         """Return the RMS value of a curve; None if it has none."""
@@ -423,7 +425,7 @@ def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
     for name, load in loads.items():
         kept = drop_rounding(load, largest) != 0.0
         curves[name] = np.where(kept[:, None], getattr(solution, name), 0.0)
-    for bar, bending in compute_bending(scene, solution).items():
+    for bar, bending in compute_bending(solution).items():
         curves[f"bending_{bar}"] = np.abs(bending.moment)
     drive = read_drive_demand(solution)
     if scene.motion.free is not None:
@@ -456,7 +458,7 @@ def compute_pin_loads(solution: Solution) -> dict[str, Array]:
     return loads
 
 
-def compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
+def compute_bending(solution: Solution) -> dict[int, Bending]:
     """Compute the largest bending moment of each bar at each position.
 
     Many positions are solved again block by block: the forces along the bars of all of
@@ -464,9 +466,9 @@ def compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
     """
     count = len(solution)
     if count <= POSITIONS_OF_A_BLOCK or isinstance(solution.at.origin, ReleaseOrigin):
-        return _compute_bending_of_block(scene, solution)
+        return _compute_bending_of_block(solution)
     blocks = [
-        _compute_bending_of_block(scene, solve(scene, at=solution.at.part(rows)))
+        _compute_bending_of_block(solve(solution.scene, at=solution.at.part(rows)))
         for rows in split(count, POSITIONS_OF_A_BLOCK)
     ]
     return {
@@ -477,14 +479,14 @@ def compute_bending(scene: Scene, solution: Solution) -> dict[int, Bending]:
     }
 
 
-def _compute_bending_of_block(scene: Scene, solution: Solution) -> dict[int, Bending]:
+def _compute_bending_of_block(solution: Solution) -> dict[int, Bending]:
     forces = [*compute_pin_loads(solution).values()]
     if solution.drive_force is not None:
         forces.append(np.abs(solution.drive_force))
-    size = max(scene.linkage.lengths) * np.max(forces, axis=0)
+    size = max(solution.scene.linkage.lengths) * np.max(forces, axis=0)
     bending = {}
     for bar in MOVING_BARS:
-        largest = largest_bending(scene, solution, bar)
+        largest = largest_bending(solution.scene, solution, bar)
         # a two-force bar has none
         is_round_off = np.abs(largest.moment) <= _NO_BENDING * size
         moment = np.where(is_round_off, 0.0, largest.moment)

@@ -11,7 +11,6 @@ import numpy as np
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import DERIVED_NAMES, PIN_FORCES, Array
-from fourbar.scene import Scene
 from fourbar.show.change_point import NoSideError, find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
@@ -52,8 +51,8 @@ class PositionSheet:
     units : units of the numbers; one that is left out is the SI unit with a prefix.
     """
 
-    def __init__(self, scene: Scene, solution: Solution, units: Conversion) -> None:
-        self.scene = scene
+    def __init__(self, solution: Solution, units: Conversion) -> None:
+        scene = self.scene = solution.scene
         self.units = units
         self.on_change_point = ""
         """What is said of the pin forces on a change point."""

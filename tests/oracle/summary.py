@@ -21,9 +21,9 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
 from fourbar.scene import command_at
 from fourbar.scene.motion import FromLimit
-from fourbar.show.block import list_duty, write_block
-from fourbar.show.duty import shaking_force
-from fourbar.show.summary import Facts, summarize
+from fourbar.show.block import write_block
+from fourbar.show.duty import list_duty, shaking_force
+from fourbar.show.summary import Facts
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
@@ -293,7 +293,7 @@ def summarize_scene(question):
     worst = min(solution.condition.min(), solution.drive_condition.min())
     if (solution.status_code != OK).any() or not worst > _LEAST_CONDITION:
         raise NotAskedError("the motion has no forces somewhere, or nearly none")
-    return summarize(scene, solution)
+    return Facts(solution)
 
 
 def _judge_ranges(judged):
@@ -484,7 +484,7 @@ def _judge_bore(judged, fine):
     if judged.scene.drive is None or not judged.scene.drive.has_stroke:
         return
     units = {"m": ("mm", 1e3), "N": ("N", 1.0)}
-    lines = write_block(judged.scene, judged.solution, units, pressure=_PRESSURE)
+    lines = write_block(judged.solution, units, pressure=_PRESSURE)
     text = " ".join(" ".join(lines).split()).partition("bore at least ")[2]
     printed = {
         word: 1e-3 * float(number)

@@ -57,9 +57,9 @@ def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
 def test_bending_is_the_same_in_blocks(name, monkeypatch):
     scene = fourbar.load(MODELS / f"{name}.toml")
     solution = solve(scene, at=command(scene))
-    whole = motion_curves.compute_bending(scene, solution)
+    whole = motion_curves.compute_bending(solution)
     monkeypatch.setattr(motion_curves, "POSITIONS_OF_A_BLOCK", 7)
-    in_blocks = motion_curves.compute_bending(scene, solution)
+    in_blocks = motion_curves.compute_bending(solution)
     for bar, bending in whole.items():
         np.testing.assert_array_equal(in_blocks[bar].moment, bending.moment)
         np.testing.assert_array_equal(in_blocks[bar].x, bending.x)

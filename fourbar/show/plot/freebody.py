@@ -14,7 +14,6 @@ from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import Scene
-from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage_figure import (
     draw_mass_centre,
@@ -38,7 +37,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.shown_units import choose_unit
-from fourbar.show.summary import locate_bending
+from fourbar.show.summary import Facts
 from fourbar.solution import Conversion
 from fourbar.studies.internal_forces import internal_forces
 
@@ -242,7 +241,7 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
     elif view.sweep.F12 is None or not np.isfinite(view.sweep.F12).any():
         raise InputError("figure", "bars", f"needs forces, and {WITHOUT_VALUES}")
     solution = view.here if view.stated else view.sweep
-    bending = locate_bending(describe_motion(solution))
+    bending = Facts(solution).bending
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)

@@ -42,7 +42,7 @@ def load_coarse(name):
 )
 def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
-    block = " ".join(write_block(scene, solve(scene), COMMON))
+    block = " ".join(write_block(solve(scene), COMMON))
     headline = evaluate_scene(scene, COMMON, settled=True)["headline"]
     drive, pins, _ = headline.split("; ")
     peak = re.sub(r"^peak (torque|drive force) ", "", drive)

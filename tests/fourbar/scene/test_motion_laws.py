@@ -215,4 +215,4 @@ def test_a_table_that_leaves_no_choice_says_nothing_of_its_ends():
 def write_note(scene):
     from fourbar.show.block import write_block
 
-    return " ".join(" ".join(write_block(scene, solve(scene, "error"))).split())
+    return " ".join(" ".join(write_block(solve(scene, "error"))).split())

@@ -31,7 +31,7 @@ from fourbar.show.block import write_block, write_facts
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.studies import write_equilibria
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts
 from fourbar.show.tables import write_cells
 from fourbar.solving import find_last_stage
 from tests.support.scenes import CYLINDER, balanced_lamp, crank_rocker, thesis
@@ -44,7 +44,7 @@ WEIGHT = (Gravity(),)
 
 def block(scene, **options):
     """Return the block of a scene in one line, whose breaks depend on the width."""
-    lines = write_block(scene, solve(scene, find_last_stage(scene)), **options)
+    lines = write_block(solve(scene, find_last_stage(scene)), **options)
     assert max(map(len, lines)) <= BLOCK_WIDTH, lines
     return " ".join(" ".join(lines).split())
 
@@ -395,7 +395,7 @@ def test_the_block_says(name):
 
 def test_the_block_has_the_numbers_of_the_facts():
     scene = crank_rocker(motion=turn(360))
-    facts = summarize(scene, solve(scene, "error"))
+    facts = Facts(solve(scene, "error"))
     text = "\n".join(write_facts(facts))
     duty = facts.duty
     peak = facts.peak
@@ -530,16 +530,18 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     effects = (*WEIGHT, fourbar.PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
     rubbing = {"loads": (SPIKE,), "effects": effects, "drive": CYLINDER}
     ways = [
-        summarize(scene, solve(scene))
+        Facts(solve(scene))
         for speed in (1e-9, -1e-9)
         for scene in [crank_rocker(motion=Motion(angle, speed), **rubbing)]
     ]
     scene = crank_rocker(motion=Motion(angle, 0.0), **rubbing)
-    lines = write_block(scene, solve(scene), fourbar.units("N N.m"))
+    lines = write_block(solve(scene), fourbar.units("N N.m"))
     rows = [line for line in lines if line.startswith("  to move")]
     names = [*PIN_FORCES], ["bending_2", "bending_3", "bending_4"]
     for row, group in zip(rows, names, strict=True):
-        peaks = [max(way.find_peak(name).value for way in ways) for name in group]
+        peaks = [
+            max(way.motion.find_peak(name).value for way in ways) for name in group
+        ]
         printed = [float(size) for size in re.findall(r"\d[\d.]*", row)]
         assert printed == approx(peaks, rel=2e-4)
     assert "to move" not in block(crank_rocker(motion=Motion(angle, 0.0)))
@@ -568,7 +570,7 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
         ground = Place(1, (abs(z), np.angle(z)))
     drive = fourbar.LinearDrive(ground, Place(bar, (0.1, 0.0)))
     pushed = replace(scene, drive_bar=None, drive=drive)
-    low, high = summarize(pushed, solve(pushed)).stroke_limits
+    low, high = Facts(solve(pushed)).stroke_limits
     assert low == 0.0 and "assembles from 0 mm to" in block(pushed)
     assert bar == 3 or high == approx(0.2, rel=1e-12)
 

@@ -15,8 +15,13 @@ import fourbar
 from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, vary
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import Law
-from fourbar.show.block import list_duty
-from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
+from fourbar.show.duty import (
+    bearing_load,
+    list_duty,
+    motor_duty,
+    shaking_force,
+    shaking_moment,
+)
 from fourbar.show.shown_units import units
 from tests.support.scenes import CYLINDER, crank_rocker
 

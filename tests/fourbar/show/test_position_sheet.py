@@ -46,7 +46,7 @@ def numbers(line):
 def test_what_a_scene_has_not_is_left_out(motion, rates):
     """A static position has no rates, and one without a speed no forces."""
     still = replace(ONE, motion=motion, points=())
-    sheet = PositionSheet(still, solve(still), COMMON)
+    sheet = PositionSheet(solve(still), COMMON)
     heading = sheet.write_bars()[0]
     assert "theta" in heading
     assert [name for name in ("omega", "alpha") if name in heading] == rates
@@ -60,7 +60,7 @@ def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
     lift = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), Motion(np.pi / 2.0, 1.0))
     text = "\n".join(
         line
-        for sheet in [PositionSheet(lift, solve(lift), COMMON)]
+        for sheet in [PositionSheet(solve(lift), COMMON)]
         for line in (*sheet.write_points(), *sheet.write_ratios())
     )
     assert "e-1" not in text and "-0 " not in text
@@ -84,7 +84,7 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     The work of a pull of 1 lbf against the jaw's path says the same.
     """
     scene = loads(PRESSED, "pliers.toml")
-    rows = PositionSheet(scene, solve(scene), COMMON).write_ratios()
+    rows = PositionSheet(solve(scene), COMMON).write_ratios()
     (row,) = [row for row in rows if row.startswith("F_jaw/drive_force")]
     ratio = numbers(row)[0]
     assert ratio == approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
@@ -107,7 +107,7 @@ def write_forces(motion, gravity=ALONG, at=None, **parts):
     places = None if at is None else find_positions(scene, *at)
     solution = solve(scene, at=places)
     assert solution.status == ["change_point"]
-    return PositionSheet(scene, solution, units("N m")).write_pin_forces(), solution
+    return PositionSheet(solution, units("N m")).write_pin_forces(), solution
 
 
 @pytest.mark.parametrize("theta_2, sense", ((0.0, 1.0), (np.pi, -1.0)))
@@ -178,11 +178,11 @@ def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     """At the limit of bar 4 its speed is zero; a whole turn later the angle is 2 pi."""
     scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(None, 10.0))
     at_limit = locate(scene, "theta_4", "max")
-    rows = PositionSheet(scene, solve(scene, at=at_limit), units("N m")).write_bars()
+    rows = PositionSheet(solve(scene, at=at_limit), units("N m")).write_bars()
     assert abs(solve(scene, at=at_limit).omega_4[0]) > 0.0
     assert rows[3].split()[3] == "0" and rows[2].split()[3] != "0"
     turned = Scene(PARALLELOGRAM, Motion(fourbar.Sweep(0.0, 2.0 * np.pi, 4), 1.0))
     one = solve(turned, at=command_at(turned, np.array([2.0 * np.pi])))
     follow(turned, one)
-    rows = PositionSheet(turned, one, units("N m")).write_bars()
+    rows = PositionSheet(one, units("N m")).write_bars()
     assert rows[3].split()[2] == "6.2832"

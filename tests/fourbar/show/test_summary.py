@@ -20,9 +20,9 @@ from fourbar.files import loads
 from fourbar.files.scene_file import read_tables
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command_at
-from fourbar.show.block import list_duty
+from fourbar.show.duty import list_duty
 from fourbar.show.motion_curves import acts, describe_motion
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts
 from fourbar.studies.internal_forces import largest_bending
 from tests.support.scenes import bare, crank_rocker
 from tests.support.shares import slow_but
@@ -162,7 +162,7 @@ def test_facts_are_those_of_a_dense_scan(name):
     scene = take_scene(name)
     pin = REVERSES.get(name, "")
     solution = solve(scene)
-    facts = summarize(scene, solution)
+    facts = Facts(solution)
     motion = facts.motion
     panels = facts.motion.panels
     assert not panels.growing
@@ -244,7 +244,7 @@ def test_a_list_has_its_own_peaks_and_means():
 def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones():
     """Nothing acts but one force, so that everything is in proportion to it."""
     small, huge = (
-        summarize(scene, solve(scene))
+        Facts(solve(scene))
         for force in (1.0, 1e300)
         for load in [Load(3, (force, 0.4), from_pin=(0.05, 0.0))]
         for scene in [Scene(MASSLESS, TURN, loads=(load,))]
@@ -294,7 +294,7 @@ def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction():
     for text in (BUCKET, BUCKET + FRICTION):
         scene = loads(text)
         before = time.process_time()
-        facts = summarize(scene, solve(scene))
+        facts = Facts(solve(scene))
         assert facts.motion.stretches
         seconds.append(time.process_time() - before)
 
@@ -327,7 +327,7 @@ def release_pendulum(omega, duration, *effects):
     free = fourbar.Free(duration, 7)
     motion = Motion(1.5 * pi - AWAY, omega, free=free)
     scene = Scene(linkage, motion, effects=(fourbar.Gravity(9.8), *effects))
-    return summarize(scene, solve(scene))
+    return Facts(solve(scene))
 
 
 @pytest.mark.slow
@@ -367,6 +367,6 @@ def test_transmission_angle_is_the_least_of_all_stretches():
     )
     sines = solve(fine).sin_mu
     assert np.nanmin(sines) < 0.0 < np.nanmax(sines)
-    least = summarize(scene, solve(scene)).transmission
+    least = Facts(solve(scene)).transmission
     right = math.asin(np.nanmin(np.abs(sines)))
     assert least.value == approx(right, abs=BETWEEN_STEPS)

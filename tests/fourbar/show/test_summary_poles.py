@@ -18,9 +18,10 @@ from fourbar.effects import PinFriction
 from fourbar.files import loads
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
-from fourbar.show.block import list_duty, write_facts
+from fourbar.show.block import write_facts
+from fourbar.show.duty import list_duty
 from fourbar.show.motion_curves import describe_motion
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.scenes import CYLINDER, crank_rocker
 from tests.support.shares import slow_but
@@ -58,7 +59,7 @@ def sweep(lengths, start, stop, bar=2, **parts):
 
 
 def find_facts(scene):
-    return summarize(scene, solve(scene))
+    return Facts(solve(scene))
 
 
 def write(facts, **options):

@@ -13,7 +13,7 @@ from pytest import approx
 
 import fourbar
 from fourbar import solve
-from fourbar.show.summary import summarize
+from fourbar.show.summary import Facts
 
 SCENE = fourbar.load(
     Path(__file__).parents[2]
@@ -116,7 +116,7 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
 @pytest.mark.slow
 def test_the_largest_moments_are_those_of_many_digits():
     """That of the input is the same everywhere, that of the output has a maximum."""
-    facts = summarize(SCENE, solve(SCENE))
+    facts = Facts(solve(SCENE))
     assert "drive_force" in facts.motion.panels.growing
     assert facts.bending[3].peak is None
     assert facts.bending[2].peak.value == approx(bend_input(), rel=ROUNDED, abs=0.0)
