@@ -19,6 +19,7 @@ from fourbar.linkage import (
     BAR_NAMES,
     BAR_NUMBERS,
     ENDS,
+    FIRST_PIN,
     MOVING_BARS,
     PINS,
     Bar,
@@ -83,8 +84,8 @@ def read_drawing(read: Reader, top: dict[str, Any]) -> DrawnPins | None:
         allowed = "must be left out: the pins state the assembly"
         raise read.refuse("motion.branch", motion["branch"], allowed)
     pins = read.table("pins", top["pins"], PINS)
-    places = {pin: read_point(read, f"pins.{pin}", pins.get(pin)) for pin in PINS}
-    return DrawnPins(**places)
+    places = (read_point(read, f"pins.{pin}", pins.get(pin)) for pin in PINS)
+    return DrawnPins(*places)
 
 
 def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
@@ -123,7 +124,8 @@ def read_ground(read: Reader, lengths: Any) -> DrawnGround:
     angle = lengths.get("ground_angle")
     ground = lengths.get("ground")
     if not isinstance(ground, dict):
-        return DrawnGround(read.quantity(f"{key}_angle", angle, "rad", default=0.0))
+        by = FourBar.numbers["ground_angle"]
+        return DrawnGround(read.declared(f"{key}_angle", angle, by))
     if angle is not None:
         allowed = "must be left out: x and y of the ground state its angle"
         raise read.refuse(f"{key}_angle", angle, allowed)
@@ -143,19 +145,14 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 
     `pins`: x and y of each pin as they are written.
     """
-    moved = {}
-    coarsest = {}
-    for pin in PINS:
-        in_x, in_y = (half_unit_of_text(text, "m") for text in pins[pin])
-        moved[pin] = math.hypot(in_x, in_y)
-        coarsest[pin] = max(in_x, in_y)
+    halves = {pin: [half_unit_of_text(text, "m") for text in pins[pin]] for pin in PINS}
     lengths = []
     roundings = []
     decimals = []
     for bar, (first, second) in ENDS.items():
         lengths.append(drawing.length(bar))
-        roundings.append(moved[first] + moved[second])
-        decimals.append(max(coarsest[first], coarsest[second]))
+        roundings.append(math.hypot(*halves[first]) + math.hypot(*halves[second]))
+        decimals.append(max(*halves[first], *halves[second]))
     met = meet_change_points(tuple(lengths), tuple(roundings), tuple(decimals))  # type: ignore[arg-type]
     # one equality alone is met by chance: nobody draws it
     return met if count_equalities(met) > 1 else tuple(lengths)
@@ -185,21 +182,13 @@ def state_places(
             return place
         if "from_pin" in value:
             raise read.refuse(f"{key}.from_pin", value["from_pin"], _STANDS_ALONE)
-        value = {name: entry for name, entry in value.items() if name != DRAWN_WORD}
-        value["from_pin"] = place
-    stated = {}
-    for name, entry in value.items():
-        bar_of_entry = bar
-        if key == "bars":
-            bar_of_entry = BAR_NUMBERS.get(name, bar)
-        stated[name] = state_places(
-            read,
-            f"{key}.{name}",
-            entry,
-            drawing,
-            bar_of_entry,
-        )
-    return stated
+        value = {**value, "from_pin": place}
+        del value[DRAWN_WORD]
+    named = BAR_NUMBERS if key == "bars" else {}
+    return {
+        name: state_places(read, f"{key}.{name}", entry, drawing, named.get(name, bar))
+        for name, entry in value.items()
+    }
 
 
 def _state_place(
@@ -210,21 +199,22 @@ def _state_place(
     bar: int | None,
 ) -> dict[str, str]:
     """State a place of the drawing by its coordinates in the frame of its bar."""
+    drawn = f"{key}.{DRAWN_WORD}"
+    stated = value[DRAWN_WORD]
     if bar is None:
         allowed = (
             f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
         )
-        raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
+        raise read.refuse(drawn, stated, allowed)
     if bar != 1 and isinstance(drawing, DrawnGround):
         allowed = (
             "is a place of a moving bar: it is drawn where [pins] states the linkage;"
             " here from_pin states it"
         )
-        raise read.refuse(f"{key}.{DRAWN_WORD}", value[DRAWN_WORD], allowed)
+        raise read.refuse(drawn, stated, allowed)
     if key.endswith((".from_centre", ".arm")):
         raise read.refuse(key, value, "a place of the drawing is written from_pin")
-    point = read_point(read, f"{key}.{DRAWN_WORD}", value[DRAWN_WORD])
-    z = drawing.into_bar(bar, point)
+    z = drawing.into_bar(bar, read_point(read, drawn, stated))
     return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 
@@ -247,13 +237,11 @@ def _draw_ends(drawing: DrawnPins, line: LinearDrive) -> tuple[complex, complex]
 def find_side_of_cylinder(drawing: DrawnPins, drive: ForceDrive | None) -> str:
     """Find the side of a cylinder's end on its bar; InputError for another drive."""
     line = require_cylinder(drive)
-    on_ground, on_bar = _draw_ends(drawing, line)
-    bar = line.end.bar
-    if bar == 1:
-        on_ground, on_bar = on_bar, on_ground
-        bar = line.start.bar
-    pivot = complex(*drawing.place("O2" if bar == 2 else "O4"))
-    across = cross(on_ground - pivot, on_bar - pivot)
+    ends = line.start, line.end
+    moving = ends[0].bar == 1  # the number of the end on the bar
+    places = _draw_ends(drawing, line)
+    pivot = complex(*drawing.place(FIRST_PIN[ends[moving].bar]))
+    across = cross(places[not moving] - pivot, places[moving] - pivot)
     return "left" if across >= 0.0 else "right"
 
 
@@ -268,11 +256,11 @@ def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
     angle = np.array([drawing.angle(bar)])
     branch = find_signs(scene.linkage, angle, sign, bar)
     here = solve(scene, "position", at=Command(angle, branch, None, 0.0, bar))
-    gaps = []
+    gap = 0.0
     for pin, found in (("A", here.A), ("B", here.B)):
         drawn = np.subtract(drawing.place(pin), drawing.O2)
-        gaps.append(math.hypot(*(found[0] - drawn)))
-    if sum(gaps) > PINS_APART * max(scene.linkage.lengths):
+        gap += math.hypot(*(found[0] - drawn))
+    if gap > PINS_APART * max(scene.linkage.lengths):
         raise InputError(
             f"motion.theta_{bar}",
             DRAWN_WORD,

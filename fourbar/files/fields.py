@@ -1,14 +1,26 @@
-"""Entries of a scene file, read and written.
+"""Entries of a scene file, read and written: numbers, places and whole descriptions.
 
-Every error names the file, the key, the value and what is allowed.
+Every error names the file, the key, the value and what is allowed. Loads, points,
+drives, springs and effects follow the declarations of their fields.
 """
 
 import difflib
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
+from fourbar.effects.effect import PinRows
+from fourbar.effects.load import PLACES_OF_LOADS
+from fourbar.effects.place import (
+    AT_FIRST_PIN,
+    STATED_PAIR,
+    STATED_PLACES,
+    At,
+    Place,
+    states_place,
+)
 from fourbar.errors import (
     ELSEWHERE,
     InputError,
@@ -23,7 +35,15 @@ from fourbar.linkage import (
     PINS,
     REQUIRED_NUMBER,
     Declared,
+    DeclaredField,
+    Entries,
+    Listed,
+    OfBar,
+    OneOf,
+    Part,
+    Whole,
     is_within,
+    list_declared,
 )
 from fourbar.quantities.units import (
     UNIT_MISSING,
@@ -88,8 +108,17 @@ _LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
 """Units that a number without one may have been meant in, other than the SI unit. They
 are suggested where no number beside it has a unit of the kind.
 """
-_STEP_OF_KEY = re.compile(r"[^.\[\]]+")
-"""One name or index of a key like `loads[0].force[1]`."""
+PLACES_OF_ENDS = (*STATED_PLACES, "point")
+"""Keys of which one states an end of a spring or cylinder, or the point of a force."""
+_KEYS_OF_PLACE = ("bar", *PLACES_OF_ENDS)
+_PAIR = ["0", "1"]
+"""Keys of two numbers that are written as a pair [magnitude, angle]."""
+
+
+def split_key(key: str) -> list[str | int]:
+    """List the names and indices of a key like `loads[0].force[1]` or `loads.0`."""
+    steps = re.findall(r"[^.\[\]]+", key)
+    return [int(step) if step.isdigit() else step for step in steps]
 
 
 class Reader:
@@ -100,7 +129,7 @@ class Reader:
     polar pair.
     """
     QUANTITIES = '["1 {0}", "2 {0}"]'
-    POLAR = '["1 {}", "0 deg"]'
+    POLAR = '["1 {0}", "0 deg"]'
     COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
     """A place or a force by its components; empty where it has to be polar."""
 
@@ -113,15 +142,13 @@ class Reader:
         """
         self.drawn: dict[str, float] = {}
         """Numbers that the word "drawn" stands for in a motion, by their names."""
+        self.bars: dict[str, int] = {}
+        """Bar of each named point, which a place at it need not state again."""
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
         """Make the error for an entry, or a missing one (None), with the file."""
-        return InputError(
-            key,
-            _shorten_for_error(value),
-            f"{'is missing; ' if value is None else ''}{allowed}",
-            self.file,
-        )
+        missing = "is missing; " if value is None else ""
+        return InputError(key, _shorten_for_error(value), missing + allowed, self.file)
 
     def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
         """Read a table that holds no keys but those allowed.
@@ -130,11 +157,8 @@ class Reader:
         """
         names = list(allowed)
         if not isinstance(value, dict):
-            raise self.refuse(
-                key,
-                value,
-                "must be a table with the keys " + ", ".join(names),
-            )
+            allowed = f"must be a table with the keys {', '.join(names)}"
+            raise self.refuse(key, value, allowed)
         for name, entry in value.items():
             if name not in names:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
@@ -142,8 +166,9 @@ class Reader:
                     known = f"write it under [{_TABLE_OF[name]}]"
                 if "inertia" in names and name in _FORMULAS:
                     known = _FORMULAS[name]
-                hint = ELSEWHERE if _is_elsewhere(key, value, names) else known
-                raise self.refuse(_join_key(key, name), entry, f"unknown key; {hint}")
+                if _is_elsewhere(key, value, names):
+                    known = ELSEWHERE
+                raise self.refuse(_join_key(key, name), entry, f"unknown key; {known}")
         return value
 
     def text(self, key: str, value: object) -> str:
@@ -152,54 +177,37 @@ class Reader:
             raise self.refuse(key, value, "must be a text in quotes")
         return value
 
-    def choice(self, key: str, value: object, allowed: Iterable[str]) -> str:
+    def choice(self, key: str, value: object, allowed: Iterable[str]) -> Any:
         """Read one of a few words."""
         words = list(allowed)
-        if not isinstance(value, str) or value not in words:
-            raise self.refuse(
-                key,
-                value,
-                f"{_suggest_word(value, words)}must be "
-                + " or ".join(f'"{word}"' for word in words),
-            )
+        if value not in words:
+            quoted = " or ".join(f'"{word}"' for word in words)
+            meant = _suggest_word(value, words)
+            raise self.refuse(key, value, f"{meant}must be {quoted}")
         return value
 
-    def whole(self, key: str, value: object, least: int, most: int) -> int:
+    def whole(self, key: str, value: Any, least: int, most: int) -> int:
         """Read an integer of a range, both ends included."""
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int)
-            or not least <= value <= most
-        ):
-            raise self.refuse(
-                key,
-                value,
-                f"must be a whole number from {least} to {most}",
-            )
+        if type(value) is not int or not least <= value <= most:
+            allowed = f"must be a whole number from {least} to {most}"
+            raise self.refuse(key, value, allowed)
         return value
 
     def bar(self, key: str, value: object, bars: tuple[int, ...] = MOVING_BARS) -> int:
         """Read the number of a bar, one of `bars`."""
-        if isinstance(value, bool) or not isinstance(value, int) or value not in bars:
-            numbers = [f"{bar} ({BAR_NAMES[bar]})" for bar in bars]
-            allowed = f"must be {', '.join(numbers[:-1])} or {numbers[-1]}"
+        if type(value) is not int or value not in bars:
+            *others, last = (f"{bar} ({BAR_NAMES[bar]})" for bar in bars)
+            allowed = f"must be {', '.join(others)} or {last}"
             if isinstance(value, int) and value > len(BAR_NAMES):
                 allowed = f"{allowed}: {ELSEWHERE}"
             raise self.refuse(key, value, allowed)
         return value
 
-    def number(self, key: str, value: object) -> float:
+    def number(self, key: str, value: Any) -> float:
         """Read a number without a dimension."""
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, (int, float))
-            or not math.isfinite(value)
-        ):
-            raise self.refuse(
-                key,
-                value,
-                "must be a finite number without a unit, and without quotes",
-            )
+        if type(value) not in (int, float) or not math.isfinite(value):
+            allowed = "must be a finite number without a unit, and without quotes"
+            raise self.refuse(key, value, allowed)
         return float(value)
 
     def quantity(
@@ -208,14 +216,8 @@ class Reader:
         value: object,
         unit: str,
         bound: str = ANY_NUMBER,
-        default: float | None = None,
     ) -> float:
-        """Read a number in `unit`; with unit "1" it has none.
-
-        `default`: what a value of None stands for.
-        """
-        if value is None and default is not None:
-            return default
+        """Read a number in `unit`; with unit "1" it has none."""
         if unit == "1":
             return self.number(key, value)
         wanted = f"must be {bound} {self.QUANTITY.format(name_unit(unit))}"
@@ -224,17 +226,17 @@ class Reader:
             raise self.refuse(key, value, wanted)
         return number
 
-    def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
+    def in_si(self, key: str, value: Any, unit: str, wanted: str) -> float:
         """Convert a text with a unit to a number in `unit`."""
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if type(value) in (int, float):
             like = f"{value:.6g} {self._find_likely_unit(key, unit)}"
             missing = f'the unit is missing; did you mean "{like}"? {wanted}'
             raise self.refuse(key, value, missing)
         if value == "drawn":
             _, _, name = key.partition("motion.")
-            drawn = self.drawn.get(name.partition(".")[0])
-            if drawn is not None:
-                return drawn
+            name = name.partition(".")[0]
+            if name in self.drawn:
+                return self.drawn[name]
             allowed = "stands for what a drawing has, and the scene has no [pins]; "
             raise self.refuse(key, value, allowed + wanted)
         if not isinstance(value, str):
@@ -258,15 +260,12 @@ class Reader:
         The nearest number of its kind decides, first in the entry's own table, then in
         those around it.
         """
-        around: list[Any] = [self.document]
-        for step in _STEP_OF_KEY.findall(key):
-            holder = around[-1]
-            if isinstance(holder, dict):
-                around.append(holder.get(step))
-            elif isinstance(holder, list) and step.isdigit():
-                around += holder[int(step) : int(step) + 1]
-            else:
-                break
+        holder: Any = self.document
+        around = [holder]
+        with suppress(LookupError, TypeError):
+            for step in split_key(key):
+                holder = holder[step]
+                around.append(holder)
         for holder in reversed(around):
             for text in _list_texts(holder):
                 stated = find_unit(text, "")
@@ -275,12 +274,12 @@ class Reader:
         return name_unit(unit, _LIKELY.get(unit))
 
     def declared(self, key: str, value: object, by: Declared) -> Any:
-        """Read a number, or a magnitude with its angle, as it is declared."""
+        """Read a number, or a pair of numbers, as it is declared."""
         if value is None and by.left_out is not REQUIRED_NUMBER:
             return by.left_out
         if by.pair:
             return self.pair(key, value, by)
-        return self.quantity(key, value, *by[:2])
+        return self.quantity(key, value, by.unit, by.bound)
 
     def numbers(
         self,
@@ -295,11 +294,23 @@ class Reader:
         }
 
     def pair(self, key: str, value: object, by: Declared) -> tuple[float, float]:
-        """Read a declared pair: magnitude and angle, or two numbers of a kind."""
-        if by.pair == "rad":
-            return self.polar(key, value, by.unit)
+        """Read a declared pair: two numbers, or { x, y } of a magnitude and angle."""
+        is_polar = by.pair == "rad"
+        if is_polar and isinstance(value, dict) and self.COORDINATES:
+            entry = self.table(key, value, ("x", "y"))
+            x, y = (
+                self.quantity(f"{key}.{name}", entry.get(name), by.unit)
+                for name in "xy"
+            )
+            if not math.isfinite(math.hypot(x, y)):
+                raise self.refuse(key, value, "must have a finite size")
+            self.coordinates[key] = x, y
+            return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
             form = f'["1 {by.unit}", "1 {by.pair}"]'
+            if is_polar:
+                form = f"{self.POLAR} {self.COORDINATES}".strip()
+                form = form.format(name_unit(by.unit))
             raise self.refuse(key, value, f"must be a pair like {form}")
         first, second = (
             self.quantity(f"{key}[{index}]", value[index], unit, by.bounds[index])
@@ -319,35 +330,144 @@ class Reader:
             for index, entry in enumerate(value)
         )
 
-    def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
-        """Read a pair [magnitude, angle], in `unit` and rad, or { x, y }."""
-        if isinstance(value, dict) and self.COORDINATES:
-            entry = self.table(key, value, ("x", "y"))
-            x, y = (
-                self.quantity(f"{key}.{name}", entry.get(name), unit) for name in "xy"
+    def described(self, key: str, value: Any, kind: Any, **stated: Any) -> Any:
+        """Read a description of a class by the declarations of its fields.
+
+        A place is stated by `from_pin`, `from_centre` or `point`, in polar form or by x
+        and y.
+
+        `stated`: fields that stand elsewhere.
+        """
+        if issubclass(kind, PinRows):
+            return kind(self._read_rows(key, value, kind))
+        fields: Any = list_declared(kind)
+        if [field.key for field in fields] == _PAIR:
+            by = Declared(fields[0].by.unit, pair="rad")
+            return kind(*self.pair(key, value, by))
+        if [field.key for field in fields if isinstance(field.by, Entries)] == [""]:
+            return kind(self._read_field(key, {"": value}, fields[0]))
+        entry = self.table(key, value, list_keys(kind))
+        make = kind
+        for form, numbers in getattr(kind, "forms", {}).items():
+            if form in entry:
+                make = getattr(kind, form)
+                fields = [one for one in fields if not isinstance(one.by, Declared)]
+                self.table(key, entry, (*(field.key for field in fields), form))
+                table = self.table(f"{key}.{form}", entry[form], numbers)
+                stated |= self.numbers(f"{key}.{form}", table, numbers)
+        if states_place(kind):
+            by = next(field.by for field in fields if field.name == "bar")
+            place = self._read_place(key, entry, by.bars)._asdict()
+            for field in fields:
+                if field.name in place:
+                    stated[field.name] = place[field.name]
+        for field in fields:
+            if field.name not in stated:
+                stated[field.name] = self._read_field(key, entry, field)
+        with self._knowing(key, kind.stated_at):
+            return make(**stated)
+
+    @contextmanager
+    def _knowing(self, key: str, section: str) -> Iterator[None]:
+        """Name the file and the key in errors of one description of a section."""
+        try:
+            yield
+        except InputError as error:
+            if error.file or "{" in section:
+                raise
+            inner = error.key.removeprefix(section).removeprefix(".")
+            raise error.moved_to(f"{key}.{inner}".strip("."), self.file) from None
+
+    def _read_field(
+        self, key: str, entry: Mapping[str, Any], field: DeclaredField
+    ) -> Any:
+        """Read one field of a description from the entries of its table."""
+        path = f"{key}.{field.key}".rstrip(".")
+        value = entry.get(field.key)
+        by = field.by
+        if isinstance(by, At):
+            if by.is_value:
+                return self._read_place(key, entry, by.bars)
+            table = self.table(path, value, _KEYS_OF_PLACE)
+            end = self._read_place(path, table, by.bars)
+            return end._replace(from_pin=AT_FIRST_PIN) if end == Place(end.bar) else end
+        if value is None and field.left_out is not REQUIRED_NUMBER:
+            return field.left_out
+        if isinstance(by, Entries):
+            if not isinstance(value, list) or not 1 <= len(value) <= by.most:
+                allowed = f"must be a list of 1 to {by.most} {field.name}"
+                raise self.refuse(path, value, allowed)
+            return tuple(
+                self.described(f"{path}[{index}]", one, by.kind)
+                for index, one in enumerate(value)
             )
-            if not math.isfinite(math.hypot(x, y)):
-                raise self.refuse(key, value, "must have a finite size")
-            self.coordinates[key] = x, y
-            return convert_to_polar(x, y)
-        if not isinstance(value, list) or len(value) != 2:
-            named = name_unit(unit)
-            polar = self.POLAR.format(named)
-            form = self.COORDINATES.format(named)
-            raise self.refuse(key, value, f"must be a pair like {polar} {form}".strip())
-        return (
-            self.quantity(f"{key}[0]", value[0], unit),
-            self.quantity(f"{key}[1]", value[1], "rad"),
-        )
+        if isinstance(by, Part):
+            return self.described(path, value, by.kind)
+        if isinstance(by, Listed):
+            return self.quantities(path, value, by.unit)
+        if isinstance(by, Whole):
+            return self.whole(path, value, by.least, by.most)
+        if isinstance(by, OneOf):
+            return self.choice(path, value, by.words)
+        if isinstance(by, OfBar):
+            return self.bar(path, value, by.bars)
+        return self.declared(path, value, by)
+
+    def _read_rows(self, key: str, value: object, kind: Any) -> tuple[Any, ...]:
+        """Read what each pin has: one number, or a table of several."""
+        rows = []
+        for pin, entry in self.table(key, value, PINS).items():
+            path = f"{key}.{pin}"
+            stated = {"": entry}
+            if "" not in kind.numbers:
+                stated = self.table(path, entry, kind.numbers)
+            rows.append((pin, *self.numbers(path, stated, kind.numbers).values()))
+        return tuple(rows)
+
+    def _read_place(
+        self, key: str, entry: Mapping[str, Any], allowed_bars: tuple[int, ...]
+    ) -> Place:
+        """Read the bar of an entry, one of some, and its place, which one key states.
+
+        An entry without such a key is at the bar's first pin.
+        """
+        stated = [name for name in PLACES_OF_LOADS if name in entry]
+        if len(stated) > 1:
+            allowed = f"{stated[0]} states the place already; state one of them"
+            raise self.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
+        bars = self.bars
+        name: Any = entry.get("point")
+        if name is not None:
+            if name not in [*bars] and (not bars or name in [*PINS]):
+                allowed = (
+                    "must be a point of [points]; the first pin of a bar is "
+                    'from_pin = ["0 m", "0 deg"], the second has its length in place of'
+                    " 0"
+                )
+                raise self.refuse(f"{key}.point", name, allowed)
+            self.choice(f"{key}.point", name, bars)
+        bar = self.bar(f"{key}.bar", entry.get("bar", bars.get(name)), allowed_bars)
+        if name is not None and bar != bars[name]:
+            allowed = f"the point {name} is on bar {bars[name]}"
+            raise self.refuse(f"{key}.bar", bar, allowed)
+        pairs = self.numbers(key, entry, STATED_PLACES)
+        return Place(bar, **pairs, point=name)
+
+
+def list_keys(kind: Any) -> tuple[str, ...]:
+    """List the keys in which a scene file states a description of a class."""
+    keys = list[str]()
+    for field in list_declared(kind):
+        keys += [field.key] if field.key else _KEYS_OF_PLACE
+    return (*keys, *getattr(kind, "forms", ()))
 
 
 def _list_texts(holder: Any) -> Iterator[str]:
     """List the texts of an entry, those of tables and lists within it too."""
+    if isinstance(holder, dict):
+        holder = [*holder.values()]
     if isinstance(holder, str):
         yield holder
-    elif isinstance(holder, Mapping):
-        for entry in holder.values():
-            yield from _list_texts(entry)
     elif isinstance(holder, list):
         for entry in holder:
             yield from _list_texts(entry)
@@ -374,30 +494,65 @@ def write_quantity(value: float, unit: str) -> Any:
 
 
 def write_declared(value: Any, by: Declared) -> Any:
-    """Write a number, or a magnitude with its angle, as it is declared."""
-    if by.pair:
-        return write_pair(value[0], value[1], by.unit, by.pair)
-    return write_quantity(value, by.unit)
+    """Write a number, or a pair of numbers, as it is declared."""
+    if not by.pair:
+        return write_quantity(value, by.unit)
+    return [write_quantity(*one) for one in zip(value, by.units, strict=True)]
 
 
-def write_numbers(description: Any) -> dict[str, Any]:
-    """Write the numbers that a description states; what it leaves out stays out."""
-    values = {name: getattr(description, name) for name in description.numbers}
-    return {
-        name: write_declared(value, description.numbers[name])
-        for name, value in values.items()
-        if value is not None
-    }
+def write_described(description: Any) -> Any:
+    """Write a description by the declarations of its fields.
+
+    What it leaves out stays out. A table is returned, or the list that is the value of
+    an effect.
+    """
+    if isinstance(description, PinRows):
+        return _write_rows(description)
+    table = dict[str, Any]()
+    for field in list_declared(type(description)):
+        value = getattr(description, field.name)
+        by = field.by
+        if value is None:
+            continue
+        if isinstance(by, Declared):
+            value = write_declared(value, by)
+        elif isinstance(by, At):
+            value = _write_place(value)
+            if by.is_value:
+                table |= value
+                continue
+        elif isinstance(by, Entries):
+            if not value and not by.is_value:
+                continue
+            value = [write_described(entry) for entry in value]
+        elif isinstance(by, Part):
+            value = write_described(value)
+        elif isinstance(by, Listed):
+            value = [write_quantity(number, by.unit) for number in value]
+        table[field.key] = value
+    if [*table] == _PAIR:
+        return [*table.values()]
+    return table.get("", table)
 
 
-def write_pair(
-    first: float,
-    second: float,
-    unit: str,
-    of_second: str = "rad",
-) -> list[str]:
-    """Write a pair, mostly [magnitude, angle], likewise."""
-    return [write_quantity(first, unit), write_quantity(second, of_second)]
+def _write_rows(rows: PinRows) -> dict[str, Any]:
+    """Write what each pin has: one number, or a table of several."""
+    table = dict[str, Any]()
+    for pin, *numbers in rows.rows:
+        pairs = zip(rows.numbers.items(), numbers, strict=True)
+        row = {name: write_declared(number, by) for (name, by), number in pairs}
+        table[pin] = row.get("", row)
+    return table
+
+
+def _write_place(place: Place) -> dict[str, Any]:
+    stated = dict[str, Any]()
+    for name, value in place._asdict().items():
+        if isinstance(value, tuple):
+            stated[name] = write_declared(value, STATED_PAIR)
+        elif value is not None:
+            stated[name] = value
+    return stated
 
 
 def _is_elsewhere(key: str, table: dict[str, Any], names: list[str]) -> bool:
@@ -405,31 +560,27 @@ def _is_elsewhere(key: str, table: dict[str, Any], names: list[str]) -> bool:
 
     A key that may mean one of those allowed is none.
     """
-    unknown = [name for name in table if name not in names]
     if key == "pins" and len(table) > len(names):
         return True
-    if key == "lengths" and table.keys() >= set(BAR_NAMES.values()):
-        for name in unknown:
-            if is_length(table[name]) and not _suggest_word(name, names):
-                return True
-    of_pins = names == [*PINS] and any(_FURTHER_PIN.fullmatch(name) for name in unknown)
-    return of_pins or any(
-        names_other_mechanism(name) and _MEANT.get(name) not in names
-        for name in unknown
-    )
+    has_lengths = key == "lengths" and table.keys() >= set(BAR_NAMES.values())
+    for name in table.keys() - {*names}:
+        if has_lengths and is_length(table[name]) and not _suggest_word(name, names):
+            return True
+        if names == [*PINS] and _FURTHER_PIN.fullmatch(name):
+            return True
+        if names_other_mechanism(name) and _MEANT.get(name) not in names:
+            return True
+    return False
 
 
 def _suggest_word(word: object, names: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not, or means the same."""
-    if isinstance(word, str) and _MEANT.get(word) in names:
-        return f'did you mean "{_MEANT[word]}"? '
-    if isinstance(word, str):
-        close = difflib.get_close_matches(word[:LONGEST_FIELD], names, 1)
-    else:
-        close = []
-    if close:
-        return f'did you mean "{close[0]}"? '
-    return ""
+    if not isinstance(word, str):
+        return ""
+    close = difflib.get_close_matches(word[:LONGEST_FIELD], names, 1)
+    if _MEANT.get(word) in names:
+        close = [_MEANT[word]]
+    return f'did you mean "{close[0]}"? ' if close else ""
 
 
 def _join_key(key: str, name: str) -> str:
@@ -438,9 +589,8 @@ def _join_key(key: str, name: str) -> str:
     A name that is not a plain word is quoted, so that it stays on one line.
     """
     if not BARE_KEY.fullmatch(name):
-        name = repr(
-            name if len(name) <= LONGEST_FIELD else name[:LONGEST_FIELD] + "..."
-        )
+        end = "..." if len(name) > LONGEST_FIELD else ""
+        name = repr(name[:LONGEST_FIELD] + end)
     return f"{key}.{name}" if key else name
 
 

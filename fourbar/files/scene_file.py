@@ -6,9 +6,7 @@ Numbers are rounded once when they are read; what is written reads back bit for 
 import math
 import re
 import tomllib
-from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,7 +14,6 @@ import numpy as np
 
 from fourbar import writing
 from fourbar.effects import (
-    Effect,
     ForceDrive,
     LinearDrive,
     Load,
@@ -25,7 +22,6 @@ from fourbar.effects import (
 )
 from fourbar.effects.place import settler
 from fourbar.errors import InputError, expect
-from fourbar.files.described import PLACES_OF_ENDS, list_keys, read_described
 from fourbar.files.drawn_pins import (
     DrawnGround,
     choose_assembly,
@@ -36,10 +32,17 @@ from fourbar.files.drawn_pins import (
     read_ground,
     state_places,
 )
-from fourbar.files.fields import BARE_KEY, Reader
+from fourbar.files.fields import BARE_KEY, PLACES_OF_ENDS, Reader, list_keys
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS, SIGMA
 from fourbar.formulas.mobility import meet_change_points
-from fourbar.linkage import BAR_NAMES, MOST_INTERVALS, POSITIVE, Bar, FourBar
+from fourbar.linkage import (
+    BAR_NAMES,
+    MOST_INTERVALS,
+    POSITIVE,
+    Bar,
+    Declared,
+    FourBar,
+)
 from fourbar.quantities import Array
 from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
@@ -105,6 +108,12 @@ _OVER_THETA_2 = (
 _LIKE_A_SWEEP = re.compile(r"\d[^\d]*(\bto\b|\.\.|:|;)\s*-?\d")
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
+_PICTURE = {
+    "scale": Declared("m", POSITIVE, None),
+    "angle": Declared("rad", left_out=0.0),
+    "opacity": Declared("1", left_out=0.5),
+}
+"""Numbers of the picture under the drawing."""
 MOST_POINTS_OF_A_SCENE = 1000
 """Limit of the points, each of which is three columns of every table."""
 
@@ -215,32 +224,31 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     for key in top.keys() - {"pins", "lengths"}:
         top[key] = state_places(read, key, top[key], drawn)
     points = _read_points(read, top.get("points", {}))
-    bars = {point.name: point.bar for point in points}
-    drive_bar, drive = _read_drive(read, top.get("drive", {}), bars)
+    read.bars = {point.name: point.bar for point in points}
+    drive_bar, drive = _read_drive(read, top.get("drive", {}))
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > _MOST_LOADS:
         allowed = f"must be written as [[loads]], at most {_MOST_LOADS}"
         raise read.refuse("loads", entries, allowed)
     effects = read.table("effects", top.get("effects", {}), list_kinds())
     lengths, met = _read_lengths(read, top, drawn)
-    linkage = _read_linkage(read, top.get("bars", {}), met, drawn.angle(1))
+    bars = top.get("bars", {})
+    linkage = _read_linkage(read, bars, met, drawn.angle(1))
     pictures = []
-    for name, bar in top.get("bars", {}).items():
-        if "picture" in bar:  # its file is read when it is shown
-            text = read.text(f"bars.{name}.picture", bar["picture"])
-            pictures.append(Picture(MOVING_BAR_NUMBERS[name], text, folder))
-    pictures.sort(key=lambda picture: picture.bar)
-    motion = top.get("motion", {})
+    for name, bar in MOVING_BAR_NUMBERS.items():
+        if "picture" in bars.get(name, {}):  # its file is read when it is shown
+            text = read.text(f"bars.{name}.picture", bars[name]["picture"])
+            pictures.append(Picture(bar, text, folder))
     settled = drive and drive.with_places(settler(linkage, points))
     scene = Scene(
         linkage,
-        _read_motion(read, motion, drawing, settled),
+        _read_motion(read, top.get("motion", {}), drawing, settled),
         drive_bar,  # type: ignore[arg-type]
         tuple(
-            _read_load(read, f"loads[{index}]", entry, bars)
+            _read_load(read, f"loads[{index}]", entry)
             for index, entry in enumerate(entries)
         ),
-        tuple(_read_effect(read, key, value, bars) for key, value in effects.items()),
+        tuple(_read_effect(read, key, value) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
         tuple(pictures),
@@ -259,30 +267,27 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     )
 
 
-def _read_drive(
-    read: Reader,
-    value: object,
-    bars: Mapping[str, int],
-) -> tuple[int | None, ForceDrive | None]:
+def _read_drive(read: Reader, value: object) -> tuple[int | None, ForceDrive | None]:
     """Read the bar on which a couple acts, or a force along a line or at a place."""
     if isinstance(value, dict):
         for name in ("torque", "moment", "force"):
             if name in value:
                 raise read.refuse(f"drive.{name}", value[name], _A_GIVEN_DRIVE)
     on_line = list_keys(LinearDrive)
-    at_point = list_keys(PointDrive)
-    entry = read.table("drive", value, dict.fromkeys(("bar", *on_line, *at_point)))
+    allowed = dict.fromkeys(("bar", *on_line, *list_keys(PointDrive)))
+    entry = read.table("drive", value, allowed)
     stated = entry.keys()
+    kind: Any = PointDrive
     if not stated.isdisjoint(on_line):
+        kind = LinearDrive
         for name in stated - {*on_line}:
             raise read.refuse(f"drive.{name}", entry[name], _A_LINE)
-        return None, read_described(read, "drive", entry, LinearDrive, bars)
-    if stated <= {"bar"}:
+    elif stated <= {"bar"}:
         return read.bar("drive.bar", entry.get("bar", 2)), None
-    if stated.isdisjoint(PLACES_OF_ENDS):
+    elif stated.isdisjoint(PLACES_OF_ENDS):
         read.bar("drive.bar", entry.get("bar"))
         raise read.refuse("drive.point", None, _A_POINT)
-    return None, read_described(read, "drive", entry, PointDrive, bars)
+    return None, read.described("drive", entry, kind)
 
 
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
@@ -292,7 +297,7 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
-        points.append(read_described(read, key, point, Point, {}, name=name))
+        points.append(read.described(key, point, Point, name=name))
     return tuple(points)
 
 
@@ -300,28 +305,16 @@ def _read_traced(read: Reader, value: object, folder: str) -> TracedPicture | No
     """Read the picture under the drawing; its file is read when it is shown."""
     if value is None:
         return None
-    stated = ("file", "origin", "scale", "angle", "opacity")
-    entry = read.table("picture", value, stated)
+    entry = read.table("picture", value, ("file", "origin", *_PICTURE))
     origin = entry.get("origin")
     if origin is not None:
         if not isinstance(origin, list) or len(origin) != 2:
             raise read.refuse("picture.origin", origin, "must be a pixel [x, y]")
         x, y = (read.number("picture.origin", number) for number in origin)
         origin = (x, y)
-    scale = entry.get("scale")
-    if scale is not None:
-        scale = read.quantity("picture.scale", scale, "m", POSITIVE)
-    opacity = read.number("picture.opacity", entry.get("opacity", 0.5))
-    if not 0.0 <= opacity <= 1.0:
-        raise read.refuse("picture.opacity", opacity, "must be from 0 to 1")
-    return TracedPicture(
-        read.text("picture.file", entry.get("file")),
-        origin,
-        scale,
-        read.quantity("picture.angle", entry.get("angle"), "rad", default=0.0),
-        opacity,
-        folder,
-    )
+    numbers = read.numbers("picture", entry, _PICTURE)
+    name = read.text("picture.file", entry.get("file"))
+    return TracedPicture(name, origin, folder=folder, **numbers)
 
 
 def _read_lengths(
@@ -342,11 +335,10 @@ def _read_lengths(
         stated["ground"] = f"{drawn.length:.16e} m"
     declared = dict.fromkeys(names, Bar.numbers["length"])
     lengths: Any = tuple(read.numbers("lengths", stated, declared).values())
-    met: Any = lengths
-    if math.isfinite(sum(lengths)):  # more is refused where they are put together
-        roundings: Any = [half_unit_of_text(stated[name], "m") for name in names]
-        met = meet_change_points(lengths, tuple(roundings))
-    return lengths, met
+    if not math.isfinite(sum(lengths)):  # refused where they are put together
+        return lengths, lengths
+    roundings: Any = tuple(half_unit_of_text(stated[name], "m") for name in names)
+    return lengths, meet_change_points(lengths, roundings)
 
 
 def _read_linkage(
@@ -384,7 +376,6 @@ def _read_motion(
 
     A side that is left out of a commanded stroke is the drawn one.
     """
-    places = (*BAR_OF_ANGLE, "stroke")
     entry = read.table(
         "motion", value, (*Motion.numbers, "side", "branch", "free", "law")
     )
@@ -396,41 +387,40 @@ def _read_motion(
     arguments: dict[str, Any] = {}
     for name, by in Motion.numbers.items():
         if name in entry:
-            reading: Any = read.quantity
-            if name in places:
-                reading = partial(_read_commanded, read)
-            elif isinstance(entry[name], list):
-                reading = read.quantities
-            arguments[name] = reading(f"motion.{name}", entry[name], by.unit)
+            stated = entry[name]
+            key = f"motion.{name}"
+            if name in (*BAR_OF_ANGLE, "stroke"):
+                arguments[name] = _read_commanded(read, key, stated, by.unit)
+            elif isinstance(stated, list):
+                arguments[name] = read.quantities(key, stated, by.unit)
+            else:
+                arguments[name] = read.quantity(key, stated, by.unit)
     for name, words in (("branch", BRANCH_OF_NAME), ("side", SIDES)):
         if name in entry:
             arguments[name] = read.choice(f"motion.{name}", entry[name], words)
     if "free" in entry:
-        free = read_described(read, "motion.free", entry["free"], Free, {})
-        arguments["free"] = free
+        arguments["free"] = read.described("motion.free", entry["free"], Free)
     if "law" in entry:
         arguments["law"] = _read_law(read, entry["law"])
     return Motion(**arguments)
 
 
-def _read_law(read: Reader, value: object) -> Law | Rise | Sine:
+def _read_law(read: Reader, value: Any) -> Law | Rise | Sine:
     """Read a table; a sine; or a rise, a dwell, a fall and a rest by a standard law."""
     key = "motion.law"
     law: Any = Law
-    entry = value
     if isinstance(value, dict) and "kind" in value:
-        kind = read.choice(f"{key}.kind", value["kind"], LAW_KINDS)
         law = Rise
-        if kind == SINE_LAW:
+        if read.choice(f"{key}.kind", value["kind"], LAW_KINDS) == SINE_LAW:
             law = Sine
-            entry = {name: number for name, number in value.items() if name != "kind"}
-    return read_described(read, key, entry, law, {})  # type: ignore[no-any-return]
+            value = {name: number for name, number in value.items() if name != "kind"}
+    return read.described(key, value, law)  # type: ignore[no-any-return]
 
 
 def _read_commanded(
     read: Reader,
     key: str,
-    value: object,
+    value: Any,
     unit: str,
 ) -> float | Array | Sweep | FromLimit:
     """Read angles or strokes: one, a list of them, or a sweep.
@@ -440,17 +430,18 @@ def _read_commanded(
     if isinstance(value, str) and _LIKE_A_SWEEP.search(value):
         form = '{ from = "0 deg", to = "360 deg", steps = 360 }'
         raise read.refuse(key, value, f"is no number; a sweep is written {form}")
-    if value is None or isinstance(value, (str, int, float)):
+    if isinstance(value, str | int | float):
         return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
         return np.array(read.quantities(key, value, unit))
-    from_limit = " or { limit, offset }" if unit == "rad" else ""
+    is_angle = unit == "rad"
     if not isinstance(value, dict):
-        like = "135 deg" if unit == "rad" else "1.5 m"
-        forms = f"a list of such, {{ from, to, steps }}{from_limit}"
-        raise read.refuse(key, value, f'must be like "{like}", {forms}')
-    if from_limit and value.keys() & {"limit", "offset"}:
-        return read_described(read, key, value, FromLimit, {})  # type: ignore[no-any-return]
+        like = '"1.5 m", a list of such, { from, to, steps }'
+        if is_angle:
+            like = '"135 deg", a list of such, { from, to, steps } or { limit, offset }'
+        raise read.refuse(key, value, f"must be like {like}")
+    if is_angle and value.keys() & {"limit", "offset"}:
+        return read.described(key, value, FromLimit)  # type: ignore[no-any-return]
     sweep = read.table(key, value, ("from", "to", "steps"))
     start, stop = (
         read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to")
@@ -459,30 +450,24 @@ def _read_commanded(
     return Sweep(start, stop, read.whole(f"{key}.steps", steps, 1, MOST_INTERVALS))
 
 
-def _read_load(read: Reader, key: str, value: Any, bars: Mapping[str, int]) -> Load:
-    if isinstance(value, dict) and value.keys().isdisjoint(("force", "moment")):
-        read.table(key, value, list_keys(Load))
-        raise read.refuse(key, value, "must have a force, a moment or both")
+def _read_load(read: Reader, key: str, value: Any) -> Load:
     if isinstance(value, dict):
+        if value.keys().isdisjoint(("force", "moment")):
+            read.table(key, value, list_keys(Load))
+            raise read.refuse(key, value, "must have a force, a moment or both")
         table = value.get("table")
         if isinstance(table, dict) and "time" in table:
             raise read.refuse(f"{key}.table.time", table["time"], _OVER_THETA_2)
-    load: Load = read_described(read, key, value, Load, bars)
-    return load
+    return read.described(key, value, Load)  # type: ignore[no-any-return]
 
 
-def _read_effect(
-    read: Reader,
-    name: str,
-    value: object,
-    bars: Mapping[str, int],
-) -> Effect:
+def _read_effect(read: Reader, name: str, value: object) -> Any:
     """Read an effect from the value under its key."""
     kind: Any = list_kinds()[name]
     key = f"effects.{name}"
     if kind.example and not isinstance(value, dict | list):
         raise read.refuse(key, value, f"must be like {kind.example}")
-    return read_described(read, key, value, kind, bars)  # type: ignore[no-any-return]
+    return read.described(key, value, kind)
 
 
 def _read_tolerances(
@@ -499,14 +484,13 @@ def _read_tolerances(
     flat = _flatten(read, value)
     for key, stated in flat.items():
         name = f'tolerances."{key}"'
-        if key in COMMAND_KEYS:
+        if key not in entries:
             allowed = (
                 "a commanded value has no tolerance; its speed and acceleration may"
                 " have one"
             )
-            raise read.refuse(name, stated, allowed)
-        if key not in entries:
-            allowed = refuse_key(key, stated, list(entries)).allowed
+            if key not in COMMAND_KEYS:
+                allowed = refuse_key(key, stated, list(entries)).allowed
             raise read.refuse(name, stated, allowed)
         entry = entries[key]
         sigma = isinstance(stated, list)

@@ -15,25 +15,33 @@ import numpy as np
 
 from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
-from fourbar.files.described import write_described
 from fourbar.files.drawn_pins import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
     Reader,
     convert_to_polar,
-    write_numbers,
-    write_pair,
+    split_key,
+    write_declared,
+    write_described,
     write_quantity,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, POSITIVE, Bar, FourBar
+from fourbar.linkage import (
+    BAR_NAMES,
+    MOVING_BARS,
+    PINS,
+    Bar,
+    Declared,
+    FourBar,
+)
 from fourbar.quantities import Array
 from fourbar.quantities.units import IMPERIAL, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
     BRANCH_NAMES,
+    SINE_LAW,
     FromLimit,
-    Law,
     Motion,
+    Sine,
     Sweep,
 )
 from fourbar.scene.pictures import TracedPicture
@@ -106,13 +114,16 @@ def _write_traced(picture: TracedPicture | None) -> dict[str, Any]:
     """Write the picture under the drawing."""
     if picture is None:
         return {}
-    entries: dict[str, Any] = {"file": picture.name}
-    if picture.origin is not None:
-        entries["origin"] = [*picture.origin]
-    if picture.scale is not None:
-        entries["scale"] = write_quantity(picture.scale, "m")
-    angle = write_quantity(picture.angle, "rad")
-    return entries | {"angle": angle, "opacity": picture.opacity}
+    origin = picture.origin
+    scale = picture.scale
+    entries = {
+        "file": picture.name,
+        "origin": None if origin is None else [*origin],
+        "scale": None if scale is None else write_quantity(scale, "m"),
+        "angle": write_quantity(picture.angle, "rad"),
+        "opacity": picture.opacity,
+    }
+    return {key: entry for key, entry in entries.items() if entry is not None}
 
 
 def _write_lengths(
@@ -143,20 +154,16 @@ def _restore_coordinates(
 ) -> None:
     """Write places by x and y again that were read so and are the same still."""
     for key, (x, y) in coordinates:
-        *into, last = (
-            int(step) if step.isdigit() else step
-            for step in re.findall(r"[^.\[\]]+", key)
-        )
+        *into, last = split_key(key)
         holder: Any = tables
         with suppress(LookupError, TypeError):
             for step in into:
                 holder = holder[step]
             unit = holder[last][0].partition(" ")[2]
-            if holder[last] == write_pair(*convert_to_polar(x, y), unit):
-                holder[last] = {
-                    "x": write_quantity(x, unit),
-                    "y": write_quantity(y, unit),
-                }
+            by = Declared(unit, pair="rad")
+            if holder[last] == write_declared(convert_to_polar(x, y), by):
+                parts = {"x": x, "y": y}.items()
+                holder[last] = {name: write_quantity(z, unit) for name, z in parts}
 
 
 def list_scene_tables(scene: Scene) -> dict[str, Any]:
@@ -168,10 +175,10 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
     """
     keys = [effect.key for effect in scene.effects]
     for effect in scene.effects:
-        if list_kinds().get(effect.key) is not type(effect):
+        kind = type(effect)
+        if list_kinds().get(effect.key) is not kind:
             allowed = "a scene file cannot state this effect"
-            kind = type(effect).__name__
-            raise InputError(f"effects.{effect.key}", kind, allowed)
+            raise InputError(f"effects.{effect.key}", kind.__name__, allowed)
     if len(set(keys)) < len(keys):
         allowed = "a scene file holds one effect of each kind"
         raise InputError("effects", keys, allowed)
@@ -200,7 +207,7 @@ def _write_bar(bar: Bar) -> dict[str, Any]:
 
     What a uniform bar has follows from the numbers before it.
     """
-    numbers = write_numbers(bar)
+    numbers: dict[str, Any] = write_described(bar)
     del numbers["length"]
     if bar.density is not None:
         del numbers["mass"]
@@ -209,38 +216,43 @@ def _write_bar(bar: Bar) -> dict[str, Any]:
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
-    law = motion.law
-    free = motion.free
-    stated = motion.angle
     theta, omega, alpha = motion.names
-    unit, of_speed, of_growth = (motion.numbers[name].unit for name in motion.names)
-    entry: dict[str, Any] = {theta: None, omega: None}
-    if isinstance(stated, Sweep):
-        ends = {"from": stated.start, "to": stated.stop}
-        written = {key: write_quantity(end, unit) for key, end in ends.items()}
-        entry[theta] = {**written, "steps": stated.steps}
-    elif isinstance(stated, FromLimit):
-        entry[theta] = write_described(stated)
-    elif stated is not None:
-        entry[theta] = _write_quantities(stated, unit)
-    if motion.speed is not None:
-        entry[omega] = _write_quantities(motion.speed, of_speed)
-    if law is None:
-        entry[alpha] = _write_quantities(motion.acceleration, of_growth)
+    unit = motion.numbers[theta].unit
+    angle: Any = motion.angle
+    if isinstance(angle, Sweep):
+        angle = {
+            "from": write_quantity(angle.start, unit),
+            "to": write_quantity(angle.stop, unit),
+            "steps": angle.steps,
+        }
+    elif isinstance(angle, FromLimit):
+        angle = write_described(angle)
     else:
-        kind = {} if isinstance(law, Law) else {"kind": law.kind}
-        entry["law"] = {**kind, **write_described(law)}
+        angle = _write_quantities(angle, unit)
+    entry = {
+        theta: angle,
+        omega: _write_quantities(motion.speed, motion.numbers[omega].unit),
+        alpha: _write_quantities(motion.acceleration, motion.numbers[alpha].unit),
+    }
+    if motion.law is not None:
+        del entry[alpha]
+        entry["law"] = write_described(motion.law)
+        if isinstance(motion.law, Sine):
+            entry["law"] = {"kind": SINE_LAW, **entry["law"]}
     entry["branch"] = BRANCH_NAMES[motion.branch]
     entry["side"] = motion.side
-    entry["free"] = None if free is None else write_described(free)
+    if motion.free is not None:
+        entry["free"] = write_described(motion.free)
     return {key: value for key, value in entry.items() if value is not None}
 
 
-def _write_quantities(numbers: float | Array, unit: str) -> Any:
-    """Write a number with its unit, or a list of them."""
+def _write_quantities(numbers: float | Array | None, unit: str) -> Any:
+    """Write a number with its unit, or a list of them; None of none."""
+    if numbers is None:
+        return None
     if isinstance(numbers, np.ndarray):
-        return [write_quantity(float(number), unit) for number in numbers]
-    return write_quantity(float(numbers), unit)
+        return [write_quantity(number, unit) for number in numbers]
+    return write_quantity(numbers, unit)
 
 
 def _write_toml_value(key: str, value: object) -> str:
@@ -271,15 +283,14 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
     entries = list_entries(scene)
     rows = dict[str, Any]()
     for tolerance in scene.tolerances:
-        if tolerance.key not in entries:
+        key = tolerance.key
+        if key not in entries:
             allowed = "no number of the scene has this key"
-            raise InputError("tolerances", tolerance.key, allowed)
-        entry = entries[tolerance.key]
-        width = write_quantity(tolerance.width, entry.unit)
-        if (misfit := find_misfit(scene, entry, tolerance)) is not None:
-            raise InputError(f"tolerances.{tolerance.key}", width, misfit)
-        key = json.dumps(tolerance.key)
-        rows[key] = [width, SIGMA] if tolerance.sigma else width
+            raise InputError("tolerances", key, allowed)
+        width = write_quantity(tolerance.width, entries[key].unit)
+        if (misfit := find_misfit(scene, entries[key], tolerance)) is not None:
+            raise InputError(f"tolerances.{key}", width, misfit)
+        rows[json.dumps(key)] = [width, SIGMA] if tolerance.sigma else width
     return rows
 
 
@@ -299,16 +310,15 @@ def write_new_scene(
     texts = [" ".join(text.split()) for text in lengths]
     stated = dict(zip(BAR_NAMES.values(), texts, strict=True))
     read = Reader("--lengths", stated)
+    declared = dict.fromkeys(stated, Bar.numbers["length"])
+    d, *moving = read.numbers("", stated, declared).values()
+    a, b, c = map(Bar, moving)
+    FourBar(d, a, b, c)
     rows = ["[lengths]"]
-    numbers = []
-    for name, text in stated.items():
-        numbers.append(read.quantity(name, text, "m", POSITIVE))
-        rows.append(f"{name} = {_quote(text)}")
+    rows += (f"{name} = {_quote(text)}" for name, text in stated.items())
     rows.append('ground_angle = "0 deg"  # from O2 to O4')
-    d, a, b, c = numbers
-    FourBar(d, Bar(a), Bar(b), Bar(c))
     unit = find_unit(texts[0], "m")
-    return _fill_in(rows, (a, b, c), _BRANCH_LINE, unit, template)
+    return _fill_in(rows, moving, _BRANCH_LINE, unit, template)
 
 
 _BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
@@ -324,15 +334,13 @@ def write_drawn_scene(
     """
     read = Reader("--pins")
     rows = ["[pins]  # x and y in the position that is drawn"]
-    places = {}
+    places = []
     for pin, (x, y) in pins.items():
-        places[pin] = read_point(read, pin, [x, y])
+        places.append(read_point(read, pin, [x, y]))
         rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
-    drawing = DrawnPins(**places)
-    a, b, c = (drawing.length(bar) for bar in MOVING_BARS)
-    x_of_A, _ = pins["A"]
-    unit = find_unit(x_of_A, "m")
-    return _fill_in(rows, (a, b, c), "", unit, template)
+    drawing = DrawnPins(*places)
+    moving = [drawing.length(bar) for bar in MOVING_BARS]
+    return _fill_in(rows, moving, "", find_unit(pins["A"][0], "m"), template)
 
 
 def _quote(text: str) -> str:
@@ -380,7 +388,7 @@ _IMPERIAL_EXAMPLES = {
 
 def _fill_in(
     rows: list[str],
-    lengths: tuple[float, float, float],
+    moving: list[float],
     branch: str,
     unit: str,
     template: str,
@@ -392,10 +400,11 @@ def _fill_in(
     examples = _EXAMPLES_IN_UNITS.get(unit, _EXAMPLES_IN_UNITS["m"])
     if unit.casefold() in IMPERIAL:
         examples = _IMPERIAL_EXAMPLES
-    length = to_si(f"1 {examples['long']}", "m")
-    per_metre = float(examples["per_length"]) / length
-    masses = (f"{float(f'{per_metre * x:.4g}')!r}" for x in lengths)
-    moving = zip(("input", "coupler", "output"), masses, strict=True)
+    per_metre = float(examples["per_length"]) / to_si(f"1 {examples['long']}", "m")
+    masses = {
+        name: repr(float(f"{per_metre * length:.4g}"))
+        for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
+    }
     # loads much that no other command needs
     from importlib.resources import files
 
@@ -403,6 +412,6 @@ def _fill_in(
     return Template(text).substitute(
         linkage="\n".join(rows),
         branch=branch,
-        **dict(moving),
+        **masses,
         **examples,
     )

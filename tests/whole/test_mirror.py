@@ -31,7 +31,7 @@ JUDGED_BY = {
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
     "fourbar/edit/test_session.py": "fourbar/edit: dragging exports scene_entries",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect",
-    "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
+    "fourbar/files/test_files.py": "fourbar/files: scene_text",
     "fourbar/formulas/test_formulas.py": (
         "fourbar/formulas: arithmetic many_digits path"
     ),
