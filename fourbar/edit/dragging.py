@@ -16,6 +16,7 @@ from fourbar.effects import Load, Place
 from fourbar.effects.place import states_place
 from fourbar.errors import InputError
 from fourbar.evaluation.case import compute_shown_state
+from fourbar.files.fields import split_key
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, SECOND_PIN
 from fourbar.quantities.units import find_unit, to_si
@@ -66,38 +67,30 @@ def list_handles(scene: Scene) -> list[_Handle]:
     """
     handles = []
     for number in MOVING_BARS:
-        name = BAR_NAMES[number]
         bar = scene.linkage.bar(number)
         if bar.mass > 0.0:
+            name = BAR_NAMES[number]
             path: KeyPath = ("bars", name, "centre")
             mass_centre = f"mass centre of {name}"
             handles.append(_Handle(mass_centre, path, number, 0j, bar.to_centre))
     for key, _, one in list_described(scene):
-        path = tuple(int(step) if step.isdigit() else step for step in key.split("."))
-        if isinstance(one, Load):
-            handles += _hold_load(path, one, scene)
-        elif isinstance(one, Place):
-            handles.append(_hold_place(path, one, scene))
-        elif states_place(type(one)):
-            handles.append(_hold_place(path, one.place, scene))
+        path = split_key(key)
+        if not isinstance(one, Place | Load) and not states_place(type(one)):
+            continue
+        if one.place is not None:
+            handle = _hold_place(path, one.place, scene)
+        elif one.arm is not None:
+            G = scene.linkage.bar(one.bar).to_centre
+            arm = cmath.rect(*one.arm)
+            of_arm = (*path, "arm")
+            handle = _Handle(_name_handle(path), of_arm, one.bar, G, arm, turns=False)
+        else:  # a couple without a place
+            continue
+        if isinstance(one, Load) and one.force is not None:
+            turns = one.frame == "bar"
+            handle = handle._replace(force=(*path, "force"), force_turns=turns)
+        handles.append(handle)
     return handles
-
-
-def _hold_load(path: KeyPath, load: Load, scene: Scene) -> list[_Handle]:
-    """List the handle of a load and its force; a couple without a place has none."""
-    if load.arm is not None:
-        G = scene.linkage.bar(load.bar).to_centre
-        arm = cmath.rect(*load.arm)
-        of_arm = (*path, "arm")
-        handle = _Handle(_name_handle(path), of_arm, load.bar, G, arm, turns=False)
-    elif load.place is not None:
-        handle = _hold_place(path, load.place, scene)
-    else:
-        return []
-    if load.force is None:
-        return [handle]
-    turns = load.frame == "bar"
-    return [handle._replace(force=(*path, "force"), force_turns=turns)]
 
 
 def _name_handle(path: KeyPath) -> str:
@@ -117,13 +110,12 @@ def _hold_place(path: KeyPath, place: Place, scene: Scene) -> _Handle:
     name = _name_handle(path)
     if place.point is not None:
         path = ("points", place.point)
-        places = {point.name: point.place for point in scene.points}
-        place = places[place.point]
-    if place.from_centre is not None:
-        G = scene.linkage.bar(place.bar).to_centre
-        pair = cmath.rect(*place.from_centre)
-        return _Handle(name, (*path, "from_centre"), place.bar, G, pair)
-    return _Handle(name, (*path, "from_pin"), place.bar, 0j, place.vector())
+        place = next(p.place for p in scene.points if p.name == place.point)
+    if place.from_centre is None:
+        return _Handle(name, (*path, "from_pin"), place.bar, 0j, place.vector())
+    G = scene.linkage.bar(place.bar).to_centre
+    pair = cmath.rect(*place.from_centre)
+    return _Handle(name, (*path, "from_centre"), place.bar, G, pair)
 
 
 class Dragged(NamedTuple):
@@ -155,13 +147,9 @@ def drag(
     Raises InputError where nothing of that name can be dragged, or the linkage does not
     assemble there.
     """
-    position = Command(
-        np.array([dragged.theta_2]),
-        np.array([dragged.branch], dtype=np.int8),
-        0.0,
-        0.0,
-    )
-    state = compute_shown_state(scene, position)
+    theta_2 = np.array([dragged.theta_2])
+    branch = np.array([dragged.branch], dtype=np.int8)
+    state = compute_shown_state(scene, Command(theta_2, branch, 0.0, 0.0))
     if isinstance(dragged.what, str):
         if scene.drawing is None:
             _drag_pin(document, dragged, state)
@@ -211,12 +199,9 @@ def _put_force(
     stated = str(plain["loads"][path[1]]["force"][0])
     unit = find_unit(stated, "N")
     force = to_si(stated, unit) * stretch
-    half_turn = 0.0 if force >= 0.0 else math.pi
-    angle = cmath.phase(arrow) + half_turn
-    of_angle = (*path, 1)
-    written = _write_like(document.at(of_angle), angle, 0.02, "rad")
+    angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
     document.put((*path, 0), write_rounded(force, abs(force) / 50.0, unit))
-    document.put(of_angle, written)
+    _put_like(document, (*path, 1), angle, 0.02, "rad")
 
 
 def _drag_pin(document: SceneDocument, dragged: Dragged, state: State) -> None:
@@ -227,14 +212,12 @@ def _drag_pin(document: SceneDocument, dragged: Dragged, state: State) -> None:
         return
     for bar, pin in SECOND_PIN.items():
         if pin == dragged.what:
-            key = ("lengths", BAR_NAMES[bar])
             length = abs(dragged.to - _take_one(state.foot(bar)))
-            document.put(key, _write_like(document.at(key), length, dragged.grain))
+            _put_like(document, ("lengths", BAR_NAMES[bar]), length, dragged.grain)
     if dragged.what == "O4":
         angle = cmath.phase(dragged.to)
         grain = dragged.grain / max(abs(dragged.to), dragged.grain)
-        key = ("lengths", "ground_angle")
-        document.put(key, _write_like(document.at(key), angle, grain, "rad"))
+        _put_like(document, ("lengths", "ground_angle"), angle, grain, "rad")
 
 
 def _drag_drawn_pin(
@@ -258,8 +241,7 @@ def _drag_drawn_pin(
     place = (dragged.to.real + x0, dragged.to.imag + y0)
     for axis, coordinate in enumerate(place):
         key = ("pins", str(dragged.what), axis)
-        old = document.at(key)
-        document.put(key, _write_like(old, coordinate, dragged.grain))
+        _put_like(document, key, coordinate, dragged.grain)
 
 
 def parse_place(stated: Any) -> complex:
@@ -268,9 +250,7 @@ def parse_place(stated: Any) -> complex:
     The entry is polar, or by x and y.
     """
     if isinstance(stated, dict):
-        x = to_si(stated["x"], "m")
-        y = to_si(stated["y"], "m")
-        return complex(x, y)
+        return complex(to_si(stated["x"], "m"), to_si(stated["y"], "m"))
     distance, angle = stated
     return cmath.rect(to_si(distance, "m"), to_si(angle, "rad"))
 
@@ -288,13 +268,11 @@ def put_place(
     file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
-    x_y = document.at((*path, "x")), document.at((*path, "y"))
-    if isinstance(old, dict) and DRAWN_WORD in old:
-        before = DRAWN_WORD
-        by = by or "xy"  # a place of its bar from now on
-    else:
-        before = "xy" if isinstance(old, dict) else "polar"
-        by = by or before
+    before = "polar"
+    if isinstance(old, dict):
+        # what is drawn is a place of its bar from now on
+        before = DRAWN_WORD if DRAWN_WORD in old else "xy"
+        by = by or "xy"
     lengths = (
         (*path, DRAWN_WORD, 0),
         (*path, "x"),
@@ -304,28 +282,31 @@ def put_place(
         ("pins", "A", 0),
     )
     length = next(filter(None, map(document.at, lengths)))
-    parts: dict[str | int, str]
+    stated: Any
     if by == "xy":
-        pairs = zip("xy", x_y, (place.real, place.imag), strict=True)
-        parts = {
-            axis: _write_like(old_part or length, part, grain)
-            for axis, old_part, part in pairs
-        }
-        stated: Any = parts
+        x = _write_like(document.at((*path, "x")) or length, place.real, grain)
+        y = _write_like(document.at((*path, "y")) or length, place.imag, grain)
+        stated = {"x": x, "y": y}
+        parts = [*stated.items()]
     else:
         distance = abs(place)
         angle_grain = grain / max(distance, grain)
         old_angle = document.at((*path, 1))
-        parts = {
-            0: _write_like(length, distance, grain),
-            1: _write_like(old_angle, cmath.phase(place), angle_grain, "rad"),
-        }
-        stated = [*parts.values()]
-    if old is None or by != before:
+        angle = _write_like(old_angle, cmath.phase(place), angle_grain, "rad")
+        stated = [_write_like(length, distance, grain), angle]
+        parts = [*enumerate(stated)]
+    if old is None or (by or before) != before:
         document.put(path, stated)
         return
-    for step, text in parts.items():
+    for step, text in parts:
         document.put((*path, step), text)
+
+
+def _put_like(
+    document: SceneDocument, path: KeyPath, value: float, grain: float, si: str = "m"
+) -> None:
+    """State a number as `_write_like` writes it in the place of an older one."""
+    document.put(path, _write_like(document.at(path), value, grain, si))
 
 
 def _write_like(old: object, value: float, grain: float, si: str = "m") -> str:

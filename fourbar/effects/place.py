@@ -60,6 +60,15 @@ class Place(NamedTuple):
         """Declarations of the forms in which numbers state a place."""
         return STATED_PLACES
 
+    @property
+    def place(self) -> "Place":
+        """The place itself, as that of what stands at a place."""
+        return self
+
+    def with_places(self, change: Callable[["Place"], "Place"]) -> "Place":
+        """Return the changed place."""
+        return change(self)
+
     def settle(self, linkage: FourBar, points: Mapping[str, "Place"]) -> "Place":
         """Return the same place from the bar's first pin, by numbers that are stated.
 

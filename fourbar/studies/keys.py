@@ -1,6 +1,6 @@
 """The numbers of a scene by their keys in its file, and scenes of arrays of them."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
@@ -70,8 +70,8 @@ _BY_MATERIAL = ("density", "section", "diameter", "mass_per_length")
 _MASS_CENTRE = "centre"
 OF_A_UNIFORM_BAR = ("inertia", _MASS_CENTRE)
 """Numbers of a bar that are those of a uniform one if they are left out."""
-_LENGTH_OF_BAR = {bar: f"lengths.{name}" for bar, name in BAR_NAMES.items()}
-_GROUND_ANGLE = "lengths.ground_angle"
+_KEYS = {"loads": "loads.{0}", "points": "{1.key}", "effects": "effects.{1.key}"}
+"""Keys of what a scene holds many of, by its field, from the index and the entry."""
 NumberPath = tuple[str | int, ...]
 """Attributes and indices that lead from a scene to one of its numbers."""
 
@@ -110,23 +110,21 @@ def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
         described.append((key, path, holder))
         for field in list_declared(type(holder)):
             value = getattr(holder, field.name)
-            inner = f"{key}.{field.key}".rstrip("."), (*path, field.name)
+            inner = f"{key}.{field.key}".rstrip(".")
+            place = (*path, field.name)
             if isinstance(field.by, At):
                 # in the holder's own table it is the first of the numbers
                 index = -1 if field.by.is_value else len(described)
-                described.insert(index, (*inner, value))
+                described.insert(index, (inner, place, value))
             elif isinstance(field.by, Entries):
                 for index, entry in enumerate(value):
-                    add(f"{inner[0]}.{index}", (*inner[1], index), entry)
+                    add(f"{inner}.{index}", (*place, index), entry)
 
     if scene.drive is not None:
         add("drive", ("drive",), scene.drive)
-    for index, load in enumerate(scene.loads):
-        add(f"loads.{index}", ("loads", index), load)
-    for index, point in enumerate(scene.points):
-        add(point.key, ("points", index), point)
-    for index, effect in enumerate(scene.effects):
-        add(f"effects.{effect.key}", ("effects", index), effect)
+    for table, key in _KEYS.items():
+        for index, one in enumerate(getattr(scene, table)):
+            add(key.format(index, one), (table, index), one)
     return described
 
 
@@ -141,15 +139,15 @@ def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, Scene
     return entries
 
 
-def _list_bar(bar: Bar, number: int) -> dict[str, SceneNumber]:
+def _list_bar(bar: Bar, name: str) -> dict[str, SceneNumber]:
     """List the entries of a moving bar as it is stated.
 
     A bar whose mass follows from its length has no entry for it.
     """
-    entries = _list_entries("", ("linkage", BAR_NAMES[number]), Bar)
-    absent = {name for name in _BY_MATERIAL if getattr(bar, name) is None}
-    if bar.density is not None or bar.mass_per_length is not None:
+    absent = {number for number in _BY_MATERIAL if getattr(bar, number) is None}
+    if not absent >= {"density", "mass_per_length"}:
         absent.add("mass")
+    entries = _list_entries(f"bars.{name}", ("linkage", name), Bar)
     stated = [item for item in entries.items() if item[1].place[2] not in absent]
     # what a uniform bar has follows from the numbers before it
     return dict(sorted(stated, key=lambda item: item[1].place[2] in OF_A_UNIFORM_BAR))
@@ -173,16 +171,13 @@ def _list_drawn_places(
         *holder, form, axis = entry.place
         stem = key.removesuffix(f".{axis}")
         if form == "from_pin":
-            stem = stem.removesuffix(form) + DRAWN_WORD
-        elif form == _MASS_CENTRE and not _is_left_out(scene, entry):
-            distance, _ = read_place(scene, entry.place[:-1])
-            if distance == 0.0:
-                continue
-            stem = f"{stem}.{DRAWN_WORD}"
+            stem = stem.removesuffix(f".{form}")
         else:
-            continue
+            is_centre = form == _MASS_CENTRE and not _is_left_out(scene, entry)
+            if not is_centre or read_place(scene, (*holder, form, 0)) == 0.0:
+                continue
         place = (*holder, DRAWN_WORD, axis)
-        drawn[f"{stem}.{axis}"] = SceneNumber(place, PIN_COORDINATE.unit)
+        drawn[f"{stem}.{DRAWN_WORD}.{axis}"] = SceneNumber(place, PIN_COORDINATE.unit)
     return drawn
 
 
@@ -197,15 +192,15 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     bars = dict[str, SceneNumber]()
     for bar in MOVING_BARS:
         name = BAR_NAMES[bar]
-        numbers = _list_bar(scene.linkage.bar(bar), bar)
-        lengths[f"lengths.{name}"] = numbers.pop(".length")
-        bars |= {f"bars.{name}{key}": number for key, number in numbers.items()}
+        bars |= _list_bar(scene.linkage.bar(bar), name)
+        lengths[f"lengths.{name}"] = bars.pop(f"bars.{name}.length")
     entries = lengths | of_ground | bars
-    if scene.motion.law is None:
-        _, omega, alpha = scene.motion.names
+    motion = scene.motion
+    if motion.law is None:
+        _, omega, alpha = motion.names
         for field, name in (("speed", omega), ("acceleration", alpha)):
-            if np.ndim(getattr(scene.motion, field)) == 0:  # not one for each angle
-                unit = scene.motion.numbers[name].unit
+            if np.ndim(getattr(motion, field)) == 0:  # not one for each angle
+                unit = motion.numbers[name].unit
                 entries[f"motion.{name}"] = SceneNumber(("motion", field), unit)
     for key, path, described in list_described(scene):
         entries |= _list_entries(key, path, described)
@@ -312,21 +307,17 @@ def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:
     A length follows from the pins of its bar, distance and angle of a place from the
     coordinates of the place. None: the keys state no number twice.
     """
-    ends = {_LENGTH_OF_BAR[bar]: pins for bar, pins in ENDS.items()}
-    ends[_GROUND_ANGLE] = ENDS[1]
-    for length, pins in ends.items():
-        if length not in keys:
-            continue
+    ends = {f"lengths.{BAR_NAMES[bar]}": pins for bar, pins in ENDS.items()}
+    ends["lengths.ground_angle"] = ENDS[1]
+    for length, (first, second) in ends.items():
         for key in keys:
-            if key.startswith(tuple(f"pins.{pin}." for pin in pins)):
+            if length in keys and key.startswith((f"pins.{first}.", f"pins.{second}.")):
                 return length, key
     for key in keys:
         stem, drawn, _ = key.partition(f".{DRAWN_WORD}.")
-        if not drawn:
-            continue
         form = stem if stem.endswith(_MASS_CENTRE) else f"{stem}.from_pin"
         for followed in (f"{form}.0", f"{form}.1"):
-            if followed in keys:
+            if drawn and followed in keys:
                 return followed, key
     return None
 
@@ -369,7 +360,7 @@ def read_number(scene: Scene, entry: SceneNumber) -> Any:
     if not entry.is_drawn_place:
         return read_place(scene, entry.place)
     *holder, _, axis = entry.place
-    place = _find_stated_place(scene, tuple(holder))
+    place = _find_stated_place(scene, holder)
     pin, theta = _find_drawn_frame(scene, place.bar)
     z = place.vector() * polar(1.0, theta)
     return pin[int(axis)] + (z.real, z.imag)[int(axis)]
@@ -385,11 +376,11 @@ def replace_number(scene: Scene, entry: SceneNumber, values: Any) -> Scene:
     x' and y' from the bar's first pin in the axes of the drawing, theta the drawn angle
     of the bar. Both terms stay polar, as a place is stated, and have slopes at z = 0.
     """
+    changed: Scene
     if not entry.is_drawn_place:
-        changed: Scene = replace_place(scene, entry.place, values)
+        changed = replace_place(scene, entry.place, values)
         return changed
-    *path, _, axis = entry.place
-    holder = tuple(path)
+    *holder, _, axis = entry.place
     place = _find_stated_place(scene, holder)
     pin, theta = _find_drawn_frame(scene, place.bar)
     z = place.vector() * polar(1.0, theta)
@@ -399,7 +390,13 @@ def replace_number(scene: Scene, entry: SceneNumber, values: Any) -> Scene:
         from_pin=(parts[0], -theta),
         from_centre=(parts[1], 0.5 * np.pi - theta),
     )
-    return _put_stated_place(scene, holder, moved)
+    stated = read_place(scene, holder)
+    if isinstance(stated, Bar):
+        stated = copy_with(stated, centre=moved.polar_from_pin())
+    else:
+        stated = stated.with_places(lambda _: moved)
+    changed = replace_place(scene, holder, stated)
+    return changed
 
 
 def _find_drawn_frame(scene: Scene, bar: int) -> tuple[tuple[Any, Any], Any]:
@@ -413,32 +410,16 @@ def _find_drawn_frame(scene: Scene, bar: int) -> tuple[tuple[Any, Any], Any]:
     return (without_slopes(x), without_slopes(y)), angle(direction)
 
 
-def _find_stated_place(scene: Scene, holder: NumberPath) -> Place:
+def _find_stated_place(scene: Scene, holder: Sequence[str | int]) -> Place:
     """Return the place of a point, a load, an end of a line or a bar's mass centre."""
     stated = read_place(scene, holder)
-    if isinstance(stated, Place):
-        return stated
     if isinstance(stated, Bar):
         return Place(BAR_NUMBERS[str(holder[-1])], stated.mass_centre)
     place: Place = stated.place
     return place
 
 
-def _put_stated_place(scene: Scene, holder: NumberPath, place: Place) -> Scene:
-    """Copy a scene with a place that `_find_stated_place` finds replaced."""
-    stated = read_place(scene, holder)
-    new: Any
-    if isinstance(stated, Place):
-        new = place
-    elif isinstance(stated, Bar):
-        new = copy_with(stated, centre=place.polar_from_pin())
-    else:
-        new = stated.with_places(lambda _: place)
-    changed: Scene = replace_place(scene, holder, new)
-    return changed
-
-
-def read_place(value: Any, place: NumberPath) -> Any:
+def read_place(value: Any, place: Sequence[str | int]) -> Any:
     """Read the number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
         if isinstance(name, int):
@@ -474,27 +455,23 @@ def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     return changed
 
 
-def replace_place(holder: Any, place: NumberPath, values: Any) -> Any:
+def replace_place(holder: Any, place: Sequence[str | int], values: Any) -> Any:
     """Copy with one number replaced; what a constructor checks is not checked again."""
     if not place:
         return values
-    name, *rest = place
+    name: Any = place[0]
+    old = read_place(holder, [name])
+    new = replace_place(old, place[1:], values)
     if isinstance(name, int):
-        parts = list(holder)
-        parts[name] = replace_place(parts[name], tuple(rest), values)
-        return tuple(parts)
-    old = getattr(holder, name)
-    if isinstance(holder, Bar) and name == "centre" and old is None:
-        old = holder.mass_centre
-    changed = {name: replace_place(old, tuple(rest), values)}
+        return (*holder[:name], new, *holder[name + 1 :])
     if hasattr(holder, "_replace"):  # a named tuple
-        return holder._replace(**changed)
-    new = copy_with(holder, **changed)
-    if isinstance(new, Bar):
-        return copy_with(new, mass=new.weigh())
-    if isinstance(new, Scene) and name == "drawing":
-        return _follow_pins(new, old)
-    return new
+        return holder._replace(**{name: new})
+    copied = copy_with(holder, **{name: new})
+    if isinstance(copied, Bar):
+        return copy_with(copied, mass=copied.weigh())
+    if isinstance(copied, Scene) and name == "drawing":
+        return _follow_pins(copied, old)
+    return copied
 
 
 def _follow_pins(scene: Scene, drawn: DrawnPins) -> Scene:
@@ -515,15 +492,14 @@ def _follow_pins(scene: Scene, drawn: DrawnPins) -> Scene:
             continue
         v = drawn.vector(bar)
         moved_v = moved.vector(bar)
-        place: NumberPath = ("linkage", "ground")
+        place = ["linkage", BAR_NAMES[bar]]
         if bar in MOVING_BARS:
-            place = ("linkage", BAR_NAMES[bar], "length")
+            place.append("length")
         rounding = read_place(followed, place) - np.hypot(v.real, v.imag)
         length = np.hypot(moved_v.real, moved_v.imag) + rounding
         followed = replace_place(followed, place, length)
         if bar == 1:
             turned = angle(vector(dot(v, moved_v), sine(v, moved_v)))
-            ground_angle = followed.linkage.ground_angle + turned
-            place = ("linkage", "ground_angle")
-            followed = replace_place(followed, place, ground_angle)
+            turned = followed.linkage.ground_angle + turned
+            followed = replace_place(followed, ["linkage", "ground_angle"], turned)
     return followed
