@@ -72,28 +72,31 @@ OFFERED_UNITS = (
 """Units of results to choose from; any other list can be typed."""
 
 
+_ENDING_OF_PICTURE = {
+    "data:image/png": "png",
+    "data:image/jpeg": "jpg",
+    "data:image/svg+xml": "svg",
+}
+Asked = dict[str, Any]
+"""Request of a page, or a part of the answer to it."""
+
+
 class SceneState(NamedTuple):
     """A scene file that can be read, and what was read."""
 
     text: str
     scene: Scene
-    plain: dict[str, Any]
+    plain: Asked
 
     @property
     def units(self) -> Conversion:
         """Units of the file, in which messages state numbers too."""
         return units_of_scene(self.plain)
 
-    def evaluate(
-        self,
-        units: Conversion,
-        *,
-        settled: bool = False,
-        pressure: float | None = None,
-    ) -> dict[str, Any]:
+    def evaluate(self, units: Conversion, **more: Any) -> Asked:
         """Evaluate the scene for the page, as `evaluate_scene` does."""
         with state_messages_in(self.units):
-            return evaluate_scene(self.scene, units, settled=settled, pressure=pressure)
+            return evaluate_scene(self.scene, units, **more)
 
 
 class Session:
@@ -109,11 +112,10 @@ class Session:
         self.token = secrets.token_urlsafe(32)  # of this process alone
         self.unit_names = _AS_THE_FILE
         self.pressure_text = ""
-        if self.path.exists():
-            text = read_scene_text(self.path)
-        else:
-            text = write_new_scene(NEW)
         self.disk = self._read_disk()
+        text = write_new_scene(NEW)
+        if self.disk is not None:
+            text = read_scene_text(self.path)
         self.texts = [text]
         self.history_index = 0
         self.kept = {"start": text}
@@ -214,40 +216,29 @@ class Session:
     def read(self, text: str) -> SceneState:
         """Read the text of a scene; InputError where the workbench takes none such."""
         if len(text.encode()) > LARGEST_SCENE_FILE:
-            raise InputError(
-                "scene file",
-                len(text),
-                f"must not exceed {LARGEST_SCENE_FILE} bytes",
-            )
+            allowed = f"must not exceed {LARGEST_SCENE_FILE} bytes"
+            raise InputError("scene file", len(text), allowed)
         plain = parse_tables(text, str(self.path))
         with state_messages_in(units_of_scene(plain)):
             scene = read_tables(plain, str(self.path))
-            require_steps(
-                scene.motion,
-                MOST_SOLVED_ANEW,
-                "in the workbench",
-                str(self.path),
-            )
+            path = str(self.path)
+            require_steps(scene.motion, MOST_SOLVED_ANEW, "in the workbench", path)
         return SceneState(text, scene, plain)
 
     # ---- what a page asks for ----
 
-    def answer(self) -> dict[str, Any]:
+    def answer(self) -> Asked:
         """Describe the present state, without error bars and summary."""
         return self.describe(self.now.evaluate(self.units))
 
-    def describe(
-        self,
-        data: dict[str, Any],
-        *,
-        settled: bool = False,
-    ) -> dict[str, Any]:
+    def describe(self, data: Asked, *, settled: bool = False) -> Asked:
         """Describe the present state.
 
         `data`: its numbers. `settled`: with error bars and summary.
         """
         entries = list_entries(self.now.scene)
-        description = {
+        saved = {"saved": self.saved} if settled else {}
+        return {
             "data": data,
             "settled": settled,
             "plain": self.now.plain,
@@ -261,18 +252,13 @@ class Session:
             "kept": [*self.kept],
             "keys": {key: entry.unit for key, entry in entries.items()},
             "fresh": self.fresh,
+            **saved,
         }
-        if settled:
-            description["saved"] = self.saved
-        return description
 
-    def compared(self) -> dict[str, Any]:
+    def compared(self) -> Asked:
         """Describe the state that the present one is held against."""
         kept = self.read(self.kept[self.reference])
-        return {
-            "compared": self.reference,
-            "data": kept.evaluate(self.units),
-        }
+        return {"compared": self.reference, "data": kept.evaluate(self.units)}
 
     def locate_kept_peaks(self) -> dict[str, float | None]:
         """List the located peaks of the state that the present one is held against."""
@@ -283,7 +269,7 @@ class Session:
             self.located = {text: list_peaks(solution, Facts(solution))}
         return self.located[text]
 
-    def do(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def do(self, asked: Asked) -> Asked:
         """Do what a page asks for and describe the state after it.
 
         A request that is refused changes nothing.
@@ -316,10 +302,10 @@ class Session:
             self.base = self.now
         alter(self.document)
         now = self.read(self.document.text())
-        if goes_on:
-            self.texts = [*self.texts[: self.history_index], now.text]
-        elif now.text != self.now.text:
+        if not goes_on and now.text != self.now.text:
             self.history_index += 1
+            goes_on = True
+        if goes_on:
             self.texts = [*self.texts[: self.history_index], now.text]
         forgotten = max(len(self.texts) - MOST_STATES, 0)
         self.texts = self.texts[forgotten:]
@@ -330,12 +316,277 @@ class Session:
             # entries that were put in then stand as in a file; too slow for each step
             self.document = SceneDocument(now.text)
 
+    # ---- one method for each request that a page can make ----
+
+    def _do_hello(self, asked: Asked) -> Asked:
+        """List what a page needs once: what it offers, in the units of the scene."""
+        offers = dict(list_offers())
+        for name in ("fields", "commands"):
+            offers[name] = _suit_entry(offers[name], self.now.units)
+        offers["units"] = OFFERED_UNITS
+        return {"offers": offers, "file": self.path.name, "refer": True}
+
+    def _do_set(self, asked: Asked) -> None:
+        path = asked["path"]
+        text = str(asked["value"])
+        gesture = str(asked.get("gesture", ""))
+        self.change(lambda document: document.set(path, text), gesture)
+
+    def _do_add(self, asked: Asked) -> None:
+        part = list_offers()["parts"][int(asked["part"])]
+        name = str(asked.get("name", ""))
+        path = [name if step == "" else step for step in part["at"]]
+        value = part["value"]
+        scene = self.now.scene
+        entries = list_entries(scene)
+        if path[0] == "tolerances" and name in entries:
+            # a thousandth of the number, until the designer says more
+            entry = entries[name]
+            number = float(read_number(scene, entry) or 1.0)
+            value = f"{abs(number) / 1000.0:.1g} {entry.unit}"
+        value = _suit_entry(value, self.now.units)
+        self.change(lambda document: document.put(path, value))
+
+    def _do_remove(self, asked: Asked) -> None:
+        self.change(lambda document: document.remove(asked["path"]))
+
+    def _do_drag(self, asked: Asked) -> None:
+        names = {"grain", "theta_2", "stretch"} & asked.keys()
+        numbers = {name: float(asked[name]) for name in names}
+        x, y = map(float, asked["to"])
+        branch = int(asked["branch"])
+        dragged = Dragged(asked["what"], complex(x, y), branch=branch, **numbers)
+
+        def alter(document: SceneDocument) -> None:
+            drag(document, self.base.scene, self.base.plain, dragged)
+
+        self.change(alter, str(asked.get("gesture", "")))
+
+    def _do_text(self, asked: Asked) -> None:
+        # refused in the words of the file's reader
+        text = self.read(str(asked["text"])).text
+        self.change(lambda document: document.become(text))
+
+    def _do_undo(self, asked: Asked) -> None:
+        self._move_in_history(-1)
+
+    def _do_redo(self, asked: Asked) -> None:
+        self._move_in_history(1)
+
+    def _move_in_history(self, by: int) -> None:
+        index = self.history_index + by
+        if not 0 <= index < len(self.texts):
+            raise InputError("history", index, "no further state to undo or redo")
+        self.now = self.read(self.texts[index])
+        self.history_index = index
+        self.gesture = ""
+        self.document = SceneDocument(self.now.text)
+
+    def _do_keep(self, asked: Asked) -> Asked:
+        *_, last = self.kept
+        number = 0 if last == "start" else int(last.removeprefix("state "))
+        name = f"state {number + 1}"
+        self.kept[name] = self.now.text
+        if len(self.kept) > MOST_KEPT:
+            _, oldest, *_ = self.kept
+            del self.kept[oldest]
+        return self._do_refer({"to": name})
+
+    def _do_refer(self, asked: Asked) -> Asked:
+        name = asked["to"]
+        if name not in self.kept:
+            known = ", ".join(self.kept)
+            raise InputError("reference", name, f"must be one of {known}")
+        self.reference = name
+        return {"refer": True}
+
+    def _do_units(self, asked: Asked) -> Asked:
+        name = str(asked["units"])
+        _require_readable_units(name)
+        self.unit_names = name
+        return {"refer": True}
+
+    def _do_pressure(self, asked: Asked) -> None:
+        self.pressure_text = _read_typed_pressure(str(asked["pressure"]))
+
+    def _do_command(self, asked: Asked) -> None:
+        """Command another bar, or the cylinder.
+
+        The range is what the present motion covers of it without turning back.
+        """
+        commanded = str(asked["command"])
+        names_of = {
+            names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)
+        }
+        _, rate_name, *_ = names_of[commanded]
+        now = self.now
+        has_speed = now.scene.motion.speed is not None
+        before = solve(now.scene, "force" if has_speed else "position")
+        values = getattr(before, commanded)
+        if values is None:
+            reason = "needs a cylinder: add one in place of the bar first"
+            raise InputError("command", commanded, reason)
+        first, last = _find_monotone(values, _find_shown(before.theta_2, asked))
+        if last == first:
+            reason = "does not move in this motion: choose another sweep first"
+            raise InputError("command", commanded, reason)
+
+        document = SceneDocument(now.text)
+        motion = now.plain["motion"]
+        for name in {*chain(*names_of.values()), "side", "free", "law"} & motion.keys():
+            document.remove(["motion", name])
+        unit = "deg"
+        factor = math.degrees(1.0)
+        rate_unit, rate_factor = find_unit_in("rad/s", now.units)
+        is_stroke = commanded == "stroke"
+        if is_stroke:
+            unit = find_unit(find_length(now.plain), "m")
+            factor = to_si("1 m", unit)
+            rate_unit = f"{unit}/s"
+            rate_factor = factor
+        # so that rounding leads to no position beyond
+        inset = 1e-3 * (values[last] - values[first])
+        grain = abs(factor * inset)
+        sweep = {
+            "from": write_rounded(factor * (values[first] + inset), grain, unit),
+            "to": write_rounded(factor * (values[last] - inset), grain, unit),
+            "steps": max(60, min(last - first, 360)),
+        }
+        document.put(["motion", commanded], sweep)
+        middle = (first + last) // 2
+        if has_speed:
+            rate = rate_factor * float(getattr(before, rate_name)[middle])
+            rounded = write_rounded(rate, abs(rate) / 100.0, rate_unit)
+            document.put(["motion", rate_name], rounded)
+
+        pose = _read_bar_directions(before, middle)
+        text = self._choose_nearest_assembly(document, is_stroke, pose)
+        self.change(lambda changed: changed.become(text))
+
+    def _choose_nearest_assembly(
+        self, document: SceneDocument, has_side: bool, pose: Any
+    ) -> str:
+        """State the branch and the side whose motion passes nearest to a pose.
+
+        `pose`: directions of the three moving bars.
+        """
+        # a drawing states the assembly by its pins, and refuses a branch beside them
+        branches = [""] if document.at(["pins"]) is not None else list(BRANCH_OF_NAME)
+        distances = dict[str, float]()
+        for branch, side in product(branches, SIDES if has_side else [""]):
+            for name, word in (("branch", branch), ("side", side)):
+                if word:
+                    document.put(["motion", name], word)
+            text = document.text()
+            after = solve(self.read(text).scene, "position")
+            directions = _read_bar_directions(after, len(after) // 2)
+            distance = np.abs(directions - pose).sum()
+            distances[text] = float(np.nan_to_num(distance, nan=np.inf))
+        return min(distances, key=distances.__getitem__)
+
+    def _do_restate(self, asked: Asked) -> None:
+        """State a place by x and y, or by distance and angle."""
+        path = asked["path"]
+        by = str(asked["by"])
+        stated = self.document.at(path)
+        if isinstance(stated, dict) and DRAWN_WORD in stated:
+            raise InputError(name_entry(path), by, "is stated in the drawing")
+        place = parse_place(stated)
+        grain = 1e-6 * abs(place)
+        self.change(lambda document: put_place(document, path, place, grain, by))
+
+    def _do_picture(self, asked: Asked) -> Asked:
+        """Keep a picture beside the scene, never over a file, under the drawing.
+
+        `data`: its data URI.
+        """
+        kind, _, text = str(asked["data"]).partition(";base64,")
+        if kind not in _ENDING_OF_PICTURE:
+            raise InputError("picture", kind[:40], "must be a PNG, JPEG or SVG picture")
+        content = base64.b64decode(text, validate=True)
+        folder = self.path.parent
+        for number in count(1):
+            mark = "" if number == 1 else f"-{number}"
+            name = f"{self.path.stem}{mark}.{_ENDING_OF_PICTURE[kind]}"
+            picture = TracedPicture(name, folder=str(folder))
+            with suppress(FileExistsError), open(folder / name, "xb") as file:
+                file.write(content)
+                break
+        try:
+            picture.read()
+        except InputError:
+            (folder / name).unlink()
+            raise
+        entries = {"file": name, "angle": "0 deg", "opacity": 0.5}
+        self.change(lambda document: document.put(["picture"], entries))
+        return {"note": f"the picture is {name}"}
+
+    def _do_draw(self, asked: Asked) -> Asked:
+        """State four pins in the plane, in a unit, in place of those of the file.
+
+        The first drawing becomes the state at the start: it replaces no linkage of the
+        user's.
+        """
+        unit = str(asked["unit"])
+        grain = float(asked["grain"])
+        pins = {}
+        for pin, (x, y) in zip(PINS, asked["pins"], strict=True):
+            written_x = write_rounded(float(x), grain, unit)
+            pins[pin] = (written_x, write_rounded(float(y), grain, unit))
+        drawn = write_drawn_scene(pins)
+        is_first = self.fresh
+        text = drawn if is_first else self.now.text
+        picture = self.now.plain.get("picture")
+
+        def alter(document: SceneDocument) -> None:
+            document.become(text)
+            for path in (["lengths"], ["motion", "branch"]):
+                if document.at(path) is not None:
+                    document.remove(path)
+            for pin, place in pins.items():
+                document.put(["pins", pin], [*place])
+            if is_first and picture is not None:
+                document.put(["picture"], picture)
+
+        self.change(alter)
+        if is_first:
+            self.kept["start"] = self.now.text
+        return {"refer": is_first}
+
+    def _do_save(self, asked: Asked) -> Asked:
+        """Write the file; where it is another one than was read, only on demand."""
+        name = self.path.name
+        if self._read_disk() != self.disk and not asked.get("over"):
+            if not self.path.exists():
+                return {"ask": f"{name} was removed meanwhile. Write it again?"}
+            return {"ask": f"{name} was changed on the disk meanwhile. Overwrite it?"}
+        write_bytes(self.path, self.now.text.encode())
+        self.disk = self.now.text
+        return {"note": f"saved {name}", "saved": True}
+
+    def _do_export(self, asked: Asked) -> Asked:
+        form = str(asked["format"])
+        return {"note": f"wrote {self.exports.write(self.now.scene, form, self.units)}"}
+
+    def _do_bodies(self, asked: Asked) -> Asked:
+        position = float(asked["position"])
+        drawn = self.exports.free_bodies(self.now.scene, position, self.units)
+        return {"bodies": drawn}
+
+
+_ACTIONS: dict[str, Any] = {
+    name.removeprefix("_do_"): action
+    for name, action in vars(Session).items()
+    if name.startswith("_do_")
+}
+"""Requests that a page can make."""
+
 
 _cached_units = cache(units)
 
 
 @cache
-def _read_placeholder() -> dict[str, Any]:
+def _read_placeholder() -> Asked:
     """Return what the scene states that stands for none, beside a picture."""
     return tomllib.loads(write_new_scene(NEW)) | {"picture": None}
 
@@ -383,171 +634,11 @@ def _suit_entry(value: Any, own: Conversion) -> Any:
     return value
 
 
-def _add_element(session: Session, asked: dict[str, Any]) -> None:
-    part = list_offers()["parts"][int(asked["part"])]
-    name = str(asked.get("name", ""))
-    path = [name if step == "" else step for step in part["at"]]
-    own = units_of_scene(session.now.plain)
-    value = _suit_entry(part["value"], own)
-    if path[0] == "tolerances":
-        entries = list_entries(session.now.scene)
-        if name in entries:  # a thousandth of the number, until the designer says more
-            entry = entries[name]
-            number = float(read_number(session.now.scene, entry) or 1.0)
-            width = abs(number) / 1000.0
-            value = _suit_entry(f"{width:.1g} {entry.unit}", own)
-    session.change(lambda document: document.put(path, value))
-
-
-def _drag_point(session: Session, asked: dict[str, Any]) -> None:
-    names = {"grain", "theta_2", "stretch"} & asked.keys()
-    numbers = {name: float(asked[name]) for name in names}
-    x, y = map(float, asked["to"])
-    dragged = Dragged(
-        asked["what"],
-        complex(x, y),
-        branch=int(asked["branch"]),
-        **numbers,
-    )
-
-    def alter(document: SceneDocument) -> None:
-        drag(document, session.base.scene, session.base.plain, dragged)
-
-    session.change(alter, str(asked.get("gesture", "")))
-
-
-def _replace_text(session: Session, asked: dict[str, Any]) -> None:
-    # refused in the words of the file's reader
-    text = session.read(str(asked["text"])).text
-    session.change(lambda document: document.become(text))
-
-
-def _move_in_history(session: Session, by: int) -> None:
-    index = session.history_index + by
-    if not 0 <= index < len(session.texts):
-        raise InputError("history", index, "no further state to undo or redo")
-    session.now = session.read(session.texts[index])
-    session.history_index = index
-    session.gesture = ""
-    session.document = SceneDocument(session.now.text)
-
-
-def _keep_state(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    *_, last = session.kept
-    number = 0 if last == "start" else int(last.removeprefix("state "))
-    name = f"state {number + 1}"
-    session.kept[name] = session.now.text
-    if len(session.kept) > MOST_KEPT:
-        _, oldest, *_ = session.kept
-        del session.kept[oldest]
-    return _refer(session, {"to": name})
-
-
-def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    name = asked["to"]
-    if name not in session.kept:
-        known = ", ".join(session.kept)
-        raise InputError("reference", name, f"must be one of {known}")
-    session.reference = name
-    return {"refer": True}
-
-
-def _change_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    name = str(asked["units"])
-    _require_readable_units(name)
-    session.unit_names = name
-    return {"refer": True}
-
-
 def _read_typed_pressure(text: str) -> str:
     """Return a pressure as it was typed; InputError where it is none."""
     if text.strip():
         Reader("workbench").quantity("pressure", text, "Pa", POSITIVE)
     return text.strip()
-
-
-def _state_pressure(session: Session, asked: dict[str, Any]) -> None:
-    session.pressure_text = _read_typed_pressure(str(asked["pressure"]))
-
-
-def _command_other(session: Session, asked: dict[str, Any]) -> None:
-    """Command another bar, or the cylinder.
-
-    The range is what the present motion covers of it without turning back.
-    """
-    commanded = str(asked["command"])
-    names_of = {names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)}
-    _, rate_name, *_ = names_of[commanded]
-    scene = session.now.scene
-    has_speed = scene.motion.speed is not None
-    before = solve(scene, "force" if has_speed else "position")
-    values = getattr(before, commanded)
-    if values is None:
-        reason = "needs a cylinder: add one in place of the bar first"
-        raise InputError("command", commanded, reason)
-    first, last = _find_monotone(values, _find_shown(before.theta_2, asked))
-    if last == first:
-        reason = "does not move in this motion: choose another sweep first"
-        raise InputError("command", commanded, reason)
-    middle = (first + last) // 2
-
-    document = SceneDocument(session.now.text)
-    stated = session.now.plain["motion"].keys()
-    for name in {*chain(*names_of.values()), "side", "free", "law"} & stated:
-        document.remove(["motion", name])
-    if commanded == "stroke":
-        unit = find_unit(find_length(session.now.plain), "m")
-        factor = to_si("1 m", unit)
-        rate_unit = f"{unit}/s"
-        rate_factor = factor
-    else:
-        unit = "deg"
-        factor = math.degrees(1.0)
-        rate_unit, rate_factor = find_unit_in("rad/s", session.now.units)
-    # so that rounding leads to no position beyond
-    inset = 1e-3 * (values[last] - values[first])
-    grain = abs(factor * inset)
-    sweep = {
-        "from": write_rounded(factor * (values[first] + inset), grain, unit),
-        "to": write_rounded(factor * (values[last] - inset), grain, unit),
-        "steps": max(60, min(last - first, 360)),
-    }
-    document.put(["motion", commanded], sweep)
-    if has_speed:
-        rate = rate_factor * float(getattr(before, rate_name)[middle])
-        rounded = write_rounded(rate, abs(rate) / 100.0, rate_unit)
-        document.put(["motion", rate_name], rounded)
-
-    pose = _read_bar_directions(before, middle)
-    text = _choose_nearest_assembly(session, document, commanded == "stroke", pose)
-    session.change(lambda changed: changed.become(text))
-
-
-def _choose_nearest_assembly(
-    session: Session,
-    document: SceneDocument,
-    has_side: bool,
-    pose: Any,
-) -> str:
-    """State the branch and the side whose motion passes nearest to a pose.
-
-    `pose`: directions of the three moving bars.
-    """
-    # a drawing states the assembly by its pins, and refuses a branch beside them
-    branches = [""] if document.at(["pins"]) is not None else list(BRANCH_OF_NAME)
-    sides = SIDES if has_side else [""]
-    distances = dict[str, float]()
-    for branch, side in product(branches, sides):
-        if branch:
-            document.put(["motion", "branch"], branch)
-        if side:
-            document.put(["motion", "side"], side)
-        text = document.text()
-        after = solve(session.read(text).scene, "position")
-        directions = _read_bar_directions(after, len(after) // 2)
-        distance = np.abs(directions - pose).sum()
-        distances[text] = float(np.nan_to_num(distance, nan=np.inf))
-    return min(distances, key=distances.__getitem__)
 
 
 def _read_bar_directions(solution: Solution, index: int) -> Any:
@@ -556,7 +647,7 @@ def _read_bar_directions(solution: Solution, index: int) -> Any:
     return np.exp(1j * np.array(angles)[:, index])
 
 
-def _find_shown(theta_2: Any, asked: dict[str, Any]) -> int | None:
+def _find_shown(theta_2: Any, asked: Asked) -> int | None:
     """Return the position that the page shows, by its theta_2, or None."""
     if asked.get("theta_2") is None:
         return None
@@ -572,162 +663,9 @@ def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
     """
     signs = np.nan_to_num(np.sign(np.diff(values)))
     turns = np.flatnonzero(np.diff(signs)) + 1
-    runs = []
+    runs = pairwise([0, *turns.tolist(), len(signs)])
+    moving = [run for run in runs if signs[slice(*run)].any()]
     around = []
-    for start, stop in pairwise([0, *turns.tolist(), len(signs)]):
-        if not signs[start : start + 1].any():
-            continue
-        runs.append((start, stop))
-        if shown is not None and start <= shown <= stop:
-            around.append((start, stop))
-    return max(around or runs, key=lambda run: run[1] - run[0], default=(0, 0))
-
-
-def _restate(session: Session, asked: dict[str, Any]) -> None:
-    """State a place by x and y, or by distance and angle."""
-    path = asked["path"]
-    by = str(asked["by"])
-    stated = session.document.at(path)
-    if isinstance(stated, dict) and DRAWN_WORD in stated:
-        raise InputError(name_entry(path), by, "is stated in the drawing")
-    place = parse_place(stated)
-    session.change(
-        lambda document: put_place(document, path, place, 1e-6 * abs(place), by)
-    )
-
-
-_ENDING_OF_PICTURE = {
-    "data:image/png": "png",
-    "data:image/jpeg": "jpg",
-    "data:image/svg+xml": "svg",
-}
-
-
-def _take_picture(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    """Keep a picture beside the scene, never over a file, and lay it under the drawing.
-
-    `data`: its data URI.
-    """
-    kind, _, text = str(asked["data"]).partition(";base64,")
-    if kind not in _ENDING_OF_PICTURE:
-        raise InputError("picture", kind[:40], "must be a PNG, JPEG or SVG picture")
-    content = base64.b64decode(text, validate=True)
-    folder = session.path.parent
-    for number in count(1):
-        mark = "" if number == 1 else f"-{number}"
-        name = f"{session.path.stem}{mark}.{_ENDING_OF_PICTURE[kind]}"
-        picture = TracedPicture(name, folder=str(folder))
-        with suppress(FileExistsError), open(folder / name, "xb") as file:
-            file.write(content)
-            break
-    try:
-        picture.read()
-    except InputError:
-        (folder / name).unlink()
-        raise
-    entries = {"file": name, "angle": "0 deg", "opacity": 0.5}
-    session.change(lambda document: document.put(["picture"], entries))
-    return {"note": f"the picture is {name}"}
-
-
-def _draw_pins(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    """State four pins in the plane, given in a unit, in place of those of the file.
-
-    The first drawing becomes the state at the start: it replaces no linkage of the
-    user's.
-    """
-    unit = str(asked["unit"])
-    grain = float(asked["grain"])
-    pins = {}
-    for pin, (x, y) in zip(PINS, asked["pins"], strict=True):
-        written_x = write_rounded(float(x), grain, unit)
-        written_y = write_rounded(float(y), grain, unit)
-        pins[pin] = (written_x, written_y)
-    drawn = write_drawn_scene(pins)
-    is_first = session.fresh
-    text = drawn if is_first else session.now.text
-    picture = session.now.plain.get("picture")
-
-    def alter(document: SceneDocument) -> None:
-        document.become(text)
-        plain = tomllib.loads(text)
-        if "lengths" in plain:
-            document.remove(["lengths"])
-        if "branch" in plain.get("motion", {}):
-            document.remove(["motion", "branch"])
-        for pin, place in pins.items():
-            document.put(["pins", pin], list(place))
-        if is_first and picture is not None:
-            document.put(["picture"], picture)
-
-    session.change(alter)
-    if is_first:
-        session.kept["start"] = session.now.text
-    return {"refer": is_first}
-
-
-def _save_file(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    """Write the file; where it is another one than was read, only on demand."""
-    name = session.path.name
-    if session._read_disk() != session.disk and not asked.get("over"):
-        if not session.path.exists():
-            return {"ask": f"{name} was removed meanwhile. Write it again?"}
-        return {"ask": f"{name} was changed on the disk meanwhile. Overwrite it?"}
-    write_bytes(session.path, session.now.text.encode())
-    session.disk = session.now.text
-    return {"note": f"saved {name}", "saved": True}
-
-
-def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    form = str(asked["format"])
-    file = session.exports.write(session.now.scene, form, session.units)
-    return {"note": f"wrote {file}"}
-
-
-def _begin_page(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    """List what a page needs once: what it offers, in the units of the scene."""
-    offers = dict(list_offers())
-    own = units_of_scene(session.now.plain)
-    for name in ("fields", "commands"):
-        offers[name] = _suit_entry(offers[name], own)
-    offers["units"] = OFFERED_UNITS
-    return {
-        "offers": offers,
-        "file": session.path.name,
-        "refer": True,
-    }
-
-
-_ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
-    "set": lambda session, asked: session.change(
-        lambda of: of.set(asked["path"], str(asked["value"])),
-        str(asked.get("gesture", "")),
-    ),
-    "add": _add_element,
-    "remove": lambda session, asked: session.change(
-        lambda document: document.remove(asked["path"])
-    ),
-    "drag": _drag_point,
-    "text": _replace_text,
-    "undo": lambda session, asked: _move_in_history(session, -1),
-    "redo": lambda session, asked: _move_in_history(session, 1),
-    "keep": _keep_state,
-    "refer": _refer,
-    "units": _change_units,
-    "pressure": _state_pressure,
-    "command": _command_other,
-    "restate": _restate,
-    "draw": _draw_pins,
-    "picture": _take_picture,
-    "save": _save_file,
-    "export": _export,
-    "bodies": lambda session, asked: {
-        "bodies": session.exports.free_bodies(
-            session.now.scene,
-            float(asked["position"]),
-            session.units,
-        )
-    },
-    "hello": _begin_page,
-}
-"""Requests that a page can make."""
+    if shown is not None:
+        around = [run for run in moving if run[0] <= shown <= run[1]]
+    return max(around or moving, key=lambda run: run[1] - run[0], default=(0, 0))
