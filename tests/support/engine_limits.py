@@ -30,6 +30,7 @@ from fourbar_validation.engines.limits import (
 )
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.runner import Course
 from fourbar_validation.scenes.hard_families import (
     draw_lengths_of_type,
     dress,
@@ -52,7 +53,8 @@ class Measured(NamedTuple):
 
 def _simulated(scene):
     """The simulation itself, whatever its declared limits."""
-    return simulate._Simulation(RECIPE, scene, command(scene), bounded=False).answer()
+    course = Course(scene, command(scene))
+    return simulate._Simulation(RECIPE, course, bounded=False).answer()
 
 
 def _near_toggle(sine):
@@ -123,7 +125,7 @@ def _centre_kept(r):
     scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
     loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
     return bool(
-        loop.model.body_sameframe[loop.body["output"]]
+        loop.model.body_sameframe[loop.model.body("output").id]
         != mujoco.mjtSameFrame.mjSAMEFRAME_BODY
     )
 

@@ -437,8 +437,10 @@ def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:
     """Find the greatest deviation of the speed from the commanded one, relative."""
     theta_2 = trial.at.theta_2
     omega_2 = np.asarray(trial.at.omega_2, float)
-    first = theta_2.min() if setup.omega > 0.0 else theta_2.max()
-    squared = setup.omega**2 + 2.0 * setup.alpha * (theta_2 - first)
+    first = theta_2.min() if setup.course.speed > 0.0 else theta_2.max()
+    squared = setup.course.speed**2 + 2.0 * setup.course.acceleration * (
+        theta_2 - first
+    )
     due = np.sqrt(np.maximum(squared, 0.0))
     return float(np.max(np.abs(np.abs(omega_2) - due)) / np.max(due))
 

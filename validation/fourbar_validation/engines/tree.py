@@ -40,7 +40,7 @@ _OPEN_AT_B = [(name, point) for name, point in PART_POINTS.items() if name != "A
 _ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
 NO_RATES = np.zeros(3)
 """Speeds or accelerations of the coordinates, where they are zero."""
-_BORNE = {2: (2,), 3: (3, 2), 4: (4,)}
+BEARERS = {2: (2,), 3: (3, 2), 4: (4,)}
 """Bars whose first pins carry what acts on a bar of the open tree."""
 _OMEGAS, _ALPHAS = (
     tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha")
@@ -281,7 +281,7 @@ def carry(on: dict[int, Components], bar: int, x: float, y: float) -> None:
 
     The ground takes none.
     """
-    for bearer in _BORNE.get(bar, ()):
+    for bearer in BEARERS.get(bar, ()):
         f_x, f_y = on[bearer]
         on[bearer] = f_x - x, f_y - y
 

@@ -9,21 +9,16 @@ from functools import partial
 import mujoco
 import numpy as np
 
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.mjcf.model import CYLINDER
 from fourbar.quantities import Array
 from fourbar_validation.engines.loaded import Assembled
-from fourbar_validation.engines.tree import solve_closed
+from fourbar_validation.engines.tree import BEARERS, solve_closed
 
 # MuJoCo would write warnings to standard error and to a file of a fixed name in the
 # working folder; the monitor reads them from its data
 mujoco.set_mju_user_warning(lambda _: None)
 
-_CARRIED_BY = {
-    "input": ("input",),
-    "coupler": ("coupler", "input"),
-    "output": ("output",),
-}
-"""The bodies whose parent bears what acts on a body."""
 O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
 _TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
@@ -35,13 +30,6 @@ _COLUMN_OF = {
 """Derivative of each bar's rotation by the joint angles."""
 CYLINDER_SITES = (f"{CYLINDER}_start", f"{CYLINDER}_end")
 """Sites of the cylinder."""
-_SITE_OF = {
-    "O4": "O4",
-    "A": "A",
-    "B": "B3",
-    "B4": "B4",
-}
-"""Sites of the pins; B is that of bar 3, B4 that of bar 4."""
 WARNINGS = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -90,7 +78,7 @@ class ClosedLoop(Assembled):
         self.model = model = mujoco.MjModel.from_xml_string(mjcf)
         self.data = mujoco.MjData(model)
         self.site = {model.site(number).name: number for number in range(model.nsite)}
-        self.body = {name: model.body(name).id for name in _CARRIED_BY}
+        bar_of = {model.body(BAR_NAMES[bar]).id: bar for bar in MOVING_BARS}
         actuators = {model.actuator(i).name: i for i in range(model.nu)}
         self.drive = actuators.get("drive")
         self.ram = actuators.get(CYLINDER)
@@ -98,20 +86,23 @@ class ClosedLoop(Assembled):
         for name, load in actuators.items():
             if name.startswith("load_"):
                 body = model.site_bodyid[model.actuator_trnid[load, 0]]
-                bearers = _CARRIED_BY[model.body(body).name]
+                bearers = BEARERS[bar_of[body]]
                 self._loads.append((find_site_load(model, self.data, load), bearers))
         # MuJoCo's own memory, as that of the loads
-        self._carried = {}
-        for name, body in self.body.items():
-            self._carried[name] = self.data.cfrc_int[body, 3:5]
+        forces = self.data.cfrc_int
+        self._carried = {bar: forces[body, 3:5] for body, bar in bar_of.items()}
         self._jac = np.zeros((3, model.nv))
 
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4, m."""
-        on_bar_3 = self.data.site_xpos[self.site["B3"]]
-        on_bar_4 = self.data.site_xpos[self.site["B4"]]
-        x, y, _ = on_bar_3 - on_bar_4
-        return float(x), float(y)
+        x, y = self.find_line("B4", "B3").tolist()
+        return x, y
+
+    def find_line(self, start: str, end: str) -> Array:
+        """Return the vector from one site to another, (2,), m."""
+        places = self.data.site_xpos
+        across: Array = places[self.site[end]] - places[self.site[start]]
+        return across[:2]
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap by the joint angles, (2, 3)."""
@@ -130,11 +121,9 @@ class ClosedLoop(Assembled):
 
     def positions(self) -> dict[str, Array]:
         """Locate pins O4 and A, and B at the end of bar 3 and of bar 4, (2,), m."""
+        sites = {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         places = self.data.site_xpos
-        positions = {}
-        for name, site in _SITE_OF.items():
-            positions[name] = places[self.site[site]][:2].copy()
-        return positions
+        return {name: places[self.site[site], :2] for name, site in sites.items()}
 
     def branch(self, bar: int = 2) -> int:
         """Return the branch (+1 or -1, 0 at a toggle) of a command of a bar.
@@ -178,40 +167,31 @@ class ClosedLoop(Assembled):
         """Read the pin forces of the state that was last forwarded, world axes, N."""
         on = self.joint_forces()
         closure = self.data.efc_force[:2].copy()
-        return {
-            "F12": on["input"],
-            "F32": -on["coupler"],
-            "F43": closure,
-            "F14": on["output"],
-        }
+        return {"F12": on[2], "F32": -on[3], "F43": closure, "F14": on[4]}
 
-    def joint_forces(self) -> dict[str, Array]:
+    def joint_forces(self) -> dict[int, Array]:
         """Return the force of the parent on each bar in world axes, N.
 
         Read is cfrc_int, which includes all that the bar carries, without the forces of
         actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
-        on = {name: force.copy() for name, force in self._carried.items()}
-        for read, names in self._loads:
+        on = {bar: force.copy() for bar, force in self._carried.items()}
+        for read, bearers in self._loads:
             load = read()[:2]
-            for name in names:
-                on[name] -= load
+            for bar in bearers:
+                on[bar] -= load
         return on
 
-    def given(self) -> float:
-        """Return the acceleration that the flywheel's motor is given, rad/s^2."""
-        if self.drive is None:
-            return 0.0
-        motor = self.data.actuator_force[self.drive]
-        return float(motor / self.model.dof_armature[O2])
+    def motor(self) -> float:
+        """Return the torque of the flywheel's motor, N m."""
+        return (
+            0.0 if self.drive is None else float(self.data.actuator_force[self.drive])
+        )
 
     def crank_torque(self) -> float:
         """Return T2 of the flywheel and of the motor next to it, N m."""
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
-        motor = 0.0
-        if self.drive is not None:
-            motor = self.data.actuator_force[self.drive]
-        return float(flywheel + motor)
+        return float(flywheel + self.motor())
 
     def drive_column(self, drive_bar: int | None) -> Array:
         """Return the derivative of what is driven by the joint angles, (3,).
@@ -221,24 +201,18 @@ class ClosedLoop(Assembled):
         if drive_bar is not None:
             return _COLUMN_OF[drive_bar]
         start, end = CYLINDER_SITES
-        direction = self.line() / self.stroke()
+        line = self.find_line(start, end)
         jacobian = self.jacobian_at(end) - self.jacobian_at(start)
-        return direction @ jacobian
+        along: Array = line / self.stroke()
+        return along @ jacobian
 
     def angle(self, bar: int) -> float:
         """Sum of the joint angles that a bar's direction is, rad."""
         return float(self.data.qpos[_TURNED_BY[bar]].sum())
 
-    def line(self) -> Array:
-        """Return the vector from the cylinder's one site to the other, (2,), m."""
-        start, end = CYLINDER_SITES
-        places = self.data.site_xpos
-        across = places[self.site[end]] - places[self.site[start]]
-        return np.asarray(across[:2])
-
     def stroke(self) -> float:
         """Return the distance of the cylinder's sites, m."""
-        return float(np.hypot(*self.line()))
+        return float(np.hypot(*self.find_line(*CYLINDER_SITES)))
 
     def drive_drift(self, drive_bar: int | None) -> float:
         """Return the second derivative of the drive at the present speeds.
@@ -249,7 +223,7 @@ class ClosedLoop(Assembled):
         if drive_bar is not None:
             return 0.0
         start, end = CYLINDER_SITES
-        line = self.line()
+        line = self.find_line(start, end)
         stroke = self.stroke()
         v = self.data.qvel
         jacobian = self.jacobian_at(end) - self.jacobian_at(start)
@@ -274,20 +248,12 @@ class ClosedLoop(Assembled):
         The end on the bar is at angle 0 of the bar; the other is on the ground.
         """
         self.place((0.0, 0.0, 0.0))
+        places = self.data.site_xpos
+        pivot = places[self.site["O4"]] if bar == 4 else np.zeros(3)
         ground = self.model.body("ground").id
-        pivot = np.zeros(3)
-        if bar == 4:
-            pivot = self.data.site_xpos[self.site["O4"]]
-
-        def is_on_ground(site: int) -> bool:
-            return bool(self.model.site_bodyid[site] == ground)
-
         sites = [self.site[end] for end in CYLINDER_SITES]
-        arms = []
-        for site in sorted(sites, key=is_on_ground):
-            x, y, _ = self.data.site_xpos[site] - pivot
-            arms.append(complex(x, y))
-        on_bar, on_ground = arms
+        sites.sort(key=lambda site: self.model.site_bodyid[site] == ground)
+        on_bar, on_ground = (complex(*(places[site] - pivot)[:2]) for site in sites)
         return on_bar, on_ground
 
     def work(
@@ -338,42 +304,6 @@ class ClosedLoop(Assembled):
         MuJoCo resets the data at each of them.
         """
         return sum(self.data.warning[kind].number for kind in WARNINGS)
-
-
-def solve_couple_elsewhere(
-    loop: ClosedLoop,
-    light: ClosedLoop,
-    drive_bar: int | None,
-    alpha_2: float,
-    crank_torque: float,
-) -> float | None:
-    """Solve for what accelerates the crank as before.
-
-    None if it does not move the crank. That is a couple on bar 3 or 4, or the force of
-    the actuator between the cylinder's two sites. The accelerations are linear in it;
-    two trials of the size of the crank's torque (T2, N m) give it, and `light`, the
-    same linkage with a light flywheel, is left at a third, to be read.
-
-    `alpha_2`: what the flywheel's motor was given, rad/s^2.
-    """
-    data = light.data
-    size = data.qpos.size  # a drive may have coordinates of its own
-    data.qpos[:] = loop.data.qpos[:size]
-    data.qvel[:] = loop.data.qvel[:size]
-    data.time = loop.data.time
-    happened = loop.data.qacc[O2]
-    # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the
-    # crank really had
-    correction = light.model.dof_armature[O2] * (happened - alpha_2)
-    column = loop.drive_column(drive_bar)[:size]
-    speed = float(column @ data.qvel)
-    guess = crank_torque
-    if speed:
-        guess = crank_torque * data.qvel[O2] / speed
-    trials = (-1.0, 1.0)
-    if guess:
-        trials = (0.5 * guess, 1.5 * guess)
-    return light.solve_drive(drive_bar, happened, trials, correction)
 
 
 def solve_couple(

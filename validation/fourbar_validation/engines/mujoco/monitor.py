@@ -24,7 +24,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, Array
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.tree import put_back, solve_multipliers
@@ -248,9 +247,9 @@ class ResidualMonitor:
             mujoco.mj_fwdActuation(bars.model, d)
             d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
-        on = bars.joint_forces()
+        on = {bar: force.tolist() for bar, force in bars.joint_forces().items()}
         x, y = loop_force.tolist()
-        pins = put_back({bar: on[BAR_NAMES[bar]].tolist() for bar in MOVING_BARS}, x, y)
+        pins = put_back(on, x, y)
         return {name: np.array(force) for name, force in pins.items()}
 
     def _close(

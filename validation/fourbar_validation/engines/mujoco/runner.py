@@ -15,7 +15,7 @@ which the motor of its flywheel is given.
 
 import bisect
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -25,29 +25,30 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Load, Table
+from fourbar.effects import Table
 from fourbar.errors import LimitError
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Law, Motion, Rise, Sine
+from fourbar.scene.motion import Law, Motion
 from fourbar_validation.engines.applied_effects import look_up
+from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import (
-    O2,
-    ClosedLoop,
-    solve_couple_elsewhere,
-)
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.tree import solve_closed
 
 INSTANTS_OF_A_LAW = 2000
 """Instants at which a law is searched for its greatest speed and acceleration. Between
 them it hardly differs.
 """
+
+
+ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
+"""The force of an actuator, in units of its gear."""
 
 
 class SteadySegment:
@@ -57,23 +58,13 @@ class SteadySegment:
     |omega_2|, and `turning` that of the input, rad/s.
     """
 
-    bar: int | None = 2
-    """Number of the bar that moves so; None for the stroke."""
-
-    def __init__(
-        self,
-        theta_2: Array,
-        segment: Sequence[int],
-        omega: float,
-        alpha: float,
-    ) -> None:
-        self.theta_2 = theta_2
-        commanded = theta_2[list(segment)]
-        self.run = choose_run(commanded, omega, alpha)
+    def __init__(self, course: "Course", segment: Sequence[int]) -> None:
+        self.course = course
+        commanded = course.values[list(segment)]
+        self.run = choose_run(commanded, course.speed, course.acceleration)
         self.width = len(np.unique(commanded)) - 1
-        self.omega = omega
-        self.fastest = self.run.fastest
-        self.turning = self.fastest
+        self.omega = course.speed
+        self.turning = self.fastest = self.run.fastest
 
     def timestep(self, settings: Settings) -> float:
         """Return the timestep for this segment, s.
@@ -90,7 +81,7 @@ class SteadySegment:
 
         The angle from the start of the segment gives it.
         """
-        return self.run.time(float(self.theta_2[index]))
+        return self.run.time(float(self.course.values[index]))
 
     def speed(self, turned: float, seconds: float) -> float:
         """Return |omega_2| that is due after a turn (rad) and a time.
@@ -100,68 +91,129 @@ class SteadySegment:
         squared = self.run.omega**2 + 2.0 * self.run.alpha * turned
         return math.sqrt(max(squared, 0.0))
 
+    def accelerate(self) -> ActuatorForce | None:
+        """Return the input's acceleration at a state, None if the file states it."""
+        return None
 
-class LawSegment:
+
+class LawSegment(SteadySegment):
     """A segment of positions in the order of their times, by a motion law."""
 
-    bar = 2
+    course: "LawCourse"
 
-    def __init__(
-        self,
-        law: Law | Rise | Sine,
-        command: Command,
-        segment: Sequence[int],
-    ) -> None:
-        assert command.time is not None
-        self.law = law
-        self.time = command.time
-        self.began = float(command.time[segment[0]])
-        ends = float(command.time[segment[-1]])
+    def __init__(self, course: "LawCourse", segment: Sequence[int]) -> None:
+        self.course = course
         self.intervals = len(segment) - 1
+        self.began = float(course.time[segment[0]])
+        ends = float(course.time[segment[-1]])
         self.duration = ends - self.began
-        _, at_begin, _ = law.at(np.array([self.began]))
-        self.omega = float(at_begin[0])
-        self.knots = list(law.time)
-        _, _, at_knots = law.at(np.array(law.time))
-        self.at_knots = at_knots.tolist()
         instants = np.linspace(self.began, ends, INSTANTS_OF_A_LAW)
-        angles, speeds, _ = law.at(instants)
-        # the stages of a step share their instants
-        self.evaluate_alpha = lru_cache(maxsize=4)(self._evaluate_alpha)
-        self.fastest = float(np.abs(speeds).max())
-        self.turning = self.fastest
-        self.width = float(np.ptp(angles))
+        angles, speeds, _ = course.law.at(instants)
+        self.omega = float(speeds[0])
+        self.turning = self.fastest = float(np.abs(speeds).max())
+        self.turned = float(np.ptp(angles))
 
     def timestep(self, settings: Settings) -> float:
         """Divide the time from each position to the next into whole steps."""
         if not self.intervals:
             return 1e-3
-        turned = self.duration * self.fastest
-        revolutions = turned / (2.0 * math.pi)
-        steps = revolutions * settings.steps_per_revolution
-        if 0.0 < self.width < FULL_TURN:
-            steps = max(steps, settings.steps_per_window * turned / self.width)
+        most = self.duration * self.fastest
+        steps = count_steps(settings, most, self.turned)
         pieces = math.ceil(steps / self.intervals * (1.0 - 1e-9))
         timestep = self.duration / (self.intervals * pieces)
         return timestep * settings.timestep_scale
 
     def seconds(self, index: int) -> float:
         """Return the time of a position since the segment began, s."""
-        return float(self.time[index]) - self.began
+        return float(self.course.time[index]) - self.began
 
     def speed(self, turned: float, seconds: float) -> float:
         """Return |omega_2| at a time from the segment's begin, rad/s."""
         instant = np.array([self.began + seconds])
-        _, speed, _ = self.law.at(instant)
+        _, speed, _ = self.course.law.at(instant)
         return float(abs(speed[0]))
 
-    def alpha(self, seconds: float) -> float:
+    def accelerate(self) -> ActuatorForce | None:
+        """Return what evaluates the law at MuJoCo's time."""
+        return lambda _, data: self.course.alpha(self.began + data.time)
+
+
+def count_steps(settings: Settings, most: float, turned: float) -> float:
+    """Count the steps of a segment, as many as at its greatest speed throughout.
+
+    Parameters
+    ----------
+    most : what the input would turn at that speed, rad.
+    turned : what it turns, rad.
+    """
+    steps = most / (2.0 * math.pi) * settings.steps_per_revolution
+    if 0.0 < turned < FULL_TURN:
+        steps = max(steps, settings.steps_per_window * most / turned)
+    return steps
+
+
+class Course:
+    """A command run through in time, the input at constant acceleration."""
+
+    bar: int | None = 2
+    """Number of the bar that moves as commanded; None for the stroke."""
+
+    def __init__(self, scene: Scene, command: Command) -> None:
+        self.command = self.of_input = command
+        self.values: Array = command.theta_2
+        rates = list_speeds(command)
+        self.speed, self.acceleration = (float(rate.max()) for rate in rates)
+        motion = scene.motion.replace(
+            angle=command.theta_2,
+            speed=self.speed,
+            acceleration=self.acceleration,
+        )
+        self.scene = replace(scene, motion=motion)
+        """The scene whose MJCF is run through."""
+
+    def order(self) -> NDArray[np.intp]:
+        """Order the positions as they are passed, as indices."""
+        values = self.values if self.speed > 0.0 else -self.values
+        return np.argsort(values, kind="stable")
+
+    def segment(self, positions: Sequence[int]) -> SteadySegment:
+        """Choose how the input moves through some positions."""
+        return SteadySegment(self, positions)
+
+    def least_sine(self, closes: NDArray[np.bool_]) -> float:
+        """Return the least |sin(theta_4 - theta_3)| on the way."""
+        return compute_least_sine(self.scene.linkage, self.command.theta_2, closes)
+
+
+class LawCourse(Course):
+    """A motion law of the input.
+
+    Flywheel and closure are laid out for its greatest |omega_2| and |alpha_2|.
+    """
+
+    def __init__(self, scene: Scene, command: Command) -> None:
+        law = scene.motion.law
+        assert law is not None and command.time is not None
+        self.law = law
+        self.time: Array = command.time
+        self.command = self.of_input = command
+        self.knots = list(law.time)
+        _, _, at_knots = law.at(np.array(law.time))
+        self.at_knots = at_knots.tolist()
+        # the stages of a step share their instants
+        self.evaluate_alpha = lru_cache(maxsize=4)(self._evaluate_alpha)
+        instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
+        _, *rates = law.at(instants)
+        omega, alpha = (float(np.abs(rate).max()) for rate in rates)
+        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch)
+        self.scene = replace(scene, motion=motion)
+
+    def alpha(self, instant: float) -> float:
         """Return the law's angular acceleration at a time, rad/s^2.
 
         A law of cubic pieces is linear between knots in acceleration, and is
         interpolated; another law is evaluated.
         """
-        instant = self.began + seconds
         if not (isinstance(self.law, Law) and self.law.omega is None):
             return self.evaluate_alpha(instant)
         times = self.knots
@@ -177,36 +229,13 @@ class LawSegment:
         _, _, alpha = self.law.at(np.array([instant]))
         return float(alpha[0])
 
+    def order(self) -> NDArray[np.intp]:
+        """Order the positions by their times."""
+        return np.argsort(self.time, kind="stable")
 
-MotionSegment = SteadySegment | LawSegment
-
-
-def find_extremes(law: Law | Rise | Sine) -> tuple[float, float]:
-    """Find the greatest |omega_2| and |alpha_2| of a law.
-
-    Flywheel and closure are laid out for them.
-    """
-    instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
-    _, omega, alpha = law.at(instants)
-    return float(np.abs(omega).max()), float(np.abs(alpha).max())
-
-
-def order_in_time(
-    values: Array,
-    time: Array | None,
-    speed: float,
-) -> NDArray[np.intp]:
-    """Order the positions as they are passed, as indices.
-
-    The order is by what is commanded or by the times of a law.
-    """
-    if time is not None:
-        passed = time
-    elif speed > 0.0:
-        passed = values
-    else:
-        passed = -values
-    return np.argsort(passed, kind="stable")
+    def segment(self, positions: Sequence[int]) -> SteadySegment:
+        """Choose how the input moves through some positions."""
+        return LawSegment(self, positions)
 
 
 LIGHT_FLYWHEEL = 1e4
@@ -268,29 +297,28 @@ class SimulatedRun:
 
     def __init__(
         self,
-        scene: Scene,
         loop: ClosedLoop,
         light: ClosedLoop | None,
-        motion_segment: MotionSegment,
+        motion_segment: SteadySegment,
         start: tuple[float, float, float],
         timestep: float,
     ) -> None:
-        self.scene = scene
         self.loop = loop
         self.light = light
         self.motion_segment = motion_segment
-        wound = unwind(scene, start)
+        self.course = course = motion_segment.course
+        wound = unwind(course.scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead, rad. Springs at pins count
         them.
         """
-        loop.set_state(wound, motion_segment.omega, motion_segment.bar)
+        loop.set_state(wound, motion_segment.omega, course.bar)
         self.begins = self.progress()
         self.stepper = Stepper(loop.model, loop.data, timestep)
 
     def progress(self) -> float:
         """Return the angle or stroke of what moves as commanded."""
-        bar = self.motion_segment.bar
+        bar = self.course.bar
         if bar is None:
             return self.loop.stroke()
         return self.loop.angle(bar)
@@ -308,14 +336,36 @@ class SimulatedRun:
         torque = self.loop.crank_torque()
         if self.light is None:
             return torque, self.loop.forces()
-        couple = solve_couple_elsewhere(
-            self.loop,
-            self.light,
-            self.scene.drive_bar,
-            self.loop.given(),
-            torque,
-        )
-        return couple, self.light.forces()
+        return self._solve_elsewhere(self.light, torque), self.light.forces()
+
+    def _solve_elsewhere(self, light: ClosedLoop, crank_torque: float) -> float | None:
+        """Solve for what accelerates the crank as it was.
+
+        None if it does not move the crank. That is a couple on bar 3 or 4, or the force
+        of the actuator between the cylinder's two sites. The accelerations are linear
+        in it; two trials of the size of the crank's torque (T2, N m) give it, and
+        `light`, the same linkage with a light flywheel, is left at a third, to be read.
+        """
+        loop = self.loop
+        drive_bar = self.course.scene.drive_bar
+        data = light.data
+        size = data.qpos.size  # a drive may have coordinates of its own
+        data.qpos[:] = loop.data.qpos[:size]
+        data.qvel[:] = loop.data.qvel[:size]
+        data.time = loop.data.time
+        happened = loop.data.qacc[O2]
+        # the light flywheel's motor gives it alpha_2 as commanded; this gives it what
+        # the crank really had
+        given = loop.motor() / (loop.model.dof_armature[O2] or 1.0)
+        correction = light.model.dof_armature[O2] * (happened - given)
+        speed = float(loop.drive_column(drive_bar)[:size] @ data.qvel)
+        guess = crank_torque
+        if speed:
+            guess = crank_torque * data.qvel[O2] / speed
+        trials = (-1.0, 1.0)
+        if guess:
+            trials = (0.5 * guess, 1.5 * guess)
+        return light.solve_drive(drive_bar, happened, trials, correction)
 
 
 def find_assembled(
@@ -363,11 +413,8 @@ throughout; here they are 40 000.
 """
 
 
-class Lead:
-    """Command of another bar or of the stroke, and the input's motion.
-
-    The motion is that at each position.
-    """
+class Lead(Course):
+    """A command of another bar or of the stroke, and the input's motion by it."""
 
     def __init__(self, scene: Scene, command: Command) -> None:
         motion = scene.motion
@@ -379,19 +426,18 @@ class Lead:
         still = replace(take_full_size(scene), motion=Motion(0.0, 1.0))
         settings = replace(RECIPE, timestep=1e-3)
         self.loop = loop = ClosedLoop(write_mjcf(still, settings, keyframe=False))
-        self.bar: int | None = command.bar
-        """Number of the commanded bar; None if the stroke is commanded."""
+        self.bar = command.bar
         if command.moves_stroke:
             self.bar = None
             command = find_angle(command, motion, *loop.cylinder(command.bar))
         self.command = command
-        self.values: Array = command.stated[0]
+        self.values = command.stated[0]
         self.speed = float(np.max(motion.speed or 0.0))
         self.acceleration = float(np.max(motion.acceleration))
         positions = range(len(self.values))
         assembled = find_assembled(Assembler(loop, command.bar), command, positions)
-        self.closes = np.array([q is not None for q in assembled])
-        if not self.closes.any():
+        closes = np.array([q is not None for q in assembled])
+        if not closes.any():
             raise LimitError("the loop closes at none of the positions")
         self.input = np.full((3, len(assembled)), np.nan)
         """theta_2, omega_2, alpha_2."""
@@ -400,20 +446,19 @@ class Lead:
             if q is not None:
                 self.input[:, index] = self._find_input(q)
                 branch[index] = loop.branch()
-        self.input[0, self.closes] = np.unwrap(self.input[0, self.closes])
-        theta_2, omega_2, alpha_2 = self.input[:, self.closes]
+        self.input[0, closes] = np.unwrap(self.input[0, closes])
+        theta_2, omega_2, alpha_2 = self.input[:, closes]
         # greatest speed and acceleration, as for a law: flywheel and closure are sized
         # by them
         fastest = float(np.abs(omega_2).max())
         most_accelerated = float(np.abs(alpha_2).max()) or np.finfo(float).tiny
         largest = Motion(theta_2, fastest, most_accelerated)
         self.scene = replace(scene, motion=largest)
-        self.of_input = Command(
-            theta_2,
-            branch[self.closes],
-            fastest,
-            most_accelerated,
-        )
+        self.of_input = Command(theta_2, branch[closes], fastest, most_accelerated)
+
+    def segment(self, positions: Sequence[int]) -> SteadySegment:
+        """Choose how the input is led through some positions."""
+        return LedSegment(self, positions)
 
     def _find_input(self, q: tuple[float, float, float]) -> tuple[float, float, float]:
         """Find theta_2, omega_2 and alpha_2 of the input at joint angles.
@@ -445,7 +490,7 @@ class Lead:
         accelerations = solve_closed(loop.jacobian(), due, column, *drift.tolist())
         return float(accelerations[O2])
 
-    def least_sine(self) -> float:
+    def least_sine(self, closes: NDArray[np.bool_]) -> float:
         """Return the least |sin(theta_4 - theta_3)| on the way; 0 if signs differ."""
         command = self.of_input
         if np.ptp(command.branch):
@@ -458,8 +503,8 @@ class LedSegment(SteadySegment):
     """A segment of positions in the order of what is commanded."""
 
     def __init__(self, lead: Lead, segment: Sequence[int]) -> None:
-        super().__init__(lead.values, segment, lead.speed, lead.acceleration)
-        self.bar = lead.bar
+        super().__init__(lead, segment)
+        self.lead = lead
         theta_2, omega_2, _ = lead.input[:, list(segment)]
         self.turning = float(np.abs(omega_2).max())
         self.turned = float(np.ptp(theta_2))
@@ -476,19 +521,19 @@ class LedSegment(SteadySegment):
                 f"the input is at most {uneven:.0f} times as fast as on the mean; up to"
                 f" {_MOST_UNEVEN:g} it is led"
             )
-        steps = most / (2.0 * np.pi) * settings.steps_per_revolution
-        if 0.0 < self.turned < FULL_TURN:
-            steps = max(steps, settings.steps_per_window * uneven)
-        timestep = duration / max(np.ceil(steps), self.width)
-        return float(timestep * settings.timestep_scale)
+        steps = count_steps(settings, most, self.turned)
+        timestep = duration / max(math.ceil(steps), self.width)
+        return timestep * settings.timestep_scale
+
+    def accelerate(self) -> ActuatorForce | None:
+        """Return what solves for the acceleration at MuJoCo's state."""
+        return self.lead.alpha_2
 
 
 OVERRUN = 1e-7
 """Angle by which a simulated crank may turn too far, rad; 1e-9 was seen in healthy
 runs, and the angle is judged to 1e-5.
 """
-ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
-"""The force of an actuator, in units of its gear."""
 
 
 def take_full_size(scene: Scene) -> Scene:
@@ -498,24 +543,20 @@ def take_full_size(scene: Scene) -> Scene:
     """
     loads = []
     for load in scene.loads:
-        peak = _find_peak_of_load(load)
-        force = None
-        if load.force is not None:
-            size, angle = load.force
-            force = (size * peak, angle)
-        full = replace(load, force=force, moment=load.moment * peak, table=None)
-        loads.append(full)
+        if load.table is not None:
+            peak = _find_peak(load.table)
+            force = load.force
+            if force is not None:
+                force = (force[0] * peak, force[1])
+            moment = load.moment * peak
+            loads.append(replace(load, force=force, moment=moment, table=None))
+        else:
+            loads.append(load)
     return replace(scene, loads=tuple(loads))
 
 
-def _find_peak_of_load(load: Load) -> float:
-    if load.table is None:
-        return 1.0
-    return _find_peak_of_table(load.table)
-
-
-def _find_peak_of_table(table: Table) -> float:
-    return max(abs(factor) for factor in table.factor) or 1.0
+def _find_peak(table: Table) -> float:
+    return max(map(abs, table.factor)) or 1.0
 
 
 def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
@@ -532,7 +573,7 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
 def _evaluate_table(table: Table) -> ActuatorForce:
     """Return the function that evaluates a table over its largest factor."""
-    peak = _find_peak_of_table(table)
+    peak = _find_peak(table)
     first = table.theta_2[0]
     last = table.theta_2[-1]
 
@@ -573,7 +614,7 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
     return inside
 
 
-def receive_forces(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoop:
+def receive_forces(loop: ClosedLoop, supplied: Container[str]) -> ClosedLoop:
     """Let the actuators of these names take their force from `supply_forces`."""
     for number in range(loop.model.nu):
         if loop.model.actuator(number).name in supplied:

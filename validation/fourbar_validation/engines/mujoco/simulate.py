@@ -2,19 +2,22 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from fourbar.effects import PointDrive
 from fourbar.errors import InputError, LimitError
+from fourbar.linkage import FourBar
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import compute_mass_ratio
 from fourbar.mjcf.model import CYLINDER, unwind
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import COMMAND_NAMES, Motion
+from fourbar.scene.motion import COMMAND_NAMES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.scales import find_scale_of_answer, make_reference
@@ -27,7 +30,6 @@ from fourbar_validation.engines.description import (
 from fourbar_validation.engines.limits import (
     NEAREST_TOGGLE,
     NO_PUSH,
-    compute_least_sine,
     find_exceeded,
 )
 from fourbar_validation.engines.loaded import BarValues
@@ -36,18 +38,13 @@ from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
-    ActuatorForce,
-    LawSegment,
+    Course,
+    LawCourse,
     Lead,
-    LedSegment,
-    MotionSegment,
     SimulatedRun,
-    SteadySegment,
     clip_angles,
     evaluate_loads,
     find_assembled,
-    find_extremes,
-    order_in_time,
     receive_forces,
     split_segments,
     supply_forces,
@@ -106,21 +103,10 @@ class MujocoSimulated:
         if isinstance(scene.drive, PointDrive):
             return Answer(self.name, "", refusal=NO_PUSH)
         began = time.perf_counter()
-        lead = None
         try:
-            if scene.motion.free is not None:
-                raise LimitError("a free motion has no commanded sweep")
-            if command.speed is None or not np.any(command.speed):
-                raise LimitError(
-                    f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate"
-                    " through time"
-                )
-            if command.bar != 2 or command.moves_stroke:
-                lead = Lead(scene, command)
-                scene = lead.scene
-                command = lead.command
-            _require_run(scene, command if lead is None else lead.of_input)
-            answer = _Simulation(self.settings, scene, command, lead).answer()
+            course = _choose_course(scene, command)
+            _require_run(course)
+            answer = _Simulation(self.settings, course).answer()
         except (
             LimitError,
             InputError,
@@ -132,66 +118,59 @@ class MujocoSimulated:
         return answer
 
 
-def _require_run(scene: Scene, command: Command) -> None:
-    """Raise LimitError where this motion of the input is not simulated."""
-    by_law = command.time is not None and scene.motion.law is not None
-    if not by_law and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
+def _choose_course(scene: Scene, command: Command) -> Course:
+    """Choose how a command is run through; LimitError where there is nothing to run."""
+    if scene.motion.free is not None:
+        raise LimitError("a free motion has no commanded sweep")
+    if command.speed is None or not np.any(command.speed):
+        raise LimitError(
+            f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate"
+            " through time"
+        )
+    if command.bar != 2 or command.moves_stroke:
+        return Lead(scene, command)
+    if scene.motion.law is not None and command.time is not None:
+        return LawCourse(scene, command)
+    if any(np.ptp(values) != 0.0 for values in list_speeds(command)):
         raise LimitError(
             "omega_2 or alpha_2 differs from position to position: that is no one"
             " motion through time"
         )
-    if np.ptp(command.theta_2) == 0.0:
+    return Course(scene, command)
+
+
+def _require_run(course: Course) -> None:
+    """Raise LimitError where this motion of the input is not simulated."""
+    theta_2 = course.of_input.theta_2
+    if np.ptp(theta_2) == 0.0:
         raise LimitError("one position: nothing to run through")
-    run = _make_run_scene(scene, command)
-    if reason := find_exceeded(run, abs(run.motion.omega_2 or 0.0)):
+    scene = course.scene
+    if reason := find_exceeded(scene, abs(scene.motion.omega_2 or 0.0)):
         raise LimitError(reason)
-    if _passes_change_point(scene, command):
+    if _passes_change_point(scene.linkage, theta_2):
         raise LimitError(
             "the sweep meets a change point, where all bars are collinear and MuJoCo's"
             " closure loses a direction"
         )
 
 
-def _passes_change_point(scene: Scene, command: Command) -> bool:
+def _passes_change_point(linkage: FourBar, theta_2: Array) -> bool:
     """Return whether all four bars become collinear within the sweep.
 
     At such a position +-a +-b +-c = d.
     """
-    d, a, b, c = scene.linkage.lengths
-    theta_1 = scene.linkage.ground_angle
-    least = float(command.theta_2.min()) - theta_1
-    most = float(command.theta_2.max()) - theta_1
-    near = COLLINEAR * (a + b + c + d)
+    d, a, b, c = linkage.lengths
+    least = float(theta_2.min()) - linkage.ground_angle
+    most = float(theta_2.max()) - linkage.ground_angle
     for half_turn in range(
         math.ceil(least / math.pi - COLLINEAR),
         math.floor(most / math.pi + COLLINEAR) + 1,
     ):
         diagonal = abs(d - a if half_turn % 2 == 0 else d + a)
-        from_folded = abs(diagonal - abs(b - c))
-        from_stretched = abs(diagonal - (b + c))
-        if min(from_folded, from_stretched) <= near:
+        missed = min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c)))
+        if missed <= COLLINEAR * (a + b + c + d):
             return True
     return False
-
-
-def _make_run_scene(scene: Scene, command: Command) -> Scene:
-    """Make the scene whose MJCF is run through.
-
-    A law is stated by its greatest speed and acceleration.
-    """
-    if scene.motion.law is not None:
-        omega, alpha = find_extremes(scene.motion.law)
-        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch)
-        return replace(scene, motion=motion)
-    omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
-    return replace(
-        scene,
-        motion=scene.motion.replace(
-            angle=command.theta_2,
-            speed=omega,
-            acceleration=alpha,
-        ),
-    )
 
 
 class _Simulation:
@@ -203,58 +182,37 @@ class _Simulation:
     def __init__(
         self,
         settings: Settings,
-        scene: Scene,
-        command: Command,
-        lead: Lead | None = None,
+        course: Course,
         *,
         bounded: bool = True,
     ) -> None:
         self.bounded = bounded
-        self.lead = lead
         self.settings = settings
-        self.command = command
-        self.law = scene.motion.law
-        # the text is that of the command, which a caller may have given instead of the
-        # scene's own
-        if lead is None:
-            self.scene = _make_run_scene(scene, command)
-        else:
-            self.scene = scene
+        self.course = course
+        self.command = course.command
+        self.scene = scene = course.scene
         self.supplied = evaluate_loads(scene)
-        n = len(command.angle)
-        values, speed = (
-            (command.angle, self.scene.motion.omega_2)
-            if lead is None
-            else (lead.values, lead.speed)
-        )
-        self.order = order_in_time(
-            values,
-            command.time if self.law else None,
-            speed or 0.0,
-        )
+        self.order = course.order()
+        n = len(self.command.angle)
+        unknowns = list_unknowns(scene)
         self.out = make_blank(
-            n, [*MADE, *list_unknowns(scene), *(_OF_TENDON if scene.drive else ())]
+            n, [*MADE, *unknowns, *(_OF_TENDON if scene.drive else ())]
         )
-        self.branch = command.branch.copy()
-        self.evidence = dict.fromkeys(_RESIDUALS, 0.0) | {
-            "mass_ratio": compute_mass_ratio(scene.linkage)
-        }
+        self.branch = self.command.branch.copy()
+        self.evidence = dict.fromkeys(_RESIDUALS, 0.0)
+        self.evidence["mass_ratio"] = compute_mass_ratio(scene.linkage)
         self.steps_per_revolution = 0.0
-        self.predicted = {name: np.zeros(n) for name in list_unknowns(scene)}
+        self.predicted = {name: np.zeros(n) for name in unknowns}
 
     def answer(self) -> Answer:
         """Answer over all positions."""
         bar = self.command.bar
         linkage = self.scene.linkage
-        position = Assembler(
-            ClosedLoop(self._write_text(1e-3)), bar
-        )  # kinematics alone: the timestep plays no part
+        # kinematics alone: the timestep plays no part
+        position = Assembler(self._compile_loop(timestep=1e-3), bar)
         assembled = find_assembled(position, self.command, self.order)
         closes = np.array([angles is not None for angles in assembled])
-        if self.lead is None:
-            least = compute_least_sine(linkage, self.command.theta_2, closes)
-        else:
-            least = self.lead.least_sine()
+        least = self.course.least_sine(closes)
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(
                 f"|sin(theta_4 - theta_3)| falls to {least:.1e};"
@@ -270,25 +228,12 @@ class _Simulation:
             self._run(segment, start)
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
         # the command stands for the motion where nothing moved
-        commanded = zip(
-            COMMAND_NAMES[bar],
-            (self.command.angle, *list_speeds(self.command)),
-            strict=True,
-        )
-        motion_made = [
-            np.where(np.isnan(self.out[name]), x, self.out[name])
-            for name, x in commanded
-        ]
-        motion_made[0] = motion_made[0] + 2.0 * np.pi * np.round(
-            (self.command.angle - motion_made[0]) / (2.0 * np.pi)
-        )
-        motion = Command(
-            motion_made[0],
-            self.branch,
-            motion_made[1],
-            motion_made[2],
-            bar=bar,
-        )
+        commanded = self.command.angle, *list_speeds(self.command)
+        made = []
+        for name, told in zip(COMMAND_NAMES[bar], commanded, strict=True):
+            made.append(np.where(np.isnan(self.out[name]), told, self.out[name]))
+        made[0] += 2.0 * np.pi * np.round((commanded[0] - made[0]) / (2.0 * np.pi))
+        motion = Command(made[0], self.branch, made[1], made[2], bar=bar)
         values = {
             name: x for name, x in self.out.items() if bar != 2 or name not in MADE
         }
@@ -317,41 +262,16 @@ class _Simulation:
             return 1.0
         return float(np.nanmin(scale.factor))
 
-    def _choose_motion(self, segment: list[int]) -> MotionSegment:
-        """Choose how the input moves through a segment."""
-        if self.law is not None:
-            return LawSegment(self.law, self.command, segment)
-        if self.lead is not None:
-            return LedSegment(self.lead, segment)
-        motion = self.scene.motion
-        return SteadySegment(
-            self.command.theta_2,
-            segment,
-            motion.omega_2 or 0.0,
-            motion.alpha_2,
-        )
-
     def _compile_loop(
-        self,
-        timestep: float,
-        supplied: dict[str, ActuatorForce],
-        flywheel: float | None = None,
+        self, supplied: Container[str] = (), **changed: Any
     ) -> ClosedLoop:
-        """Compile a model that takes from `supply_forces` what its text cannot say."""
-        return receive_forces(
-            ClosedLoop(self._write_text(timestep, flywheel)), supplied
-        )
+        """Compile a model that takes from `supply_forces` what its text cannot say.
 
-    def _write_text(self, timestep: float, flywheel: float | None = None) -> str:
-        """Write the generated MJCF without its keyframe."""
-        heavy = self.settings.flywheel if flywheel is None else flywheel
-        settings = replace(
-            self.settings,
-            timestep=timestep,
-            timestep_scale=1.0,
-            flywheel=heavy,
-        )
-        return write_mjcf(take_full_size(self.scene), settings, keyframe=False)
+        `changed`: settings.
+        """
+        settings = replace(self.settings, timestep_scale=1.0, **changed)
+        text = write_mjcf(take_full_size(self.scene), settings, keyframe=False)
+        return receive_forces(ClosedLoop(text), supplied)
 
     def _closes_between(
         self,
@@ -371,38 +291,27 @@ class _Simulation:
 
     def _run(self, segment: list[int], start: tuple[float, float, float]) -> None:
         """Step through one segment and read at the step nearest to each position."""
-        motion_segment = self._choose_motion(segment)
+        motion_segment = self.course.segment(segment)
         timestep = motion_segment.timestep(self.settings)
         if len(segment) > 1:
             turn = 2.0 * np.pi / motion_segment.turning
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
-        supplied = self.supplied
-        if isinstance(motion_segment, LawSegment):
-            supplied = {
-                **supplied,
-                "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time),
-            }
-        elif (lead := self.lead) is not None:
-            supplied = {
-                **supplied,
-                "drive": lambda m, d: m.dof_armature[O2] * lead.alpha_2(m, d),
-            }
+        supplied = dict(self.supplied)
+        if (accelerate := motion_segment.accelerate()) is not None:
+            supplied["drive"] = lambda m, d: m.dof_armature[O2] * accelerate(m, d)
         with supply_forces(supplied):
-            loop = self._compile_loop(timestep, supplied)
-            if self.scene.drive_bar == 2:
-                light = None
-            else:
-                light = self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
-            bars = self._compile_loop(timestep, supplied)
-            monitor = ResidualMonitor(bars, self.scene.drive_bar)
-            run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
+            build = partial(self._compile_loop, supplied, timestep=timestep)
+            loop = build()
+            light = None
+            if self.scene.drive_bar != 2:
+                light = build(flywheel=LIGHT_FLYWHEEL)
+            monitor = ResidualMonitor(build(), self.scene.drive_bar)
+            run = SimulatedRun(loop, light, motion_segment, start, timestep)
             for index in segment:
                 run.to(index)
                 self._read(run, monitor, index)
         self.evidence["steps"] += run.stepper.done
-        for name, value in monitor.evidence().items():
-            before = self.evidence.get(name, 0.0)
-            self.evidence[name] = float(np.maximum(before, value))
+        self._keep_worst(monitor.evidence())
 
     def _read(
         self,
@@ -414,7 +323,17 @@ class _Simulation:
         loop = run.loop
         d = loop.data
         loop.forward()
-        self._keep_worst(run)
+        due = run.motion_segment.speed(run.progress() - run.begins, run.stepper.time)
+        speed = float(loop.drive_column(self.course.bar) @ d.qvel)
+        missed = abs(abs(speed) - due)
+        evidence = {
+            "closure_gap_m": float(np.hypot(*loop.gap())),
+            "speed_error": float(missed / (run.motion_segment.fastest or 1.0)),
+            "solver_iterations": float(d.solver_niter.max()),
+            "bad_states": float(loop.bad()),
+            "time_went_back": float(run.stepper.lost()),
+        }
+        self._keep_worst(evidence)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwind(self.scene, q) != q:
             raise LimitError(
@@ -445,22 +364,10 @@ class _Simulation:
         for name, error in monitor.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
-    def _keep_worst(self, run: SimulatedRun) -> None:
+    def _keep_worst(self, evidence: dict[str, float]) -> None:
         """Keep the worst of what the engine says of itself."""
-        loop = run.loop
-        segment = run.motion_segment
-        due = segment.speed(run.progress() - run.begins, run.stepper.time)
-        speed = float(loop.drive_column(segment.bar) @ loop.data.qvel)
-        missed = abs(abs(speed) - due)
-        values = {
-            "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(missed / (segment.fastest or 1.0)),
-            "solver_iterations": float(loop.data.solver_niter.max()),
-            "bad_states": float(loop.bad()),
-            "time_went_back": float(run.stepper.lost()),
-        }
-        for name, value in values.items():
-            worst = np.maximum(self.evidence[name], value)
+        for name, value in evidence.items():
+            worst = np.maximum(self.evidence.get(name, 0.0), value)
             self.evidence[name] = float(worst)
 
 

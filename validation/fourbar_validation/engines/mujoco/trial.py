@@ -39,10 +39,10 @@ from fourbar_validation.engines.loop import (
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
+    Course,
     SimulatedRun,
     SteadySegment,
     find_assembled,
-    order_in_time,
     split_segments,
 )
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
@@ -165,44 +165,24 @@ class TrialSetup:
                 "nothing to run through in time: a sweep of theta_2 at omega_2 is"
                 " needed"
             )
-        self.omega, self.alpha = (
-            float(np.max(command.omega_2)),  # type: ignore[arg-type]
-            float(np.max(command.alpha_2)),
-        )
-        motion = scene.motion.replace(
-            angle=command.theta_2,
-            speed=self.omega,
-            acceleration=self.alpha,
-        )
-        self.scene = replace(scene, motion=motion)
+        self.course = course = Course(scene, command)
+        self.scene = course.scene
         self.command = command
-        order = order_in_time(command.theta_2, None, self.omega)
+        order = course.order()
         position = Assembler(
             ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False))
         )
         signed = with_signs(scene.linkage, command)
-        assembled = find_assembled(position, signed, order)
+        self.start = find_assembled(position, signed, order)
+        """Joint angles of each position, None where the loop does not close."""
         self.segments = [
-            segment for segment in split_segments(assembled, order) if len(segment) > 1
+            segment for segment in split_segments(self.start, order) if len(segment) > 1
         ]
-        self.start = {
-            index: angles
-            for index, angles in enumerate(assembled)
-            if angles is not None
-        }
         if not self.segments:
             raise LimitError(
                 "the loop closes at no two neighbouring positions: nothing to run"
                 " through in time"
             )
-
-    def text(self, settings: Settings, timestep: float) -> str:
-        """Write the generated MJCF, without its keyframe."""
-        return write_mjcf(
-            self.scene,
-            replace(settings, timestep=timestep, timestep_scale=1.0),
-            keyframe=False,
-        )
 
     def build_loops(
         self,
@@ -219,9 +199,10 @@ class TrialSetup:
 
         `edit`: change of both texts of MJCF.
         """
+        settings = replace(settings, timestep=timestep, timestep_scale=1.0)
 
         def build(built: Settings) -> ClosedLoop:
-            text = self.text(built, timestep)
+            text = write_mjcf(self.scene, built, keyframe=False)
             return ClosedLoop(text if edit is None else edit(text))
 
         loop = build(settings)
@@ -232,12 +213,8 @@ class TrialSetup:
             flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
         return loop, build(replace(settings, flywheel=flywheel))
 
-    def motion_segment(self, segment: list[int]) -> SteadySegment:
-        """Choose how the input moves through a segment."""
-        return SteadySegment(self.command.theta_2, segment, self.omega, self.alpha)
-
     def _list_runs(self) -> list[WindowMotion]:
-        return [self.motion_segment(segment).run for segment in self.segments]
+        return [SteadySegment(self.course, one).run for one in self.segments]
 
     @property
     def simulated_seconds(self) -> float:
@@ -324,11 +301,12 @@ class TrialSetup:
         self, segment: list[int], settings: Settings, edit: Edit | None
     ) -> SimulatedRun:
         """Return a run that stands at the first position of a segment."""
-        motion_segment = self.motion_segment(segment)
+        motion_segment = SteadySegment(self.course, segment)
         timestep = motion_segment.run.timestep(settings)
         loop, light = self.build_loops(settings, timestep, edit)
         start = self.start[segment[0]]
-        return SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
+        assert start is not None
+        return SimulatedRun(loop, light, motion_segment, start, timestep)
 
     def make_clocks(
         self,
@@ -344,18 +322,19 @@ class TrialSetup:
         loop = run.loop
         data = loop.data
         start = self.start[segment[0]]
+        assert start is not None
         forces = np.empty((_MOST_READINGS, *data.cfrc_int.shape))
         closing = np.empty((_MOST_READINGS, 2))
         accelerations = np.empty(_MOST_READINGS)
 
         def time_steps(count: int) -> float:
-            loop.set_state(start, self.omega)
+            loop.set_state(start, self.course.speed)
             began = time.process_time()
             mujoco.mj_step(loop.model, loop.data, count)
             return time.process_time() - began
 
         def time_readings(count: int) -> float:
-            loop.set_state(start, self.omega)
+            loop.set_state(start, self.course.speed)
             mujoco.mj_step(loop.model, loop.data)
             began = time.process_time()
             for row in range(count):
