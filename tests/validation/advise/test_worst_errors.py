@@ -73,7 +73,7 @@ def test_a_run_is_read_at_every_step_and_judged_between_them(steps):
 class Pretended:
     """A setup whose error falls with the fourth power of the steps, to a floor."""
 
-    omega, alpha = 10.0, 0.0
+    course = SimpleNamespace(speed=10.0, acceleration=0.0)
 
     def __init__(self, floor=0.0, broken=""):
         self.floor, self.broken = floor, broken
