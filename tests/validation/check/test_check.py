@@ -619,7 +619,7 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text():
         )
 
     cases = [kind(words) for planted in MISTAKES.values() for words in planted]
-    listed = list(list_column_mistakes())
+    listed = list(list_column_mistakes(solve(OURS)))
     for name, scene in SCENES.items():
         texts = [mistake.text for mistake in list_hypotheses(scene, command(scene))]
         calculated = Calculation(scene, solve(scene, "force")).mistakes()
@@ -652,9 +652,9 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
 def test_a_ratio_of_one_is_no_mistake_and_a_reversed_sign_has_one_text(judged, read):
     """Four numbers are half as far again from ours as round-off allows."""
     numbers = right(OURS)
-    judge = Judge(OURS, read(write(numbers)))
+    column = Judge(OURS, read(write(numbers))).columns["F12"]
     off = np.zeros((12, 2))
-    off[::3, 0] = 1.5 * (judge.judged_right("F12")[1] * judge.size("F12"))[::3]
+    off[::3, 0] = 1.5 * (column.judged_right[1] * column.size)[::3]
     for sign, texts in (1.0, []), (-1.0, ["sign reversed, or F_ij given for F_ji"]):
         judgement = judged(OURS, numbers | {"F12": sign * (numbers["F12"] + off)})
         assert judgement.differing
@@ -944,17 +944,14 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     if any(scene.origin):
         unmoved = read_table(path, points=points)
         assert list_differing(scene, unmoved) >= {"A", "B"}
-    made = [key for key in table.values if key.strip("|") not in UNITS]
+    made = [key for key in table.columns if key.strip("|") not in UNITS]
     assert len(made) > len(MADE_OF)
-    for key in table.values.keys() - {*NOT_JUDGED, table.found_by}:
-        column = table.values[key]
-        off = {**table.values, key: column + FAR_OFF * np.nanmax(np.abs(column))}
-        exact = {**table.rounding, key: np.zeros(len(column))}
-        theirs = replace(
-            table,
-            values=off,
-            rounding=exact,
-        )
+    for key in table.columns.keys() - {*NOT_JUDGED, table.found_by}:
+        column = table.columns[key]
+        far = FAR_OFF * np.nanmax(np.abs(column.values))
+        exact = np.zeros(len(column.values))
+        off = column._replace(values=column.values + far, rounding=exact)
+        theirs = replace(table, columns={**table.columns, key: off})
         assert list_differing(scene, theirs) == {key}
 
 

@@ -317,7 +317,7 @@ def test_what_is_left_out_of_the_free_bodies_is_left_out_of_the_scene(name):
     for text in compared:
         left = fourbar.solve(without[text], "force", at=right.at)
         for quantity in (*PIN_FORCES, name_driving(scene), "power"):
-            values = predictions[text](quantity, right)
+            values = predictions[text](quantity)
             expected = getattr(left, quantity)
             if expected is not None:
                 size = np.nanmax(np.abs(expected), initial=0.0)

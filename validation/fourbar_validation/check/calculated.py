@@ -5,22 +5,21 @@ drive follow from this change by the equations of the free bodies, which are sol
 all changes at once.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Flywheel, Gravity, Load
 from fourbar.errors import FourBarError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
-from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array, ComplexArray
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.judge_table import Judge
-from fourbar_validation.check.theirs import name_quantity
+from fourbar_validation.check.csv_columns import compute_column
+from fourbar_validation.check.judge_table import Column, Judge
 from fourbar_validation.check.variants import Mistake, Wanted, always
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
 from fourbar_validation.compare.tolerance import EPS, Mask, magnitude
@@ -135,11 +134,11 @@ _SPRINGS = {"springs": "spring", "torsion": "torsion spring"}
 
 
 class Change(NamedTuple):
-    """What a mistake changes of what acts on the bars."""
+    """What a mistake changes of the unknowns of the free bodies."""
 
     text: str
-    wrenches: BodyWrenches
-    """Forces and moments that act besides the right ones."""
+    more: Array
+    """What is added to the right unknowns, (n, 13)."""
     moved: Mapping[str, Array] = {}
     """Wrong motion from which they follow."""
     where: Mapping[str, Collection[str]] = {"": FORCE_NAMES}
@@ -149,7 +148,11 @@ class Change(NamedTuple):
 
 
 class Calculation:
-    """The right numbers of a scene, and the free bodies that they balance."""
+    """The right numbers of a scene, and the free bodies that they balance.
+
+    The free bodies are linear in what acts on them: what a wrench adds to the unknowns,
+    (n, 13), is scaled and summed as the wrench is.
+    """
 
     def __init__(
         self,
@@ -163,74 +166,101 @@ class Calculation:
         self.right = right
         linkage = scene.linkage
         zero = np.zeros(len(right))
-        ground = np.exp(1j * linkage.ground_angle)
-        theta = {bar: getattr(right, f"theta_{bar}") for bar in MOVING_BARS}
+        theta = {bar: right[f"theta_{bar}"] for bar in MOVING_BARS}
+        theta[1] = zero + linkage.ground_angle
         unit = {bar: np.exp(1j * angle) for bar, angle in theta.items()}
-        O4 = zero + linkage.ground * ground
+        O4 = linkage.ground * unit[1]
         first_pin = {1: 0j * zero, 2: 0j * zero, 3: join(right.A), 4: O4}
         omega, alpha = (
-            {1: zero} | {bar: zero + getattr(right, f"{rate}_{bar}") for bar in theta}
+            {1: zero} | {bar: right[f"{rate}_{bar}"] for bar in MOVING_BARS}
             for rate in ("omega", "alpha")
         )
-        self.motion = BodyMotion(
-            linkage, theta[2], {1: zero + ground, **unit}, first_pin, omega, alpha
-        )
+        self.motion = BodyMotion(linkage, theta[2], unit, first_pin, omega, alpha)
         self.driving = name_driving(scene)
-        fields = [one for one in scene.effects if isinstance(one, Gravity)]
-        self.weighs = bool(fields)
-        self.wheels = [one for one in scene.effects if isinstance(one, Flywheel)]
-        self.weights = self.apply(*fields).force
+        self.gravity = [one for one in scene.effects if isinstance(one, Gravity)]
+        units = []
+        for bar in MOVING_BARS:
+            for force, couple in ((1.0, 0.0), (1.0j, 0.0), (0.0, 1.0)):
+                one = BodyWrenches(len(right))
+                one.push(bar, force, 0.0)
+                one.couple(bar, couple)
+                units.append(one)
+        self.response, _ = solve_wrenches(self.scene, self.motion, units)
+        self.of_bar = {bar: self.motion.linkage.bar(bar) for bar in MOVING_BARS}
+        self.to_centre = {bar: self.motion.to_centre(bar) for bar in MOVING_BARS}
+        self.a_G = {bar: join(right[f"a_G{bar}"]) for bar in MOVING_BARS}
 
-    def none(self) -> BodyWrenches:
-        """Return wrenches of nothing."""
-        return BodyWrenches(len(self.right))
+    def respond(
+        self, wrenches: BodyWrenches, bars: Collection[int] = MOVING_BARS
+    ) -> Array:
+        """Return what the wrenches on some bars add to the unknowns, (n, 13)."""
+        more = np.zeros((len(self.right), 13))
+        for bar in bars:
+            force = wrenches.force[bar]
+            components = np.array([force.real, force.imag, wrenches.moment[bar]])
+            response = self.response[..., 3 * bar - 6 : 3 * bar - 3]
+            more += np.einsum("nuk,kn->nu", response, components)
+        return more
 
-    def apply(self, *terms: Any) -> BodyWrenches:
+    def push(self, bar: int, force: Any, arm: Any = 0.0, couple: Any = 0.0) -> Array:
+        """Return what a force at an arm from a bar's first pin, and a couple, add."""
+        wrenches = BodyWrenches(len(self.right))
+        wrenches.push(bar, force, arm)
+        wrenches.couple(bar, couple)
+        return self.respond(wrenches, [bar])
+
+    def accelerate(
+        self, a: Mapping[int, ComplexArray], alpha: Mapping[int, Array] = {}
+    ) -> Array:
+        """Return what d'Alembert's forces of added accelerations of bars add."""
+        wrenches = BodyWrenches(len(self.right))
+        for bar, body in self.of_bar.items():
+            force = -find_mass(body) * a.get(bar, 0.0)
+            wrenches.push(bar, force, self.to_centre[bar])
+            wrenches.couple(bar, -find_inertia(body) * alpha.get(bar, 0.0))
+        return self.respond(wrenches)
+
+    def apply(self, *terms: Any, bars: Collection[int] = MOVING_BARS) -> Array:
         """Sum what loads and effects do; one that the free bodies do not know, no."""
-        wrenches = self.none()
+        wrenches = BodyWrenches(len(self.right))
         for term in terms:
             if term.key == "load":
                 apply_load(term, self.motion, wrenches)
             elif has_wrench(term):
                 apply_effect(term, self.motion, wrenches)
-        return wrenches
+        return self.respond(wrenches, bars)
 
     def solve(self, changes: list[Change]) -> Iterator[Mistake]:
-        """Solve the free bodies under each change, all at once."""
-        changes = [change for change in changes if self._is_wanted(change)]
-        if not changes:
+        """Yield the numbers that each change leads to."""
+        wanted = [change for change in changes if self._is_wanted(change)]
+        if not wanted:
             return
-        more = [change.wrenches for change in changes]
-        unknowns, _ = solve_wrenches(self.scene, self.motion, more)
+        unknowns = np.stack([change.more for change in wanted], axis=-1)
         if list_sliding_pins(self.scene):
-            unknowns = self._follow_friction(unknowns, changes)
-        for i, change in enumerate(changes):
+            unknowns = self._follow_friction(unknowns, wanted)
+        for i, change in enumerate(wanted):
             numbers = self._read(unknowns[..., i])
             if change.moved:
-                yield _state(change.text, {**change.moved, **numbers})
+                yield Mistake(change.text, {**change.moved, **numbers}.get)
             for words, names in change.where.items():
                 shown = {name: numbers[name] for name in names if name in numbers}
-                yield _state(f"{change.text}{words}", shown)
+                yield Mistake(f"{change.text}{words}", shown.get)
 
     def _is_wanted(self, change: Change) -> bool:
-        return any(
-            map(self.wanted, [f"{change.text}{words}" for words in ("", *change.where)])
-        )
+        texts = [f"{change.text}{words}" for words in ("", *change.where)]
+        return any(map(self.wanted, texts))
 
     def _read(self, more: Array) -> MistakenNumbers:
         """Return forces, drive and power under unknowns that are added, (n, 13)."""
-        right = self.right
-        forces = {
-            name: getattr(right, name) + more[:, column : column + 2]
+        numbers = {
+            name: self.right[name] + more[:, FORCE_COLUMNS[name] :][:, :2]
             for name in PIN_FORCES
-            for column in (FORCE_COLUMNS[name],)
         }
-        effort = getattr(right, self.driving) + more[:, DRIVE_COLUMN]
+        effort = self.right[self.driving] + more[:, DRIVE_COLUMN]
+        speed = self.right.stroke_speed
         if self.scene.drive is None:
             speed = self.motion.omega[self.scene.drive_bar]
-        else:
-            speed = right.stroke_speed
-        return {**forces, self.driving: effort, "power": effort * speed}
+        return {**numbers, self.driving: effort, "power": effort * speed}
 
     def _follow_friction(self, unknowns: Array, changes: list[Change]) -> Array:
         """Add what the pins' friction changes with their load, (n, 13, k)."""
@@ -259,6 +289,17 @@ class Calculation:
             couples[:, i] = arm * magnitude(getattr(self.right, FORCE_AT[pin]))
         return couples
 
+    def shift_loop_force(self, more: ComplexArray) -> MistakenNumbers:
+        """Return the pin forces under another force on bar 3 at B.
+
+        The sum of the forces on each bar stays.
+        """
+        signs = {"F12": -1.0, "F32": 1.0, "F43": 1.0, "F14": 1.0}
+        return {
+            name: self.right[name] + sign * stack_components(more)
+            for name, sign in signs.items()
+        }
+
     def cut(self, pin: str) -> MistakenNumbers:
         """Return forces and torque of the tree that a cut at a pin leaves.
 
@@ -266,38 +307,23 @@ class Calculation:
         driven bar hangs on the ground or on the bar before it in its chain; the joint
         carries the bar and all behind it.
         """
-        F12, F32, F43, F14 = (join(getattr(self.right, name)) for name in PIN_FORCES)
+        F12, F32, F43, F14 = (join(self.right[name]) for name in PIN_FORCES)
         motion = self.motion
-        needed = {2: F12 + F32, 3: F43 - F32, 4: F14 - F43}
+        sums = {2: F12 + F32, 3: F43 - F32, 4: F14 - F43}
         at_second = {2: F32, 3: F43, 4: -F43}
-        moment = {
-            bar: cross_products(
-                motion.linkage.bar(bar).length * motion.unit[bar], at_second[bar]
-            )
-            for bar in MOVING_BARS
-        }
         drive_bar = self.scene.drive_bar
-        moment[drive_bar] = moment[drive_bar] + self.right.torque
-        none = 0.0 * F12
-        if pin == "A":
-            F32, F43 = none, needed[3]
-        elif pin == "B":
-            F32, F43 = -needed[3], none
-        else:
-            F32, F43 = -needed[3] - needed[4], -needed[4]
-        chain = next(chain for chain in _CHAINS[pin] if drive_bar in chain)
         joint = motion.first_pin[drive_bar]
         if (pin, drive_bar) in (("A", 3), ("O4", 4)):
             joint = join(self.right.B)
-        torque = np.zeros(len(joint))
+        torque = self.right.torque
+        chain = next(chain for chain in _CHAINS[pin] if drive_bar in chain)
         for bar in chain[chain.index(drive_bar) :]:
+            tip = self.of_bar[bar].length * motion.unit[bar]
             arm = motion.first_pin[bar] - joint
-            torque = torque + moment[bar] + cross_products(arm, needed[bar])
-        F12 = needed[2] - F32
-        F14 = needed[4] + F43
-        forces = zip(PIN_FORCES, (F12, F32, F43, F14), strict=True)
-        vectors = {name: stack_components(force) for name, force in forces}
-        return {**vectors, "torque": torque}
+            torque = torque + cross_products(tip, at_second[bar])
+            torque = torque + cross_products(arm, sums[bar])
+        passed = {"A": F32, "B": F43, "O4": F14}[pin]
+        return {**self.shift_loop_force(-passed), "torque": torque}
 
     def mistakes(self) -> Iterator[Mistake]:
         """List the mistakes that this calculation can have, the simplest first."""
@@ -322,11 +348,11 @@ class Calculation:
         how = "the loop force is 0, as from mj_inverse or rnea of a loop"
         for pin, values in trees.items():
             text = f"forces and torque of the open tree, cut at {pin}: {how}"
-            yield _state(text, values, left=SOFT_TORQUE)
+            yield Mistake(text, values.get, left=SOFT_TORQUE)
         for pin, values in trees.items():
             text = f"torque of the open tree, cut at {pin}: {how}"
             torque = {"torque": values["torque"]}
-            yield _state(text, torque, whole=False, left=SOFT_TORQUE)
+            yield Mistake(text, torque.get, whole=False, left=SOFT_TORQUE)
 
     def _frames(self) -> Iterator[Mistake]:
         ways = {
@@ -335,14 +361,14 @@ class Calculation:
         }
         for text, side in ways.items():
             frames = {name: bars[side] for name, bars in FORCE_BETWEEN.items()}
-            yield _state(f"{text}, not in world axes", self._turn(frames))
+            yield Mistake(f"{text}, not in world axes", self._turn(frames).get)
         for bar in (1, *MOVING_BARS):
             text = f"forces are in the frame of bar {bar}, not in world axes"
-            yield _state(text, self._turn(dict.fromkeys(FORCE_BETWEEN, bar)))
+            yield Mistake(text, self._turn(dict.fromkeys(FORCE_BETWEEN, bar)).get)
         for name in FORCE_BETWEEN:
             for bar in (1, *MOVING_BARS):
                 text = f"{name} is in the frame of bar {bar}, not in world axes"
-                yield _state(text, self._turn({name: bar}), whole=False)
+                yield Mistake(text, self._turn({name: bar}).get, whole=False)
 
     def _turn(self, frames: dict[str, int]) -> MistakenNumbers:
         return {
@@ -354,54 +380,31 @@ class Calculation:
 
     def _equal_forces(self) -> Iterator[Mistake]:
         text = f"the power is given in place of the {self.driving}"
-        yield _state(text, {self.driving: self.right.power}, whole=False)
+        yield Mistake(text, {self.driving: self.right.power}.get, whole=False)
         for name in PIN_FORCES:
             for other in PIN_FORCES:
                 if other == name:
                     continue
                 values = getattr(self.right, other)
-                yield _state(f"{name} = {other}", {name: values}, whole=False)
-                yield _state(f"{name} = -{other}", {name: -values}, whole=False)
+                yield Mistake(f"{name} = {other}", {name: values}.get, whole=False)
+                yield Mistake(f"{name} = -{other}", {name: -values}.get, whole=False)
 
     def _scale_inertial(self) -> Iterator[Change]:
         """Scale the inertial forces against the loads."""
-        every = self.none()
-        turning = self.none()
-        for bar in MOVING_BARS:
-            self._accelerate(every, bar, join(getattr(self.right, f"a_G{bar}")))
-            alpha = self.motion.alpha[bar]
-            turning.couple(bar, -find_inertia(self.motion.linkage.bar(bar)) * alpha)
+        every = self.accelerate(self.a_G)
+        turning = self.accelerate({}, self.motion.alpha)
         for text, (by_mass, by_inertia) in _INERTIAL.items():
-            more = (
-                self.none().plus(every, by_mass - 1.0).plus(turning, by_inertia - 1.0)
-            )
+            more = (by_mass - 1.0) * every + (by_inertia - 1.0) * turning
             yield Change(text, more)
-
-    def _accelerate(
-        self,
-        wrenches: BodyWrenches,
-        bar: int,
-        a: ComplexArray,
-        alpha: Array | float = 0.0,
-    ) -> MistakenNumbers:
-        """Add d'Alembert's forces of an added acceleration of a bar; return its a_G."""
-        body = self.motion.linkage.bar(bar)
-        wrenches.push(bar, -find_mass(body) * a, self.motion.to_centre(bar))
-        wrenches.couple(bar, -find_inertia(body) * alpha)
-        a_G = getattr(self.right, f"a_G{bar}")
-        return {f"a_G{bar}": a_G + stack_components(a)}
 
     def _scale_actions(self) -> Iterator[Change]:
         """Leave out, double or reverse each load and effect, and each part of one."""
         for name, acting, pins in self._list_acting():
             for factor, done in _SCALED.items():
-                yield self._scale(
-                    name,
-                    done,
-                    acting,
-                    factor,
-                    where=_WHERE,
-                    friction=dict.fromkeys(pins, factor),
+                friction = dict.fromkeys(pins, factor)
+                text = f"{_name_with_verb(name)} {done}"
+                yield Change(
+                    text, (factor - 1.0) * acting, where=_WHERE, friction=friction
                 )
         for factor, done in _SCALED.items():
             for name, more in self._list_numbers(factor):
@@ -410,53 +413,45 @@ class Calculation:
             yield from self._change_effect(effect)
         every = (*self.scene.loads, *self.scene.effects)
         if self.scene.effects and len(every) > 1:
-            less = self.none().plus(self.apply(*every), -1.0)
             dry = dict.fromkeys(list_sliding_pins(self.scene), 0.0)
             text = "all loads and effects are missing: inertia alone"
-            yield Change(text, less, friction=dry)
-        if not self.weighs:
+            yield Change(text, -self.apply(*every), friction=dry)
+        if not self.gravity:
             text = "gravity along -y is included though the scene has none"
             yield Change(text, self.apply(Gravity()))
-
-    def _scale(
-        self, name: str, done: str, acting: BodyWrenches, factor: float, **more: Any
-    ) -> Change:
-        """Return the change that gives a factor to what acts."""
-        text = f"{name} {'are' if _is_plural(name) else 'is'} {done}"
-        return Change(text, self.none().plus(acting, factor - 1.0), **more)
 
     def _change_effect(self, effect: Any) -> Iterator[Change]:
         """State an effect otherwise, or let it act on one of two bars alone."""
         name = _name_effect(effect)
         for text, other in _list_other_forms(effect, self.scene.linkage.ground_angle):
-            more = self.apply(other).plus(self.apply(effect), -1.0)
-            yield Change(f"{name} {text}", more)
+            yield Change(f"{name} {text}", self.apply(other) - self.apply(effect))
         parts = _split_effect(effect)
         if effect.key in ("viscous", "torsion"):
-            linear_parts = parts
+            linear = self.apply(effect)
             if effect.key == "torsion":
-                linear_parts = [_change_number(part, "preload", 0.0) for part in parts]
-            linear = self.apply(*linear_parts)
+                relaxed = [_change_number(part, "preload", 0.0) for part in parts]
+                linear = self.apply(*relaxed)
             for factor, done in _IN_DEGREES.items():
-                yield self._scale(name, done, linear, factor)
+                text = f"{_name_with_verb(name)} {done}"
+                yield Change(text, (factor - 1.0) * linear)
         if effect.key == "viscous":
-            more = self.none()
+            own = BodyWrenches(len(self.right))
             for pin, k in effect.coefficients:
-                more.twist_at(pin, -k * self.motion.omega[PINS[pin][0]])
+                own.twist_at(pin, -k * self.motion.omega[PINS[pin][0]])
             how = "is of the second bar's own speed"
-            yield Change(f"{name} {how}", more)
-        verb = "act" if _is_plural(name) else "acts"
-        if all(1 in _list_bars(part) for part in parts):
+            yield Change(f"{name} {how}", self.respond(own))
+        bars_of_parts = [_list_bars(part) for part in parts]
+        if all(1 in bars for bars in bars_of_parts):
             return  # on the ground nothing is missed
+        verb = "act" if _is_plural(name) else "acts"
         for left_out, words in enumerate(("second", "first")):
-            less = self.none()
-            for part in parts:
-                bar = _list_bars(part)[left_out]
-                if bar in MOVING_BARS:
-                    less = less.plus(self.apply(part).on(bar), -1.0)
+            less = np.zeros((len(self.right), 13))
+            for part, bars in zip(parts, bars_of_parts, strict=True):
+                if bars[left_out] in MOVING_BARS:
+                    less -= self.apply(part, bars=[bars[left_out]])
             yield Change(f"{name} {verb} on the {words} of two bars alone", less)
 
-    def _list_acting(self) -> Iterator[tuple[str, BodyWrenches, list[str]]]:
+    def _list_acting(self) -> Iterator[tuple[str, Array, list[str]]]:
         """List what acts besides inertia, with pins whose friction depends on loads."""
         scene = self.scene
         if scene.loads:
@@ -468,7 +463,7 @@ class Calculation:
             if load.force is not None and load.moment:
                 force = self.apply(replace(load, moment=0.0))
                 yield f"the force of {name}", force, []
-                yield f"the couple of {name}", acting.plus(force, -1.0), []
+                yield f"the couple of {name}", acting - force, []
         forces = [replace(one, moment=0.0) for one in scene.loads if one.force]
         if len(forces) > 1 and forces != list(scene.loads):
             yield "the forces of the loads", self.apply(*forces), []
@@ -477,42 +472,38 @@ class Calculation:
             yield "all dry friction", self.apply(*dry), list(list_sliding_pins(scene))
         for effect in scene.effects:
             name = _name_effect(effect)
-            acting = self.apply(effect)
-            yield name, acting, list(effect.loaded_pins)
+            yield name, self.apply(effect), list(effect.loaded_pins)
             parts = _split_effect(effect)
             if len(parts) > 1:
                 for number, part in enumerate(parts, 1):
                     pins = list(part.loaded_pins)
                     yield f"part {number} of {name}", self.apply(part), pins
 
-    def _list_numbers(self, factor: float) -> Iterator[tuple[str, BodyWrenches]]:
+    def _list_numbers(self, factor: float) -> Iterator[tuple[str, Array]]:
         """List what acts besides where a number of springs has a factor."""
         for effect in self.scene.effects:
             springs = _SPRINGS.get(effect.key)
-            if springs is None:
-                continue
-            every: dict[str, BodyWrenches] = {}
-            parts = _split_effect(effect)
-            for i, part in enumerate(parts, 1):
-                for number, more in self._change_spring(part, factor):
-                    yield f"the {number} of {springs} {i}", more
-                    every[number] = every.get(number, self.none()).plus(more)
-            if len(parts) > 1:
-                for number, more in every.items():
-                    yield f"the {number} of every {springs}", more
+            if springs is not None:
+                parts = _split_effect(effect)
+                of_parts = (
+                    (f"{springs} {i}", number, more)
+                    for i, part in enumerate(parts, 1)
+                    for number, more in self._change_spring(part, factor)
+                )
+                every = f"every {springs}" if len(parts) > 1 else None
+                for whose, number, more in _add_sums(of_parts, every):
+                    yield f"the {number} of {whose}", more
 
-    def _change_spring(
-        self, effect: Any, factor: float
-    ) -> Iterator[tuple[str, BodyWrenches]]:
+    def _change_spring(self, effect: Any, factor: float) -> Iterator[tuple[str, Array]]:
         """List each number of one spring with what its factor lets act besides."""
         right = self.apply(effect)
         for number in _SPRING_NUMBERS[effect.key]:
             changed = _change_number(effect, number, factor)
             if changed != effect:
-                yield number, self.apply(changed).plus(right, -1.0)
+                yield number, self.apply(changed) - right
         relaxed = _change_number(effect, "preload", 0.0)
         if relaxed != effect:  # else the stiffness scales the whole force
-            yield "stiffness", self.none().plus(self.apply(relaxed), factor - 1.0)
+            yield "stiffness", (factor - 1.0) * self.apply(relaxed)
 
     def _velocity_terms(self) -> Iterator[Change]:
         """Leave out (dJ/dt) v, or reverse it, in the accelerations of the other bars.
@@ -542,134 +533,128 @@ class Calculation:
                 "a_A": right.a_A + stack_components(of_A),
                 "a_B": right.a_B + stack_components(of_B),
             }
-            wrenches = self.none()
-            for k, more in added.items():
-                of_pin = of_A if k == 3 else 0.0
-                swing = of_pin + 1j * more * motion.to_centre(k)
-                moved |= self._accelerate(wrenches, k, swing, more)
-                for wheel in self.wheels:
-                    if wheel.bar == k:
-                        wrenches.couple(k, -wheel.inertia * more)
+            swing = {k: 1j * added[k] * self.to_centre[k] for k in speeds}
+            swing[3] = swing[3] + of_A
+            more = self.accelerate(swing, added)
+            for wheel in self.scene.effects:
+                if isinstance(wheel, Flywheel):
+                    couple = -wheel.inertia * added[wheel.bar]
+                    more = more + self.push(wheel.bar, 0.0, couple=couple)
             text = f"(dJ/dt) v {done} in the accelerations of the loop"
-            yield Change(text, wrenches, moved, _FOLLOWING)
+            moved |= self._move_centres(swing)
+            yield Change(text, more, moved, _FOLLOWING)
+
+    def _move_centres(self, swing: Mapping[int, ComplexArray]) -> MistakenNumbers:
+        """Return the accelerations of the mass centres where some are added."""
+        return {
+            f"a_G{bar}": stack_components(self.a_G[bar] + a) for bar, a in swing.items()
+        }
 
     def _accelerations_of_centres(self) -> Iterator[Change]:
         """Leave out a part of the acceleration of each G about its bar's first pin."""
         motion = self.motion
-        arms = {bar: motion.to_centre(bar) for bar in MOVING_BARS}
+        arms = self.to_centre
         centripetal = {bar: -(motion.omega[bar] ** 2) * arms[bar] for bar in arms}
         tangential = {bar: 1j * motion.alpha[bar] * arms[bar] for bar in arms}
         whose: dict[str, tuple[int, ...]] = {"every bar": MOVING_BARS}
         whose |= {f"bar {bar}": (bar,) for bar in MOVING_BARS}
+        wrong: dict[str, dict[int, ComplexArray]] = {}
         for part, of_bars in (("-omega^2 r", centripetal), ("alpha x r", tangential)):
             for factor, done in _PART_OF_ACCELERATION.items():
                 for name, bars in whose.items():
-                    wrenches = self.none()
-                    moved = MistakenNumbers()
-                    for bar in bars:
-                        a = factor * of_bars[bar]
-                        moved |= self._accelerate(wrenches, bar, a)
                     text = f"{part} {done} in a_G of {name}, r from its first pin to G"
-                    yield Change(text, wrenches, moved, _FOLLOWING)
+                    wrong[text] = {bar: factor * of_bars[bar] for bar in bars}
         for bar in MOVING_BARS:
-            wrenches = self.none()
-            a = -centripetal[bar] - tangential[bar]
-            moved = self._accelerate(wrenches, bar, a)
             text = f"the acceleration of bar {bar}'s first pin is used as its a_G"
-            yield Change(text, wrenches, moved, _FOLLOWING)
+            wrong[text] = {bar: -centripetal[bar] - tangential[bar]}
+        for text, added in wrong.items():
+            more = self.accelerate(added)
+            yield Change(text, more, self._move_centres(added), _FOLLOWING)
 
     def _change_bars(self) -> Iterator[Change]:
         """Give each bar, and every bar, another mass or moment of inertia."""
-        if self.weighs:
+        if self.gravity:
             for bar in MOVING_BARS:
-                less = self.none()
-                less.push(bar, -self.weights[bar], self.motion.to_centre(bar))
+                less = -self.apply(*self.gravity, bars=[bar])
                 yield Change(f"the weight of bar {bar} is missing", less)
-        for name, text, wrenches in self._list_bar_mistakes():
-            yield Change(f"{name}: {text}", wrenches)
+        for name, text, more in self._list_bar_mistakes():
+            yield Change(f"{name}: {text}", more)
 
-    def list_factors(self) -> Iterator[tuple[str, BodyWrenches]]:
-        """List what may have a factor, with what it lets act on the bars."""
+    def list_factors(self) -> Iterator[tuple[str, Array]]:
+        """List what may have a factor, with what it adds to the unknowns, (n, 13)."""
         for name, text, less in self._list_bar_mistakes():
             if text.endswith(_LEFT_OUT):
-                what = text.removesuffix(_LEFT_OUT)
-                yield f"{name}: {what}", self.none().plus(less, -1.0)
-        for name, wrenches, _ in self._list_acting():
-            yield name, wrenches
+                yield f"{name}: {text.removesuffix(_LEFT_OUT)}", -less
+        for name, acting, _ in self._list_acting():
+            yield name, acting
         for name, less in self._list_numbers(0.0):
-            yield name, self.none().plus(less, -1.0)
+            yield name, -less
 
-    def _list_bar_mistakes(self) -> Iterator[tuple[str, str, BodyWrenches]]:
+    def _list_bar_mistakes(self) -> Iterator[tuple[str, str, Array]]:
         """List mistakes in mass and inertia of each bar, then of every bar."""
-        every: dict[str, BodyWrenches] = {}
-        for bar in MOVING_BARS:
-            for text, wrenches in self._list_mistakes_of(bar):
-                every[text] = every.get(text, self.none()).plus(wrenches)
-                yield BAR_NAMES[bar], text, wrenches
-        for text, wrenches in every.items():
-            yield "every bar", text, wrenches
+        of_bars = (
+            (BAR_NAMES[bar], text, more)
+            for bar in MOVING_BARS
+            for text, more in self._list_mistakes_of(bar)
+        )
+        return _add_sums(of_bars, "every bar")
 
-    def _list_mistakes_of(self, bar: int) -> Iterator[tuple[str, BodyWrenches]]:
-        """List mistakes in mass and inertia of a bar, with what they let act."""
-        body = self.motion.linkage.bar(bar)
-        mass, inertia = find_mass(body), find_inertia(body)
+    def _list_mistakes_of(self, bar: int) -> Iterator[tuple[str, Array]]:
+        """List mistakes in mass and inertia of a bar, with what they add."""
+        mass, inertia = find_mass(self.of_bar[bar]), find_inertia(self.of_bar[bar])
         alpha = self.motion.alpha[bar]
-        to_centre = self.motion.to_centre(bar)
-        about_pin, massless, pointlike = (self.none() for _ in range(3))
-        about_pin.couple(bar, -mass * np.abs(to_centre) ** 2 * alpha)
-        massless.push(bar, mass * join(getattr(self.right, f"a_G{bar}")), to_centre)
-        massless.push(bar, -self.weights[bar], to_centre)
-        pointlike.couple(bar, inertia * alpha)
+        steiner = mass * np.abs(self.to_centre[bar]) ** 2
+        about_pin = self.push(bar, 0.0, couple=-steiner * alpha)
+        weight = self.apply(*self.gravity, bars=[bar])
+        massless = -self.accelerate({bar: self.a_G[bar]}) - weight
+        pointlike = -self.accelerate({}, {bar: alpha})
         if mass:
             yield "inertia about the pin used as the inertia about G", about_pin
-            text = "inertia about G used as the inertia about the pin"
-            yield text, self.none().plus(about_pin, -1.0)
+            yield "inertia about G used as the inertia about the pin", -about_pin
             yield f"mass{_LEFT_OUT}", massless
         if inertia:
             yield f"moment of inertia{_LEFT_OUT}", pointlike
             if mass:
-                both = massless.plus(pointlike)
-                yield f"mass and moment of inertia{_LEFT_OUT}", both
+                yield f"mass and moment of inertia{_LEFT_OUT}", massless + pointlike
 
     def _change_loads(self) -> Iterator[Change]:
         """Let each load, and every load, act elsewhere or in another direction."""
-        every: dict[str, BodyWrenches] = {}
         loads = zip(self.stated.loads, self.scene.loads, strict=True)
-        for number, (stated, load) in enumerate(loads, 1):
-            for text, more in self._list_load_mistakes(stated, load):
-                yield Change(f"load {number} (bar {load.bar}): {text}", more)
-                every[text] = every.get(text, self.none()).plus(more)
-        if len(self.scene.loads) > 1:
-            for text, more in every.items():
-                yield Change(f"every load: {text}", more)
+        of_loads = (
+            (f"load {number} (bar {load.bar})", text, more)
+            for number, (stated, load) in enumerate(loads, 1)
+            for text, more in self._list_load_mistakes(stated, load)
+        )
+        every = "every load" if len(self.scene.loads) > 1 else None
+        for whose, text, more in _add_sums(of_loads, every):
+            yield Change(f"{whose}: {text}", more)
 
     def _list_load_mistakes(
         self, stated: Load, load: Load
-    ) -> Iterator[tuple[str, BodyWrenches]]:
+    ) -> Iterator[tuple[str, Array]]:
         """List what else may be made of a load, with what it lets act more."""
         right = self.apply(load)
-        others = {}
         if load.table is not None:
-            others["its table is left out"] = replace(load, table=None)
-        if load.force is not None and load.frame == "bar":
-            size, angle = load.force
-            text = "the angle of its force has the wrong sign"
-            others[text] = replace(load, force=(size, -angle))
-        for text, other in others.items():
-            yield text, self.apply(other).plus(right, -1.0)
+            yield "its table is left out", self.apply(replace(load, table=None)) - right
         if load.force is None:
             return
         bar = load.bar
+        if load.frame == "bar":
+            size, angle = load.force
+            mirrored = self.apply(replace(load, force=(size, -angle)))
+            yield "the angle of its force has the wrong sign", mirrored - right
         what = "its place" if load.arm is None else "its arm"
-        force = right.force[bar]
+        acting = BodyWrenches(len(self.right))
+        apply_load(load, self.motion, acting)
+        force = acting.force[bar]
         arm = find_arm(load, self.motion)
-        to_centre = self.motion.to_centre(bar)
+        to_centre = self.to_centre[bar]
         unit = self.motion.unit[bar]
         moved = {
             "its force acts at G of the bar": to_centre - arm,
             "its force acts at the first pin of the bar": -arm,
             "its force acts at the second pin of the bar": (
-                self.motion.linkage.bar(bar).length * unit - arm
+                self.of_bar[bar].length * unit - arm
             ),
         }
         if stated.from_pin is None:
@@ -681,18 +666,14 @@ class Calculation:
         else:
             moved["its arm turns with the bar"] = (arm - to_centre) * (unit - 1.0)
         for text, shift in moved.items():
-            couple = self.none()
-            couple.couple(bar, cross_products(shift, force))
-            yield text, couple
+            yield text, self.push(bar, 0.0, couple=cross_products(shift, force))
         directions = {"its force has y reversed": np.conj(force)}
         if load.frame == "bar":
             directions["its direction is kept"] = force * np.conj(unit)
         else:
             directions["its direction turns with the bar"] = force * unit
         for text, pushed in directions.items():
-            turned = self.none()
-            turned.push(bar, pushed - force, arm)
-            yield text, turned
+            yield text, self.push(bar, pushed - force, arm)
 
     def _drive_other_bars(self) -> Iterator[Mistake]:
         for bar in MOVING_BARS:
@@ -703,9 +684,24 @@ class Calculation:
                 unknowns = balance(scene, self.motion, self._find_couples())[0]
                 numbers = {"torque": unknowns[:, DRIVE_COLUMN]}
                 for name in PIN_FORCES:
-                    column = FORCE_COLUMNS[name]
-                    numbers[name] = unknowns[:, column : column + 2]
-                yield _state(text, numbers)
+                    numbers[name] = unknowns[:, FORCE_COLUMNS[name] :][:, :2]
+                yield Mistake(text, numbers.get)
+
+
+def _add_sums(
+    parts: Iterable[tuple[str, str, Array]], every: str | None
+) -> Iterator[tuple[str, str, Array]]:
+    """Yield parts, each with its owner and a text, then the sum of each text's.
+
+    The owner of the sums is `every`; None: there are none.
+    """
+    sums: dict[str, Any] = {}
+    for whose, text, more in parts:
+        yield whose, text, more
+        sums[text] = sums.get(text, 0.0) + more
+    if every is not None:
+        for text, more in sums.items():
+            yield every, text, more
 
 
 _LEFT_OUT = " left out"
@@ -731,6 +727,10 @@ def _name_effect(effect: Any) -> str:
 
 def _is_plural(name: str) -> bool:
     return name.startswith("the ") and name.endswith("s")
+
+
+def _name_with_verb(name: str) -> str:
+    return f"{name} {'are' if _is_plural(name) else 'is'}"
 
 
 def _list_bars(part: Any) -> tuple[int, int]:
@@ -796,9 +796,10 @@ def _list_other_forms(effect: Any, ground_angle: float) -> Iterator[tuple[str, A
 def find_miscalculated(judge: Judge, wanted: Wanted) -> Iterator[Mistake]:
     """List the mistakes of a calculation, or of a simulation, that a table can show."""
     if judge.stage == "force":
-        yield from Calculation(judge.scene, judge.right, wanted).mistakes()
+        calculation = Calculation(judge.scene, judge.right, wanted)
+        yield from calculation.mistakes()
         yield from _find_impulses(judge)
-        yield from _find_stale(judge)
+        yield from _find_stale(judge, calculation)
     yield from _find_late(judge)
     yield from _find_other_branch(judge)
 
@@ -812,50 +813,42 @@ def find_single_precision(judge: Judge) -> Iterator[Mistake]:
     """
     errors = []
     common = []
-    for key, theirs in judge.table.values.items():
-        mask = judge.where(key)
-        error = judge.judged_right(key)[0][mask]
-        if not np.all(error <= EPS_SINGLE / EPS * judge.find_exact(key)[mask]):
+    for column in judge.columns.values():
+        mask = column.where
+        error = column.judged_right[0][mask]
+        if not np.all(error <= EPS_SINGLE / EPS * column.exact[mask]):
             return
         errors.append(error[error > 0.0])
-        apart = (theirs - judge.ours(key))[mask]
-        if not np.all(_is_single(judge, key)[mask] | np.isnan(theirs[mask])):
+        apart = (column.theirs - column.ours)[mask]
+        if not np.all(_is_single(column)[mask] | np.isnan(column.theirs[mask])):
             return
         common.append(np.nansum(apart[1:] * apart[:-1]) / np.nansum(apart**2))
     typical = np.median(np.concatenate(errors))
     if typical >= LEAST_OF_SINGLE and np.nanmedian(common) < MOST_IN_COMMON:
+        theirs = {key: column.theirs for key, column in judge.columns.items()}
         text = "numbers have some 7 digits, as those of single precision"
-        yield _state(text, judge.table.values)
+        yield Mistake(text, theirs.get)
 
 
-def _is_single(judge: Judge, key: str) -> Mask:
+def _is_single(column: Column) -> Mask:
     """Mark the numbers that single precision holds, or that are off by its rounding."""
-    theirs = judge.table.values[key]
-    factor = judge.table.units[key].factor
-    rounding = judge.table.rounding[key].reshape(-1, *[1] * (theirs.ndim - 1))
+    theirs = column.theirs
+    factor = column.unit.factor
+    rounding = (column.rounding * column.divisor).reshape(-1, *[1] * (theirs.ndim - 1))
     printed = theirs / factor
     held = np.abs(np.float32(printed) - printed) - EPS * np.abs(printed)
-    off = np.abs(theirs - judge.ours(key)) - 0.5 * EPS_SINGLE * np.abs(theirs)
+    off = np.abs(theirs - column.ours) - 0.5 * EPS_SINGLE * np.abs(theirs)
     return np.asarray((held * factor <= rounding) | (off <= rounding))
-
-
-def _state(
-    text: str,
-    values: MistakenNumbers,
-    **more: Any,
-) -> Mistake:
-    """Return the mistake that leads to these numbers; `more`: fields of `Mistake`."""
-    return Mistake(text, lambda quantity, right: values.get(quantity), **more)
 
 
 def _find_impulses(judge: Judge) -> Iterator[Mistake]:
     """Fit one time by which all forces and the torque are multiplied."""
-    keys = [key for key in judge.table.values if name_quantity(key) in FORCE_NAMES]
-    if len(keys) < ENOUGH_POSITIONS:
+    columns = [one for one in judge.columns.values() if one.quantity in FORCE_NAMES]
+    if len(columns) < ENOUGH_POSITIONS:
         return
     ours, theirs = (
-        np.concatenate([numbers(key)[judge.where(key)].ravel() for key in keys])
-        for numbers in (judge.ours, judge.table.values.__getitem__)
+        np.concatenate([getattr(one, side)[one.where].ravel() for one in columns])
+        for side in ("ours", "theirs")
     )
     stated = np.isfinite(theirs)
     squares = float(ours[stated] @ ours[stated])
@@ -866,7 +859,15 @@ def _find_impulses(judge: Judge) -> Iterator[Mistake]:
         forces = ((name, getattr(judge.right, name)) for name in FORCE_NAMES)
         impulses = {name: time * force for name, force in forces if force is not None}
         how = f"every force and the torque times {time:.4g} s"
-        yield _state(f"impulses in place of forces: {how}", impulses, times=2.0)
+        text = f"impulses in place of forces: {how}"
+        yield Mistake(text, impulses.get, times=2.0)
+
+
+def _take_edge(judge: Judge, name: str, values: Array, row: int) -> None:
+    """Give a row of predicted numbers those of the table: it may be anything there."""
+    column = judge.columns.get(name)
+    if column is not None and column.theirs.shape == values.shape:
+        values[row] = column.theirs[row]
 
 
 def _find_late(judge: Judge) -> Iterator[Mistake]:
@@ -874,88 +875,61 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
     n = len(judge.at.angle)
     if n < ENOUGH_POSITIONS + 1:
         return
-    of_forces: Callable[[str], bool] = (*FORCE_NAMES, *PIN_FORCES).__contains__
     for text, step in _LATE.items():
         rows = np.clip(np.arange(n) - step, 0, n - 1)
-        edge = 0 if step == 1 else n - 1
         moved = {}
-        for key in judge.table.values:
-            quantity = name_quantity(key)
-            if quantity != judge.right.commanded:
-                moved[quantity] = _take_edge(judge, quantity, rows, edge)
-        forces = {name: values for name, values in moved.items() if of_forces(name)}
-        yield _state(text, moved)
-        yield _state(f"{text} (forces alone)", forces)
-        yield _state(text, moved, whole=False)
+        for name in {column.quantity for column in judge.columns.values()}:
+            values = compute_column(judge.right, name)
+            if values is not None and name != judge.right.commanded:
+                moved[name] = values[rows]
+                _take_edge(judge, name, moved[name], 0 if step == 1 else n - 1)
+        forces = {name: moved[name] for name in FORCE_NAMES if name in moved}
+        yield Mistake(text, moved.get)
+        yield Mistake(f"{text} (forces alone)", forces.get)
+        yield Mistake(text, moved.get, whole=False)
 
 
-def _take_edge(
-    judge: Judge,
-    quantity: str,
-    rows: NDArray[np.intp],
-    edge: int,
-) -> Array:
-    """Return the numbers of other rows, and at the edge theirs: it may be anything."""
-    moved = np.array(judge.ours(quantity)[rows])
-    theirs = judge.table.values.get(quantity)
-    if theirs is not None and theirs.shape == moved.shape:
-        moved[edge] = theirs[edge]
-    return moved
-
-
-def _find_stale(judge: Judge) -> Iterator[Mistake]:
+def _find_stale(judge: Judge, calculation: Calculation) -> Iterator[Mistake]:
     """Balance each position with the force at B of the one before."""
-    scene = judge.scene
-    if scene.drive is not None or len(judge.at.angle) <= ENOUGH_POSITIONS:
+    bar = judge.scene.drive_bar
+    if judge.scene.drive is not None or len(judge.at.angle) <= ENOUGH_POSITIONS:
         return
     right = judge.right
     stale = join(np.roll(right.F43, 1, axis=0) - right.F43)
-    linkage = scene.linkage
-    unit = np.exp(1j * getattr(right, f"theta_{scene.drive_bar}"))
-    arm = linkage.bar(scene.drive_bar).length * unit
-    sense = 1.0 if scene.drive_bar == 4 else -1.0
-    numbers = {"torque": right.torque + sense * cross_products(arm, stale)}
-    for name in PIN_FORCES:
-        less = -1.0 if name == "F12" else 1.0
-        numbers[name] = getattr(right, name) + less * stack_components(stale)
+    arm = calculation.of_bar[bar].length * calculation.motion.unit[bar]
+    sense = 1.0 if bar == 4 else -1.0
+    numbers = calculation.shift_loop_force(stale)
+    numbers["torque"] = right.torque + sense * cross_products(arm, stale)
     for name, values in numbers.items():
-        theirs = judge.table.values.get(name)
-        if theirs is not None:
-            values[0] = theirs[0]
+        _take_edge(judge, name, values, 0)
     text = "the force at B is that of the position before: a constraint one step old"
-    yield _state(text, numbers)
+    yield Mistake(text, numbers.get)
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
     """Yield the mistake of the other branch from where the numbers change."""
-    keys = ("theta_3", "theta_4", *judge.table.values)
-    key = next(filter(judge.table.values.__contains__, keys))
-    error, allowed, _ = judge.judged_right(key)
+    keys = ("theta_3", "theta_4", *judge.columns)
+    column = judge.columns[next(filter(judge.columns.__contains__, keys))]
+    error, allowed, _ = column.judged_right
     if not (error > allowed).any():
         return
     try:
-        other = solve(
-            judge.scene,
-            judge.stage,
-            at=judge.at._replace(branch=-judge.at.branch),
-        )
+        opposite = judge.at._replace(branch=-judge.at.branch)
+        other = solve(judge.scene, judge.stage, at=opposite)
     except FourBarError:
         return
-    of_other = judge.judged(key, judge.ours(key, other))[0]
-    left = of_other < error
+    left = column.compare(column.take(other))[0] < error
     places = np.flatnonzero(left)
     if not len(places) or places[0] == 0:
         return
     start = int(places[0])
-    later = np.arange(len(left)) >= start
     here = np.degrees(judge.at.angle[start])
 
-    def predict(quantity: str, right: Solution) -> Array | None:
-        ours, theirs = (getattr(one, quantity, None) for one in (right, other))
+    def predict(quantity: str) -> Array | None:
+        ours, theirs = (getattr(one, quantity, None) for one in (judge.right, other))
         if ours is None or theirs is None:
             return None
-        mask = later[:, None] if quantity in VECTORS else later
-        return np.asarray(np.where(mask, theirs, ours))
+        return np.concatenate((ours[:start], theirs[start:]))
 
     place = f"{judge.at.commanded} = {here:.4g} deg"
     yield Mistake(f"the other branch from {place} on", predict)

@@ -4,7 +4,7 @@ import json
 import math
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -30,7 +30,7 @@ from fourbar_validation.check.judge_table import (
     Judge,
 )
 from fourbar_validation.check.mistakes import Explanation, explain
-from fourbar_validation.check.theirs import TheirTable, name_quantity, read_table
+from fourbar_validation.check.theirs import TheirTable, Unit, read_table
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.report.junit import JunitCase, write_document
@@ -41,30 +41,45 @@ from fourbar_validation.report.sentences import make_words_table, print_sentence
 class Judgement:
     """All findings, and the known mistakes that would explain them."""
 
-    table: TheirTable
-    """The table as it was read."""
-    findings: list[Discrepancy]
-    precisions: dict[str, float]
-    """Largest allowed error of each quantity."""
-    not_assembled: list[int]
-    """Lines at which the linkage does not assemble, or is singular. There is no right
-    answer there.
-    """
+    judge: Judge
     explanations: list[Explanation]
-    tolerance: Allowance | None
-    blank: int
-    """Cells of the judged columns in which no number stands."""
     explained_power: int | None = None
     """Power of ten within which all numbers agree once the mistakes are mended."""
 
     @cached_property
+    def table(self) -> TheirTable:
+        """Return the table as it was read, with what is to be said of it."""
+        table = self.judge.table
+        return replace(table, notes=(*table.notes, *self.judge.describe_held()))
+
+    @property
+    def tolerance(self) -> Allowance | None:
+        """Return the tolerance that a user stated."""
+        return self.judge.tolerance
+
+    @cached_property
+    def findings(self) -> list[Discrepancy]:
+        """Return every number that the table states where the formulas have one."""
+        return self.judge.findings()
+
+    @cached_property
     def differing(self) -> list[Discrepancy]:
         """Return the findings that do not agree, though digits are left to judge by."""
-        return [
-            finding
-            for finding in self.findings
-            if finding.judged and not finding.agrees
-        ]
+        return [one for one in self.findings if one.judged and not one.agrees]
+
+    @cached_property
+    def not_assembled(self) -> list[int]:
+        """Return the lines at which the linkage does not assemble, or is singular.
+
+        There is no right answer there.
+        """
+        return self.judge.without_answer()
+
+    @property
+    def blank(self) -> int:
+        """Return how many cells of the judged columns have no number."""
+        columns = self.judge.columns.values()
+        return sum(int((~column.stated).sum()) for column in columns)
 
     @property
     def agreeing(self) -> int:
@@ -149,9 +164,10 @@ class Judgement:
         Of the numbers of a quantity the one with the fewest digits counts.
         """
         fewest: dict[int, list[str]] = {}
-        for quantity, most in self.precisions.items():
-            digits = math.floor(-math.log10(max(most, EPS)))
-            fewest.setdefault(digits, []).append(quantity)
+        for column in self.judge.columns.values():
+            if math.isfinite(most := column.precision):
+                digits = math.floor(-math.log10(max(most, EPS)))
+                fewest.setdefault(digits, []).append(column.label)
         if len(fewest) == 1:
             (digits,) = fewest
             return write_count(digits, "digit")
@@ -175,85 +191,66 @@ def judge_table(
     table: TheirTable,
     tolerance: Allowance | None = None,
 ) -> Judgement:
-    """Judge every number of a table.
+    """Judge every number of a table, and find the mistakes that explain what differs.
 
     The allowed error is K eps/condition, plus half a unit of the last printed digit,
     and of the angle's. A tolerance decides if it is given, and what explains the rest
     is held to it too.
+
+    Mistakes are looked for in fewer digits than a table prints if none explains it all
+    otherwise: in as many as are right, within what a table in few may be off by.
     """
     judge = Judge(scene, table, tolerance)
-    findings = judge.findings()
-    read = replace(judge.table, notes=(*judge.table.notes, *judge.describe_held()))
-    precisions = judge.list_precisions()
-    differing_quantities = {
-        finding.quantity
-        for finding in findings
-        if finding.judged and not finding.agrees
-    }
-    of_formulas = {
-        key: values
-        for key, values in table.values.items()
-        if name_quantity(key) in UNITS
-    }
-    differing = sorted(
-        key for key in of_formulas if table.label(key) in differing_quantities
-    )
-    if differing:
-        if len(of_formulas) < len(table.values):
-            judge = Judge(scene, replace(table, values=of_formulas), tolerance)
-        explanations = explain(judge, differing) or _explain_motion(judge, differing)
-    else:
-        explanations = []
-    judgement = Judgement(
-        read,
-        findings,
-        precisions,
-        judge.without_answer(),
-        explanations,
-        tolerance,
-        sum(int((~table.stated(key)).sum()) for key in judge.table.values),
-    )
-    unexplained = bool(differing) and not judgement.is_explained()
-    if tolerance is None and unexplained and judgement.agreed_power is None:
-        return _explain_in_fewer_digits(scene, table, judgement)
-    return judgement
-
-
-def _explain_motion(judge: Judge, differing: list[str]) -> list[Explanation]:
-    """Explain what differs in the motion where no mistake explains the forces too."""
-    values = {
-        key: values
-        for key, values in judge.table.values.items()
-        if STAGE_OF.get(name_quantity(key)) != "force"
-    }
-    wrong = [key for key in differing if key in values]
-    if len(wrong) in (0, len(differing)):
-        return []
-    table = replace(judge.table, values=values)
-    of_motion = Judge(judge.scene, table, judge.tolerance, judge.rows)
-    return [replace(one, complete=False) for one in explain(of_motion, wrong)]
-
-
-def _explain_in_fewer_digits(
-    scene: Scene,
-    table: TheirTable,
-    judgement: Judgement,
-) -> Judgement:
-    """Explain a table by mistakes that its numbers show in fewer digits than printed.
-
-    Returned as it is if no mistake explains all of it even within what a table in few
-    digits may be off by.
-    """
-    powers = range(_LEAST_POWER, round(math.log10(FEWEST_DIGITS)) + 1)
+    judgement = _explain(judge)
+    unexplained = not judgement.is_explained()
+    if tolerance is not None or not unexplained or judgement.agreed_power is not None:
+        return judgement
 
     def explain_within(power: int) -> list[Explanation]:
-        within = judge_table(scene, table, Allowance(10.0**power))
+        allowance = Allowance(10.0**power)
+        within = _explain(Judge(judge.scene, judge.table, allowance, judge.rows))
         return within.explanations if within.is_explained() else []
 
+    powers = range(_LEAST_POWER, round(math.log10(FEWEST_DIGITS)) + 1)
     if not explain_within(powers[-1]):
         return judgement
     power = powers[bisect_left(powers, True, key=lambda p: bool(explain_within(p)))]
-    return replace(judgement, explanations=explain_within(power), explained_power=power)
+    return Judgement(judge, explain_within(power), power)
+
+
+def _explain(judge: Judge) -> Judgement:
+    """Explain what differs of the quantities of a solution, or else of its motion."""
+    judgement = Judgement(judge, [])
+    labels = {finding.quantity for finding in judgement.differing}
+    stages = {
+        key: STAGE_OF.get(column.quantity)
+        for key, column in judge.columns.items()
+        if column.quantity in UNITS
+    }
+    differing = [key for key in sorted(stages) if judge.columns[key].label in labels]
+    explanations = _explain_part(judge, differing, stages)
+    motion = [key for key, stage in stages.items() if stage != "force"]
+    if not explanations and not set(differing) <= set(motion):
+        explanations = [
+            replace(one, complete=False)
+            for one in _explain_part(judge, differing, motion)
+        ]
+    return replace(judgement, explanations=explanations)
+
+
+def _explain_part(
+    judge: Judge, differing: list[str], keys: Collection[str]
+) -> list[Explanation]:
+    """Explain what differs as if the table had these columns alone."""
+    wrong = [key for key in differing if key in keys]
+    if not wrong:
+        return []
+    columns = {key: judge.table.columns[key] for key in judge.columns if key in keys}
+    table = replace(judge.table, columns=columns)
+    part = judge
+    if len(columns) < len(judge.columns):
+        part = Judge(judge.scene, table, judge.tolerance, judge.rows)
+    return explain(part, [part.columns[key] for key in wrong])
 
 
 def write_judgement_json(judgement: Judgement) -> str:
@@ -446,6 +443,7 @@ def show_judgement(judgement: Judgement, name: str) -> None:
             f"{escape(escape_controls(name))}: what differs,"
             f" the {MOST_SHOWN_OF_EACH} worst of each quantity"
         )
+        units = {one.label: one.unit for one in judgement.judge.columns.values()}
         head = (
             "line",
             f"{table.found_by}\ndeg",
@@ -459,7 +457,7 @@ def show_judgement(judgement: Judgement, name: str) -> None:
             (
                 str(each.line),
                 f"{math.degrees(each.place):.7g}",
-                *_write_in_their_unit(each, table),
+                *_write_in_their_unit(each, units),
                 f"{each.error:.1e}",
                 f"{each.allowed:.1e}",
             )
@@ -520,14 +518,14 @@ def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     ]
 
 
-def _write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
+def _write_in_their_unit(
+    finding: Discrepancy, units: dict[str, Unit]
+) -> tuple[str, ...]:
     """Write the quantity with the unit of their column, and both numbers in it.
 
     As many digits are written as set the numbers apart.
     """
-    unit = table.units[
-        next(key for key in table.values if table.label(key) == finding.quantity)
-    ]
+    unit = units[finding.quantity]
     theirs, ours = (
         [x / unit.factor for x in numbers] for numbers in (finding.theirs, finding.ours)
     )

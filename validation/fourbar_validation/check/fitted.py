@@ -5,35 +5,31 @@ The number is a ratio, a factor, an offset or another order.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
-from fourbar.scene import Command, Scene
-from fourbar.solution import Solution
-from fourbar.solving import solve
+from fourbar.scene import Command
 from fourbar_validation.check.calculated import Calculation, Change
-from fourbar_validation.check.judge_table import Judge
-from fourbar_validation.check.theirs import OTHER_UNITS, name_quantity
+from fourbar_validation.check.judge_table import Column, Judge
+from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
     Mistake,
-    Predict,
     Variant,
     predict_variants,
     state_all,
 )
-from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
+from fourbar_validation.compare.tolerance import compute_difference, wrap_difference
 from fourbar_validation.scenes.bars import list_moving
 
 _Vary = Callable[[float], Variant]
-"""Function of a factor that returns the problem in which a number has it."""
+"""Function of a number that returns the problem in which a number has it."""
 ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 ENOUGH_DIGITS = 3.0
@@ -57,7 +53,6 @@ _FACTORS = {
 }
 """Factors of a moment of inertia, and the mistake behind each."""
 REVERSED = "sign reversed, or F_ij given for F_ji"
-_LATE = "each row has the numbers of the time"
 _INERTIA = "moment of inertia"
 LEAST_FACTOR = 1e-9
 """Least factor. What a smaller one multiplies was left out, which is a mistake of its
@@ -88,172 +83,140 @@ MOST_ROWS_REORDERED = 1000
 """
 
 
-def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+def find_fitted(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
     """List every mistake whose number the table gives, the simplest first."""
     yield from _find_ratios(judge, differing)
-    yield from _try_exchanged(differing)
+    yield from _try_exchanged(judge, differing)
     moved = all(
-        key in differing or not np.ptp(judge.ours(key)[judge.where(key)], axis=0).any()
-        for key in judge.table.values
-        if judge.where(key).any()
+        column in differing or not np.ptp(column.ours[column.where], axis=0).any()
+        for column in judge.columns.values()
+        if column.where.any()
     )
     if moved:  # another order or zero leaves nothing right that varies
         yield from _try_order(judge)
-    if any(name_quantity(key) in FORCE_NAMES for key in differing):
+    if any(column.quantity in FORCE_NAMES for column in differing):
         yield from _try_factors(judge, differing)
-    if moved:
-        yield from _try_offset(judge)
-    yield from _try_motions(judge, lengths=moved)
+    yield from _try_motions(judge, moved=moved)
 
 
-def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Yield columns that are ours times a number.
-
-    The number is named as two units if a pair of them has that ratio.
-    """
-    by_ratio: dict[tuple[str, float], set[str]] = {}
-    for key in differing:
-        theirs = judge.table.values[key]
-        stated = judge.where(key).reshape(-1, *[1] * (theirs.ndim - 1))
-        stated = stated & np.isfinite(theirs)
-        ours = judge.ours(key)[stated]
-        if not (squares := float(ours @ ours)):
+def _find_ratios(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
+    """Yield columns that are ours times a number."""
+    by_ratio: dict[str, tuple[float, set[str]]] = {}
+    for column in differing:
+        ours = np.where(np.isfinite(column.theirs), column.ours, 0.0)[column.where]
+        if not (squares := float(np.sum(ours * ours))):
             continue
-        near = float(ours @ theirs[stated]) / squares
-        if not judge.explained(key, near * judge.ours(key), NEAR_ENOUGH):
+        near = float(np.nansum(ours * column.theirs[column.where])) / squares
+        if not column.explained(near * column.ours, NEAR_ENOUGH):
             continue
-        ratio_found = _name_ratio(judge, key, near)
-        if ratio_found is None and np.count_nonzero(ours) >= ENOUGH_NUMBERS and near:
-            ratio_found = _round_ratio(judge, key, near)
-        if ratio_found is not None:
-            group = next((g for g in by_ratio if g[0] == ratio_found[0]), ratio_found)
-            by_ratio.setdefault(group, set()).add(name_quantity(key))
-    for (text, ratio), quantities in by_ratio.items():
-        yield Mistake(
-            text,
-            lambda quantity, right, ratio=ratio, own=quantities: (  # type: ignore[misc]
-                ratio * getattr(right, quantity) if quantity in own else None
-            ),
-            whole=False,
-            times=CARRIED,
-        )
+        for text, ratio, times in _list_ratios(column, near, np.count_nonzero(ours)):
+            if column.explained(ratio * column.ours, times):
+                if text:
+                    by_ratio.setdefault(text, (ratio, set()))[1].add(column.quantity)
+                break
+    for text, (ratio, quantities) in by_ratio.items():
+        numbers = {name: ratio * judge.right[name] for name in quantities}
+        yield Mistake(text, numbers.get, whole=False, times=CARRIED)
 
 
-def _name_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
-    announced = judge.table.units[key]
-    unit = UNITS[name_quantity(key)]
-    for unit_tried in OTHER_UNITS.get(unit, ()):
-        ratio = math.copysign(announced.factor / find_factor(unit, unit_tried), near)
-        if (
-            abs(near / ratio - 1.0) < NEAR_A_PLAIN_NUMBER
-            and abs(ratio) != 1.0
-            and judge.explained(key, ratio * judge.ours(key))
-        ):
-            text = (
-                f"units: numbers in {unit_tried} where {announced.text} was announced"
-                f" ({ratio:.6g} times)"
-            )
-            return text + ", and reversed" * (near < 0.0), ratio
-    return None
+def _list_ratios(
+    column: Column, near: float, numbers: Any
+) -> Iterator[tuple[str, float, float]]:
+    """List what a ratio may be: its name, itself and the factor on what is allowed.
 
-
-def _round_ratio(
-    judge: Judge,
-    key: str,
-    near: float,
-) -> tuple[str, float] | None:
-    """Round to a power of ten, or keep the ratio as fitted.
-
-    A reversed sign is a mistake of its own, and is not named twice.
+    The number is named as two units if a pair of them has that ratio. A reversed sign
+    is a mistake of its own, and has no name here.
     """
-    if judge.explained(key, -judge.ours(key)):
-        return None
+    unit = UNITS[column.quantity]
+    announced = column.unit
+    for tried in OTHER_UNITS.get(unit, ()):
+        ratio = math.copysign(announced.factor / find_factor(unit, tried), near)
+        if abs(near / ratio - 1.0) < NEAR_A_PLAIN_NUMBER and abs(ratio) != 1.0:
+            text = f"units: numbers in {tried} where {announced.text} was announced"
+            text += f" ({ratio:.6g} times)" + ", and reversed" * (near < 0.0)
+            yield text, ratio, 1.0
+    if numbers < ENOUGH_NUMBERS or not near:
+        return
+    yield "", -1.0, 1.0
     power = round(math.log10(abs(near)))
     ten = math.copysign(10.0**power, near)
-    if judge.explained(key, ten * judge.ours(key), CARRIED):
-        if ten == -1.0:
-            return REVERSED, ten
-        return f"every number is {'-' if near < 0.0 else ''}10^{power} times ours", ten
-    if judge.explained(key, near * judge.ours(key), CARRIED):
-        digits = 5 if abs(abs(near) - 1.0) > _NEARLY_ONE else 12
-        return f"every number is {near:.{digits}g} times ours", near
-    return None
+    text = f"every number is {'-' if near < 0.0 else ''}10^{power} times ours"
+    yield REVERSED if ten == -1.0 else text, ten, CARRIED
+    digits = 5 if abs(abs(near) - 1.0) > _NEARLY_ONE else 12
+    yield f"every number is {near:.{digits}g} times ours", near, CARRIED
 
 
-def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
+def _try_exchanged(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
     """Try two columns of one unit, each under the name of the other."""
-    for one, second in combinations(dict.fromkeys(map(name_quantity, differing)), 2):
+    names = dict.fromkeys(column.quantity for column in differing)
+    for one, second in combinations(names, 2):
         if UNITS[one] == UNITS[second] and (one in VECTORS) == (second in VECTORS):
-            taken = {one: second, second: one}
-            yield Mistake(
-                f"{one} and {second} are exchanged",
-                lambda quantity, right, taken=taken: getattr(
-                    right, taken.get(quantity, ""), None
-                ),  # type: ignore[misc]
-                whole=False,
-            )
+            taken = {one: judge.right[second], second: judge.right[one]}
+            text = f"{one} and {second} are exchanged"
+            yield Mistake(text, taken.get, whole=False)
+
+
+_EVERY = slice(None)
 
 
 def _compute_residual(
-    judge: Judge,
-    key: str,
-    one: Array,
-    base: Array,
+    columns: list[Column],
+    mistake: Mistake,
+    rows: Any = _EVERY,
 ) -> Array:
-    scale = judge.size(key)
-    mask = judge.where(key) & (scale > 0.0)
-    scaled = (one[mask] - base[mask]) / (
-        scale[mask][:, None] if one.ndim == 2 else scale[mask]
-    )
-    stated = np.isfinite(judge.table.values[key][mask])
-    return np.asarray(np.where(stated, scaled, 0.0)).ravel()
+    """Compute theirs less what a mistake predicts at some rows, in parts of the size.
+
+    What they do not state, and what has no size, counts as right.
+    """
+    parts = [np.zeros(0)]
+    for column in columns:
+        theirs = column.theirs[rows]
+        predicted = column.predict(mistake.predict)
+        apart = theirs - (column.ours[rows] if predicted is None else predicted)
+        if column.quantity.startswith("theta"):
+            apart = wrap_difference(apart)
+        apart = apart.reshape(len(theirs), -1) / column.divisor[rows, None]
+        judged = (column.where & (column.size > 0.0))[rows, None]
+        stated = np.isfinite(theirs).reshape(apart.shape)
+        parts.append(np.where(judged & stated, apart, 0.0).ravel())
+    return np.concatenate(parts)
 
 
-def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+def _try_factors(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
     """Try a moment of inertia, a mass, a load or an effect times a factor.
 
     Forces and torque are linear in each, so that the doubled number tells the factor.
     """
-    keys = [key for key in differing if name_quantity(key) in FORCE_NAMES]
-    keys = [
-        key for key in keys if not key.startswith("|")
-    ] or keys  # a magnitude is linear in none of them
-    theirs = np.concatenate(
-        [
-            _compute_residual(judge, key, judge.table.values[key], judge.ours(key))
-            for key in keys
-        ]
-    )
+    columns = [column for column in differing if column.quantity in FORCE_NAMES]
+    # a magnitude is linear in none of them
+    vectors = [column for column in columns if not column.key.startswith("|")]
+    columns = vectors or columns
+    right = Mistake("", judge.right.__getitem__)
+    theirs = _compute_residual(columns, right)
     if np.count_nonzero(theirs) < ENOUGH_NUMBERS:
         return
     calculation = Calculation(judge.scene, judge.right)
     parts = dict(calculation.list_factors())
     fitted: list[tuple[str, float, Change]] = []
     for doubled in calculation.solve([Change(*part) for part in parts.items()]):
-        moves = np.concatenate(
-            [
-                _compute_residual(judge, key, predicted, judge.ours(key))
-                for key in keys
-                if (predicted := doubled.prediction(key, judge.right)) is not None
-            ]
-        )
+        moves = theirs - _compute_residual(columns, doubled)
         squares = float(moves @ moves)
         factor = 1.0 + float(moves @ theirs) / squares if squares else math.nan
         if LEAST_FACTOR < factor < math.inf and factor != 1.0:
             name = doubled.text
             for f, what, times in _name_factors(name, factor):
-                more = calculation.none().plus(parts[name], f - 1.0)
-                fitted.append((name, times, Change(f"{name} {what}", more)))
+                change = Change(f"{name} {what}", (f - 1.0) * parts[name])
+                fitted.append((name, times, change))
     explained = set()
     solved = calculation.solve([change for _, _, change in fitted])
     for (name, times, _), mistake in zip(fitted, solved, strict=True):
         if name in explained:
             continue  # by a plain factor
-        yield replace(mistake, times=times)
+        yield mistake._replace(times=times)
         if times == 1.0 and all(
-            (predicted := mistake.prediction(key, judge.right)) is not None
-            and judge.explained(key, predicted)
-            for key in keys
+            (predicted := column.predict(mistake.predict)) is not None
+            and column.explained(predicted)
+            for column in columns
         ):
             explained.add(name)
 
@@ -271,221 +234,157 @@ def _name_factors(name: str, factor: float) -> Iterator[tuple[float, str, float]
     yield factor, f"{factor:.6g} times ours (fitted)", CARRIED
 
 
-def _try_offset(judge: Judge) -> Iterator[Mistake]:
-    """Try the commanded angle from another zero, where no stroke is commanded.
+def _list_varied(judge: Judge, moved: bool) -> Iterator[_Vary]:
+    """List lengths where angles are stated, speed and times, as functions.
 
-    The offset is that at which theirs fit best, refined by Gauss and Newton.
+    Lengths only if all that varies differs.
     """
-    keys = _list_fitted(judge)
-    numbers = sum(np.count_nonzero(judge.where(key)) for key in keys)
-    if numbers < ENOUGH_NUMBERS or judge.at.moves_stroke:
-        return
-    n = len(judge.at.angle)
-    rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
-    tried = 2.0 * np.pi * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
-    residuals = _compute_residuals(judge, keys, tried, rows)
-    sizes = np.abs(np.nan_to_num(residuals, nan=1.0))
-    misfits = np.mean(np.minimum(sizes, 1.0), axis=1)
-    if not misfits.min() < PROMISING:
-        return
-    offset = float(tried[np.argmin(misfits)])
-    everything = np.arange(n)
-    for _ in range(NEWTON):
-        offsets = offset + np.array([0.0, FIT_STEP, -FIT_STEP])
-        here, more, less = _compute_residuals(judge, keys, offsets, everything)
-        slope = (more - less) / (2.0 * FIT_STEP)
-        finite = np.isfinite(here) & np.isfinite(slope)
-        if not finite.any():
-            return
-        squared = float(slope[finite] @ slope[finite])
-        if not squared:
-            return
-        step = float(slope[finite] @ here[finite]) / squared
-        offset -= step
-        if abs(step) < FIT_STEP**2:
-            break
-    offset = math.remainder(offset, 2.0 * np.pi)
-    moved = judge.at.as_doubles()._replace(angle=judge.at.angle + offset)
-    wrong = solve(judge.scene, judge.stage, at=moved)
-
-    name = judge.at.commanded
-
-    def take(quantity: str, right: Solution) -> Array | None:
-        return None if quantity == name else getattr(wrong, quantity, None)
-
-    yield Mistake(
-        f"the angle of the {BAR_NAMES[judge.at.bar]} is measured from another zero:"
-        f" {name} {math.degrees(offset):+.6g} deg is what they solved",
-        take,
-        times=CARRIED,
-    )
-
-
-def _list_varied(judge: Judge, scene: Scene, lengths: bool) -> dict[str, _Vary]:
-    """List the speed, and the lengths where angles are stated, as functions."""
-    varied: dict[str, _Vary] = {}
-    if lengths and any(key.startswith("theta") for key in judge.table.values):
-        usual = {name: bar.length for name, bar in list_moving(scene)}
-        for name, length in (*usual.items(), ("ground", scene.linkage.ground)):
-            varied[f"{name}: length"] = partial(_stretch, name, length)
-    if judge.at.speed is not None:
-        varied[f"omega_{judge.at.bar}"] = partial(_hasten, judge.at, judge.at.speed)
+    at = judge.at
+    if moved and any(key.startswith("theta") for key in judge.columns):
+        lengths = {name: bar.length for name, bar in list_moving(judge.scene)}
+        lengths["ground"] = judge.scene.linkage.ground
+        for name, length in lengths.items():
+            yield partial(_stretch, name, length)
+    if at.speed is not None:
+        yield partial(_hasten, at, at.speed)
     law, times = judge.scene.motion.law, judge.table.times
     if law is not None and times is not None:
-        varied[_LATE] = partial(_delay, judge.at, law, times[:, 0])
-    return varied
+        yield partial(_delay, at, law, times[:, 0])
+
+
+def _turn(at: Command, offset: float) -> Variant:
+    """Return the problem of angles that are counted from another zero."""
+    degrees = math.degrees(math.remainder(offset, TURN))
+    name = at.commanded
+    text = (
+        f"the angle of the {BAR_NAMES[at.bar]} is measured from another zero:"
+        f" {name} {degrees:+.6g} deg is what they solved"
+    )
+    turned = at._replace(angle=at.angle + offset)
+    return Variant(text, at=turned, names=UNITS.keys() - {name}, times=CARRIED)
 
 
 def _stretch(name: str, length: float, factor: float) -> Variant:
-    return Variant(name, {f"lengths.{name}": factor * length})
+    text = f"{name}: length {factor:.6g} times ours (fitted)"
+    return Variant(text, {f"lengths.{name}": factor * length}, times=CARRIED)
 
 
 def _hasten(at: Command, speed: float | Array, factor: float) -> Variant:
-    return Variant("", at=at._replace(speed=factor * speed))
+    text = f"omega_{at.bar} {factor:.6g} times ours (fitted)"
+    return Variant(text, at=at._replace(speed=factor * speed), times=CARRIED)
 
 
 def _delay(at: Command, law: Any, time: Array, factor: float) -> Variant:
     """Return the problem of the law at times that are earlier by factor - 1, in s."""
-    earlier = np.clip(time - (factor - 1.0), law.time[0], law.time[-1])
+    lag = factor - 1.0
+    side = "before" if lag > 0.0 else "after"
+    text = f"each row has the numbers of the time {abs(lag):.6g} s {side} its own"
+    earlier = np.clip(time - lag, law.time[0], law.time[-1])
     angle, speed, acceleration = law.at(earlier)
     moved = at._replace(angle=angle, speed=speed, acceleration=acceleration)
-    return Variant(_LATE, at=moved, names=UNITS.keys() - {*at.names})
+    names = UNITS.keys() - {*at.names}
+    return Variant(f"{text} (fitted)", at=moved, names=names, times=CARRIED)
 
 
-def _try_motions(judge: Judge, *, lengths: bool) -> Iterator[Mistake]:
-    """Try another speed, other lengths and times, each fitted by Gauss and Newton."""
+def _find_stage(column: Column) -> int:
+    """Return the number of the stage that computes a quantity."""
+    return STAGES.index(STAGE_OF.get(column.quantity, "force"))
+
+
+def _try_motions(judge: Judge, *, moved: bool) -> Iterator[Mistake]:
+    """Try another zero of the angle, other lengths, speed and times.
+
+    Each is fitted by Gauss and Newton. A zero is tried if all that varies differs; it
+    starts where theirs fit best.
+    """
     scene = state_all(judge.scene)
-    varied = _list_varied(judge, scene, lengths)
+    sized = [column for column in judge.columns.values() if column.size.any()]
+    columns = sorted(sized, key=_find_stage)[:MOST_FITTED]
+    stage = STAGES[max(map(_find_stage, columns), default=0)]
+    offsets: list[float] = []
+    numbers = sum(np.count_nonzero(column.where) for column in columns)
+    if moved and numbers >= ENOUGH_NUMBERS and not judge.at.moves_stroke:
+        n = len(judge.at.angle)
+        rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
+        at = judge.at.part(rows)
+        tried = TURN * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
+        turned = [_turn(at, offset) for offset in tried]
+        wrong = predict_variants(scene, at, turned, stage)
+        residuals = [_compute_residual(columns, one, rows) for one in wrong]
+        misfits = np.mean(np.fmin(np.abs(residuals), 1.0), axis=1)
+        if misfits.min() < PROMISING:
+            offsets.append(float(tried[np.argmin(misfits)]))
+    varied: list[_Vary] = [partial(_turn, judge.at) for _ in offsets]
+    varied += _list_varied(judge, moved)
+    fitted = np.ones(len(varied))
+    fitted[: len(offsets)] = offsets
     if not varied:
         return
-    keys = _list_fitted(judge)
-    factors = dict.fromkeys(varied, 1.0)
 
-    def predict_all(*shifts: float) -> list[Predict]:
-        variants = [
-            vary(factors[name] + shift)
-            for name, vary in varied.items()
-            for shift in shifts
-        ]
-        return predict_variants(scene, judge.at, variants)
+    def list_variants(shifts: tuple[float, ...]) -> list[Variant]:
+        pairs = zip(varied, fitted.tolist(), strict=True)
+        return [vary(number + shift) for vary, number in pairs for shift in shifts]
 
-    def compute_residual(predict: Predict) -> Array:
-        parts = []
-        for key in keys:
-            predicted = Mistake("", predict).prediction(key, judge.right)
-            if predicted is not None:
-                theirs = judge.table.values[key]
-                parts.append(_compute_residual(judge, key, theirs, predicted))
-        return np.concatenate([np.zeros(0), *parts])
-
-    least = math.inf
+    least = np.full(len(varied), np.inf)
     for _ in range(NEWTON):
-        residuals = [
-            compute_residual(predict)
-            for predict in predict_all(0.0, FIT_STEP, -FIT_STEP)
-        ]
-        before = least
-        least = float(np.fmin.reduce([np.linalg.norm(here) for here in residuals[::3]]))
-        if not least < 0.5 * before:
+        variants = list_variants((0.0, FIT_STEP, -FIT_STEP))
+        wrong = predict_variants(scene, judge.at, variants, stage)
+        residuals = [_compute_residual(columns, one) for one in wrong]
+        here, more, less = np.reshape(residuals, (len(varied), 3, -1)).swapaxes(0, 1)
+        sizes = np.sqrt(np.nansum(here * here, axis=1))
+        if not offsets and not np.any(sizes < 0.5 * least):
             break  # nothing fits better, or only by rounding
-        for name, here, more, less in zip(
-            varied, residuals[::3], residuals[1::3], residuals[2::3], strict=True
-        ):
-            # a number that jumps beside the position, as friction does, has no slope
-            smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
-            slope = ((less - more) / (2.0 * FIT_STEP))[smooth]
-            squares = float(slope @ slope)
-            step = float(slope @ here[smooth]) / squares if squares else math.nan
-            if 0.0 < factors[name] + step < math.inf:
-                factors[name] += step
-    for name, predict in zip(varied, predict_all(0.0), strict=True):
-        text = f"{name} {factors[name]:.6g} times ours (fitted)"
-        if name == _LATE:
-            lag = factors[name] - 1.0
-            side = "before" if lag > 0.0 else "after"
-            text = f"{_LATE} {abs(lag):.6g} s {side} its own (fitted)"
-        yield Mistake(text, predict, times=CARRIED)
-
-
-def _list_fitted(judge: Judge) -> list[str]:
-    """List the columns to which a number of the motion is fitted."""
-    keys = [key for key in judge.table.values if judge.size(key).any()]
-    return sorted(keys, key=_find_stage)[:MOST_FITTED]
-
-
-def _find_stage(key: str) -> int:
-    """Return the number of the stage that computes a quantity."""
-    return STAGES.index(STAGE_OF.get(name_quantity(key), "force"))
-
-
-def _compute_residuals(
-    judge: Judge,
-    keys: list[str],
-    offsets: Array,
-    rows: NDArray[np.int_],
-) -> Array:
-    """Compute theirs against ours at crank angles from other zeros.
-
-    Returns one line for each offset; what they do not state counts as right.
-    """
-    m = len(offsets)
-    repeated = judge.at.part(np.tile(rows, m))
-    angle = repeated.angle + np.repeat(offsets, len(rows))
-    at = repeated.as_doubles()._replace(angle=angle, time=None)
-    latest = max(map(_find_stage, keys))
-    moved = solve(judge.scene, STAGES[latest], at=at)
-    parts = []
-    for key in keys:
-        theirs = judge.table.values[key][rows].reshape(len(rows), -1)
-        apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
-        if name_quantity(key).startswith("theta"):
-            apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
-        scaled = apart / replace_zero_size(judge.size(key)[rows])[:, None]
-        stated = np.where(np.isfinite(theirs), scaled, 0.0)
-        parts.append(stated.reshape(m, -1))
-    return np.concatenate(parts, axis=1)
+        least = np.fmin(least, sizes)
+        # a number that jumps beside the position, as friction does, has no slope
+        smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
+        slope = np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP)
+        step = np.nansum(slope * here, axis=1) / np.sum(slope * slope, axis=1)
+        fitted = np.where(
+            np.isfinite(step) & (fitted + step > 0.0), fitted + step, fitted
+        )
+    yield from predict_variants(scene, judge.at, list_variants((0.0,)))
 
 
 def _try_order(judge: Judge) -> Iterator[Mistake]:
     """Yield the right numbers in other rows: each row of theirs goes to our nearest."""
-    table = judge.table
     n = len(judge.at.angle)
-    keys = [
-        key for key in table.values if judge.where(key).all() and judge.size(key).all()
+    columns = [
+        column
+        for column in judge.columns.values()
+        if column.where.all() and column.size.all()
     ]
-    if not ENOUGH_NUMBERS <= n <= MOST_ROWS_REORDERED or not keys:
+    if not ENOUGH_NUMBERS <= n <= MOST_ROWS_REORDERED or not columns:
         return
     apart = np.zeros((n, n))
-    for key in keys:
-        tiled = np.tile(np.arange(n), n)
-        ours = judge.ours(key)[tiled]
-        theirs = np.repeat(table.values[key], n, axis=0)
+    for column in columns:
+        theirs = np.repeat(column.theirs, n, axis=0)
+        ours = np.concatenate([column.ours] * n)
         filled = np.where(np.isnan(theirs), ours, theirs)
-        difference = compute_difference(name_quantity(key), ours, filled)
-        apart += difference.reshape(n, n) / judge.size(key).max()
+        difference = compute_difference(column.quantity, ours, filled)
+        apart += difference.reshape(n, n) / column.size.max()
     nearest = np.argmin(apart, axis=1)
     in_place = np.arange(n)
     # a revolution ends where it began
     several_alike = len(np.unique(nearest)) < n - 1
     if several_alike or np.array_equal(nearest, in_place):
         return
+    found_by = judge.table.found_by
     steps = np.diff(nearest)
     if np.all(steps[1:-1] == -1):
-        direction = f"{table.found_by} runs the other direction"
-        text = f"the rows are in reverse order: {direction}"
+        text = f"the rows are in reverse order: {found_by} runs the other direction"
     elif np.count_nonzero(steps == 1) >= n - 2:
         shifts = np.remainder(nearest - in_place + n / 2, n) - n / 2
         rows = round(float(np.median(shifts)))
         text = (
             f"the rows are shifted by {rows:+d}: each has the numbers of another"
-            f" {table.found_by}"
+            f" {found_by}"
         )
     else:
-        text = f"the rows are in another order than their {table.found_by}"
+        text = f"the rows are in another order than their {found_by}"
 
-    def take(quantity: str, right: Solution) -> Array | None:
-        values = getattr(right, quantity, None)
-        if values is None or quantity == right.commanded:
+    def take(quantity: str) -> Array | None:
+        values = getattr(judge.right, quantity, None)
+        if values is None or quantity == judge.right.commanded:
             return None
         return np.asarray(values[nearest])
 

@@ -3,7 +3,7 @@
 The numbers that each would make are held against the table.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, permutations
@@ -28,10 +28,9 @@ from fourbar_validation.check.fitted import (
     REVERSED,
     find_fitted,
 )
-from fourbar_validation.check.judge_table import Judge
+from fourbar_validation.check.judge_table import Column, Judge
 from fourbar_validation.check.variants import (
     Mistake,
-    Predict,
     Variant,
     Wanted,
     always,
@@ -67,16 +66,14 @@ _BETWEEN = {
 """Mistakes in time, and the side on which the numbers were taken."""
 
 
-def list_column_mistakes() -> Iterator[Mistake]:
+def list_column_mistakes(right: Solution) -> Iterator[Mistake]:
     """List the mistakes that a column can have by itself."""
     for text, change, applies in _COLUMN_MISTAKES:
-        yield Mistake(text, partial(_change_column, change, applies), whole=False)
+        predict = partial(_change_column, right, change, applies)
+        yield Mistake(text, predict, whole=False)
     for bar in (2, 3):
-        yield Mistake(
-            f"relative to bar {bar} instead of the ground",
-            partial(_subtract_angle_of, bar),
-            whole=False,
-        )
+        text = f"relative to bar {bar} instead of the ground"
+        yield Mistake(text, partial(_subtract_angle_of, right, bar), whole=False)
 
 
 def list_hypotheses(
@@ -86,44 +83,36 @@ def list_hypotheses(
 ) -> Iterator[Mistake]:
     """List every other problem that may have been solved, the simplest first."""
     variants = [one for one in _list_variants(scene, command) if wanted(one.text)]
-    differences = filter(wanted, map(_name_differences, _DIFFERENCES))
-    shifted = list(_shift_by_steps(command)) if any(differences) else []
-    every = [*variants, *shifted]
-    if not every:
+    shifted: list[Variant] = []
+    if any(wanted(_NAME_DIFFERENCES.format(name)) for name in _DIFFERENCES):
+        shifted += _shift_by_steps(command)
+    if not variants and not shifted:
         return
-    predictions = predict_variants(state_all(scene), command, every)
+    every = predict_variants(state_all(scene), command, [*shifted, *variants])
     if shifted:
-        yield from _take_differences(command, predictions[len(variants) :])
-    for variant, predict in zip(variants, predictions, strict=False):
-        yield Mistake(variant.text, predict, times=variant.times)
+        yield from _take_differences(command, every[: len(shifted)])
+    yield from every[len(shifted) :]
 
 
 def _change_column(
+    right: Solution,
     change: Callable[[Array], Array],
     applies: Callable[[str], bool],
     quantity: str,
-    right: Solution,
 ) -> Array | None:
     values = getattr(right, quantity, None)
-    if applies(quantity) and values is not None:
-        return change(values)
-    return None
+    if values is None or not applies(quantity):
+        return None
+    return change(values)
 
 
-def _subtract_angle_of(
-    bar: int,
-    quantity: str,
-    right: Solution,
-) -> Array | None:
+def _subtract_angle_of(right: Solution, bar: int, quantity: str) -> Array | None:
     """Take an angle, or its rate, from the line of another bar."""
-    if not _is_angular(quantity) or quantity.endswith(str(bar)):
+    values = getattr(right, quantity, None)
+    base = getattr(right, f"{quantity[:-1]}{bar}", None)
+    if values is None or base is None or quantity.endswith(str(bar)):
         return None
-    values, base = (
-        getattr(right, name, None) for name in (quantity, f"{quantity[:-1]}{bar}")
-    )
-    if values is None or base is None:
-        return None
-    return np.asarray(values - base)
+    return np.asarray(values - base) if _is_angular(quantity) else None
 
 
 _DIFFERENCES = {
@@ -154,39 +143,32 @@ def _shift_by_steps(command: Command) -> Iterator[Variant]:
         yield Variant("", at=command._replace(angle=command.angle + number * steps[0]))
 
 
-def _take_differences(command: Command, near: list[Predict]) -> Iterator[Mistake]:
+def _take_differences(command: Command, near: list[Mistake]) -> Iterator[Mistake]:
     """Take speeds and accelerations from the angles at neighbouring rows of a table."""
     moved = dict(zip(_NEAR, near, strict=True))
     speed = np.max(np.asarray(command.speed, dtype=float))
     second = (command.angle[1] - command.angle[0]) / float(speed)
-    for name, (of_speed, of_acceleration) in _DIFFERENCES.items():
-        predict = partial(_difference, moved, second, of_speed, of_acceleration)
-        yield Mistake(_name_differences(name), predict)
+    for name, steps in _DIFFERENCES.items():
+
+        def predict(
+            quantity: str, steps: tuple[tuple[int, ...], ...] = steps
+        ) -> Array | None:
+            """Divide differences of an angle by those of the time."""
+            rate, _, bar = quantity.rpartition("_")
+            if rate not in ("omega", "alpha") or command.commanded.endswith(bar):
+                return None
+            order = 1 + (rate == "alpha")
+            taken = steps[order - 1]
+            angles = [moved[number].predict(f"theta_{bar}") for number in taken]
+            turns = np.diff(np.array(angles), axis=0)
+            turns -= TURN * np.rint(turns / TURN)
+            step = second * (taken[1] - taken[0])
+            return np.asarray(np.diff(turns, order - 1, axis=0)[0] / step**order)
+
+        yield Mistake(_NAME_DIFFERENCES.format(name), predict)
 
 
-def _name_differences(name: str) -> str:
-    return f"speeds and accelerations are {name} differences"
-
-
-def _difference(
-    moved: Mapping[int, Predict],
-    second: float,
-    of_speed: tuple[int, ...],
-    of_acceleration: tuple[int, ...],
-    quantity: str,
-    right: Solution,
-) -> Array | None:
-    """Divide differences of an angle by those of the time; None for no rate of one."""
-    rate, _, bar = quantity.rpartition("_")
-    taken = {"omega": of_speed, "alpha": of_acceleration}.get(rate)
-    if taken is None or quantity.endswith(right.commanded[-1]):
-        return None
-    angles = [np.asarray(moved[number](f"theta_{bar}", right)) for number in taken]
-    turns = np.diff(angles, axis=0)
-    turns -= TURN * np.rint(turns / TURN)
-    if rate == "omega":
-        return np.asarray(turns[0] / (second * (taken[1] - taken[0])))
-    return np.asarray((turns[1] - turns[0]) / second**2)
+_NAME_DIFFERENCES = "speeds and accelerations are {} differences"
 
 
 def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
@@ -397,13 +379,14 @@ class Explanation:
         adds = self.text.startswith(more)
         if other.text == _OTHER_BRANCH:  # its angles are those of the mirror image
             adds = adds or _CLOCKWISE in self.text
-        return self.quantities == other.quantities and adds
+        alike = self.quantities == other.quantities and self.whole == other.whole
+        return alike and adds
 
 
 @np.errstate(all="ignore")
 def explain(
     judge: Judge,
-    differing: list[str],
+    differing: list[Column],
     wanted: Wanted = always,
 ) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
@@ -413,40 +396,37 @@ def explain(
     tried that are wanted.
     """
     least = ENOUGH_EXPLAINED * len(differing)
-    whole: list[Explanation] = []
-    of_columns: list[Explanation] = []
+    found: list[Explanation] = []
     for find in _SOURCES:
         for mistake in find(judge, differing, wanted):
             explained = _list_explained(judge, mistake, differing, least)
             if explained:
                 explanation = Explanation(
                     mistake.text,
-                    tuple(map(judge.table.label, explained)),
+                    tuple(column.label for column in explained),
                     len(explained) == len(differing),
                     mistake.whole,
                 )
-                among = whole if mistake.whole else of_columns
-                if not any(map(explanation.narrows, among)):
-                    among.append(explanation)
-        if any(explanation.complete for explanation in (*whole, *of_columns)):
+                if not any(map(explanation.narrows, found)):
+                    found.append(explanation)
+        if any(explanation.complete for explanation in found):
             break
-    together = {name for one in of_columns for name in one.quantities}
-    if len(together) < least:
-        of_columns.clear()
-    unlike = {(one.text, one.quantities): one for one in (*of_columns, *whole)}
-    order = sorted(
-        unlike.values(), key=lambda one: (-len(one.quantities), not one.whole)
-    )
-    return order[:MOST_EXPLANATIONS]
+    of_columns = [one.quantities for one in found if not one.whole]
+    if len(set().union(*of_columns)) < least:
+        found = [one for one in found if one.whole]
+    unlike: dict[object, Explanation] = {}
+    for one in sorted(found, key=lambda one: (-len(one.quantities), not one.whole)):
+        unlike.setdefault((one.text, one.quantities), one)
+    return list(unlike.values())[:MOST_EXPLANATIONS]
 
 
 def _list_explained(
     judge: Judge,
     mistake: Mistake,
-    differing: list[str],
+    differing: list[Column],
     least: float,
-) -> list[str]:
-    """List the keys that differ and agree once a mistake is assumed.
+) -> list[Column]:
+    """List the columns that differ and agree once a mistake is assumed.
 
     Empty if a mistake of the calculation explains fewer than `least`, breaks one that
     agreed, may do so by chance, or is fitted to fewer than ENOUGH_NUMBERS. Empty too if
@@ -457,41 +437,39 @@ def _list_explained(
     possible = len(differing)
     numbers = 0
     digits = 0.0
-    others = judge.table.values if mistake.whole else ()
-    for key in dict.fromkeys((*differing, *others)):
-        ours = judge.ours(key)
-        predicted = mistake.prediction(key, judge.right)
-        if predicted is not None and np.array_equal(predicted, ours, equal_nan=True):
+    slack = mistake.times, mistake.left
+    others = judge.columns.values() if mistake.whole else ()
+    for column in dict.fromkeys((*differing, *others)):
+        predicted = column.predict(mistake.predict)
+        if predicted is not None and np.array_equal(
+            predicted, column.ours, equal_nan=True
+        ):
             predicted = None
-        if predicted is not None and judge.where(key).any():
-            agrees = judge.explained(key, predicted, mistake.times, mistake.left)
-        else:
-            agrees = False
-        if key not in differing:
+        agrees = predicted is not None and column.explained(predicted, *slack)
+        if column not in differing:
             if predicted is not None and not agrees:
                 return []
         elif agrees:
-            explained.append(key)
-            error, allowed, _ = judge.judged_right(key)
-            wrong = (error > allowed) & judge.where(key)
+            explained.append(column)
+            error, allowed, _ = column.judged_right
+            wrong = (error > allowed) & column.where
             numbers += int(wrong.sum())
             digits += float(np.log10(error / allowed)[wrong].sum())
-        elif mistake.whole:
+        else:
             possible -= 1
-            if possible < least:
+            if mistake.whole and possible < least:
                 return []
     if mistake.whole and mistake.fitted and numbers < ENOUGH_NUMBERS:
         return []
     if mistake.whole and digits < ENOUGH_DIGITS:
         return []
-    slack = mistake.times, mistake.left
-    if all(judge.explained(key, judge.ours(key), *slack) for key in explained):
+    if all(column.explained(column.ours, *slack) for column in explained):
         return []
-    return [key for key in judge.table.values if key in explained]
+    return [column for column in judge.columns.values() if column in explained]
 
 
-_SOURCES: tuple[Callable[[Judge, list[str], Wanted], Iterator[Mistake]], ...] = (
-    lambda judge, differing, wanted: list_column_mistakes(),
+_SOURCES: tuple[Callable[[Judge, list[Column], Wanted], Iterator[Mistake]], ...] = (
+    lambda judge, differing, wanted: list_column_mistakes(judge.right),
     lambda judge, differing, wanted: find_miscalculated(judge, wanted),
     lambda judge, differing, wanted: list_hypotheses(judge.scene, judge.at, wanted),
     lambda judge, differing, wanted: find_fitted(judge, differing),

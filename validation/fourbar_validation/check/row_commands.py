@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,12 +69,12 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
         )
         raise InputError("motion.free", None, allowed)
     commanded = table.found_by == base.commanded
-    if commanded:
-        same = base.angle.shape == table.places.shape and np.allclose(
-            base.angle, table.places, rtol=_AS_PRINTED, atol=0.0
-        )
-    else:
+    if not commanded:
         same = _has_positions_of(scene, table)
+    elif base.angle.shape != table.places.shape:
+        same = False
+    else:
+        same = np.allclose(base.angle, table.places, rtol=_AS_PRINTED, atol=0.0)
     varies = scene.motion.law is not None or scene.motion.has_rate_of_each
     if varies and not same and commanded:
         along = _follow_law(scene, table, base)
@@ -83,21 +83,36 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     rates: tuple[str, ...] = ()
     if not same if varies else scene.motion.speed is None:
         rates = _list_stated_rates(scene, table, both=varies)
-    if rates:
-        speed, acceleration = rates
-        base = base._replace(
-            speed=table.values[speed],
-            acceleration=table.values.get(acceleration, base.acceleration),
-        )
-    if same:
-        found = _with_rounding(base, table) if commanded else RowCommands(base)
-    elif commanded:
-        own = _find_own_positions(base, table)
-        at = _command_each(base, table.places if own is None else own, scene)
-        found = _with_rounding(at, table) if own is None else RowCommands(at)
-    else:
-        found = _find_by_another_bar(scene, table, base)
-    return found._replace(rates=rates)
+    stated: dict[str, Any] = {
+        field: table.columns[rate].values
+        for field, rate in zip(("speed", "acceleration"), rates, strict=False)
+        if rate in table.columns
+    }
+    base = base._replace(**stated)
+    if not commanded and same:
+        return RowCommands(base, rates=rates)
+    if not commanded:
+        return _find_by_another_bar(scene, table, base)._replace(rates=rates)
+    own = None if same else _find_own_positions(base, table)
+    if own is not None:
+        return RowCommands(_command_each(base, own, scene), rates=rates)
+    at = base if same else _command_each(base, table.places, scene)
+
+    def command_at(shift: Array) -> Command:
+        return at.as_doubles()._replace(angle=at.angle + shift)
+
+    return RowCommands(at, _command_beside(table, command_at), rates)
+
+
+def _command_beside(
+    table: TheirTable,
+    command_at: Callable[[Array], Command],
+) -> tuple[Command, ...]:
+    """Command the rows at both ends of the rounding of their places."""
+    rounding = table.places_rounding
+    if not rounding.any():
+        return ()
+    return command_at(-rounding), command_at(rounding)
 
 
 def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
@@ -112,9 +127,7 @@ def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands
         motion = scene.motion.replace(angle=table.places + shift)
         return command(replace(scene, motion=motion))
 
-    rounding = table.places_rounding
-    near = map(command_at, (-rounding, rounding) if rounding.any() else ())
-    return RowCommands(command_at(0.0), tuple(near))
+    return RowCommands(command_at(0.0), _command_beside(table, command_at))
 
 
 def _list_stated_rates(
@@ -128,7 +141,7 @@ def _list_stated_rates(
     a list, is known at the scene's own positions alone.
     """
     rates = scene.motion.names[1:]
-    if all(rate in table.values for rate in rates[: 1 + both]):
+    if all(rate in table.columns for rate in rates[: 1 + both]):
         return rates
     if both:
         names = " and ".join(rates)
@@ -164,7 +177,7 @@ def _follow_law(
     first, *_, last = law.time
     printed, half = table.times.T
     stated = np.clip(printed, first, last)
-    rounding = table.rounding[table.found_by]
+    rounding = table.place.rounding
     rounding = rounding + _AS_PRINTED * (1.0 + np.abs(table.places))
 
     def measure(time: Array) -> Array:
@@ -190,7 +203,7 @@ def _follow_law(
     off = ~fits_stated & several | (np.abs(measure(time)) > rounding + _ONE_PLACE)
     if off.any():
         names = scene.motion.names[1:]
-        if all(name in table.values for name in names):
+        if all(name in table.columns for name in names):
             return None
         row = int(np.argmax(off))
         law_at, place = np.degrees([law.at(stated)[0][row], table.places[row]])
@@ -270,7 +283,7 @@ def _find_own_positions(base: Command, table: TheirTable) -> Array | None:
     angles = np.sort(base.angle)
     if angles[0] == angles[-1]:
         return None
-    half = table.rounding[table.found_by]
+    half = table.place.rounding
     after = np.clip(np.searchsorted(angles, table.places), 1, len(angles) - 1)
     lower, upper = angles[after - 1], angles[after]
     nearest = np.where(table.places - lower < upper - table.places, lower, upper)
@@ -280,25 +293,13 @@ def _find_own_positions(base: Command, table: TheirTable) -> Array | None:
     return nearest if rounds.all() and by_chance < _BY_CHANCE else None
 
 
-def _with_rounding(at: Command, table: TheirTable) -> RowCommands:
-    """Return a command with those at both ends of the rounding of its angle."""
-    rounding = table.places_rounding
-    if not rounding.any():
-        return RowCommands(at)
-    near = (
-        at.as_doubles()._replace(angle=at.angle + shift)
-        for shift in (-rounding, rounding)
-    )
-    return RowCommands(at, tuple(near))
-
-
 def _has_positions_of(scene: Scene, table: TheirTable) -> bool:
     """Return whether the rows are the scene's own positions, as they are printed."""
     angles = getattr(solve(scene, "position"), table.found_by)
     if angles.shape != table.places.shape:
         return False
     apart = np.abs(wrap_difference(angles - table.places))
-    return bool(np.all(apart <= table.rounding[table.found_by] + _ONE_PLACE))
+    return bool(np.all(apart <= table.place.rounding + _ONE_PLACE))
 
 
 def _find_by_another_bar(
@@ -329,16 +330,14 @@ def _find_by_another_bar(
     chosen = np.argmax(fits, axis=0)
     angle = np.where(fits.any(axis=0), angles[chosen, np.arange(n)], np.nan)
     at = _command_each(base, angle, scene)
-    rounding = table.places_rounding
-    if not rounding.any():
-        return RowCommands(at)
     side = np.where(chosen == 0, 1, -1)
-    near = []
-    for shift in (-rounding, rounding):
+
+    def command_at(shift: Array) -> Command:
         beside = _command_other_bar(scene, table, table.places + shift, side)
         moved = angle + wrap_difference(beside[base.commanded] - angle)
-        near.append(at._replace(angle=moved))
-    return RowCommands(at, tuple(near))
+        return at._replace(angle=moved)
+
+    return RowCommands(at, _command_beside(table, command_at))
 
 
 def _command_other_bar(
@@ -379,7 +378,7 @@ def _refuse_row(
     row: np.intp,
 ) -> None:
     """Raise InputError for a row at whose angle the motion is twice."""
-    unit = table.units[table.found_by]
+    unit = table.place.unit
     place = f"{table.places[row] / unit.factor:.6g} {unit.text}"
     both = " and ".join(f"{math.degrees(angle):.6g}" for angle in sorted(angles[:, 0]))
     raise InputError(

@@ -22,9 +22,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
@@ -55,19 +55,33 @@ _COMMANDED_ANGLE = ("angle", "winkel", "antriebswinkel", "inputangle")
 """Names of the angle that a scene commands, spelled as in _OTHER_NAMES."""
 _PLACES = ("theta_2", "theta_4", "theta_3")
 """Angles by which a row may be found where the commanded one has no column."""
+_OF_TORQUE = (
+    "t2",
+    "t3",
+    "t4",
+    "moment",
+    "drehmoment",
+    "antriebsmoment",
+    "motortorque",
+    "inputtorque",
+    "cranktorque",
+    "drivetorque",
+    "drivingtorque",
+)
 _OTHER_NAMES = {
-    **dict.fromkeys(("t2", "t3", "t4", "moment", "drehmoment"), "torque"),
-    **dict.fromkeys(
-        ("antriebsmoment", "motortorque", "inputtorque", "cranktorque"), "torque"
-    ),
-    **dict.fromkeys(("drivetorque", "drivingtorque"), "torque"),
-    **dict.fromkeys(("kurbelwinkel", "crankangle"), "theta_2"),
-    **dict.fromkeys(("abtriebswinkel", "outputangle"), "theta_4"),
-    **dict.fromkeys(("koppelwinkel", "couplerangle"), "theta_3"),
+    **dict.fromkeys(_OF_TORQUE, "torque"),
+    "kurbelwinkel": "theta_2",
+    "crankangle": "theta_2",
+    "abtriebswinkel": "theta_4",
+    "outputangle": "theta_4",
+    "koppelwinkel": "theta_3",
+    "couplerangle": "theta_3",
     "zeit": "time",
+    **{f"{name.lower()}{axis}": f"{name}_{axis}" for name in VECTORS for axis in "xy"},
+    **{name.lower().replace("_", ""): name for name in (*NOT_JUDGED, *UNITS)},
 }
-"""Names that other programs and languages use, in small letters, without spaces and
-underscores.
+"""Names that other programs and languages use, or other spellings, in small letters,
+without spaces and underscores.
 """
 _BY_UNIT = {"t": {"time": "s", "torque": "N m"}, "m": {"torque": "N m"}}
 """Letters, spelled as in _OTHER_NAMES, and what they mean by the unit beside them."""
@@ -138,24 +152,37 @@ class Unit:
     """Factor to SI."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TheirTable:
-    """Somebody's numbers in SI units: an angle (n,) and values by quantity.
+class TheirColumn(NamedTuple):
+    """One column of somebody's numbers, or the two of a vector, in SI units.
 
-    Values are (n,) or (n, 2) and have their rounding. Of a vector (n,) are its
-    magnitudes, under |name|. What the table does not state is NaN.
+    What the table does not state is NaN.
     """
 
-    places: Array
-    """Angle by which each row is found, rad, (n,)."""
-    values: dict[str, Array]
-    rounding: dict[str, Array]
-    """Half a unit of the last digit printed, in SI, (n,); of the angle too."""
-    units: dict[str, Unit]
+    values: Array
+    """(n,), or (n, 2) of a vector."""
+    rounding: Array
+    """Half a unit of the last digit printed, (n,)."""
+    filled: Array
+    """The same if the zeros at the ends of numbers were left off, (n,)."""
+    unit: Unit
+
+    def part(self, rows: slice) -> "TheirColumn":
+        """Return some of the rows."""
+        values, rounding, filled, unit = self
+        return TheirColumn(values[rows], rounding[rows], filled[rows], unit)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TheirTable:
+    """Somebody's numbers: the angle by which each row is found, and columns by key.
+
+    A key is a quantity, or |name| of the magnitudes of a vector.
+    """
+
+    place: TheirColumn
+    columns: dict[str, TheirColumn]
     lines: list[int]
     """The line of the file that each row stands in."""
-    filled: dict[str, Array]
-    """Rounding of values if the zeros at their ends were left off."""
     places_rounding: Array
     """Rounding of the angle, rad, (n,): half a unit of its last digit if the column is
     printed with _DECIMALS, else 0: somebody chose it.
@@ -169,31 +196,17 @@ class TheirTable:
     times: Array | None = None
     """Time of each row and half a unit of its last digit, s, (n, 2)."""
 
-    def label(self, key: str) -> str:
-        """Name the quantity, or the one component of it that the table has."""
-        values = self.values[key]
-        letters = [
-            letter
-            for letter, gone in zip("xy", np.isnan(values).T, strict=False)
-            if not gone.all()
-        ]
-        if values.ndim == 2 and len(letters) == 1:
-            return f"{key}_{letters[0]}"
-        return key
-
-    def stated(self, key: str) -> NDArray[np.bool_]:
-        """Mark the rows in which a quantity has any number, (n,)."""
-        finite = np.isfinite(self.values[key])
-        return np.asarray(finite.any(axis=1) if finite.ndim == 2 else finite)
+    @property
+    def places(self) -> Array:
+        """Return the angle of each row, rad, (n,)."""
+        return self.place.values
 
     def part(self, rows: slice) -> "TheirTable":
         """Return some of the rows."""
         return replace(
             self,
-            places=self.places[rows],
-            values={key: value[rows] for key, value in self.values.items()},
-            rounding={key: value[rows] for key, value in self.rounding.items()},
-            filled={key: value[rows] for key, value in self.filled.items()},
+            place=self.place.part(rows),
+            columns={key: column.part(rows) for key, column in self.columns.items()},
             lines=self.lines[rows],
             places_rounding=self.places_rounding[rows],
             times=None if self.times is None else self.times[rows],
@@ -204,29 +217,36 @@ class TheirTable:
 
         O2 stands at `origin` in a drawing's coordinates.
         """
-        if not any(origin):
-            return self
         drawn = {
-            key
-            for key, value in self.values.items()
-            if value.ndim == 2 and find_unit_of_quantity(key) == "m"
+            key: column._replace(values=column.values - origin)
+            for key, column in self.columns.items()
+            if column.values.ndim == 2 and find_unit_of_quantity(key) == "m"
         }
-        if not drawn:
+        if not drawn or not any(origin):
             return self
-        values = {
-            key: value - origin if key in drawn else value
-            for key, value in self.values.items()
-        }
         x, y = origin
         note = (
             f"places are those of the drawing; shown from O2, at ({x:.6g}, {y:.6g}) m"
         )
-        return replace(self, values=values, notes=(*self.notes, note))
+        return replace(self, columns=self.columns | drawn, notes=(*self.notes, note))
 
 
 def name_quantity(key: str) -> str:
-    """Name the quantity of a key of `TheirTable.values`."""
+    """Name the quantity of a key of `TheirTable.columns`."""
     return key.strip("|")
+
+
+class _Heading(NamedTuple):
+    """What a heading means."""
+
+    name: str
+    """Quantity, or the component of one; |name| for the magnitudes of a vector."""
+    unit: Unit | None = None
+    """Unit of its numbers; None if they are not read."""
+    why: str = ""
+    """Reason for which it is not judged."""
+    renaming: str = ""
+    """What it may be renamed to."""
 
 
 def read_table(
@@ -243,28 +263,34 @@ def read_table(
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
-    lines_of_file = _read_lines(path)
-    unit_line: list[str] = []
-    if len(lines_of_file) > 1 and _is_unit_line(lines_of_file[1][1]):
-        unit_line = lines_of_file.pop(1)[1]
-    if len(lines_of_file) < 2:
-        allowed = "needs a header and at least one row"
-        raise InputError("table", path.name, allowed, str(path))
-    (_, headings), *rows = lines_of_file
+    text = read_text(path, "table", LARGEST_TABLE_FILE)
+    try:
+        return _read_columns(*_read_lines(text, path.name), commanded, points, law)
+    except InputError as error:
+        raise error.in_file(str(path)) from None
+
+
+def _read_columns(
+    headings: list[str],
+    unit_line: list[str],
+    rows: list[tuple[int, list[str]]],
+    commanded: str,
+    points: Collection[str],
+    law: Law | Rise | Sine | None,
+) -> TheirTable:
+    """Read the columns of the rows of a table, each a line number and its cells."""
     columns, left_out, renamings = _read_headings(
-        path, headings, unit_line, commanded, points
+        headings, unit_line, commanded, points
     )
     times = _read_times(columns, rows)
-    _drop_repeated(path, columns, left_out, headings, rows)
-    names = [name for name, _ in columns.values()]
-    numbers = {name: np.empty(len(rows)) for name in names}
-    halves = {name: np.empty(len(rows)) for name in names}
-    units = {name: unit for name, unit in columns.values()}
-    found_by = next((name for name in (commanded, *_PLACES) if name in names), None)
+    left_out |= _drop_repeated(columns, headings, rows)
+    indices = {column.name: index for index, column in columns.items()}
+    lines = [line for line, _ in rows]
+    found_by = next((name for name in (commanded, *_PLACES) if name in indices), None)
+    place = None
     if found_by is None and law is not None and times is not None:
-        found_by, units[commanded] = commanded, Unit("rad", 1.0)
-        lines_of_rows = [line for line, _ in rows]
-        numbers[commanded], halves[commanded] = _follow(law, times, lines_of_rows, path)
+        found_by = commanded
+        place = _follow(law, times, lines)
         left_out = {
             name: why for name, why in left_out.items() if why != NOT_JUDGED["time"]
         }
@@ -273,92 +299,91 @@ def read_table(
             "header",
             headings,
             f"needs a column {commanded} (say {commanded} [deg] for degrees), or the"
-            " angle of another bar" + _list_renamings(renamings),
-            str(path),
+            f" angle of another bar{renamings}",
         )
-    for row, (line, cells) in enumerate(rows):
-        _require_cells(path, headings, line, cells)
-        for index, (name, unit) in columns.items():
-            is_component = name.endswith(("_x", "_y"))
-            is_reaction = headings[index].strip()[:3] in _REACTIONS
-            sign = -1.0 if is_component and is_reaction else 1.0
-            try:
-                value, half = _read_cell(cells[index])
-            except InputError as error:
-                place = f"line {line}, {headings[index].strip()}"
-                raise InputError(
-                    place,
-                    cells[index],
-                    error.allowed,
-                    str(path),
-                ) from None
-            numbers[name][row], halves[name][row] = (
-                sign * value * unit.factor,
-                half * unit.factor,
-            )
-        if math.isnan(numbers[found_by][row]):
-            raise InputError(
-                f"line {line}",
-                cells,
-                f"needs a {found_by}",
-                str(path),
-            )
-    notes = _read_degrees(found_by, numbers, halves, units, headings, columns)
-    blank = {
-        headings[index]: _BLANK
-        for index, (name, _) in columns.items()
-        if np.isnan(numbers[name]).all()
-    }
-    lines = [line for line, _ in rows]
-    table = TheirTable(
-        numbers[found_by],
-        {},
-        {found_by: halves[found_by]},
-        {found_by: units[found_by]},
-        lines,
-        {},
-        _find_rounding(halves[found_by], units[found_by]),
-        left_out | blank,
-        notes,
-        found_by,
-        times,
-    )
-    for name in names:
-        if name != found_by and not np.isnan(numbers[name]).all():
-            _enter_column(table, name, units[name], numbers[name], halves[name])
-    if not table.values:
+    numbers = _read_numbers(columns, headings, rows)
+    notes: tuple[str, ...] = ()
+    if place is None:
+        index = indices[found_by]
+        del columns[index]
+        place = numbers.pop(index)
+        missing = np.isnan(place.values)
+        if missing.any():
+            line, cells = rows[int(np.argmax(missing))]
+            raise InputError(f"line {line}", cells, f"needs a {found_by}")
+        if place.unit.text == "rad" and not re.search(r"[\[(]", headings[index]):
+            place, notes = _read_degrees(found_by, place)
+    read_columns: dict[str, TheirColumn] = {}
+    blank = {}
+    for index, column in numbers.items():
+        if np.isnan(column.values).all():
+            blank[headings[index]] = _BLANK
+        else:
+            _enter_column(read_columns, columns[index].name, column)
+    if not read_columns:
         example = "such as torque, F12_x and F12_y, or F12 (its magnitude)"
         stated = " in place of blank cells" * bool(blank)
         raise InputError(
             "header",
             headings,
-            f"needs a result{stated}, {example}{_list_renamings(renamings)}; "
+            f"needs a result{stated}, {example}{renamings}; "
             "known are the columns of fourbar analyze SCENE --csv",
-            str(path),
         )
-    return table
+    return TheirTable(
+        place,
+        read_columns,
+        lines,
+        _find_rounding(place.rounding, place.unit),
+        left_out | blank,
+        notes,
+        found_by,
+        times,
+    )
+
+
+def _read_headings(
+    headings: list[str],
+    unit_line: list[str],
+    commanded: str,
+    points: Collection[str],
+) -> tuple[dict[int, _Heading], dict[str, str], str]:
+    """Return the columns that are read, and why others are left out.
+
+    The last is what those that are not known may be renamed to.
+    """
+    columns: dict[int, _Heading] = {}
+    left_out: dict[str, str] = {}
+    renamings = ""
+    for index, heading in enumerate(headings):
+        unit = "".join(unit_line[index : index + 1]).strip(" []()")
+        read = _read_heading(heading, unit, commanded, points)
+        if not read.name and index == len(headings) - 1:
+            continue  # an empty cell that a spreadsheet leaves at the end of a line
+        column = heading.strip() or f"column {index + 1}"
+        if read.why:
+            left_out[column] = read.why
+        if read.renaming:
+            renamings += f"; {column}: {read.renaming}"
+        if read.unit is not None:
+            columns[index] = read
+    return columns, left_out, renamings
 
 
 def _read_times(
-    columns: dict[int, tuple[str, Unit]],
+    columns: dict[int, _Heading],
     rows: list[tuple[int, list[str]]],
 ) -> Array | None:
     """Take the times out of the columns; None if they are not all numbers."""
-    of_time = [index for index, (name, _) in columns.items() if name == "time"]
-    units = [columns.pop(index)[1] for index in of_time]
+    of_time = [index for index, column in columns.items() if column.name == "time"]
+    units = [columns.pop(index).unit for index in of_time]
     with suppress(InputError, IndexError):
-        for index, unit in zip(of_time, units, strict=True):
-            times = np.array([_read_cell(cells[index]) for _, cells in rows])
-            return times * unit.factor if np.isfinite(times).all() else None
+        times = np.array([_read_cell(cells[of_time[0]]) for _, cells in rows])
+        if units[0] is not None and np.isfinite(times).all():
+            return times * units[0].factor
     return None
 
 
-def _follow(
-    law: Law | Rise | Sine,
-    times: Array,
-    lines: list[int],
-    path: Path,
-) -> tuple[Array, Array]:
+def _follow(law: Law | Rise | Sine, times: Array, lines: list[int]) -> TheirColumn:
     """Return the law's angle at each time, and what the rounding of the time moves it.
 
     Raises InputError for a time that the law does not have.
@@ -370,120 +395,115 @@ def _follow(
     if beyond.any():
         row = int(np.argmax(beyond))
         wanted = f"the law lasts from {first:g} to {last:g} s"
-        raise InputError(f"line {lines[row]}, time", printed[row], wanted, str(path))
+        raise InputError(f"line {lines[row]}, time", printed[row], wanted)
     angle, speed, _ = law.at(inside)
-    return angle, np.abs(speed) * _find_rounding(half, Unit("s", 1.0))
-
-
-def _require_cells(
-    path: Path,
-    headings: list[str],
-    line: int,
-    cells: list[str],
-) -> None:
-    """Refuse a row that has not one cell for each heading; blank ones may follow."""
-    if len(cells) < len(headings) or any(
-        cell.strip() for cell in cells[len(headings) :]
-    ):
-        allowed = f"needs {len(headings)} cells"
-        if len(cells) > len(headings):
-            allowed += "; with decimal commas, semicolons between them"
-        raise InputError(f"line {line}", cells, allowed, str(path))
-
-
-def _list_renamings(renamings: dict[str, str]) -> str:
-    """List the columns that are not known and what they may be renamed to."""
-    return "".join(f"; {heading}: {what}" for heading, what in renamings.items())
+    moved = np.abs(speed) * _find_rounding(half, Unit("s", 1.0))
+    return TheirColumn(angle, moved, moved, Unit("rad", 1.0))
 
 
 def _drop_repeated(
-    path: Path,
-    columns: dict[int, tuple[str, Unit]],
-    left_out: dict[str, str],
+    columns: dict[int, _Heading],
     headings: list[str],
     rows: list[tuple[int, list[str]]],
-) -> None:
-    """Leave out a column that repeats another one.
+) -> dict[str, str]:
+    """Take out each column that repeats another one, and return why it is left out.
 
     Raises InputError if it says otherwise.
     """
     first: dict[str, int] = {}
-    for index, (name, unit) in list(columns.items()):
-        earlier = first.setdefault(name, index)
+    left_out = {}
+    for index, column in list(columns.items()):
+        earlier = first.setdefault(column.name, index)
         if earlier == index:
             continue
         same = all(
             cells[index : index + 1] == cells[earlier : earlier + 1]
             for _, cells in rows
         )
-        if not same or unit != columns[earlier][1]:
-            allowed = (
-                f"columns {earlier + 1} and {index + 1} are both {name}, with other "
-                "numbers: rename or remove one"
-            )
+        if not same or column != columns[earlier]:
             raise InputError(
                 "header",
                 headings,
-                allowed,
-                str(path),
+                f"columns {earlier + 1} and {index + 1} are both {column.name}, with"
+                " other numbers: rename or remove one",
             )
         left_out[f"{headings[index].strip()} (column {index + 1})"] = (
             f"repeats column {earlier + 1}"
         )
         del columns[index]
+    return left_out
+
+
+def _read_numbers(
+    columns: dict[int, _Heading],
+    headings: list[str],
+    rows: list[tuple[int, list[str]]],
+) -> dict[int, TheirColumn]:
+    """Read the cells of the columns, by their places in a row."""
+    numbers = np.empty((len(headings), 2, len(rows)))
+    for row, (line, cells) in enumerate(rows):
+        more = cells[len(headings) :]
+        if len(cells) < len(headings) or "".join(more).strip():
+            allowed = f"needs {len(headings)} cells"
+            if more:
+                allowed += "; with decimal commas, semicolons between them"
+            raise InputError(f"line {line}", cells, allowed)
+        for index in columns:
+            try:
+                numbers[index, :, row] = _read_cell(cells[index])
+            except InputError as error:
+                place = f"line {line}, {headings[index].strip()}"
+                raise error.moved_to(place, None) from None
+    read = {}
+    for index, (name, unit, *_) in columns.items():
+        assert unit is not None
+        values, half = numbers[index]
+        if name.endswith(("_x", "_y")) and headings[index].strip()[:3] in _REACTIONS:
+            values = -values
+        half = np.where(np.isnan(values), 0.0, half)
+        filled = unit.factor * fill_zeros(values, half)
+        factor = unit.factor
+        read[index] = TheirColumn(values * factor, half * factor, filled, unit)
+    return read
 
 
 def _read_degrees(
-    name: str,
-    numbers: dict[str, Array],
-    halves: dict[str, Array],
-    units: dict[str, Unit],
-    headings: list[str],
-    columns: dict[int, tuple[str, Unit]],
-) -> tuple[str, ...]:
+    name: str, column: TheirColumn
+) -> tuple[TheirColumn, tuple[str, ...]]:
     """Read an angle without a unit as degrees if it can be nothing else."""
-    values = numbers[name]
-    stated = [headings[i] for i, (one, _) in columns.items() if one == name]
-    bare = not re.search(r"[\[(]", "".join(stated)) and units[name].text == "rad"
-    bare &= bool(stated)  # and not found by a time
+    values = column.values
     largest = float(np.abs(values).max())
-    if not bare or not _TWO_TURNS < largest < _MOST_DEGREES:
-        return ()
+    if not _TWO_TURNS < largest < _MOST_DEGREES:
+        return column, ()
     if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
         text = f"{name} has no unit and is read in rad: write {name} [deg] if it is not"
-        return (text,)
+        return column, (text,)
     factor = math.pi / 180.0
-    numbers[name], halves[name] = values * factor, halves[name] * factor
-    units[name] = Unit("deg", factor)
-    return (
-        (
-            f"{name} has no unit and goes to {largest:g}: it is read as degrees; "
-            f"write {name} [deg], or {name} [rad] if it is not"
-        ),
+    text = (
+        f"{name} has no unit and goes to {largest:g}: it is read as degrees; "
+        f"write {name} [deg], or {name} [rad] if it is not"
     )
+    rounding = column.rounding * factor
+    column = TheirColumn(values * factor, rounding, rounding, Unit("deg", factor))
+    return column, (text,)
 
 
 def _enter_column(
-    table: TheirTable,
-    name: str,
-    unit: Unit,
-    numbers: Array,
-    halves: Array,
+    columns: dict[str, TheirColumn], name: str, column: TheirColumn
 ) -> None:
-    """Enter a column into the table, a component into its vector."""
-    halves = np.where(np.isnan(numbers), 0.0, halves)
-    filled = fill_zeros(numbers / unit.factor, halves)
-    if name[-2:] not in ("_x", "_y"):
-        table.values[name], table.units[name] = numbers, unit
-        table.rounding[name], table.filled[name] = halves, filled
+    """Enter a column of a table, a component into its vector."""
+    vector, _, axis = name.rpartition("_")
+    if axis not in ("x", "y"):
+        columns[name] = column
         return
-    vector = name[:-2]
-    axis = "xy".index(name[-1])
-    values = table.values.setdefault(vector, np.full((len(numbers), 2), np.nan))
-    values[:, axis] = numbers
-    for roundings, more in ((table.rounding, halves), (table.filled, filled)):
-        roundings[vector] = np.hypot(roundings.get(vector, 0.0), more)
-    table.units.setdefault(vector, unit)
+    n = len(column.values)
+    none = TheirColumn(np.full((n, 2), np.nan), np.zeros(n), np.zeros(n), column.unit)
+    entered = columns.get(vector, none)
+    entered.values[:, "xy".index(axis)] = column.values
+    columns[vector] = entered._replace(
+        rounding=np.hypot(entered.rounding, column.rounding),
+        filled=np.hypot(entered.filled, column.filled),
+    )
 
 
 def fill_zeros(numbers: Array, halves: Array) -> Array:
@@ -515,32 +535,29 @@ def _find_rounding(halves: Array, unit: Unit) -> Array:
     )
 
 
-def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Read the lines that hold anything, with their numbers."""
-    text = read_text(path, "table", LARGEST_TABLE_FILE)
+def _read_lines(
+    text: str, name: str
+) -> tuple[list[str], list[str], list[tuple[int, list[str]]]]:
+    """Read the headings, the units under them, and rows with their line numbers."""
     text = _remove_comments(text)
     header = next((line for line in text.splitlines() if line.strip()), "")
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
     try:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-        numbered = [
-            (reader.line_num, row)
-            for row in reader
-            if any(cell.strip() for cell in row)
-        ]
+        numbered = [(reader.line_num, row) for row in reader if "".join(row).strip()]
     except csv.Error:
-        raise InputError(
-            "table",
-            path.name,
-            "must be a CSV file",
-            str(path),
-        ) from None
+        raise InputError("table", name, "must be a CSV file") from None
     if delimiter != ",":  # there a comma is a decimal comma
         numbered[1:] = [
             (line, [_read_comma(cell) for cell in cells])
             for line, cells in numbered[1:]
         ]
-    return numbered
+    units: list[str] = []
+    if len(numbered) > 1 and _is_unit_line(numbered[1][1]):
+        units = numbered.pop(1)[1]
+    if len(numbered) < 2:
+        raise InputError("table", name, "needs a header and at least one row")
+    return numbered[0][1], units, numbered[1:]
 
 
 def _remove_comments(text: str) -> str:
@@ -571,27 +588,20 @@ def _read_comma(cell: str) -> str:
     return text.replace(",", ".")
 
 
-def _is_vector(name: str) -> bool:
-    """Return True for a vector of a solution, or a derived one."""
-    derived = find_derived(name)
-    return name in VECTORS or (derived is not None and derived.kind == "vector")
+def _name_vector(name: str, points: Collection[str]) -> str:
+    """Name the vector whose magnitude or component a column has; "" if it has none."""
+    vector = name[:-2] if name.endswith(("_x", "_y")) else name
+    derived = find_derived(vector)
+    of_vector = vector in points or vector in VECTORS
+    if of_vector or (derived is not None and derived.kind == "vector"):
+        return vector
+    return ""
 
 
-def _find_name(name: str, commanded: str, points: Collection[str]) -> str:
-    """Find the quantity that a column's name means, in any letters."""
-    if name in UNITS or name in NOT_JUDGED or find_derived(name) is not None:
-        return name
-    vector = name[:-2] if name[-2:] in ("_x", "_y") else name
-    if vector in points or _is_vector(vector):
-        return name
-    plain = _spell(name)
-    if plain in _COMMANDED_ANGLE:
-        return commanded
-    known = {**dict.fromkeys(NOT_JUDGED), **UNITS}
-    spelled = {one.lower().replace("_", ""): one for one in known}
-    for letter in "xy":
-        spelled |= {f"{one.lower()}{letter}": f"{one}_{letter}" for one in VECTORS}
-    return spelled.get(plain, _OTHER_NAMES.get(plain, name))
+def _is_known(name: str, points: Collection[str]) -> bool:
+    """Return whether a column's name is that of a quantity."""
+    is_scalar = name in UNITS or find_derived(name) is not None
+    return is_scalar or bool(_name_vector(name, points))
 
 
 def _spell(name: str) -> str:
@@ -619,77 +629,53 @@ def _is_unit_line(cells: list[str]) -> bool:
     )
 
 
-def _read_headings(
-    path: Path,
-    headings: list[str],
-    unit_line: list[str],
+def _read_heading(
+    heading: str,
+    unit: str,
     commanded: str,
     points: Collection[str],
-) -> tuple[dict[int, tuple[str, Unit]], dict[str, str], dict[str, str]]:
-    """Return each column's name and unit by its place in a row.
-
-    The headings left out are returned too. Of these each has a reason, and some that
-    are not known what they may be renamed to.
-    """
-    columns: dict[int, tuple[str, Unit]] = {}
-    left_out: dict[str, str] = {}
-    renamings: dict[str, str] = {}
+) -> _Heading:
+    """Find what a heading means, in any letters; `unit`: stated in another line."""
     from fourbar.quantities.units import converts
 
-    for index, heading in enumerate(headings):
-        match = _HEADING.fullmatch(heading.strip())
-        text = "".join(unit_line[index : index + 1]).strip(" []()")
-        if match:
-            name = match["name"] + (match["letter"] or "")
-            text = (match["square"] or match["round"] or text).strip()
-        else:
-            name = heading.strip()
-        plain = name
-        name = _REACTIONS.get(name[:3], name[:3]) + name[3:]
-        name = _find_name(name, commanded, points)
-        if _spell(plain) in _BY_UNIT:
-            means = _BY_UNIT[_spell(plain)].items()
-            name = next((one for one, unit in means if converts(text, unit)), name)
-        vector = name[:-2] if name[-2:] in ("_x", "_y") else name
-        of_vector = vector in points or _is_vector(vector)
-        quantity = vector if of_vector else name
-        if not name and index >= len(headings) - 1:
-            continue  # an empty cell that a spreadsheet leaves at the end of a line
-        known = quantity in UNITS or of_vector or find_derived(quantity) is not None
-        if match is None or quantity in NOT_JUDGED or not known:
-            column = heading.strip() or f"column {index + 1}"
-            parts = re.split("[-/]", re.sub(r"\s*\[.*", "", heading.strip()))
-            if len(parts) > 1 and all(
-                part in UNITS or part in points for part in parts
-            ):
-                left_out[column] = "follows from columns that are judged"
-                continue
-            left_out[column] = NOT_JUDGED.get(quantity, "not a known column")
+    plain = heading.strip()
+    match = _HEADING.fullmatch(plain)
+    if match:
+        unit = (match["square"] or match["round"] or unit).strip()
+        plain = match["name"] + (match["letter"] or "")
+    name = _REACTIONS.get(plain[:3], plain[:3]) + plain[3:]
+    if not _is_known(name, points) and name not in NOT_JUDGED:
+        spelled = _spell(name)
+        name = _OTHER_NAMES.get(spelled, name)
+        if spelled in _COMMANDED_ANGLE:
+            name = commanded
+    for meaning, its_unit in _BY_UNIT.get(_spell(plain), {}).items():
+        if converts(unit, its_unit):
+            name = meaning
+            break
+    vector = _name_vector(name, points)
+    quantity = vector or name
+    if match is None or quantity in NOT_JUDGED or not _is_known(name, points):
+        parts = re.split("[-/]", re.sub(r"\s*\[.*", "", heading.strip()))
+        if len(parts) > 1 and all(part in UNITS or part in points for part in parts):
+            return _Heading(name, why="follows from columns that are judged")
+        if quantity in NOT_JUDGED:
+            known = None
             if quantity == "time":
                 with suppress(InputError):
-                    unit = _read_unit(path, heading, quantity, text)
-                    columns[index] = (name, unit)
-            if quantity not in NOT_JUDGED and (renaming := _suggest_column(name)):
-                left_out[column] += f": {renaming}"
-                renamings[column] = renaming
-            continue
-        if name != plain and len(name) == 1 and text in OTHER_UNITS["rad"]:
-            renamings[heading] = _suggest_column("angle")
-            left_out[heading] = f"not a known column: {renamings[heading]}"
-            continue
-        columns[index] = (
-            f"|{name}|" if of_vector and name == vector else name,
-            _read_unit(path, heading, quantity, text),
-        )
-    return columns, left_out, renamings
+                    known = _read_unit(heading, quantity, unit)
+            return _Heading(name, known, NOT_JUDGED[quantity])
+        renaming = _suggest_column(name)
+    elif name != plain and len(name) == 1 and unit in OTHER_UNITS["rad"]:
+        renaming = _suggest_column("angle")
+    else:
+        key = f"|{name}|" if name == vector else name
+        return _Heading(key, _read_unit(heading, quantity, unit))
+    why = "not a known column" + f": {renaming}" * bool(renaming)
+    return _Heading(name, None, why, renaming)
 
 
-def _read_unit(
-    path: Path,
-    heading: str,
-    quantity: str,
-    text: str,
-) -> Unit:
+def _read_unit(heading: str, quantity: str, text: str) -> Unit:
     unit = "s" if quantity == "time" else find_unit_of_quantity(quantity)
     if not text or text == unit:
         return Unit(unit, 1.0)
@@ -701,12 +687,8 @@ def _read_unit(
     except InputError as error:
         if (usual := plain.get(_spell(text))) is not None:
             return Unit(text, find_factor(unit, usual))
-        raise InputError(
-            "header",
-            heading,
-            f"{text}: {error.allowed}",
-            str(path),
-        ) from None
+        allowed = f"{text}: {error.allowed}"
+        raise InputError("header", heading, allowed) from None
 
 
 def _read_cell(cell: str) -> tuple[float, float]:

@@ -6,7 +6,8 @@ member of a study, whose members together take a tenth of the time of one by one
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,17 +15,12 @@ import numpy as np
 from fourbar.effects import Gravity, Table
 from fourbar.quantities import UNITS, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
-from fourbar.solution import Solution
 from fourbar.studies.keys import list_entries, read_number
 from fourbar.studies.study import Study
-from fourbar_validation.check.theirs import name_quantity
-from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.scenes.bars import list_moving, replace_bars
 
-Predict = Callable[[str, Solution], Array | None]
-"""Function of a quantity and the right solution that returns the numbers of a mistake.
-None: the quantity has none.
-"""
+Predict = Callable[[str], Array | None]
+"""Function of a quantity that returns the numbers of a mistake; None: it has none."""
 
 _TURNING = ("rad", "rad/s", "rad/s^2", "N m")
 """Units of what is reversed where angles are counted clockwise."""
@@ -37,8 +33,7 @@ def always(text: str) -> bool:
     return True
 
 
-@dataclass(frozen=True, slots=True)
-class Mistake:
+class Mistake(NamedTuple):
     """A mistake as a hypothesis: what was done, and what the numbers become."""
 
     text: str
@@ -60,13 +55,6 @@ class Mistake:
     def fitted(self) -> bool:
         """Return True if a number of it was fitted to the table."""
         return self.times > 1.0
-
-    def prediction(self, key: str, right: Solution) -> Array | None:
-        """Return the numbers that this mistake predicts for a column, or None."""
-        predicted = self.predict(name_quantity(key), right)
-        if predicted is not None and key.startswith("|"):
-            return magnitude(predicted)
-        return predicted
 
 
 class Variant(NamedTuple):
@@ -127,8 +115,9 @@ def predict_variants(
     scene: Scene,
     at: Command,
     variants: Sequence[Variant],
-) -> list[Predict]:
-    """Solve the variants of a scene that states all; return what each predicts."""
+    stage: str = "force",
+) -> list[Mistake]:
+    """Solve the variants of a scene that states all, to a stage or the end."""
     entries = list_entries(scene)
     keys = {key for variant in variants for key in variant.numbers}
     values = {}
@@ -141,26 +130,25 @@ def predict_variants(
     commands = [_leave_out_lost(variant.at or at) for variant in variants]
     together: Command = _stack(commands, len(at.angle))
     together = together._replace(bar=at.bar)
-    stage = "position" if at.speed is None else "force"
+    stage = "position" if at.speed is None else stage
     wrong = Study(scene, values, invalid, together).solve(stage)
 
-    def predict_member(member: int, variant: Variant) -> Predict:
-        def predict(quantity: str, right: Solution) -> Array | None:
-            values = getattr(wrong, quantity, None)
-            if values is None or quantity == right.commanded:
-                return None
-            if quantity not in variant.names:
-                return None
-            factor: Any = 1.0
-            if variant.mirror and quantity in VECTORS:
-                factor = 1.0, variant.mirror
-            elif variant.mirror and UNITS[quantity] in _TURNING:
-                factor = -1.0
-            return np.asarray(values[member] * factor)
+    def predict(member: int, variant: Variant, quantity: str) -> Array | None:
+        values = getattr(wrong, quantity, None)
+        commanded = quantity == at.commanded
+        if values is None or commanded or quantity not in variant.names:
+            return None
+        factor: Any = 1.0
+        if variant.mirror and quantity in VECTORS:
+            factor = 1.0, variant.mirror
+        elif variant.mirror and UNITS[quantity] in _TURNING:
+            factor = -1.0
+        return np.asarray(values[member] * factor)
 
-        return predict
-
-    return [predict_member(i, variant) for i, variant in enumerate(variants)]
+    return [
+        Mistake(variant.text, partial(predict, member, variant), times=variant.times)
+        for member, variant in enumerate(variants)
+    ]
 
 
 def _leave_out_lost(command: Command) -> Command:

@@ -87,21 +87,6 @@ class BodyWrenches:
         }
         self.moment: dict[int, Array] = {bar: np.zeros(n) for bar in MOVING_BARS}
 
-    def plus(self, other: "BodyWrenches", times: float = 1.0) -> "BodyWrenches":
-        """Return the sum of these and `times` the other ones."""
-        total = BodyWrenches(0)
-        for bar in MOVING_BARS:
-            total.force[bar] = self.force[bar] + times * other.force[bar]
-            total.moment[bar] = self.moment[bar] + times * other.moment[bar]
-        return total
-
-    def on(self, bar: int) -> "BodyWrenches":
-        """Return what acts on one bar alone."""
-        alone = BodyWrenches(len(self.moment[bar]))
-        alone.force[bar] = self.force[bar]
-        alone.moment[bar] = self.moment[bar]
-        return alone
-
     def push(self, bar: int, force: Any, arm: Any) -> None:
         """Add a force, at `arm` from the bar's first pin.
 

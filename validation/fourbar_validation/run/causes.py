@@ -3,11 +3,16 @@
 import numpy as np
 
 from fourbar.errors import FourBarError
-from fourbar.quantities import OK, UNITS, Array
+from fourbar.quantities import OK, UNITS
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.row_commands import RowCommands
-from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, Unit
+from fourbar_validation.check.theirs import (
+    NOT_JUDGED,
+    TheirColumn,
+    TheirTable,
+    Unit,
+)
 from fourbar_validation.check.variants import Wanted, always
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
@@ -63,8 +68,9 @@ def find_causes(
         judge = Judge(scene, table, rows=rows, slack=slack)
         if predicted is not None:
             hold_to_prediction(judge, predicted, len(at.angle))
-        wrong = {key: find_wrong(judge, key) for key in judge.table.values}
-        differing = [key for key, rows in wrong.items() if rows.any()]
+        columns = judge.columns.values()
+        wrong = {column: column.wrong & judge.ok for column in columns}
+        differing = [column for column, rows in wrong.items() if rows.any()]
         if not differing:
             return None
         wanted: Wanted = always
@@ -75,10 +81,10 @@ def find_causes(
             part = choose_rows(np.logical_or.reduce(list(wrong.values())), most)
             rows = RowCommands(judge.at.part(part))
             few = Judge(scene, table.part(part), rows=rows, slack=slack)
-            for key in table.values:
-                few.hold(key, judge.find_exact(key)[part])
-            differing_there = [key for key in differing if wrong[key][part].any()]
-            tried = explain(few, differing_there)
+            for key, column in few.columns.items():
+                column.exact = judge.columns[key].exact[part]
+            there = [one.key for one in differing if wrong[one][part].any()]
+            tried = explain(few, [few.columns[key] for key in there])
             if not tried:
                 return []
             wanted = {explanation.text for explanation in tried}.__contains__
@@ -87,7 +93,7 @@ def find_causes(
             found = explain(judge, differing)
     except FourBarError:
         return None
-    return _say_causes(found, list(map(judge.table.label, differing)))
+    return _say_causes(found, [column.label for column in differing])
 
 
 def _say_causes(found: list[Explanation], differing: list[str]) -> list[str]:
@@ -127,14 +133,14 @@ def hold_to_prediction(judge: Judge, predicted: Predicted, n: int) -> None:
 
     A run fails an answer by the same prediction.
     """
-    for key in judge.table.values:
-        exact = judge.find_exact(key)
+    for key, column in judge.columns.items():
+        exact = column.exact
         beyond = np.zeros(n, dtype=bool)
         beyond[: len(exact)] = ~(exact <= MOST_ALLOWED)
         if beyond.any():
             errors = TIMES_PREDICTED * predicted(key, beyond)[: len(exact)]
-            share = divide(errors, judge.size(key))
-            judge.hold(key, np.where(beyond[: len(exact)], share, exact))
+            share = divide(errors, column.size)
+            column.exact = np.where(beyond[: len(exact)], share, exact)
 
 
 def make_answer_table(answer: Answer, regular: Mask) -> TheirTable:
@@ -146,19 +152,13 @@ def make_answer_table(answer: Answer, regular: Mask) -> TheirTable:
     rows = slice(MOST_POSITIONS_SEARCHED)
     angle = np.asarray(answer.at.angle[rows], dtype=float)
     blank = ~(answer.assembled & regular)[rows]
-    values: dict[str, Array] = {}
+    exact = np.zeros(len(angle))
+    place = TheirColumn(angle, exact, exact, Unit("rad", 1.0))
+    columns = {}
     for name, numbers in answer.quantities.items():
         if name in UNITS and name not in _NO_CAUSE:
-            values[name] = np.array(numbers[rows], dtype=float)
-            values[name][blank] = np.nan
-    exact = np.zeros(len(angle))
-    units = {name: Unit(UNITS[name], 1.0) for name in values}
+            values = np.array(numbers[rows], dtype=float)
+            values[blank] = np.nan
+            columns[name] = TheirColumn(values, exact, exact, Unit(UNITS[name], 1.0))
     lines = list(range(1, len(angle) + 1))
-    rounding = dict.fromkeys(values, exact)
-    return TheirTable(angle, values, rounding, units, lines, rounding, exact, {})
-
-
-def find_wrong(judge: Judge, key: str) -> Mask:
-    """Mark the rows in which a quantity is beyond what is allowed, (n,)."""
-    error, allowed, _ = judge.judged_right(key)
-    return np.asarray(judge.where(key) & judge.ok & ~(error <= allowed))
+    return TheirTable(place, columns, lines, exact, {})
