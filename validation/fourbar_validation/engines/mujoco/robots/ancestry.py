@@ -74,9 +74,19 @@ def find_tied_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
     return objects
 
 
+def name_part(model: mujoco.MjModel, kind: str, number: int) -> str:
+    """Name a joint, body or tendon: as the file does, or by its number."""
+    return getattr(model, kind)(number).name or f"{kind} {number}"
+
+
 def name_joint(model: mujoco.MjModel, joint: int) -> str:
     """Name a joint: as the file does, or by its number."""
-    return model.joint(joint).name or f"joint {joint}"
+    return name_part(model, "joint", joint)
+
+
+def name_body(model: mujoco.MjModel, body: int) -> str:
+    """Name a body; the world is its own."""
+    return name_part(model, "body", body)
 
 
 class Follower(NamedTuple):

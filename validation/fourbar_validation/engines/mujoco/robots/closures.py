@@ -6,7 +6,7 @@ no joint parts, or a held one, are one bar.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise, permutations
 
@@ -27,7 +27,9 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_followers,
     list_joints,
     list_motors,
+    name_body,
     name_joint,
+    name_part,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
@@ -66,6 +68,9 @@ EQUALITY_KINDS = {
     int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
     for name in ("connect", "weld", "joint", "tendon")
 }
+_CLOSING = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
+_TIED = {"connect": "body", "weld": "body"}
+"""What an equality ties, where its kind does not say it."""
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven")
 NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
@@ -161,27 +166,15 @@ def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
 
 
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
-    """Return an equality's name, or the two bodies or joints that it ties."""
+    """Return an equality's name, or the names of what it ties."""
     if model.equality(number).name:
         return str(model.equality(number).name)
     kind = EQUALITY_KINDS.get(int(model.eq_type[number]))
-    first = int(model.eq_obj1id[number])
-    second = int(model.eq_obj2id[number])
-    if kind in ("connect", "weld"):
-        names = [name_body(model, body) for body in find_tied_bodies(model, number)]
-    elif kind == "joint":
-        names = [name_joint(model, i) for i in (first, second) if i >= 0]
-    elif kind == "tendon":
-        tendons = [i for i in (first, second) if i >= 0]
-        names = [model.tendon(i).name or f"tendon {i}" for i in tendons]
-    else:
+    if kind is None:
         return f"equality {number}"
+    tied = [one for one in find_tied_bodies(model, number) if one >= 0]
+    names = [name_part(model, _TIED.get(kind, kind), one) for one in tied]
     return "-".join(names)
-
-
-def name_body(model: mujoco.MjModel, body: int) -> str:
-    """Name a body; the world is its own."""
-    return model.body(body).name or f"body {body}"
 
 
 def _spell_count(number: int, most: int = 7) -> str:
@@ -194,66 +187,38 @@ class _NoFourBarError(Exception):
 
 
 class _Chain:
-    """Joints from one end of a closure to the other, and the bars between them.
+    """Joints from one end of a connect or weld to the other, and the bars between them.
 
     The chain leads over the common ancestor of both ends.
     """
 
     def __init__(self, finder: "_Finder", number: int) -> None:
-        self.model = finder.model
+        model = finder.model
         self.number = number
-        self.is_pin = finder.is_pin(number)
-        first, second = find_tied_bodies(self.model, number)
-        common = find_common(self.model, first, second)
+        self.name = finder.names[number]
+        self.is_active = bool(model.eq_active0[number])
+        self.is_pin = bool(
+            model.eq_type[number] == mujoco.mjtEq.mjEQ_CONNECT
+            or model.eq_data[number, 10] == 0.0  # a weld's torquescale
+        )
+        self.ends = find_tied_bodies(model, number)
+        common = find_common(model, *self.ends)
         self.ground = finder.root[common]
-        self.ground_name = name_body(self.model, common)
-        upward = self._list_side(finder, first, common)
-        downward = self._list_side(finder, second, common)[::-1]
-        self.joints = [joint for joint, _ in upward + downward]
-        self.bars = [finder.root[first], *(bearer for _, bearer in upward)]
+        self.ground_name = name_body(model, common)
+        ways = [finder.list_way(end, common) for end in self.ends]
+        (self.joints, self.bars), (joints, bars) = ways
+        self.joints += reversed(joints)
+        self.bars += bars[-2::-1]
         """One more than joints; None: the joint hangs on another of the same body."""
-        if downward:
-            self.bars += [*(bearer for _, bearer in downward[1:]), finder.root[second]]
-
-    def _list_side(
-        self,
-        finder: "_Finder",
-        end: int,
-        common: int,
-    ) -> list[tuple[int, int | None]]:
-        """List (moving joint, its bearer) from an end up to the common ancestor.
-
-        The bearer is a bar, or None if another joint bears this one.
-        """
-        side: list[tuple[int, int | None]] = []
-        for body in climb(self.model, end):
-            if body == common:
-                break
-            joints = list_joints(self.model, body)
-            moving = [joint for joint in joints if joint not in finder.held]
-            bearers = [
-                finder.root[find_parent(self.model, body)],
-                *[None] * len(moving),
-            ]
-            side += reversed([*zip(moving, bearers, strict=False)])
-        return side
+        types = {joint: int(model.jnt_type[joint]) for joint in self.joints}
+        self.hinges = [one for one, kind in types.items() if kind == HINGE_JOINT]
+        self.others = {one: types[one] for one in types if one not in self.hinges}
+        """Type of each joint that is no hinge."""
 
     @property
     def pins(self) -> int:
         """Number of its joints, and of its closure if that is a pin."""
         return len(self.joints) + self.is_pin
-
-    @property
-    def hinges(self) -> list[int]:
-        """Hinges among the joints."""
-        types = self.model.jnt_type
-        return [joint for joint in self.joints if types[joint] == HINGE_JOINT]
-
-    @property
-    def others(self) -> dict[int, int]:
-        """Type of each joint that is no hinge."""
-        types = {joint: int(self.model.jnt_type[joint]) for joint in self.joints}
-        return {joint: kind for joint, kind in types.items() if kind != HINGE_JOINT}
 
 
 class _Finder:
@@ -262,31 +227,57 @@ class _Finder:
     def __init__(self, posed: PosedRobot, options: PoseOptions) -> None:
         self.posed = posed
         self.options = options
-        self.model = posed.model
         self.data = posed.data
-        self.held = {find_joint(self.model, name, "--hold") for name in options.held}
-        self.root = find_roots(self.model, self.held)
-        self.standing = self._hold_standing()
-        self.normals = find_normals(self.model, self.data, self.held)
-        self.before = mujoco.MjData(self.model)
-        self.before.qpos[:] = posed.stated
-        mujoco.mj_kinematics(self.model, self.before)
-
-    def _hold_standing(self) -> dict[int, int]:
-        """Hold the hinges that cannot turn, and return them by the closure that acts.
+        model = self.model = posed.model
+        names = [describe_equality(model, number) for number in range(model.neq)]
+        self.names = [
+            f"{name}-{names[: number + 1].count(name)}"
+            if names.count(name) > 1
+            else name
+            for number, name in enumerate(names)
+        ]
+        """Name of each equality, which no other has."""
+        self.held = {find_joint(model, name, "--hold") for name in options.held}
+        self.root = find_roots(model, self.held)
+        self.standing: dict[int, int] = {}
+        """Hinge that cannot turn, by the closure that holds it.
 
         A closure of two hinges that lies on the axis of one leaves this one free. The
         other hinge stands.
         """
-        standing = {}
-        for number in self._list_others(-1):
+        closing = np.isin(model.eq_type, [*_CLOSING])
+        numbers: list[int] = np.flatnonzero(closing).tolist()
+        for number in numbers:
             chain = _Chain(self, number)
             away = self._list_away(chain)
-            if chain.is_pin and len(away) == 1 and len(chain.joints) == 2:
-                (standing[number],) = away
+            is_of_two = chain.is_pin and len(chain.joints) == 2
+            if chain.is_active and is_of_two and len(away) == 1:
+                (self.standing[number],) = away
                 self.held.update(away)
-        self.root = find_roots(self.model, self.held)
-        return standing
+        self.root = find_roots(model, self.held)
+        self.chains = {number: _Chain(self, number) for number in numbers}
+        self.normals = find_normals(model, self.data, self.held)
+        self.before = mujoco.MjData(model)
+        self.before.qpos[:] = posed.stated
+        mujoco.mj_kinematics(model, self.before)
+
+    def list_way(self, end: int, common: int) -> tuple[list[int], list[int | None]]:
+        """List the moving joints from an end up to an ancestor, and the bars they join.
+
+        There is one bar more; None stands where a joint bears another on one body.
+        """
+        joints: list[int] = []
+        bars: list[int | None] = [self.root[end]]
+        for body in climb(self.model, end):
+            if body == common:
+                break
+            on_body = list_joints(self.model, body)
+            moving = [joint for joint in on_body if joint not in self.held]
+            joints += reversed(moving)
+            if moving:
+                bars += [None] * (len(moving) - 1)
+                bars.append(self.root[find_parent(self.model, body)])
+        return joints, bars
 
     def _list_away(self, chain: _Chain) -> list[int]:
         """List the joints of a chain but the hinges on whose axis its closure lies."""
@@ -304,22 +295,27 @@ class _Finder:
         model = self.model
         kind = EQUALITY_KINDS.get(int(model.eq_type[number]), "flex")
         closure = RobotClosure(
-            self._name(number),
+            self.names[number],
             kind,
             None,
             self._describe_mimic(number, kind),
             solref=tuple(model.eq_solref[number].tolist()),
             solimp=tuple(model.eq_solimp[number].tolist()),
         )
-        if kind not in ("connect", "weld"):
+        if number not in self.chains:
             return closure
-        chain = _Chain(self, number)
+        chain = self.chains[number]
         loop = None
-        reason = ""
-        try:
-            loop = self._recognise(chain)
-        except _NoFourBarError as error:
-            reason = str(error)
+        reason = next(self._list_reasons(chain), "")
+        if not reason:
+            try:
+                loop = self._make_loop(chain)
+            except _NoFourBarError as error:
+                reason = str(error)
+        first, second = find_ends(model, self.before, number)
+        apart = first - second
+        normal = self.normals.get(number, np.zeros(3))
+        gap = float(np.linalg.norm(apart - (apart @ normal) * normal))
         return replace(
             closure,
             loop=loop,
@@ -331,29 +327,8 @@ class _Finder:
                 for joint, kind in chain.others.items()
             ),
             misaligned=self._measure_axes(chain)[0],
-            gap=self._measure_gap(number) if chain.is_pin else None,
+            gap=gap if chain.is_pin else None,
         )
-
-    def _measure_gap(self, number: int) -> float:
-        """Measure the distance of the stated ends, in a plane if there is one, m."""
-        first, second = find_ends(self.model, self.before, number)
-        apart = first - second
-        normal = self.normals.get(number, np.zeros(3))
-        return float(np.linalg.norm(apart - (apart @ normal) * normal))
-
-    def _name(self, number: int) -> str:
-        """Name an equality so that no other has the same name."""
-        names = [describe_equality(self.model, n) for n in range(self.model.neq)]
-        name = names[number]
-        if names.count(name) == 1:
-            return name
-        return f"{name}-{names[: number + 1].count(name)}"
-
-    def is_pin(self, number: int) -> bool:
-        """Return True for a connect, and for a weld that lets its bodies turn."""
-        if self.model.eq_type[number] == mujoco.mjtEq.mjEQ_CONNECT:
-            return True
-        return bool(self.model.eq_data[number, 10] == 0.0)  # torquescale
 
     def _describe_mimic(self, number: int, kind: str) -> str:
         """Write which joint follows which, by which polynomial."""
@@ -375,30 +350,33 @@ class _Finder:
         rest = float(model.eq_data[number, 0])
         return f"{name_joint(model, joint)} is kept at {rest:.6g} of its rest"
 
-    def _recognise(self, chain: "_Chain") -> RobotLoop:
-        """Return the four-bar of a closure."""
-        if not self.model.eq_active0[chain.number]:
-            raise _NoFourBarError('it is switched off in the file (active="false")')
+    def _list_reasons(self, chain: _Chain) -> Iterator[str]:
+        """Say why a closure closes no four-bar; the first reason counts."""
+        if not chain.is_active:
+            yield 'it is switched off in the file (active="false")'
         if not chain.joints:
-            raise _NoFourBarError("both ends are on one rigid body")
-        reason = (
-            self._explain_idle(chain)
-            or self._find_ball_in_a_plane(chain)
-            or self._find_other_joint(chain)
-            or self._find_skew_axes(chain)
-        )
-        if not reason and chain.pins != len(PINS):
-            reason = self._explain_count(chain)
-        elif not reason and None in chain.bars:
-            reason = "two of its hinges are on one body: a bar has no body"
-        if reason:
-            raise _NoFourBarError(reason)
-        return self._make_loop(chain)
+            yield "both ends are on one rigid body"
+        if self._is_idle(chain):
+            yield self._explain_idle(chain)
+        angle, names = self._measure_axes(chain)
+        is_skew = angle is not None and angle > PARALLEL
+        is_four = chain.pins == len(PINS)
+        if [*chain.others.values()] == [BALL] and is_four and not is_skew:
+            yield self._explain_ball(chain)
+        for joint, kind in chain.others.items():
+            yield f"{name_joint(self.model, joint)} {self._explain_joint(chain, kind)}"
+        if angle is not None and is_skew:
+            yield (
+                f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
+                f"the loop is spatial ({_SERVE_SPATIAL})"
+            )
+        if not is_four:
+            yield self._explain_count(chain)
+        if None in chain.bars:
+            yield "two of its hinges are on one body: a bar has no body"
 
     def _explain_idle(self, chain: _Chain) -> str:
-        """Say what a closure on the axes of its hinges holds; empty for others."""
-        if not self._is_idle(chain):
-            return ""
+        """Say what a closure on the axes of its hinges holds."""
         names = ", ".join(name_joint(self.model, joint) for joint in chain.joints)
         text = f"it lies on the axis of {names} and leaves it free"
         if chain.number in self.standing:
@@ -406,46 +384,42 @@ class _Finder:
             text += f"; {stands} cannot turn by it, and counts as held"
         return text
 
-    def _find_ball_in_a_plane(self, chain: _Chain) -> str:
+    def _explain_ball(self, chain: _Chain) -> str:
         """Say what to type for one ball among hinges with parallel axes.
 
         Both ends of the bar that the ball carries stay in their planes, so that a hinge
-        moves as the ball does. Empty where the loop is another.
+        moves as the ball does.
         """
-        is_one = [*chain.others.values()] == [BALL] and chain.pins == len(PINS)
-        if not is_one or self._find_skew_axes(chain):
-            return ""
+        model = self.model
         (ball,) = chain.others
-        rest = mujoco.MjData(self.model)
+        rest = mujoco.MjData(model)
         rest.qpos[:] = self.data.qpos
-        address = int(self.model.jnt_qposadr[ball])
-        rest.qpos[address : address + 4] = self.model.qpos0[address : address + 4]
-        mujoco.mj_kinematics(self.model, rest)
-        body = int(self.model.jnt_bodyid[ball])
+        of_ball = slice(model.jnt_qposadr[ball], model.jnt_qposadr[ball] + 4)
+        rest.qpos[of_ball] = model.qpos0[of_ball]
+        mujoco.mj_kinematics(model, rest)
         # a joint states its axis in the frame of its body
-        axis = rest.xmat[body].reshape(3, 3).T @ rest.xaxis[chain.hinges[0]]
+        turn = rest.xmat[model.jnt_bodyid[ball]].reshape(3, 3)
+        axis = turn.T @ rest.xaxis[chain.hinges[0]]
         numbers = " ".join(f"{part:.6g}" for part in np.round(axis, 12) + 0.0)
         typed = f'type="hinge" axis="{numbers}"'
-        if self.model.jnt_limited[ball]:  # its range is not that of a hinge
+        if model.jnt_limited[ball]:  # its range is not that of a hinge
             typed += ' limited="false"'
         return (
-            f"{name_joint(self.model, ball)} is a ball joint, but the axes of the"
+            f"{name_joint(model, ball)} is a ball joint, but the axes of the"
             f" hinges are parallel: a hinge in its place ({typed} in the file) moves"
             " alike and makes it a four-bar"
         )
 
-    def _find_other_joint(self, chain: _Chain) -> str:
-        words = {
-            FREE_JOINT: f"floats freely{self._suggest_hinge(chain)}",
-            BALL: f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})",
-            SLIDE: f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})",
-        }
-        for joint, kind in chain.others.items():
-            inner = ""
-            if kind == SLIDE and chain.hinges:
-                inner = self._describe_inner_four_bar(chain, self._find_coupled(chain))
-            return f"{name_joint(self.model, joint)} {words[kind]}{inner}"
-        return ""
+    def _explain_joint(self, chain: _Chain, kind: int) -> str:
+        """Say what a joint of a chain that is no hinge makes of it."""
+        if kind == FREE_JOINT:
+            return f"floats freely{self._suggest_hinge(chain)}"
+        if kind == BALL:
+            return f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})"
+        text = f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})"
+        if chain.hinges:
+            text += self._describe_inner_four_bar(chain, self._find_coupled(chain))
+        return text
 
     def _suggest_hinge(self, chain: _Chain) -> str:
         """Say what to type for a body that floats between two pins.
@@ -455,22 +429,24 @@ class _Finder:
         """
         model = self.model
         floating = {int(model.jnt_bodyid[joint]) for joint in chain.others}
-        pins = {}
-        for pin in sorted([chain.number, *self._list_others(chain.number)]):
-            ends = find_tied_bodies(model, pin)
-            if self.is_pin(pin) and len(floating.intersection(ends)) == 1:
-                pins[pin] = ends
+        pins = [
+            one
+            for one in self.chains.values()
+            if (one is chain or one.is_active)
+            and one.is_pin
+            and len(floating.intersection(one.ends)) == 1
+        ]
         if len(floating) != 1 or len(pins) < 2:
             return ""
         if len(pins) > 2:
             return f" on {len(pins)} pins: several loops in one ({_SERVE_SPATIAL})"
-        ((first, ends), (second, _)) = pins.items()
+        first, second = pins
         (body,) = floating
-        (holder,) = {*ends} - floating
+        (holder,) = {*first.ends} - floating
         return (
             f": with {name_body(model, body)} inside {name_body(model, holder)}, on a"
-            f" hinge in place of its free joint and of {self._name(first)},"
-            f" {self._name(second)} closes the loop"
+            f" hinge in place of its free joint and of {first.name},"
+            f" {second.name} closes the loop"
         )
 
     def _measure_axes(self, chain: _Chain) -> tuple[float | None, str]:
@@ -485,15 +461,6 @@ class _Finder:
                 names = " and ".join(name_joint(self.model, joint) for joint in pair)
         return largest, names
 
-    def _find_skew_axes(self, chain: _Chain) -> str:
-        angle, names = self._measure_axes(chain)
-        if angle is None or angle <= PARALLEL:
-            return ""
-        return (
-            f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
-            f"the loop is spatial ({_SERVE_SPATIAL})"
-        )
-
     def _explain_count(self, chain: _Chain) -> str:
         """Say what another number of hinges makes, and what makes it a four-bar."""
         freedoms = chain.pins - 3
@@ -505,35 +472,36 @@ class _Finder:
                 f"a weld that leaves no freedom: {count} in a plane cannot move; a"
                 ' <connect> or torquescale="0" makes a pin of it'
             )
-        motors = self._list_motors(chain.joints)
+        motors = self._list_motors(chain)
         coupled = self._find_coupled(chain)
-        holds = self._list_holds(chain, motors, coupled, freedoms - 1)
+        holds = self._list_holds(chain, coupled, freedoms - 1)
         if not holds:
             return self._explain_coupling(chain, coupled)
         text = f"{count} and {_spell_count(freedoms, 3)} freedoms"
         if len(motors) > 1:
-            motor_names = ", ".join(self._name_motor(*motor) for motor in motors)
-            text += f", driven by {len(motors)} motors ({motor_names})"
-        first, *others = (",".join(hold) for hold in holds)
+            names = ", ".join(
+                self.model.actuator(actuator).name
+                or f"on {name_joint(self.model, joint)}"
+                for joint, actuator in motors
+            )
+            text += f", driven by {len(motors)} motors ({names})"
+        first, *others = holds
         text += f"; --hold {first}"
         if others:
             text += f" (or {' or '.join(others[:_MOST_HOLDS])})"
         return f"{text} makes it a four-bar"
 
-    def _list_others(self, number: int, *further: str) -> list[int]:
-        """List the other active connects and welds, and those of further kinds."""
-        kinds = ("connect", "weld", *further)
-        types = {n for n, kind in EQUALITY_KINDS.items() if kind in kinds}
-        of_kinds = np.isin(self.model.eq_type, [*types]) & (self.model.eq_active0 != 0)
-        return [other for other in np.flatnonzero(of_kinds).tolist() if other != number]
+    def _list_others(self, chain: _Chain) -> list[_Chain]:
+        """List the other active closures."""
+        chains = self.chains.values()
+        return [one for one in chains if one.is_active and one is not chain]
 
     def _find_coupled(self, chain: _Chain) -> list[_Chain]:
-        """List the chains of other closures whose loops move the same bars.
+        """List the other closures whose loops move the same bars.
 
         Loops that share bars with such a loop are among them.
         """
-        others = [_Chain(self, other) for other in self._list_others(chain.number)]
-        others = [other for other in others if not self._is_idle(other)]
+        others = [one for one in self._list_others(chain) if not self._is_idle(one)]
         joints = {*chain.joints}
         coupled: list[_Chain] = []
         while more := [other for other in others if joints & {*other.joints}]:
@@ -543,28 +511,32 @@ class _Finder:
         return sorted(coupled, key=lambda other: other.number)
 
     def _list_holds(
-        self,
-        chain: _Chain,
-        motors: list[tuple[int, int]],
-        coupled: list[_Chain],
-        count: int,
-    ) -> list[tuple[str, ...]]:
-        """List the joints to hold that leave a four-bar apart from other loops."""
-        holdable = self._list_holdable(chain, motors)
+        self, chain: _Chain, coupled: list[_Chain], count: int
+    ) -> list[str]:
+        """List the joints to hold that leave a four-bar apart from other loops.
+
+        The likeliest come first. Joints without a motor may be held. Several motors
+        hold: one of them is held while another moves. A spring holds its joint best.
+        """
+        driven = {joint for joint, _ in self._list_motors(chain)}
+        several = len(driven) > 1
+        joints = [one for one in chain.joints if (one in driven) == several]
+        stiffness = self.model.jnt_stiffness
+        holdable = sorted(joints or chain.joints, key=lambda one: not stiffness[one])
         if len(holdable) < count:
-            holdable = [*chain.joints]
-        holds = []
-        for held in combinations(holdable, count):
-            moving = {*chain.joints} - {*held}
-            if not any(moving & {*other.joints} for other in coupled):
-                holds.append(tuple(name_joint(self.model, joint) for joint in held))
-        return holds
+            holdable = chain.joints
+        taken = {joint for other in coupled for joint in other.joints}
+        return [
+            ",".join(name_joint(self.model, joint) for joint in held)
+            for held in combinations(holdable, count)
+            if not ({*chain.joints} - {*held}) & taken
+        ]
 
     def _explain_coupling(self, chain: _Chain, coupled: list[_Chain]) -> str:
         """Say which linkage loops with common bars make."""
         joints = {*chain.joints}.union(*(other.joints for other in coupled))
         kinds = self.model.jnt_type[[*joints]]
-        names = ", ".join(self._name(other.number) for other in coupled)
+        names = ", ".join(other.name for other in coupled)
         moves = "moves" if len(coupled) == 1 else "move"
         if not coupled or not np.all(kinds == HINGE_JOINT):
             return f"{names} {moves} its bars too: no hold makes it a four-bar"
@@ -589,21 +561,19 @@ class _Finder:
         The pins may be those of other closures.
         """
         model = self.model
-        pins = dict[frozenset[int], Array]()
-        connects = dict[frozenset[int], str]()
-        hinges = {*chain.hinges}.union(*(other.hinges for other in coupled))
-        for joint in hinges:
+        pins: dict[frozenset[int], tuple[Array, str]] = {}
+        """Place and name of what joins two bars; hinges have no name."""
+        for joint in {*chain.hinges}.union(*(other.hinges for other in coupled)):
             across = np.cross(*self.data.xaxis[[joint, chain.hinges[0]]])
             if float(np.linalg.norm(across)) > math.sin(PARALLEL):
                 continue
             parent = self.root[find_parent(model, int(model.jnt_bodyid[joint]))]
-            pins[frozenset((self._find_root(joint), parent))] = self.data.xanchor[joint]
+            pair = frozenset((self._find_root(joint), parent))
+            pins[pair] = self.data.xanchor[joint], ""
         for one in (*coupled, chain):
-            ends = find_tied_bodies(model, one.number)
-            first, last = (self.root[end] for end in ends)
+            first, last = (self.root[end] for end in one.ends)
             place, _ = find_ends(model, self.data, one.number)
-            pins[frozenset((first, last))] = place
-            connects[frozenset((first, last))] = self._name(one.number)
+            pins[frozenset((first, last))] = place, one.name
         of_others = {
             self._find_root(joint) for other in coupled for joint in other.joints
         }
@@ -613,7 +583,7 @@ class _Finder:
             pairs = [frozenset(pair) for pair in pairwise([*cycle, first])]
             if not all(pair in pins for pair in pairs):
                 continue
-            places = [pins[pair] for pair in pairs]  # before and after each bar
+            places = [pins[pair][0] for pair in pairs]  # before and after each bar
             sizes = {
                 bar: float(np.linalg.norm(places[i] - places[i - 1]))
                 for i, bar in enumerate(cycle)
@@ -631,54 +601,28 @@ class _Finder:
                 f"; {', '.join(names[1:])} on {names[0]} ({lengths} mm) are a"
                 f" four-bar, but {', '.join(shared)} belongs to another loop too"
             )
-            in_it = [connects[pair] for pair in pairs[:-1] if pair in connects]
+            in_it = ", ".join(filter(None, (pins[pair][1] for pair in pairs[:-1])))
             if in_it:
                 text += (
-                    f": to measure it make a hinge of {', '.join(in_it)} and a connect"
+                    f": to measure it make a hinge of {in_it} and a connect"
                     " of another joint of that loop"
                 )
             return text
         return ""
 
-    def _list_holdable(
-        self,
-        chain: _Chain,
-        motors: list[tuple[int, int]],
-    ) -> list[int]:
-        """List the joints of a chain that may be held, the likeliest first.
-
-        Joints without a motor may be held. Several motors hold: one of them is held
-        while another moves. A spring holds its joint best.
-        """
-        driven = {joint for joint, _ in motors}
-        several = len(driven) > 1
-        joints = [joint for joint in chain.joints if (joint in driven) == several]
-
-        def has_no_spring(joint: int) -> bool:
-            return not self.model.jnt_stiffness[joint]
-
-        return sorted(joints or chain.joints, key=has_no_spring)
-
-    def _name_motor(self, joint: int, actuator: int) -> str:
-        """Name an actuator: as the file does, or by the joint that it acts on."""
-        name = self.model.actuator(actuator).name
-        return name or f"on {name_joint(self.model, joint)}"
-
-    def _find_bar(self, body: int, bars: set[int]) -> int | None:
-        """Return the bar that carries a body, however far down, or None."""
-        while body:
-            if self.root[body] in bars:
-                return self.root[body]
+    def _find_bar(self, body: int, bars: Container[int]) -> int:
+        """Return the bar that carries a body, however far down, or the world."""
+        while body and self.root[body] not in bars:
             body = find_parent(self.model, body)
-        return None
+        return self.root[body]
 
-    def _list_motors(self, joints: Sequence[int]) -> list[tuple[int, int]]:
-        """List (joint, actuator) of what takes a control and acts on these joints."""
-        return [motor for motor in list_motors(self.model) if motor[0] in joints]
+    def _list_motors(self, chain: _Chain) -> list[tuple[int, int]]:
+        """List (joint, actuator) of what takes a control and acts on a chain."""
+        return [motor for motor in list_motors(self.model) if motor[0] in chain.joints]
 
     def _make_loop(self, chain: _Chain) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output."""
-        number = chain.number
+        data = self.data
         joints: list[int | None] = [*chain.joints]
         groups: list[tuple[int, ...]]
         groups = [(bar,) for bar in chain.bars if bar is not None]
@@ -696,57 +640,58 @@ class _Finder:
         if driven != joints[0]:
             groups[1:] = reversed(groups[1:])
             joints.reverse()
-        hinges: dict[str, int] = {}
-        cut = None
-        for pin, joint in zip(PINS, joints, strict=True):
-            if joint is None:
-                cut = pin
-            else:
-                hinges[pin] = joint
+        at_pins = zip(PINS, joints, strict=True)
+        hinges = {pin: joint for pin, joint in at_pins if joint is not None}
+        cut = next((pin for pin in PINS if pin not in hinges), None)
         bodies = dict(zip(ENDS, groups, strict=True))
         sides = {
             pin: 1.0 if self._find_root(joint) in bodies[PINS[pin][1]] else -1.0
             for pin, joint in hinges.items()
         }
         # about it the driven joint turns bar 2 counter-clockwise
-        normal = sides["O2"] * find_mean_axis(self.data, hinges.values())
-        places = self._locate_pins(number, bodies, hinges, cut)
+        normal = sides["O2"] * find_mean_axis(data, hinges.values())
+        places = {
+            (bar, pin): data.xanchor[joint].copy()
+            for pin, joint in hinges.items()
+            for bar in PINS[pin]
+        }
+        if cut is not None:
+            ends = find_ends(self.model, data, chain.number)
+            for body, place in zip(chain.ends, ends, strict=True):
+                bar = next(one for one in PINS[cut] if self.root[body] in bodies[one])
+                places[bar, cut] = place
         along = self._choose_along(normal, places[1, "O4"] - places[1, "O2"])
 
         def to_body(bar: int, vector: Array) -> Array:
             """Return a vector of the world in the frame of a bar's first body."""
-            rotation = self.data.xmat[bodies[bar][0]].reshape(3, 3)
+            rotation = data.xmat[bodies[bar][0]].reshape(3, 3)
             return np.asarray(rotation.T @ vector)
 
-        moving = set(hinges.values())
         loop = RobotLoop(
-            name=self._name(number),
-            equality=number,
-            closures=(number,),
+            name=chain.name,
+            equality=chain.number,
+            closures=(chain.number,),
             cut=cut,
             bodies=bodies,
             ground=chain.ground_name,
             hinges=hinges,
             senses={
-                pin: math.copysign(1.0, side * self.data.xaxis[hinges[pin]] @ normal)
+                pin: math.copysign(1.0, side * data.xaxis[hinges[pin]] @ normal)
                 for pin, side in sides.items()
             },
             points={
-                (bar, pin): to_body(bar, place - self.data.xpos[bodies[bar][0]])
+                (bar, pin): to_body(bar, place - data.xpos[bodies[bar][0]])
                 for (bar, pin), place in places.items()
             },
             axis=to_body(1, normal),
             along=to_body(1, along),
             misaligned=self._measure_axes(chain)[0] or 0.0,
-            lines=(),
-            stated_lines=(),
-            qpos=self.data.qpos.copy(),
-            held=tuple(j for j in range(self.model.njnt) if j not in moving),
-            other_equalities=(),
+            qpos=data.qpos.copy(),
+            held=tuple(sorted({*range(self.model.njnt)} - {*hinges.values()})),
         )
         loop = replace(
             loop,
-            lines=tuple(map(LoopFrame(loop, self.data).line, ENDS)),
+            lines=tuple(map(LoopFrame(loop, data).line, ENDS)),
             stated_lines=tuple(map(LoopFrame(loop, self.before).line, ENDS)),
         )
         for length, (one, other) in zip(loop.lengths, ENDS.values(), strict=True):
@@ -767,27 +712,6 @@ class _Finder:
         """Return the bar that a joint turns."""
         return self.root[int(self.model.jnt_bodyid[joint])]
 
-    def _locate_pins(
-        self,
-        number: int,
-        bodies: dict[int, tuple[int, ...]],
-        hinges: dict[str, int],
-        cut: str | None,
-    ) -> dict[tuple[int, str], Array]:
-        """Locate each pin on each of its bars, by bar and pin, (3,), m."""
-        places = {
-            (bar, pin): self.data.xanchor[joint].copy()
-            for pin, joint in hinges.items()
-            for bar in PINS[pin]
-        }
-        if cut is not None:
-            tied = find_tied_bodies(self.model, number)
-            ends = find_ends(self.model, self.data, number)
-            for body, place in zip(tied, ends, strict=True):
-                bar = next(b for b in PINS[cut] if self.root[body] in bodies[b])
-                places[bar, cut] = place
-        return places
-
     def _choose_along(self, normal: Array, line: Array) -> Array:
         """Return the unit vector x of a plane in world axes, (3,).
 
@@ -797,7 +721,7 @@ class _Finder:
         gravity = self.model.opt.gravity
         in_plane = gravity - (gravity @ normal) * normal
         size = float(np.linalg.norm(in_plane))
-        if size > LEVEL_PLANE * float(np.linalg.norm(gravity)) and size > 0.0:
+        if size > LEVEL_PLANE * float(np.linalg.norm(gravity)):
             return np.asarray(np.cross(-in_plane / size, normal))
         line = line - (line @ normal) * normal
         length = float(np.linalg.norm(line))
@@ -818,74 +742,74 @@ class _Finder:
             stated = find_joint(model, self.options.drive, "--drive")
             if stated in at_ground:
                 return stated, []
-        driven = [joint for joint, _ in self._list_motors(chain.joints)]
+        driven = [joint for joint, _ in self._list_motors(chain)]
         if not driven:  # one that takes no control drives by a speed that it keeps
             driven = [joint for joint in at_ground if list_actuators(model, joint)]
         names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
         chosen = next((joint for joint in driven if joint in at_ground), None)
-        if chosen is not None:
-            if len(set(driven)) == 1:
-                return chosen, []
-            reason = f"motors act on {names}"
-        else:
-            pushed, by = self._find_pushed(at_ground, chain.number)
+        reason = f"motors act on {names}"
+        if chosen is None:
+            pushed = self._find_pushed(at_ground, chain)
             # of the hinges without a sign the first of the file
-            chosen = min(at_ground) if pushed is None else pushed
-            reason = "no motor acts on it"
+            chosen = next(iter(pushed), min(at_ground))
+            acts = [f"{by} acts on it" for by in pushed.values()]
+            reason = next(iter(acts), "no motor acts on it")
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"
-            elif by:
-                reason = f"{by} acts on it"
+        elif len({*driven}) == 1:
+            return chosen, []
         taken = f"{name_joint(model, chosen)} is taken as driven"
         return chosen, [f"{reason}: {taken} (--drive states another)"]
 
-    def _find_pushed(self, at_ground: list[int], number: int) -> tuple[int | None, str]:
+    def _find_pushed(self, at_ground: list[int], chain: _Chain) -> dict[int, str]:
         """Return the one hinge of the ground whose bar another closure moves.
 
-        The closure's name follows; (None, "") if there is not exactly one such hinge.
+        The value is the closure's name; nothing if there is not exactly one such hinge.
         """
         hinge_of = {self._find_root(joint): joint for joint in at_ground}
         pushed = {
-            hinge_of[self.root[body]]: self._name(other)
-            for other in self._list_others(number)
-            for body in find_tied_bodies(self.model, other)
-            if self.root[body] in hinge_of and not self._is_idle(_Chain(self, other))
+            hinge_of[self.root[body]]: other.name
+            for other in self._list_others(chain)
+            for body in other.ends
+            if self.root[body] in hinge_of and not self._is_idle(other)
         }
-        return next(iter(pushed.items())) if len(pushed) == 1 else (None, "")
+        return pushed if len(pushed) == 1 else {}
 
     def _sort_equalities(
         self, loop: RobotLoop
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Return the equalities of the closing pin, and others on moving bars."""
+        model = self.model
         bars = {root: bar for bar, roots in loop.bodies.items() for root in roots}
-        moving = {root for root, bar in bars.items() if bar != 1}
+        moving = [root for root, bar in bars.items() if bar != 1]
         frame = LoopFrame(loop, self.data)
         closures = [loop.equality]
         others: list[int] = []
-        for other in self._list_others(loop.equality, "joint"):
-            equality = self.model.equality(other)
-            if EQUALITY_KINDS[int(equality.type[0])] == "joint":
-                tied = {int(equality.obj1id[0]), int(equality.obj2id[0])}
-                if tied & {*loop.hinges.values()}:
-                    others.append(other)
+        for number in np.flatnonzero(model.eq_active0).tolist():
+            tied = find_tied_bodies(model, number)
+            if model.eq_type[number] == mujoco.mjtEq.mjEQ_JOINT:
+                if not {*loop.hinges.values()}.isdisjoint(tied):
+                    others.append(number)
                 continue
-            ends = find_tied_bodies(self.model, other)
-            carried = [self._find_bar(end, moving) for end in ends]
-            numbers = [1 if root is None else bars[root] for root in carried]
-            if numbers[0] == numbers[1]:
+            if number == loop.equality or number not in self.chains:
                 continue
-            if not all(self.root[end] in bars for end in ends):
-                others.append(other)
+            carrying = [self._find_bar(end, moving) for end in tied]
+            numbers = frozenset(bars.get(root, 1) for root in carrying)
+            if len(numbers) == 1:
                 continue
-            pin = _PIN_BETWEEN.get(frozenset(numbers))
-            places = find_ends(self.model, self.data, other)
-            if not (pin and self.is_pin(other) and _is_at(frame, pin, places)):
+            if not all(self.root[end] in bars for end in tied):
+                others.append(number)
+                continue
+            pin = _PIN_BETWEEN.get(numbers)
+            places = find_ends(model, self.data, number)
+            is_pin = self.chains[number].is_pin
+            if not (pin and is_pin and _is_at(frame, pin, places)):
                 raise _NoFourBarError(
-                    f"{self._name(other)} holds two of its bars as well: no freedom is"
+                    f"{self.names[number]} holds two of its bars as well: no freedom is"
                     " left"
                 )
             # beside a hinge a connect holds the same pin
-            (closures if pin == loop.cut else others).append(other)
+            (closures if pin == loop.cut else others).append(number)
         return tuple(closures), tuple(others)
 
 

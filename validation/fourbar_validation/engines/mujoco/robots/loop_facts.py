@@ -95,15 +95,15 @@ class RobotLoop:
     """Unit vector of the plane that angles are counted from, same frame, (3,)."""
     misaligned: float
     """Largest angle between two axes, rad."""
-    lines: tuple[complex, ...]
-    """Lines of bars 1 to 4 in the plane, from their first pin to the second, m."""
-    stated_lines: tuple[complex, ...]
-    """The same before the loops were closed, m."""
     qpos: Array
     """Joint positions of the whole model in the pose, (nq,)."""
     held: tuple[int, ...]
     """Joints of the model that are no pin of this loop and stay where they are."""
-    other_equalities: tuple[int, ...]
+    lines: tuple[complex, ...] = ()
+    """Lines of bars 1 to 4 in the plane, from their first pin to the second, m."""
+    stated_lines: tuple[complex, ...] = ()
+    """The same before the loops were closed, m."""
+    other_equalities: tuple[int, ...] = ()
     """Active equalities that act on its moving bars and are no closure of it."""
     remarks: tuple[str, ...] = ()
     rounding: float = 0.0

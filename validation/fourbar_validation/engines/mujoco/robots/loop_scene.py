@@ -33,13 +33,13 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
     list_actuators,
     list_lifted_masses,
+    name_body,
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     describe_equality,
     find_closures,
-    name_body,
     require_loops,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (

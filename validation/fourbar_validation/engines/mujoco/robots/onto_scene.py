@@ -21,12 +21,15 @@ from fourbar.formulas.mobility import find_circuit
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
-from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
+from fourbar_validation.engines.mujoco.robots.ancestry import (
+    is_enabled,
+    name_body,
+    name_joint,
+)
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     find_closures,
-    name_body,
     require_loops,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (

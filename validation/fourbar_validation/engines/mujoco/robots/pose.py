@@ -83,8 +83,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
         stated[model.jnt_qposadr[joint]] = _read_joint_position(name, text, unit)
         fixed.add(joint)
-    closing = _Closing(model, fixed, held)
-    tied = {*closing.joints, *fixed}
+    closing = _Closing(model, held)
+    tied = {*closing.tied, *fixed}
     outside = [joint for joint in find_outside(model, stated) if joint in tied]
     notes: list[str] = []
     for where, is_stated in ((origin, False), ("as --pose states them", True)):
@@ -92,30 +92,25 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         names = [name for name in names if (name in options.joints) == is_stated]
         if names:
             notes.append(f"outside their ranges {where}: {_list_some(names)}")
-    before = closing.size(stated)
-    if before <= CLOSED_IN_THE_FILE and not set(outside) - fixed:
-        data = _evaluate_kinematics(model, stated)
-        return PosedRobot(model, data, stated, tuple(notes))
-    motors = {joint for joint, _ in list_motors(model)} - set(outside)
-    passive = _Closing(model, fixed | motors, held)
-    closed = passive.close(stated)
-    if passive.size(closed) > LARGEST_RESIDUAL:
-        closed = closing.close(stated)
-    elif passive.size(closed) > CLOSED_IN_THE_FILE:  # the rounding of the file is left
-        closed = closing.close(closed)
-    for start in closing.list_starts(stated):  # where a range stops it short of closing
+    closed = stated
+    if closing.size(stated) > CLOSED_IN_THE_FILE or {*outside} - fixed:
+        motors = {joint for joint, _ in list_motors(model)} - {*outside}
+        closed = closing.close(stated, fixed | motors)
+        left = closing.size(closed)
+        if left > CLOSED_IN_THE_FILE:  # the rounding of the file is left, or more
+            start = stated if left > LARGEST_RESIDUAL else closed
+            closed = closing.close(start, fixed)
+    # where a range stops it short of closing
+    for start in closing.list_starts(stated, fixed):
         if closing.size(closed) <= LARGEST_RESIDUAL:
             break
-        closed = min(closed, closing.close(start), key=closing.size)
-    after = closing.size(closed)
-    moved = _list_moved(model, stated, closed)
-    if moved and after <= LARGEST_RESIDUAL:
+        closed = min(closed, closing.close(start, fixed), key=closing.size)
+    left = closing.size(closed)
+    if left > LARGEST_RESIDUAL:
+        notes.append(closing.say_open(options, stated, left))
+    elif moved := _list_moved(model, stated, closed):
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
-    elif after > LARGEST_RESIDUAL:
-        left = f"what is left is {1e3 * after:.3g} mm or mrad"
-        notes.append(_say_open(model, options, stated, held, left))
-    data = _evaluate_kinematics(model, closed)
-    return PosedRobot(model, data, stated, tuple(notes))
+    return PosedRobot(model, _evaluate_kinematics(model, closed), stated, tuple(notes))
 
 
 def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str]:
@@ -137,34 +132,6 @@ def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str
         if parts:
             moved.append(f"{name_joint(model, joint)} by {' and '.join(parts)}")
     return moved
-
-
-def _say_open(
-    model: mujoco.MjModel,
-    options: PoseOptions,
-    stated: Array,
-    held: set[int],
-    left: str,
-) -> str:
-    """Say why no pose near the stated one closes all loops.
-
-    Joints that --pose states are held, which is the reason where the loops close
-    without that.
-    """
-    free = _Closing(model, held, held)
-    closes = free.size(free.close(stated)) <= LARGEST_RESIDUAL
-    ranges = any(model.jnt_limited[joint] for joint in free.joints)
-    within = " within the joints' ranges" if ranges else ""
-    if options.joints and closes:
-        return (
-            f"--pose holds {_list_some([*options.joints])}, around which the other"
-            f" joints cannot close all loops{within}; {left}: state fewer joints, or"
-            " more digits"
-        )
-    return (
-        f"no pose near this one closes all loops{within}; {left}: state one by --pose"
-        " or --key"
-    )
 
 
 def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
@@ -214,20 +181,17 @@ def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, s
     return model.key_qpos[number].copy(), f"in keyframe {options.key}"
 
 
-def _read_joint_position(
-    name: str,
-    text: str,
-    unit: str,
-) -> float:
+def _read_joint_position(name: str, text: str, unit: str) -> float:
+    option = f"--pose {name}"
     try:
         number = float(text)
     except ValueError:
-        return require(f"--pose {name}", text, unit)
+        return require(option, text, unit)
     if number == 0.0:
         return number
     other = "deg" if unit == "rad" else "mm"
     raise InputError(
-        f"--pose {name}",
+        option,
         text,
         f'the unit is missing; did you mean "{text}{unit}" or "{text}{other}"?',
     )
@@ -260,16 +224,10 @@ def _list_some(names: list[str], most: int = 6) -> str:
 class _Closing:
     """Least squares of a model's active equalities over the joints that may move."""
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        fixed: set[int],
-        held: set[int],
-    ) -> None:
+    def __init__(self, model: mujoco.MjModel, held: set[int]) -> None:
         """Take a model.
 
-        `fixed`: joints that closing does not move; `held`: those of them that are no
-        joints of a loop.
+        `held`: joints that are no joints of a loop.
         """
         active = np.flatnonzero(model.eq_active0)
         self.model = copy_for_closures(model, active.tolist())
@@ -279,10 +237,8 @@ class _Closing:
         self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
-        self.joints = [
-            joint for joint in _list_tied_joints(model) if joint not in fixed
-        ]
-        self.dofs = [dof for joint in self.joints for dof in list_dofs(model, joint)]
+        self.tied = _list_tied_joints(model)
+        """Joints on which an active equality depends."""
 
     def _evaluate(self, qpos: Array) -> tuple[Array, Array]:
         """Return the equalities' residuals, (m,), and their Jacobian, (m, nv)."""
@@ -297,16 +253,18 @@ class _Closing:
         residuals, _ = self._evaluate(qpos)
         return float(np.abs(residuals).max(initial=0.0))
 
-    def list_starts(self, stated: Array) -> Iterator[Array]:
+    def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
         """List poses from which closing may end elsewhere, (nq,), the nearest first.
 
         A hinge without a range is turned by quarters. Then all joints with one are
-        mid-range, and one of them besides is moved.
+        mid-range, and one of them besides is moved. Fixed joints stay.
         """
         middle = stated.copy()
         turned = []
         moved = []
-        for joint in self.joints:
+        for joint in self.tied:
+            if joint in fixed:
+                continue
             place = self.model.jnt_qposadr[joint]
             low = self.low[place]
             high = self.high[place]
@@ -320,35 +278,59 @@ class _Closing:
         yield middle
         yield from (_put(middle, *change) for change in moved)
 
-    def close(self, start: Array) -> Array:
-        """Return the pose near `start` of least residuals in the ranges, (nq,)."""
+    def close(self, start: Array, fixed: set[int]) -> Array:
+        """Return the pose near `start` of least residuals in the ranges, (nq,).
+
+        Fixed joints do not move.
+        """
         from scipy.optimize import lsq_linear
 
+        model = self.model
         qpos = start.copy()
-        joints = self.model.dof_jntid[self.dofs]
-        places = self.model.jnt_qposadr[joints]
+        moving = [joint for joint in self.tied if joint not in fixed]
+        dofs = [dof for joint in moving for dof in list_dofs(model, joint)]
+        places = model.jnt_qposadr[model.dof_jntid[dofs]]
         low = self.low[places]
         high = self.high[places]
         qpos[places] = np.clip(qpos[places], low, high)
-        if not self.dofs:
+        if not dofs:
             return qpos
-        damping = _DAMPING * np.eye(len(self.dofs))
+        damping = _DAMPING * np.eye(len(dofs))
         for _ in range(MOST_NEWTON_STEPS):
             residuals, jacobian = self._evaluate(qpos)
             if np.abs(residuals).max(initial=0.0) <= 1e-3 * CLOSED_IN_THE_FILE:
                 break
-            matrix = np.vstack([jacobian[:, self.dofs], damping])
-            wanted = np.concatenate([-residuals, np.zeros(len(self.dofs))])
+            matrix = np.vstack([jacobian[:, dofs], damping])
+            wanted = np.concatenate([-residuals, np.zeros(len(dofs))])
             room = (  # scipy asks for some on both sides
                 np.clip(low - qpos[places], -LONGEST_NEWTON_STEP, -1e-15),
                 np.clip(high - qpos[places], 1e-15, LONGEST_NEWTON_STEP),
             )
-            step = np.zeros(self.model.nv)
-            step[self.dofs] = lsq_linear(matrix, wanted, room).x
-            mujoco.mj_integratePos(self.model, qpos, step, 1.0)
+            step = np.zeros(model.nv)
+            step[dofs] = lsq_linear(matrix, wanted, room).x
+            mujoco.mj_integratePos(model, qpos, step, 1.0)
             if np.abs(step).max() <= _NO_STEP:
                 break
         return qpos
+
+    def say_open(self, options: PoseOptions, stated: Array, left: float) -> str:
+        """Say why no pose near the stated one closes all loops.
+
+        Joints that --pose states are held, which is the reason where the loops close
+        without that. `left`: residual, m or rad.
+        """
+        free = [joint for joint in self.tied if joint not in self.held]
+        within = ""
+        if self.model.jnt_limited[free].any():
+            within = " within the joints' ranges"
+        text = f"all loops{within}; what is left is {1e3 * left:.3g} mm or mrad"
+        closed = self.close(stated, self.held)
+        if options.joints and self.size(closed) <= LARGEST_RESIDUAL:
+            return (
+                f"--pose holds {_list_some([*options.joints])}, around which the other"
+                f" joints cannot close {text}: state fewer joints, or more digits"
+            )
+        return f"no pose near this one closes {text}: state one by --pose or --key"
 
 
 def _put(qpos: Array, place: int, value: float) -> Array:
@@ -362,13 +344,11 @@ def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
     """List the joints on which an active equality depends."""
     kinds = mujoco.mjtEq
     joints = set[int]()
-    for number in range(model.neq):
-        if not model.eq_active0[number]:
-            continue
+    for number in np.flatnonzero(model.eq_active0).tolist():
         kind = kinds(int(model.eq_type[number]))
+        tied = find_tied_bodies(model, number)
         if kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
-            joints.update(list_joints_between(model, *find_tied_bodies(model, number)))
+            joints.update(list_joints_between(model, *tied))
         elif kind == kinds.mjEQ_JOINT:
-            tied = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
             joints.update(joint for joint in tied if joint >= 0)
     return sorted(joints)
