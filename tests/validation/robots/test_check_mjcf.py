@@ -334,7 +334,7 @@ def described(text, scene=CRANK_ROCKER):
     """Describe a file without measuring it."""
     options = MeasureOptions(PoseOptions())
     found = find_loop_of_scene(RobotFile(MINE_XML, text), scene, options)
-    inside, _ = put_loop_inside(found, scene)
+    inside, _ = put_loop_inside(found)
     seen = SeenLoop(found.robot.model, found.loop, found.turned, 2)
     return describe_model(seen, inside.flywheel)
 

@@ -143,7 +143,7 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     text = write_mjcf(scene).replace("0.9999 0.9999", impedance)
     options = MeasureOptions(PoseOptions())
     found = find_loop_of_scene(RobotFile(Path("wheel.xml"), text), scene, options)
-    inside, motion = put_loop_inside(found, scene)
+    inside, motion = put_loop_inside(found)
     assert inside.flywheel > 1e6
     (row,) = inside.answer_states(motion.thin_out(3)._replace(angle=(2.0,))).rows
     state = inside.state(2.0, row.speed)

@@ -401,13 +401,13 @@ class LoopMeasurement:
     """Change of the errors if the joints are held a tenth as firmly. None where it was
     not simulated.
     """
-    torn: tuple[TornState, ...]
+    torn: list[TornState]
     advice: SettingsAdvice | None
     as_it_is: bool
     """True if contacts, joint limits and other motors acted as in the file."""
     flywheel: float
     """Armature of the driven hinge that drives, kg m^2."""
-    unmet_stops: tuple[int, ...]
+    unmet_stops: list[int]
     """Hinges of the loop whose stops ended no state."""
 
     @property

@@ -165,6 +165,19 @@ def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
     return [*loops.values()]
 
 
+def find_loops(
+    posed: PosedRobot, options: PoseOptions, name: str | None
+) -> list[RobotLoop]:
+    """Return the four-bars of a posed robot, or that of one closure.
+
+    An InputError says why there is none.
+    """
+    closures = find_closures(posed, options)
+    if name is not None:
+        return [choose_loop(closures, name)]
+    return require_loops(closures)
+
+
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
     """Return an equality's name, or the names of what it ties."""
     if model.equality(number).name:

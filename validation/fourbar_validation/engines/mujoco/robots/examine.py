@@ -40,14 +40,13 @@ from fourbar_validation.engines.mujoco.robots.compiled import collect_warnings
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.loop_scene import miss_output
 from fourbar_validation.engines.mujoco.robots.measure import (
-    measure_on_scene,
+    measure_loop,
     put_loop_inside,
 )
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
     find_loop_of_scene,
 )
-from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 PRICING = 60.0
 """Seconds in which differences are tried one by one; each takes two evaluations."""
@@ -90,11 +89,6 @@ def _generate(scene: Scene, drive: Drive = "flywheel") -> RobotFile:
     return RobotFile(GENERATED, write_mjcf(scene, drive=drive))
 
 
-def _see(found: LoopOfScene, scene: Scene) -> SeenLoop:
-    bar = command(scene).bar
-    return SeenLoop(found.robot.model, found.loop, found.turned, bar)
-
-
 def examine_file(
     scene: Scene,
     file: RobotFile | None,
@@ -106,8 +100,8 @@ def examine_file(
     """
     with collect_warnings() as warnings:
         found = find_loop_of_scene(file or _generate(scene), scene, options)
-        measured = measure_on_scene(found, scene, options, briefly=True)
-        described = describe_model(_see(found, scene), measured.flywheel)
+        measured = measure_loop(found, options, briefly=True)
+        described = describe_model(found.see(), measured.flywheel)
     for pin, joint in found.loop.hinges.items():
         if joint in measured.unmet_stops:
             key = f"pins.{pin}.range"
@@ -127,7 +121,7 @@ def examine_changed(
     """
     file = _generate(scene, "none")
     found = find_loop_of_scene(file, scene, options)
-    generated = describe_model(_see(found, scene))
+    generated = describe_model(found.see())
     texts = (set_entry(file.text, generated, key, value) for key, value in changes)
 
     def measure(text: str | None) -> LoopMeasurement | None:
@@ -135,7 +129,7 @@ def examine_changed(
             return None
         try:
             changed = find_loop_of_scene(replace(file, text=text), scene, options)
-            return measure_on_scene(changed, scene, options, briefly=True)
+            return measure_loop(changed, options, briefly=True)
         except FourBarError:
             # with this entry it is no four-bar, or does not compile
             return None
@@ -155,10 +149,10 @@ def examine_mended(
     found = find_loop_of_scene(file, scene, options)
 
     def measure(change: tuple[str, Value | None]) -> LoopMeasurement | None:
-        seen = _see(found, scene).with_model()
+        seen = found.see().with_model()
         if not mend_entry(seen, *change):
             return None
-        return measure_on_scene(found, scene, options, seen.model, briefly=True)
+        return measure_loop(found, options, seen.model, briefly=True)
 
     return list(_take_in_time(map(measure, changes), len(changes)))
 
@@ -192,7 +186,7 @@ def predict_softness(
         found = find_loop_of_scene(file, scene, options)
         if not found.robot.model.eq_active0[found.loop.equality]:
             return {}
-        stiff, softer = (_answer_at_yield(found, scene, times) for times in (1.0, 2.0))
+        stiff, softer = (_answer_at_yield(found, times) for times in (1.0, 2.0))
     softness = {}
     for at_stiff, at_softer in zip(stiff, softer, strict=True):
         pairs = list(zip(at_stiff, at_softer, strict=False))
@@ -205,15 +199,15 @@ def predict_softness(
 
 
 def _answer_at_yield(
-    found: LoopOfScene, scene: Scene, times: float
+    found: LoopOfScene, times: float
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Return torque and pin forces of single states at a multiple of the least yield,
     and the motion of the bars through time; nothing where it is not simulated.
     """
-    seen = _see(found, scene).with_model()
+    seen = found.see().with_model()
     impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
     seen.model.eq_solimp[[*found.loop.closures], :2] = impedance
-    inside, motion = put_loop_inside(found, scene, seen.model)
+    inside, motion = put_loop_inside(found, seen.model)
     forces = [row.soft.values() for row in inside.answer_states(motion).rows]
     moved: list[dict[str, Any]] = []
     with suppress(LimitError):

@@ -37,10 +37,8 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
-    choose_loop,
     describe_equality,
-    find_closures,
-    require_loops,
+    find_loops,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
@@ -105,10 +103,7 @@ def read_loop_scene(
     """
     compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options)
-    closures = find_closures(posed, options)
-    loops = require_loops(closures)
-    if name is not None:
-        loops = [choose_loop(closures, name)]
+    loops = find_loops(posed, options, name)
     if len(loops) > 1:
         names = ", ".join(loop.name for loop in loops)
         raise InputError("--loop", None, f"states one of the four-bars: {names}")

@@ -31,10 +31,8 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
-    choose_loop,
     describe_equality,
-    find_closures,
-    require_loops,
+    find_loops,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (
     collect_warnings,
@@ -52,7 +50,6 @@ from fourbar_validation.engines.mujoco.robots.inside import (
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     SETTINGS_OF_AN_SDF,
     RobotFile,
-    RobotLoop,
 )
 from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
@@ -82,9 +79,7 @@ _LIGHTER = 0.1
 
 
 def measure_loops(
-    file: RobotFile,
-    options: MeasureOptions,
-    scene: Scene | None,
+    file: RobotFile, options: MeasureOptions, scene: Scene | None
 ) -> RobotMeasurement:
     """Measure the loops of a robot.
 
@@ -100,110 +95,76 @@ def measure_loops(
     with collect_warnings() as warnings:
         if scene is not None:
             scene = options.state_speed(scene)
-            found = find_loop_of_scene(file, scene, options)
-            measured = [measure_on_scene(found, scene, options)]
-            notes = [*found.compiled.notes, *found.robot.notes]
+            found = [find_loop_of_scene(file, scene, options)]
         else:
-            compiled = compile_robot(file)
-            posed = pose_robot(compiled.model, options.pose)
-            closures = find_closures(posed, options.pose)
-            loops = require_loops(closures)
-            if options.loop is not None:
-                loops = [choose_loop(closures, options.loop)]
-            measured = []
-            for loop in loops:
-                made = make_loop_scene(compiled, posed, loop, options.speed, loop.name)
-                turned = find_turn(made.scene, made.loop)
-                inside = _put_inside(posed.model, made.loop, made.scene, turned)
-                share = 1.0 / len(loops)
-                motion = _choose_motion(made.scene, turned)
-                one = _measure_loop(
-                    inside, motion, made.scene, turned, options, file, share
-                )
-                remarks = (*made.remarks, *one.remarks)
-                measured.append(replace(one, remarks=remarks))
-            notes = [*compiled.notes, *posed.notes]
+            found = [*_find_loops(file, options)]
+        share = 1.0 / len(found)
+        measured = tuple(measure_loop(one, options, share=share) for one in found)
+    notes = [*found[0].compiled.notes, *found[0].robot.notes]
     if file.kind == "SDF" and options.error is not None:
         notes.append(SETTINGS_OF_AN_SDF)
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
-    return RobotMeasurement(tuple(measured), tuple(notes))
+    return RobotMeasurement(measured, tuple(notes))
 
 
-def measure_on_scene(
+def _find_loops(file: RobotFile, options: MeasureOptions) -> Iterator[LoopOfScene]:
+    """Yield the loops of a file, each with the scene that is made from it."""
+    compiled = compile_robot(file)
+    posed = pose_robot(compiled.model, options.pose)
+    for loop in find_loops(posed, options.pose, options.loop):
+        made = make_loop_scene(compiled, posed, loop, options.speed, loop.name)
+        turned = find_turn(made.scene, made.loop)
+        remarked = replace(made.loop, remarks=made.remarks)
+        yield LoopOfScene(file, compiled, posed, remarked, turned, (), made.scene)
+
+
+def put_loop_inside(
+    found: LoopOfScene, model: mujoco.MjModel | None = None
+) -> tuple[LoopInside, LoopMotion]:
+    """Return a loop as its scene drives it, and the motion of the scene in it.
+
+    The file's own cylinder drives it if it can. `model`: changed model of the file;
+    None: the file's own.
+    """
+    model = found.robot.model if model is None else model
+    scene = found.scene
+    own = find_cylinder(model, scene)
+    inside = LoopInside(
+        model,
+        found.loop,
+        own or LoopDrive(model, found.loop, scene, found.turned),
+        bar=command(scene).bar,
+        branch=scene.motion.branch,
+        as_it_is=found.as_it_is,
+    )
+    flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
+    inside.find_flywheel(sum(one.inertia for one in flywheels))
+    motion = _choose_motion(scene, found.turned)
+    return inside, motion.thin_out(POSITIONS_OF_A_LOOP)
+
+
+def measure_loop(
     found: LoopOfScene,
-    scene: Scene,
     options: MeasureOptions,
     model: mujoco.MjModel | None = None,
     *,
+    share: float = 1.0,
     briefly: bool = False,
 ) -> LoopMeasurement:
-    """Measure a loop at the motion of a scene.
-
-    A file that holds nothing but the loop is taken as it is.
+    """Measure a loop at the motion of its scene.
 
     Parameters
     ----------
     model : changed model of the file; None: the file's own.
+    share : part of the time in which settings are looked for.
     briefly : nothing but torque, pin forces and motion is measured.
     """
-    inside, motion = put_loop_inside(found, scene, model)
-    measured = _measure_loop(
-        inside, motion, scene, found.turned, options, found.file, briefly=briefly
-    )
-    remarks = (*found.loop.remarks, *measured.remarks)
-    return replace(measured, remarks=remarks)
-
-
-def put_loop_inside(
-    found: LoopOfScene, scene: Scene, model: mujoco.MjModel | None = None
-) -> tuple[LoopInside, LoopMotion]:
-    """Return a loop as a scene drives it, and the motion of the scene in it."""
-    inside = _put_inside(
-        found.robot.model if model is None else model,
-        found.loop,
-        scene,
-        found.turned,
-        as_it_is=not found.loop.held,
-    )
-    motion = _choose_motion(scene, found.turned).thin_out(POSITIONS_OF_A_LOOP)
-    return inside, motion
-
-
-def _put_inside(
-    model: mujoco.MjModel,
-    loop: RobotLoop,
-    scene: Scene,
-    turned: float,
-    *,
-    as_it_is: bool = False,
-) -> LoopInside:
-    """Return a loop driven as a scene has it, by the file's own cylinder if it can."""
-    drive = find_cylinder(model, scene) or LoopDrive(model, loop, scene, turned)
-    bar = command(scene).bar
-    branch = scene.motion.branch
-    inside = LoopInside(model, loop, drive, bar=bar, branch=branch, as_it_is=as_it_is)
-    flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
-    inside.find_flywheel(sum(one.inertia for one in flywheels))
-    return inside
-
-
-def _measure_loop(
-    inside: LoopInside,
-    motion: LoopMotion,
-    scene: Scene,
-    turned: float,
-    options: MeasureOptions,
-    file: RobotFile,
-    share: float = 1.0,
-    *,
-    briefly: bool = False,
-) -> LoopMeasurement:
-    """Measure one loop; `share`: part of the time in which settings are looked for."""
+    inside, motion = put_loop_inside(found, model)
     loop = inside.loop
-    cut = ""
+    remarks = [*loop.remarks]
     if options.span is not None:
         motion, cut = _take_span(motion, inside, options.span)
-    motion = motion.thin_out(POSITIONS_OF_A_LOOP)
+        remarks += cut
     states = inside.answer_states(motion)
     if not states.rows and states.in_line:
         raise LimitError(
@@ -232,35 +193,33 @@ def _measure_loop(
             influence = _compare_at_same_angles(through, lighter, scales)
     except LimitError as error:
         refusal = str(error)
-    torn: tuple[TornState, ...] = ()
+    torn: list[TornState] = []
     if options.torque is not None:
         seconds = _CONSTANTS * inside.find_constant()
         starts = closing.thin_out(_TORN_POSITIONS).angle
-        torn = tuple(inside.answer_under_torque(starts, options.torque, seconds))
+        torn = inside.answer_under_torque(starts, options.torque, seconds)
     advice = None
     if options.error is not None and not briefly:
         if motion.varies:
             raise LimitError(
                 f"settings are tried in one motion through time: {refusal}"
             )
-        advice = SettingsSearch(inside, closing, share).advise(options.error, file)
+        search = SettingsSearch(inside, closing, share)
+        advice = search.advise(options.error, found.file)
+    remarks += _describe_noslip(inside, motion, states, scales)
+    remarks += _describe_other_circuit(inside, found.scene, states)
+    remarks += _describe_findings(inside, states, through)
+    ties = (describe_equality(inside.model, one) for one in loop.other_equalities)
     return LoopMeasurement(
         loop.name,
         inside.name,
-        scene,
-        turned,
-        (
-            *([cut] if cut else []),
-            *_describe_noslip(inside, motion, states, scales),
-            *_describe_other_circuit(inside, scene, states),
-            *_describe_findings(inside, states, through),
-        ),
+        found.scene,
+        found.turned,
+        tuple(remarks),
         read_settings(inside.model, loop),
         loop.rounding,
         len(inside.held),
-        tuple(
-            describe_equality(inside.model, number) for number in loop.other_equalities
-        ),
+        tuple(ties),
         states,
         scales,
         through,
@@ -270,7 +229,7 @@ def _measure_loop(
         advice,
         inside.as_it_is,
         inside.flywheel,
-        tuple(inside.list_unmet_stops()),
+        inside.list_unmet_stops(),
     )
 
 
@@ -396,7 +355,7 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
 
 def _take_span(
     motion: LoopMotion, inside: LoopInside, span: tuple[float, float]
-) -> tuple[LoopMotion, str]:
+) -> tuple[LoopMotion, list[str]]:
     """Return a motion evenly over a range of the driven joint, and what was cut of it.
 
     A motion of a whole turn goes on in any range of a joint without limits; another
@@ -408,7 +367,7 @@ def _take_span(
     """
     joints = [inside.position(angle) for angle in motion.angle]
     low, high = span
-    cut = ""
+    cut = []
     limited = inside.joint is not None and inside.model.jnt_limited[inside.joint]
     if limited or np.ptp(motion.angle) < WHOLE_TURN:
         low = max(low, min(joints))
@@ -424,7 +383,7 @@ def _take_span(
                 f"must overlap the motion of {inside.name}, {moved} deg",
             )
         if (low, high) != span:
-            cut = f"--range is cut to the motion of {inside.name}, {moved} deg"
+            cut = [f"--range is cut to the motion of {inside.name}, {moved} deg"]
     if motion.varies:
         raise InputError("--range", None, "needs a motion of one speed")
     sense = inside.position(motion.angle[0] + 1.0) - joints[0]

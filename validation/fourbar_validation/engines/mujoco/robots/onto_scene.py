@@ -30,7 +30,7 @@ from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import (
     choose_loop,
     find_closures,
-    require_loops,
+    find_loops,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
@@ -59,6 +59,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     move_to,
     pose_robot,
 )
+from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 _NOTHING_CLOSES = {
     "MJCF": (
@@ -103,6 +104,16 @@ class LoopOfScene:
     """Angle of the scene's axes in the plane of the loop, rad."""
     parts: tuple[str, ...]
     """Sentences that say which joint is which pin, and which body which bar."""
+    scene: Scene
+    as_it_is: bool = False
+    """True if contacts, joint limits and other motors act as in the file, since it
+    holds nothing but the loop.
+    """
+
+    def see(self) -> SeenLoop:
+        """Return the loop as its entries are described."""
+        bar = command(self.scene).bar
+        return SeenLoop(self.robot.model, self.loop, self.turned, bar)
 
 
 def find_loop_of_scene(
@@ -173,11 +184,7 @@ def _fit(
 ) -> tuple[float, LoopOfScene]:
     """Return by how much the lengths of the nearest loop miss a scene, and the loop."""
     posed = pose_robot(compiled.model, options.pose)
-    closures = find_closures(posed, options.pose)
-    if options.loop is not None:
-        loops = [choose_loop(closures, options.loop)]
-    else:
-        loops = require_loops(closures)
+    loops = find_loops(posed, options.pose, options.loop)
     ways = [way for loop in loops for way in _list_ways(posed, loop, options.pose)]
     model = posed.model
     wanted = {role: name for role, name in options.names.items() if role in BAR_ROLES}
@@ -202,8 +209,16 @@ def _fit(
     described = SceneOfLoop(compiled, robot, loop)
     described.meet_lengths()
     turned = find_turn(scene, described.loop)
-    parts = described.write_parts()
-    found = LoopOfScene(file, compiled, robot, described.loop, turned, parts)
+    found = LoopOfScene(
+        file,
+        compiled,
+        robot,
+        described.loop,
+        turned,
+        described.write_parts(),
+        scene,
+        as_it_is=not loop.held,
+    )
     return miss_lengths(scene, loop), found
 
 
