@@ -306,6 +306,11 @@ class TriedSettings:
         return self.deciding.error
 
     @property
+    def is_simulated(self) -> bool:
+        """Tell whether any time was simulated."""
+        return math.isfinite(self.seconds_per_step)
+
+    @property
     def cost(self) -> float:
         """Processor time of a simulated second, s."""
         return self.seconds_per_step / self.settings.timestep

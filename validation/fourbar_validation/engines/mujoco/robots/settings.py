@@ -18,6 +18,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 
 from fourbar.errors import LimitError
+from fourbar_validation.engines.mujoco.describe import ENUMERATIONS, MJCF_WORDS
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
@@ -49,7 +50,7 @@ _EVALUATIONS = {"RK4": 4.0}
 """Evaluations of a step, for the order in which combinations are tried. The others have
 one.
 """
-SOLVER = ("Newton", 100, 1e-10)
+SOLVER: dict[str, Any] = {"solver": "Newton", "iterations": 100, "tolerance": 1e-10}
 """Solver, iterations and tolerance at which the solver leaves nothing."""
 RANGES_TRIED = 4
 """Ranges of the driven joint in which a combination is measured that is not within the
@@ -64,25 +65,19 @@ _OF_FRICTION = ("solreffriction", "solimpfriction")
 def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
     """Read the settings of a compiled model."""
     option = model.opt
+    integrator, solver = (
+        kinds(getattr(option, name)).name.partition("_")[2]
+        for name, kinds in ENUMERATIONS.items()
+    )
     return RobotSettings(
         tuple(model.eq_solref[loop.equality].tolist()),
         tuple(model.eq_solimp[loop.equality].tolist()),
         float(option.timestep),
-        _name_value(mujoco.mjtIntegrator, option.integrator, INTEGRATORS_TRIED),
-        _name_value(mujoco.mjtSolver, option.solver, ("Newton", "CG", "PGS")),
+        MJCF_WORDS.get(integrator, integrator),
+        MJCF_WORDS.get(solver, solver),
         int(option.iterations),
         float(option.tolerance),
     )
-
-
-def _name_value(
-    kinds: type,
-    value: int,
-    words: Sequence[str],
-) -> str:
-    """Return the word of MJCF for a value of an enumeration."""
-    name = kinds(value).name.partition("_")[2]
-    return next(word for word in words if word.upper() == name)
 
 
 def _list_rubbing(model: mujoco.MjModel, loop: RobotLoop) -> list[int]:
@@ -112,13 +107,11 @@ def _set_settings(
     if settings.solimpfriction is not None:
         changed.dof_solimp[rubbing] = settings.solimpfriction
     option = changed.opt
+    integrator = f"mjINT_{settings.integrator.upper()}"
+    solver = f"mjSOL_{settings.solver.upper()}"
+    option.integrator = int(getattr(mujoco.mjtIntegrator, integrator))
+    option.solver = int(getattr(mujoco.mjtSolver, solver))
     option.timestep = settings.timestep
-    integrators = mujoco.mjtIntegrator
-    solvers = mujoco.mjtSolver
-    option.integrator = int(
-        getattr(integrators, f"mjINT_{settings.integrator.upper()}")
-    )
-    option.solver = int(getattr(solvers, f"mjSOL_{settings.solver.upper()}"))
     option.iterations = settings.iterations
     option.tolerance = settings.tolerance
     return changed
@@ -136,8 +129,6 @@ class SettingsSearch:
         self.own = read_settings(inside.given, inside.loop)
         self.rubbing = _list_rubbing(inside.given, inside.loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
-        self.excluded = set[RobotSettings]()
-        """Settings that are not simulated, because of their single states."""
         self.end = time.process_time() + SEARCH_SECONDS * share
 
     def advise(self, wanted: float, file: RobotFile) -> SettingsAdvice:
@@ -176,18 +167,12 @@ class SettingsSearch:
         are not within an error.
         """
         given = self.inside
-        changed = _set_settings(given.given, given.loop, settings)
-        inside = LoopInside(
-            changed, given.loop, given.acting, bar=given.bar, branch=given.branch
-        )
+        inside = given.with_model(_set_settings(given.given, given.loop, settings))
         answers = []
         with suppress(LimitError):
             states = inside.answer_states(motion)
             answers.append(states)
-            if states.find_worst(states.scales(inside.lever)).error > wanted:
-                self.excluded.add(settings)
-            else:
-                self.excluded.discard(settings)
+            if states.find_worst(states.scales(inside.lever)).error <= wanted:
                 answers.append(inside.answer_through_time(motion))
         return answers
 
@@ -236,22 +221,20 @@ class SettingsSearch:
         """
         if not self.rubbing:
             return math.inf
-        given = self.inside
-        model = copy(given.given)
+        model = copy(self.inside.given)
         model.dof_frictionloss[self.rubbing] = 0.0
-        inside = LoopInside(
-            model, given.loop, given.acting, bar=given.bar, branch=given.branch
-        )
-        return SettingsSearch(inside, self.motion).measure(settings).error
+        search = SettingsSearch(self.inside.with_model(model), self.motion)
+        return search.measure(settings).error
 
     def measure(
         self, settings: RobotSettings, wanted: float = math.inf
     ) -> TriedSettings:
-        """Measure what settings reach; excluded ones are not simulated."""
+        """Measure what settings reach.
+
+        They are not simulated where their single states are not within an error.
+        """
         known = self.tried.get(settings)
-        if known is not None and (
-            settings not in self.excluded or known.states.error > wanted
-        ):
+        if known is not None and (known.is_simulated or known.states.error > wanted):
             return known
         states = through = WorstState(math.inf)
         gap = seconds = math.inf
@@ -275,13 +258,13 @@ class SettingsSearch:
         for name, values in self._list_values().items():
             for value in values[1:]:
                 yield replace(own, **{name: value})
-        solver, iterations, tolerance = SOLVER
-        if own.solver != solver:
-            yield replace(own, solver=solver)
-        if own.iterations < iterations:
-            yield replace(own, iterations=iterations)
-        if own.tolerance > tolerance:
-            yield replace(own, tolerance=tolerance)
+        looser = {
+            "solver": own.solver != SOLVER["solver"],
+            "iterations": own.iterations < SOLVER["iterations"],
+            "tolerance": own.tolerance > SOLVER["tolerance"],
+        }
+        for name in filter(looser.get, SOLVER):
+            yield replace(own, **{name: SOLVER[name]})
 
     def _list_values(self) -> dict[str, list[Any]]:
         """Return the values of each setting that are combined, the file's own first."""
@@ -294,24 +277,19 @@ class SettingsSearch:
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
         model = self.inside.given
-        soft_friction = model.dof_solref[self.rubbing, 0] > shortest
+        soft = model.dof_solref[self.rubbing, 0] > shortest
         yielding = model.dof_solimp[self.rubbing, 1] < STIFFEST_IMPEDANCE[1]
+        further: dict[str, list[Any]] = {
+            "solimp": [STIFFEST_IMPEDANCE],
+            "solref": [(one, ratio) for one in faster],
+            "integrator": [*INTEGRATORS_TRIED],
+            "timestep": [factor * own.timestep for factor in _FINER],
+            "solreffriction": [(shortest, 1.0)] * bool(soft.any()),
+            "solimpfriction": [STIFFEST_IMPEDANCE] * bool(yielding.any()),
+        }
         return {
-            "solimp": [
-                own.solimp,
-                *([STIFFEST_IMPEDANCE] if own.solimp != STIFFEST_IMPEDANCE else []),
-            ],
-            "solref": [own.solref, *((one, ratio) for one in faster)],
-            "integrator": [
-                own.integrator,
-                *(name for name in INTEGRATORS_TRIED if name != own.integrator),
-            ],
-            "timestep": [own.timestep, *(factor * own.timestep for factor in _FINER)],
-            "solreffriction": [
-                None,
-                *([(shortest, 1.0)] if soft_friction.any() else []),
-            ],
-            "solimpfriction": [None, *([STIFFEST_IMPEDANCE] if yielding.any() else [])],
+            name: [*dict.fromkeys((getattr(own, name), *values))]
+            for name, values in further.items()
         }
 
     def _find_cheapest(self, wanted: float) -> TriedSettings:
@@ -321,11 +299,9 @@ class SettingsSearch:
         """
         values = self._list_values()
         solvers: list[dict[str, Any]] = [{}]
-        names = ("solver", "iterations", "tolerance")
-        solved: dict[str, Any] = dict(zip(names, SOLVER, strict=True))
-        tight = self.measure(replace(self.own, **solved))
+        tight = self.measure(replace(self.own, **SOLVER))
         if tight.error < 0.9 * self.measure(self.own).error:
-            solvers.append(solved)
+            solvers.append(SOLVER)
         combinations = [
             replace(self.own, **dict(zip(values, chosen, strict=True)), **solver)
             for *chosen, solver in product(*values.values(), solvers)
@@ -365,25 +341,28 @@ def _write_elements(
 
     `rubbing`: hinges with dry friction.
     """
-    written = []
+
+    def write(tag: str, attributes: dict[str, str]) -> str:
+        return ET.tostring(ET.Element(tag, attributes), encoding="unicode")
+
     option = dict(tried.changes)
     closure, friction = (
         {name: option.pop(name) for name in names if name in option}
         for names in (_OF_CLOSURES, _OF_FRICTION)
     )
+    written = []
     if option:
-        written.append(ET.tostring(ET.Element("option", option), encoding="unicode"))
+        written.append(write("option", option))
     root = ET.fromstring(file.text)
-    if closure:
-        equalities = [
-            element for section in root.iter("equality") for element in section
-        ]
-        equalities = [one for one in equalities if one.tag != "equality"]
-        for number in loop.closures:
-            element = ET.Element(
-                equalities[number].tag, {**equalities[number].attrib, **closure}
-            )
-            written.append(ET.tostring(element, encoding="unicode"))
+    equalities = [
+        element
+        for section in root.iter("equality")
+        for element in section
+        if element.tag != "equality"
+    ]
+    for number in loop.closures if closure else ():
+        one = equalities[number]
+        written.append(write(one.tag, one.attrib | closure))
     joints = [
         element
         for section in root.iter("worldbody")
@@ -396,6 +375,5 @@ def _write_elements(
     for number in rubbing if friction else ():
         name = name_joint(model, number)
         own = joints[number].attrib if in_order else stated.get(name, {"name": name})
-        element = ET.Element("joint", {**own, **friction})
-        written.append(ET.tostring(element, encoding="unicode"))
+        written.append(write("joint", own | friction))
     return tuple(written)
