@@ -144,29 +144,34 @@ def _join(scope: str, name: str) -> str:
     return f"{scope}::{name}" if scope else name
 
 
+def _shorten(name: str) -> str:
+    """Return a full name without the models that hold it."""
+    return name.rpartition("::")[2]
+
+
+def _attribute(element: ET.Element, path: str, name: str) -> str:
+    """Return an attribute of a descendant, "" where either is missing."""
+    found = element.find(path)
+    return "" if found is None else found.get(name, "")
+
+
 def _make_pose_matrix(element: ET.Element) -> Array:
     """Return the matrix of the <pose> of an element, (4, 4)."""
     matrix = np.eye(4)
-    pose = element.find("pose")
     text = _text(element, "pose")
-    if pose is None or not text:
+    if not text:
         return matrix
     what = f"the pose of {element.get('name', element.tag)}"
-    if pose.get("rotation_format") == "quat_xyzw":
+    if _attribute(element, "pose", "rotation_format") == "quat_xyzw":
         numbers = _numbers(text, 7, what)
         rotation = Rotation.from_quat(numbers[3:])
     else:
         numbers = _numbers(text, 6, what)
-        degrees = _is_true(pose.get("degrees", ""))
+        degrees = _is_true(_attribute(element, "pose", "degrees"))
         rotation = Rotation.from_euler("xyz", numbers[3:], degrees=degrees)
     matrix[:3, :3] = rotation.as_matrix()
     matrix[:3, 3] = numbers[:3]
     return matrix
-
-
-def _relative_to(element: ET.Element) -> str:
-    pose = element.find("pose")
-    return "" if pose is None else pose.get("relative_to", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +188,7 @@ class _Member:
     @property
     def reference(self) -> str:
         """Name of what the pose is stated in."""
-        stated = _relative_to(self.element)
+        stated = _attribute(self.element, "pose", "relative_to")
         if stated or self.element.tag not in ("joint", "frame"):
             return _join(self.scope, stated)
         return self.carrier
@@ -253,19 +258,23 @@ class _Conversion:
         worlds = [one for one in root if one.tag in ("world", "model")]
         if not worlds:
             raise _refuse(root.tag, "holds neither a <world> nor a <model>")
-        if worlds[0].tag == "world":
-            world = worlds[0]
-        else:
-            world = ET.Element("world", {"name": "world"})
+        world = worlds[0]
+        if world.tag == "model":
+            world = ET.Element("world")
             world.extend(worlds)
         self._collect("", world, static=False)
         for name, member in self.members.items():
             self._read_member(name, member)
-        links = [name for name in self.members if self._tag(name) == "link"]
-        self._name_members(links)
-        self._name_members(
-            [name for name in self.members if self._tag(name) == "joint"]
+        links, joints = (
+            [name for name, one in self.members.items() if one.element.tag == tag]
+            for tag in ("link", "joint")
         )
+        for members in (links, joints):
+            # as the file does, with models where names repeat
+            counts = Counter(map(_shorten, members))
+            for name in members:
+                short = _shorten(name)
+                self.names[name] = short if counts[short] == 1 else name
         self._grow_tree(links)
         mujoco = ET.Element("mujoco")
         ET.SubElement(mujoco, "compiler", angle="radian")
@@ -287,9 +296,6 @@ class _Conversion:
                 "<drake:ball_constraint> in its place, a rigid pin"
             )
         return mujoco, self.notes
-
-    def _tag(self, name: str) -> str:
-        return self.members[name].element.tag
 
     def _collect(self, scope: str, holder: ET.Element, *, static: bool) -> None:
         """Read the names of a world or model, and then those of the models inside."""
@@ -363,7 +369,8 @@ class _Conversion:
 
     def _begin(self, name: str, asked: str) -> _Member:
         """Return a member, of which the link or the pose in a frame is asked for."""
-        scope, _, short = name.rpartition("::")
+        scope = name.rpartition("::")[0]
+        short = _shorten(name)
         if name not in self.members:
             raise _refuse(short, f"is no link, joint, frame or model of {scope}")
         if (name, asked) in self.pending:
@@ -418,13 +425,6 @@ class _Conversion:
         """Return the pose of a joint in one of its links, (4, 4)."""
         return self._locate_in(link, self._find_frame(edge, link))
 
-    def _name_members(self, members: list[str]) -> None:
-        """Name links or joints as the file does, with models where names repeat."""
-        counts = Counter(name.rpartition("::")[2] for name in members)
-        for name in members:
-            short = name.rpartition("::")[2]
-            self.names[name] = short if counts[short] == 1 else name
-
     def _grow_tree(self, links: list[str]) -> None:
         """Hang each link on another by a joint, from the world outwards.
 
@@ -461,8 +461,8 @@ class _Conversion:
             ET.SubElement(body, "freejoint", name=f"free joint of {self.names[link]}")
         else:
             pose = self._place(edge, bearer) @ np.linalg.inv(self._place(edge, link))
-            for joint in self._list_joints(edge, link) if edge.name else ():
-                pose = pose @ _move_to_start(joint)
+            for joint, motion in self._list_joints(edge, link) if edge.name else ():
+                pose = pose @ motion
                 ET.SubElement(body, "joint", joint)
         body.attrib |= {"name": self.names[link], **_write_place(pose)}
         element = self.members[link].element
@@ -477,13 +477,18 @@ class _Conversion:
         fixed = edge is not None and edge.kind == "fixed"
         return fixed and (not bearer or self._is_fixed(bearer))
 
-    def _list_joints(self, edge: _Edge, link: str) -> Iterator[dict[str, str]]:
-        """List the joints of MJCF of one joint of SDF, on the link that it carries."""
+    def _list_joints(
+        self, edge: _Edge, link: str
+    ) -> Iterator[tuple[dict[str, str], Array]]:
+        """List the joints of MJCF of one joint of SDF, on the link that it carries.
+
+        Each comes with the motion of the link by its `ref`, (4, 4).
+        """
         name = self.names[edge.name]
         place = self._place(edge, link)
-        pin = {"pos": _write(place[:3, 3])}
+        pin = place[:3, 3]
         if edge.kind == "ball":
-            yield {"name": name, "type": "ball", **pin}
+            yield {"name": name, "type": "ball", "pos": _write(pin)}, np.eye(4)
         start = edge.read_start()
         forwards = edge.child == link
         own = self._find_frame(edge, edge.child)
@@ -492,21 +497,30 @@ class _Conversion:
             axis = edge.element.find(tag)
             if axis is None:
                 axis = ET.Element(tag)
-            xyz = axis.find("xyz")
-            stated = "" if xyz is None else xyz.get("expressed_in", "")
+            stated = _attribute(axis, "xyz", "expressed_in")
             frame = _join(edge.scope, stated) if stated else own
             if not stated and _is_true(_text(axis, "use_parent_model_frame")):
                 frame = edge.scope
             direction = _numbers(_text(axis, "xyz", "0 0 1"), 3, f"axis of {name}")
             turned = (place @ self._locate_in(own, frame))[:3, :3] @ direction
-            yield {
+            if not forwards:
+                turned = -turned
+            joint = {
                 "name": name if tag == "axis" else f"{name}::{tag}",
                 "type": "slide" if edge.kind == "prismatic" else "hinge",
-                **pin,
-                "axis": _write(turned if forwards else -turned),
-                **({"ref": repr(start)} if start else {}),
-                **_read_dynamics(axis, name),
+                "pos": _write(pin),
+                "axis": _write(turned),
             }
+            motion = np.eye(4)
+            if start:
+                joint["ref"] = repr(start)
+                shift = start * (turned / np.linalg.norm(turned))
+                if edge.kind == "prismatic":
+                    motion[:3, 3] = shift
+                else:
+                    motion[:3, :3] = Rotation.from_rotvec(shift).as_matrix()
+                    motion[:3, 3] = pin - motion[:3, :3] @ pin
+            yield joint | _read_dynamics(axis, name), motion
 
     def _add_inertia(self, body: ET.Element, link: str, element: ET.Element) -> None:
         """Add mass and inertia, as stated or of collisions; SDF's own are of size 1."""
@@ -520,10 +534,13 @@ class _Conversion:
             self._add_collisions(body, link, element, _text(inertial, "density"))
             return
         pose = _make_pose_matrix(inertial)
-        xx, yy, zz, xy, xz, yz = (
-            _number(inertial, f"inertia/i{part}", default, name)
-            for default, parts in (("1", ("xx", "yy", "zz")), ("0", ("xy", "xz", "yz")))
-            for part in parts
+        xx, yy, zz = (
+            _number(inertial, f"inertia/i{part}", "1", name)
+            for part in ("xx", "yy", "zz")
+        )
+        xy, xz, yz = (
+            _number(inertial, f"inertia/i{part}", "0", name)
+            for part in ("xy", "xz", "yz")
         )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         moments, axes = np.linalg.eigh(tensor)
@@ -551,7 +568,7 @@ class _Conversion:
             shape = collision.find("geometry/*")
             if shape is None or shape.tag == "plane":
                 continue
-            stated = _relative_to(collision)
+            stated = _attribute(collision, "pose", "relative_to")
             reference = _join(scope, stated) if stated else link
             pose = self._locate_in(link, reference) @ _make_pose_matrix(collision)
             own = _text(collision, "density", density or DEFAULT_DENSITY)
@@ -638,14 +655,9 @@ class _Conversion:
         """Add the line by which a joint follows another."""
         for mimic in edge.element.findall("axis/mimic"):
             leader = _join(edge.scope, mimic.get("joint", ""))
-            multiplier, offset, reference = (
-                _number(mimic, name, default, edge.name)
-                for name, default in (
-                    ("multiplier", "1"),
-                    ("offset", "0"),
-                    ("reference", "0"),
-                )
-            )
+            multiplier = _number(mimic, "multiplier", "1", edge.name)
+            offset = _number(mimic, "offset", "0", edge.name)
+            reference = _number(mimic, "reference", "0", edge.name)
             # MuJoCo's polynomial counts both joints from where they start
             start = sum(
                 other.read_start() for other in self.edges if other.name == leader
@@ -692,22 +704,6 @@ def _read_dynamics(axis: ET.Element, name: str) -> dict[str, str]:
     if limits != [-_WIDEST, _WIDEST]:
         attributes["range"] = _write(limits)
     return attributes
-
-
-def _move_to_start(joint: dict[str, str]) -> Array:
-    """Return the motion of a link by the `ref` of its joint in MJCF, (4, 4)."""
-    matrix = np.eye(4)
-    start = float(joint.get("ref", "0"))
-    if not start:
-        return matrix
-    axis, place = (np.array(joint[name].split(), float) for name in ("axis", "pos"))
-    axis /= np.linalg.norm(axis)
-    if joint["type"] == "slide":
-        matrix[:3, 3] = start * axis
-    else:
-        matrix[:3, :3] = Rotation.from_rotvec(start * axis).as_matrix()
-        matrix[:3, 3] = place - matrix[:3, :3] @ place
-    return matrix
 
 
 def _write_place(pose: Array) -> dict[str, str]:
