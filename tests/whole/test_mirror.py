@@ -70,9 +70,6 @@ JUDGED_BY = {
         "validation: engine; validation/engines: programs workers"
     ),
     "validation/engines/test_environments.py": "validation/engines: table",
-    "validation/engines/test_pinocchio_plain_loop.py": (
-        "validation/engines: plain_loop; validation/engines/mujoco: plain_mujoco"
-    ),
     "validation/engines/test_free_body.py": (
         "validation/engines: free_body_closure free_body_effects"
     ),

@@ -349,20 +349,20 @@ class CostStudy:
 
         The loop goes from position to position.
         """
-        from fourbar_validation.engines.mujoco.plain_mujoco import MujocoInverseLoop
-        from fourbar_validation.engines.pinocchio_plain_loop import PinocchioLoop
+        from fourbar_validation.engines.mujoco.inverse import MujocoTree
+        from fourbar_validation.engines.pinocchio import PinocchioTree
 
-        loops: dict[str, Callable[[Scene], PlainLoop]] = {
-            PINOCCHIO: PinocchioLoop,
-            MUJOCO_INVERSE: MujocoInverseLoop,
+        kinds: dict[str, Any] = {
+            PINOCCHIO: PinocchioTree,
+            MUJOCO_INVERSE: MujocoTree,
         }
         points = []
         setup = self.setup()
         rows = sorted(row for segment in setup.segments for row in segment)
         command = setup.command.part(np.array(rows))
-        for label, make in loops.items():
+        for label, kind in kinds.items():
             try:
-                loop = make(self.scene)
+                loop = PlainLoop(kind, self.scene)
             except LimitError as error:
                 self.left_out.append(f"{label}: {error}")
                 continue

@@ -14,7 +14,6 @@ one inverse dynamics tau(q, v, a), and the multipliers of
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.tree import put_back, solve_closed, solve_multipliers
+from fourbar_validation.engines.tree import KeptTree, solve_closed, solve_multipliers
 
 MOST_CLOSURE_STEPS = 20
 """Newton's steps of one position; from its neighbour two or three are enough."""
@@ -33,24 +32,23 @@ _SQUARES_AWAY = 1e-7
 
 
 class PlainLoop:
-    """The loop of one engine; a subclass asks the engine.
+    """A scene in the tree of one engine.
 
     Raises LimitError for a cylinder, and for friction that depends on the pin forces.
     """
 
-    def __init__(self, build: Callable[[Scene], Any], scene: Scene) -> None:
+    def __init__(self, build: Callable[[Scene], KeptTree], scene: Scene) -> None:
         if scene.drive is not None:
             raise LimitError("the plain loop has a couple on a bar, no cylinder")
         self.linkage = scene.linkage
         self.tree = tree = build(state_from_pins(scene))
         if tree.loaded:
             raise LimitError("the plain loop does not iterate over loads of pins")
-        self.model = tree.model
-        self.data = tree.data
         self.drive = tree.turns[scene.drive_bar]
 
     def answer(self, command: Command) -> dict[str, Array]:
         """Return the torque, (n,), and the pin forces, (n, 2)."""
+        tree = self.tree
         n = len(command.theta_2)
         torque = np.empty(n)
         forces = {name: np.empty((n, 2)) for name in PIN_FORCES}
@@ -61,39 +59,38 @@ class PlainLoop:
             # along the motion from the position before
             q = q + rates * (theta - q[0])
             q[0] = theta
-            jacobian = self.close(q)
+            jacobian = self._close(q)
             v = solve_closed(jacobian, speeds[row])
             rates = v / speeds[row]
-            x, y = self.drift(q, v)
+            x, y = tree.drift(v)
             a = solve_closed(jacobian, accelerations[row], x=x, y=y)
-            needed = self.inverse(q, v, a)
-            x, y, torque[row] = solve_multipliers(jacobian, self.drive, needed)
+            tree.moving(v, a)
+            x, y, torque[row] = solve_multipliers(jacobian, self.drive, tree.torques())
             forces["F43"][row] = x, y
-            pins = put_back(self.tree.joint_forces(), x, y)
-            for name, force in pins.items():
+            for name, force in tree.forces((x, y), torque[row]).items():
                 forces[name][row] = force
         return {"torque": torque, **forces}
 
     def _assemble_first(self, command: Command) -> Array:
         """Find the joint angles of the first position, (3,), rad."""
         first = with_signs(self.linkage, command.part(slice(0, 1)))
-        angle = float(first.theta_2[0])
-        branch = int(first.branch[0])
-        q = Assembler(self.tree).find(angle, branch)
+        q = Assembler(self.tree).find(float(first.theta_2[0]), int(first.branch[0]))
         if q is None:
             raise LimitError("the loop does not close at the first position")
         return np.array(q)
 
-    def close(self, q: Array) -> Array:
+    def _close(self, q: Array) -> Array:
         """Close the gap by bars 3 and 4, in place.
 
         Return the derivative of the gap there.
         """
         converged = False
         for _ in range(MOST_CLOSURE_STEPS):
-            x, y, jacobian = self.look(q)
+            self.tree.place(q.tolist())
+            jacobian = self.tree.jacobian()
             if converged:
                 return jacobian
+            x, y = self.tree.gap()
             (_, a, b), (_, c, d) = jacobian.tolist()
             determinant = a * d - b * c
             first = (b * y - d * x) / determinant
@@ -102,15 +99,3 @@ class PlainLoop:
             q[2] += second
             converged = abs(first) + abs(second) < _SQUARES_AWAY
         raise LimitError("Newton's method did not close the loop")
-
-    def look(self, q: Array) -> tuple[float, float, Array]:
-        """Return the gap, m, and its derivative, (2, 3)."""
-        raise NotImplementedError
-
-    def drift(self, q: Array, v: Array) -> tuple[float, float]:
-        """Return the acceleration of the gap where the joints do not accelerate."""
-        raise NotImplementedError
-
-    def inverse(self, q: Array, v: Array, a: Array) -> list[float]:
-        """Return the generalized forces of the motion beside loads and weights."""
-        raise NotImplementedError

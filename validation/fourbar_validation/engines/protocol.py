@@ -7,7 +7,8 @@ contract.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -168,43 +169,27 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
     Raises an InputError that names what is wrong.
     """
     names = _find_names(data)
-    place, speed, acceleration = names
-    _refuse_unknown(
-        data,
-        (
-            *names,
-            "branch",
-            "time",
-            "remainder",
-            *(("side",) if place == "stroke" else ()),
-        ),
-    )
-    places = _read_list(place, data[place])
+    of_stroke = names == STROKE_COMMAND
+    further = ("branch", "time", "remainder", *(("side",) if of_stroke else ()))
+    _refuse_unknown(data, (*names, *further))
+    places, omega, alpha = _read_motion(names, data)
     n = len(places)
-    rates = {
-        name: _read_rate(name, data[name], n)
-        for name in names[1:]
-        if data.get(name) is not None
-    }
     branch = _read_branch(data.get("branch", 1), n)
+    rates = zip(names[1:], (omega, alpha), strict=True)
     stated: dict[str, Any] = {
-        name: rate for name, rate in rates.items() if isinstance(rate, float)
+        name: rate for name, rate in rates if isinstance(rate, float)
     }
-    if place == "stroke":
+    if of_stroke:
         stated["side"] = data.get("side")
-    stated |= {
-        place: places,
-        "branch": int(branch[0]),
-    }
+    stated |= {names[0]: places, "branch": int(branch[0])}
     scene = replace(scene, motion=Motion(**stated))
-    omega = rates.get(speed)
-    alpha = rates.get(acceleration, 0.0)
+    if alpha is None:
+        alpha = 0.0
+    time = None
     if data.get("time") is not None:
         time = _read_list("time", data["time"], n)
-    else:
-        time = None
     bar = scene.motion.bar
-    if place == "stroke":
+    if of_stroke:
         unknown: Array = np.full(n, np.nan)  # no motion of the bar is commanded
         speed_of_bar = None if omega is None else unknown
         origin = StrokeOrigin(places, omega, alpha)
@@ -235,37 +220,36 @@ def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
             )
 
 
-def _read_list(
-    name: str,
-    value: Any,
-    n: int | None = None,
-) -> Array:
-    if n is None:
-        wanted = "must be a list of one finite number or more"
-    else:
+def _read_motion(
+    names: tuple[str, str, str], data: dict[str, Any], n: int | None = None
+) -> tuple[Array, float | Array | None, float | Array | None]:
+    """Read places, speed and acceleration; None where a rate is not stated."""
+    places = _read_list(names[0], data[names[0]], n)
+    n = len(places)
+    speed, acceleration = (
+        None if data.get(name) is None else _read_rate(name, data[name], n)
+        for name in names[1:]
+    )
+    return places, speed, acceleration
+
+
+def _read_list(name: str, value: Any, n: int | None = None) -> Array:
+    wanted = "must be a list of one finite number or more"
+    if n is not None:
         wanted = f"must be a list of {n} finite numbers"
-    if not isinstance(value, list) or not value or len(value) not in (n or len(value),):
-        raise InputError(f"command.{name}", value, wanted)
-    array = _make_array(value)
-    if array is None or not np.isfinite(array).all():
+    array = _make_array(value) if isinstance(value, list) else None
+    if array is None or len(array) != (n or len(array) or 1) or np.isnan(array).any():
         raise InputError(f"command.{name}", value, wanted)
     return array
 
 
-def _read_rate(
-    name: str,
-    value: Any,
-    n: int,
-) -> float | Array:
+def _read_rate(name: str, value: Any, n: int) -> float | Array:
     if isinstance(value, list):
         return _read_list(name, value, n)
     array = _make_array([value])
-    if array is None or not np.isfinite(array).all():
-        raise InputError(
-            f"command.{name}",
-            value,
-            f"must be a finite number, or a list of {n}",
-        )
+    if array is None or np.isnan(array[0]):
+        wanted = f"must be a finite number, or a list of {n}"
+        raise InputError(f"command.{name}", value, wanted)
     return float(array[0])
 
 
@@ -274,11 +258,8 @@ def _read_branch(value: Any, n: int) -> Any:
     if len(branches) != n or any(
         type(branch) is not int or branch not in (1, -1) for branch in branches
     ):
-        raise InputError(
-            "command.branch",
-            value,
-            f"must be 1 (open) or -1 (crossed), or a list of {n}",
-        )
+        wanted = f"must be 1 (open) or -1 (crossed), or a list of {n}"
+        raise InputError("command.branch", value, wanted)
     return np.array(branches, dtype=np.int8)
 
 
@@ -291,30 +272,23 @@ def _read_digits(value: Any, n: int) -> Any:
         return None
     from mpmath import mp, mpf
 
+    wrong = value
+    equal = isinstance(value, list) and value == value[:1] * n
+    if equal and value and isinstance(value[0], str):
+        wrong = value[0]
+        with mp.workdps(WORKING_DIGITS), suppress(ValueError):
+            number = mpf(wrong)
+            if mp.isfinite(number):
+                return number
     wanted = f"must be a list of {n} equal decimal texts"
-    if (
-        not isinstance(value, list)
-        or len(value) != n
-        or not isinstance(value[0], str)
-        or value != value[:1] * n
-    ):
-        raise InputError("command.remainder", value, wanted)
-    try:
-        with mp.workdps(WORKING_DIGITS):
-            number = mpf(value[0])
-    except ValueError:
-        raise InputError("command.remainder", value[0], wanted) from None
-    if not mp.isfinite(number):
-        raise InputError("command.remainder", value[0], wanted)
-    return number
+    raise InputError("command.remainder", wrong, wanted)
 
 
-def _make_array(values: Iterable[Any]) -> Array | None:
+def _make_array(values: list[Any]) -> Array | None:
     """Make an array of numbers and None, which becomes NaN.
 
     None if there is anything else.
     """
-    values = list(values)
     if not set(map(type, values)) <= {int, float, type(None)}:
         return None
     try:
@@ -336,41 +310,32 @@ def answer_to_json(
     """Write an answer, without the engine's name, which its hello states."""
     if answer.refusal is not None:
         return {"refusal": answer.refusal, "setting": answer.setting}
-    data: dict[str, Any] = {
-        "answers": {
-            name: _write_array(array) for name, array in answer.quantities.items()
-        }
-    }
+    data: dict[str, Any] = {"answers": _write_arrays(answer.quantities)}
     if answer.at is not None and answer.at is not command:
         data["at"] = command_to_json(scene, answer.at)
     if answer.assembled is not None:
         data["assembled"] = np.asarray(answer.assembled, dtype=bool).tolist()
     data["setting"] = answer.setting
-    data["predicted"] = {
-        name: _write_array(array) for name, array in answer.predicted.items()
-    }
-    data["evidence"] = {
-        name: float(x) if math.isfinite(x) else None
-        for name, x in answer.evidence.items()
-    }
+    data["predicted"] = _write_arrays(answer.predicted)
+    data["evidence"] = _write_arrays(answer.evidence)
     data |= {
         name: getattr(answer, name) for name in ("alarms", "shared", "own", "seconds")
     }
     return {name: value for name, value in data.items() if value or name == "answers"}
 
 
-def _write_array(array: Array) -> list[Any]:
+def _write_arrays(arrays: Mapping[str, Any]) -> dict[str, Any]:
     """Write numbers or pairs of them; null where there is no finite number."""
-    numbers = np.asarray(array)
-    if numbers.dtype.kind not in "iuf":
-        raise TypeError(f"an answer holds real numbers, not {numbers.dtype}")
-    array = numbers.astype(float)
-    finite = np.isfinite(array)
-    if finite.all():
-        values: Any = array
-    else:
-        values = np.where(finite, array, np.full(array.shape, None))
-    return values.tolist()  # type: ignore[no-any-return]
+    written = {}
+    for name, array in arrays.items():
+        numbers = np.asarray(array)
+        if numbers.dtype.kind not in "iuf":
+            raise TypeError(f"an answer holds real numbers, not {numbers.dtype}")
+        numbers = numbers.astype(float)
+        if not np.isfinite(numbers).all():
+            numbers = np.where(np.isfinite(numbers), numbers, None)  # type: ignore[call-overload]
+        written[name] = numbers.tolist()
+    return written
 
 
 def answer_from_json(
@@ -383,35 +348,27 @@ def answer_from_json(
     Raises InputError for what is no answer, and EngineError with the engine's words
     where it broke down.
     """
-    data = _read_reply(data)
-    setting = require_text("setting", data.get("setting", "exact"))
-    if "refusal" in data:
-        return Answer(engine, setting, refusal=_read_reason(data["refusal"]))
+    data, setting, refusal = _read_reply(data)
+    if refusal:
+        return Answer(engine, setting, refusal=refusal)
     n = len(command.angle)
-    quantities = {
-        name: _read_values("answers", name, values, n)
-        for name, values in _read_object("answers", data)
-    }
+    quantities = _read_arrays("answers", data, n)
     alarms = data.get("alarms") or []
     if not isinstance(alarms, list):
         raise InputError("alarms", alarms, "must be a list of texts")
-    predicted, evidence = (
-        _read_object(name, data) for name in ("predicted", "evidence")
-    )
+    predicted = _read_arrays("predicted", data, n, ())
+    evidence = _read_object("evidence", data)
     return Answer(
         engine,
         setting,
         read_answered_motion(data.get("at"), command),
         _read_assembled(data.get("assembled"), quantities, n),
         quantities,
-        predicted={
-            name: _read_values("predicted", name, values, n, ())
-            for name, values in predicted
-        },
+        predicted=predicted,
         alarms=[require_text("alarms", alarm) for alarm in alarms],
         evidence={
-            name: float(_read_values("evidence", name, [value], 1, ())[0])
-            for name, value in evidence
+            name: float(_read_values(f"evidence.{name}", [value], 1)[0])
+            for name, value in evidence.items()
         },
         shared=require_text("shared", data.get("shared", "")) or "not stated",
         own=require_text("own", data.get("own", "")) or "not stated",
@@ -419,8 +376,8 @@ def answer_from_json(
     )
 
 
-def _read_reply(data: Any) -> dict[str, Any]:
-    """Return the object that an engine replied with.
+def _read_reply(data: Any) -> tuple[dict[str, Any], str, str]:
+    """Return the object that an engine replied with, its setting and its refusal.
 
     Raises EngineError with its own words if it broke down.
     """
@@ -431,13 +388,13 @@ def _read_reply(data: Any) -> dict[str, Any]:
             require_text("error", data["error"])
             or "the engine reported an error without text"
         )
-    return data
-
-
-def _read_reason(value: Any) -> str:
-    if not (reason := require_text("refusal", value)):
-        raise InputError("refusal", value, "must say why")
-    return reason
+    setting = require_text("setting", data.get("setting", "exact"))
+    refusal = ""
+    if "refusal" in data:
+        refusal = require_text("refusal", data["refusal"])
+        if not refusal:
+            raise InputError("refusal", data["refusal"], "must say why")
+    return data, setting, refusal
 
 
 def require_text(name: str, value: Any) -> str:
@@ -454,38 +411,41 @@ def _read_seconds(value: Any) -> float:
     return float(seconds[0])
 
 
-def _read_object(name: str, data: dict[str, Any]) -> list[tuple[str, Any]]:
+def _read_object(name: str, data: dict[str, Any]) -> dict[str, Any]:
     value = data.get(name)
     if value is None and name != "answers":
-        return []
+        return {}
     if not isinstance(value, dict):
         raise InputError(name, value, "must be an object")
-    return [(write_one_line(key), entry) for key, entry in value.items()]
+    return {write_one_line(key): entry for key, entry in value.items()}
 
 
-def _read_values(
-    table: str,
-    name: str,
-    value: Any,
-    n: int,
-    vectors: Iterable[str] = VECTORS,
-) -> Array:
+def _read_arrays(
+    table: str, data: dict[str, Any], n: int, vectors: Container[str] = VECTORS
+) -> dict[str, Array]:
+    """Read n numbers under each name, or n pairs of them."""
+    return {
+        name: _read_values(f"{table}.{name}", values, n, pairs=name in vectors)
+        for name, values in _read_object(table, data).items()
+    }
+
+
+def _read_values(key: str, value: Any, n: int, *, pairs: bool = False) -> Array:
     """Read n numbers, or n pairs of them; null becomes NaN."""
-    pairs = name in vectors
     wanted = (
         f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where"
         " there is no value"
     )
-    key = f"{table}.{name}"
     if not isinstance(value, list):
         raise InputError(key, value, wanted)
     if len(value) != n:
         raise InputError(f"entries of {key}", len(value), wanted)
+    entries = value
     if pairs:
-        value = [(None, None) if pair is None else pair for pair in value]
-        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
-            raise InputError(key, value, wanted)
-    entries = list(chain.from_iterable(value) if pairs else value)
+        both = [(None, None) if pair is None else pair for pair in value]
+        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in both):
+            raise InputError(key, both, wanted)
+        entries = list(chain.from_iterable(both))
     array = _make_array(entries)
     if array is None:
         wrong = next(i for i, one in enumerate(entries) if _make_array([one]) is None)
@@ -523,40 +483,27 @@ def read_answered_motion(data: Any, command: Command) -> Command:
         return command
     names = _find_names(data)
     n = len(command.angle)
-    if names not in (
-        KINDS_OF_COMMAND[:-1] if command.moves_stroke else (COMMAND_NAMES[command.bar],)
-    ):
+    taken = KINDS_OF_COMMAND[:-1]
+    if not command.moves_stroke:
+        taken = (COMMAND_NAMES[command.bar],)
+    if names not in taken:
         raise InputError(
             "at",
             sorted(data),
             f"must have {command.commanded}, or for a stroke an angle of its bar",
         )
-    bar = BAR_OF_ANGLE[names[0]]
+    branch = command.branch
     if "branch" in data:
         branch = _read_branch(data["branch"], n)
-    else:
-        branch = command.branch
-    speed, acceleration = (
-        _read_rate(key, data[key], n) if data.get(key) is not None else None
-        for key in names[1:]
-    )
+    angle, speed, acceleration = _read_motion(names, data, n)
     if acceleration is None:
         acceleration = 0.0 if command.moves_stroke else command.acceleration
-    made = Command(
-        _read_list(names[0], data[names[0]], n),
-        branch,
-        speed,
-        acceleration,
-        bar=bar,
-    )
+    made = Command(angle, branch, speed, acceleration, bar=BAR_OF_ANGLE[names[0]])
     if command.moves_stroke:  # no motion of the bar is commanded: the caller knows it
         return made
     require_near(made, command)
-    stated: dict[str, Any] = {
-        "angle": made.angle,
-        "speed": speed,
-        "acceleration": acceleration,
-    }
+    names_of_parts = "angle", "speed", "acceleration"
+    stated = {name: getattr(made, name) for name in names_of_parts}
     if all(
         np.array_equal(value, getattr(command, name)) for name, value in stated.items()
     ):
@@ -677,8 +624,8 @@ def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
     """Write a released motion as an engine integrated it."""
     if released.refusal is not None:
         return {"refusal": released.refusal, "setting": released.setting}
-    answers = {name: _write_array(getattr(released, name)) for name in _OF_RELEASED}
-    return {"answers": answers, "setting": released.setting}
+    answers = {name: getattr(released, name) for name in _OF_RELEASED}
+    return {"answers": _write_arrays(answers), "setting": released.setting}
 
 
 def released_from_json(
@@ -687,12 +634,11 @@ def released_from_json(
     data: Any,
 ) -> ReleasedAnswer:
     """Read and check a released motion at n times, as `answer_from_json` does."""
-    data = _read_reply(data)
-    setting = require_text("setting", data.get("setting", "exact"))
-    if "refusal" in data:
-        return ReleasedAnswer.refused(engine, setting, _read_reason(data["refusal"]))
-    answers = dict(_read_object("answers", data))
+    data, setting, refusal = _read_reply(data)
+    if refusal:
+        return ReleasedAnswer.refused(engine, setting, refusal)
+    answers = _read_object("answers", data)
     theta, omega, energy, terms = (
-        _read_values("answers", name, answers.get(name), n) for name in _OF_RELEASED
+        _read_values(f"answers.{name}", answers.get(name), n) for name in _OF_RELEASED
     )
     return ReleasedAnswer(engine, setting, theta, omega, energy, terms)
