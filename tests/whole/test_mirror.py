@@ -62,7 +62,7 @@ JUDGED_BY = {
     # adapters: judged against printed figures, each other, and faults put in front of
     # them
     "validation/engines/test_engines.py": (
-        "validation/engines: balls description limits loaded loop tree;"
+        "validation/engines: balls description limits loaded loop pinocchio tree;"
         " lab/engines: drake exudyn exudyn_elements opensim; validation/scenes: random;"
         " validation/engines/mujoco: closed_loop inverse"
     ),

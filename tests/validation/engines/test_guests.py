@@ -387,9 +387,9 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
             ),
         )
     )
-    needs = guests.list_needs(crank_rocker(loads=(), effects=(springs,)))
+    sprung = crank_rocker(loads=(), effects=(springs,))
     missing = "the engine's hello does not list one_sided in effects"
-    assert client._explain_refusal(needs) == (missing if acts else "")
+    assert client._explain_refusal(sprung) == (missing if acts else "")
 
 
 @pytest.mark.slow

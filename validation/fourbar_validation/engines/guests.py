@@ -10,11 +10,12 @@ import shlex
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fourbar.effects import Springs
 from fourbar.errors import InputError
@@ -45,6 +46,7 @@ ANSWERABLE_QUANTITIES = (*COMPARED_QUANTITIES, *DRY_FRICTION_QUANTITIES)
 STATED_BY_THE_ENGINE = "as the engine states"
 """Class of the tolerance that a guest states itself."""
 COMMANDED_NAMES = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
+_Read = TypeVar("_Read")
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
 
 
@@ -82,27 +84,21 @@ class Guest(Engine):
 
     def renamed(self, name: str) -> "Guest":
         """Return the guest under another name."""
-        assert isinstance(self.start, partial)
-        start = partial(
-            self.start.func, name, *self.start.args[1:], **self.start.keywords
-        )
-        return replace(self, name=name, start=start)
+        return replace(self, name=name, start=partial(self.start, name=name))  # type: ignore[call-arg]
 
     def at_step(self, step: float) -> "GuestClient":
         """Return the engine that integrates with this step, s."""
-        engine = self.start()
-        assert isinstance(engine, GuestClient)
-        engine.step = step
-        return engine
+        return partial(self.start, step=step)()  # type: ignore[call-arg, return-value]
 
     def at_setting(self, **setting: Any) -> "Guest":
         """Return the guest that is asked with this setting.
 
         Without `name` the named setting stays.
         """
-        name = setting.pop("name", self.setting)
-        asked = {"name": name, **setting} if name else setting
-        return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
+        name = setting.setdefault("name", self.setting)
+        if not name:
+            del setting["name"]
+        return replace(self, setting=name, start=partial(self.start, setting=setting))  # type: ignore[call-arg]
 
 
 def read_guests(
@@ -134,23 +130,21 @@ def name_guests(
         trouble = ""
         try:
             hello = ask_hello(program)
-        except InputError as error:
+        except (InputError, EngineError) as error:
             trouble = str(error)
-        except EngineError as error:
-            trouble = str(error)
-            if CLASS_OF_THE_USER.fullmatch(entry) and trouble.startswith(
-                f"exit status {NOT_FOUND}: "
-            ):
+            not_found = trouble.startswith(f"exit status {NOT_FOUND}: ")
+            if not_found and CLASS_OF_THE_USER.fullmatch(entry):
                 raise InputError("--guest", entry, trouble.partition(": ")[2]) from None
-        name = stem = chosen or hello.name
-        for count in range(2, 2 + len(names)):
-            if name not in names:
-                break
-            name = f"{stem}-{count}"
+        stated = chosen or hello.name
+        counted = (f"{stated}-{number}" for number in count(2))
+        name = next(one for one in chain([stated], counted) if one not in names)
         names.add(name)
+        words = [word for word in stated.split() if word != hello.version]
         guest = Guest(
             name,
-            partial(GuestClient, name, program, hello, trouble),
+            partial(
+                GuestClient, name=name, program=program, hello=hello, trouble=trouble
+            ),
             hello.tolerance,
             answers=hello.answers,
             positions=tuple(
@@ -158,18 +152,12 @@ def name_guests(
             ),
             code=hash_files(filter(os.path.isfile, program.command)),
             version=" on ".join(filter(None, (hello.version, hello.device))),
-            stated_name=_leave_out_version(chosen or hello.name, hello.version),
+            stated_name=" ".join(words) or stated,
             seconds=program.seconds,
             effects=hello.effects,
         )
         guests.append(guest)
     return tuple(guests)
-
-
-def _leave_out_version(name: str, version: str) -> str:
-    """Return a name without the version in it."""
-    words = [word for word in name.split() if word != version]
-    return " ".join(words) or name
 
 
 def name_by_versions(
@@ -305,7 +293,7 @@ def _read_hello(data: dict[str, Any]) -> Hello:
 
     def texts(
         name: str,
-        default: tuple[str, ...],
+        default: tuple[str, ...] = (),
         allowed: Sequence[str] | None = None,
     ) -> tuple[str, ...]:
         values = data.get(name, list(default))
@@ -313,10 +301,9 @@ def _read_hello(data: dict[str, Any]) -> Hello:
             isinstance(value, str) for value in values
         ):
             raise InputError(name, values, "must be a list of texts")
-        if allowed is not None and (
-            unknown := [value for value in values if value not in allowed]
-        ):
-            raise InputError(name, unknown[0], f"must be among {', '.join(allowed)}")
+        for value in values:
+            if allowed is not None and value not in allowed:
+                raise InputError(name, value, f"must be among {', '.join(allowed)}")
         return tuple(map(write_one_line, values))
 
     def text(name: str) -> str:
@@ -326,29 +313,23 @@ def _read_hello(data: dict[str, Any]) -> Hello:
         raise EngineError(text("error") or "the engine reported an error without text")
     name = text("engine")
     if not name or name != data["engine"]:
-        raise InputError(
-            "engine",
-            data.get("engine"),
-            "must be a name of printable characters in one line",
-        )
-    answers = texts("answers", (), ANSWERABLE_QUANTITIES)
+        wanted = "must be a name of printable characters in one line"
+        raise InputError("engine", data.get("engine"), wanted)
+    answers = texts("answers", allowed=ANSWERABLE_QUANTITIES)
     if not answers:
-        raise InputError(
-            "answers",
-            data.get("answers"),
-            f"must name quantities among {', '.join(ANSWERABLE_QUANTITIES)}",
-        )
+        wanted = f"must name quantities among {', '.join(ANSWERABLE_QUANTITIES)}"
+        raise InputError("answers", data.get("answers"), wanted)
     if "four-bar" not in texts("mechanisms", ("four-bar",)):
         raise InputError("mechanisms", data["mechanisms"], 'must hold "four-bar"')
     return Hello(
         name,
         tuple(quantity for quantity in ANSWERABLE_QUANTITIES if quantity in answers),
         texts("commands", ("theta_2",), COMMANDED_NAMES),
-        texts("effects", ()),
+        texts("effects"),
         _read_tolerance(data.get("tolerance", EQUIVALENCE.name)),
         text("version"),
         text("code"),
-        texts("settings", ()),
+        texts("settings"),
         text("device"),
         text("made_for"),
     )
@@ -357,22 +338,15 @@ def _read_hello(data: dict[str, Any]) -> Hello:
 def _read_tolerance(stated: Any) -> ErrorBound:
     if stated == EQUIVALENCE.name:
         return EQUIVALENCE
-    error, reason = (
-        stated if isinstance(stated, list) and len(stated) == 2 else (0.0, "")
+    match stated:
+        case [float(error), str(reason)] if 0.0 < error < 1.0 and reason.strip():
+            reason = f"{error:g} of the scale: {write_one_line(reason)}"
+            return ErrorBound(STATED_BY_THE_ENGINE, reason, error, conditioned=False)
+    allowed = (
+        f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its'
+        " reason]"
     )
-    if (
-        type(error) is not float
-        or not 0.0 < error < 1.0
-        or not isinstance(reason, str)
-        or not reason.strip()
-    ):
-        allowed = (
-            f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its'
-            " reason]"
-        )
-        raise InputError("tolerance", stated, allowed)
-    reason = f"{error:g} of the scale: {write_one_line(reason)}"
-    return ErrorBound(STATED_BY_THE_ENGINE, reason, error, conditioned=False)
+    raise InputError("tolerance", stated, allowed)
 
 
 def list_needs(scene: Scene) -> list[str]:
@@ -383,92 +357,96 @@ def list_needs(scene: Scene) -> list[str]:
     for effect in scene.effects:
         if isinstance(effect, Springs) and any(one.acts for one in effect.springs):
             needs.append(protocol.ONE_SIDED)
-    needs += (
-        [name_drive(scene.drive)]
-        if scene.drive is not None
-        else ["drive"] * (scene.drive_bar != 2)
-    )
+    if scene.drive is not None:
+        needs.append(name_drive(scene.drive))
+    elif scene.drive_bar != 2:
+        needs.append("drive")
     return needs
 
 
+@dataclass
 class GuestClient:
     """Client of a guest's program, which runs on from scene to scene.
 
     A program that failed is started again.
     """
 
-    def __init__(
-        self,
-        name: str,
-        program: Program,
-        hello: Hello,
-        trouble: str = "",
-        setting: dict[str, Any] | None = None,
-    ) -> None:
-        self.name = name
-        self._program = program
-        self._hello = hello
-        self._trouble = trouble
-        self._setting = {"setting": setting} if setting else {}
-        self.commands = COMMANDED_NAMES if trouble else hello.commands
-        self.step: float | None = None
-        """Step of a released motion, s."""
+    name: str
+    program: Program
+    hello: Hello
+    trouble: str = ""
+    """Why the hello was not read."""
+    setting: dict[str, Any] = field(default_factory=dict)
+    step: float | None = None
+    """Step of a released motion, s."""
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Return the names of what it can be commanded by."""
+        return COMMANDED_NAMES if self.trouble else self.hello.commands
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Return the answer of the guest; EngineError where it fails."""
-        if refusal := self._explain_refusal(list_needs(scene)):
+        if refusal := self._explain_refusal(scene):
             return Answer(self.name, "exact", refusal=refusal)
-        data = {
-            "ask": "answer",
-            "scene": protocol.scene_to_json(scene),
-            "command": protocol.command_to_json(scene, command),
-            **self._setting,
-        }
-        try:
-            return protocol.answer_from_json(
-                self.name,
-                command,
-                self._ask(data, len(command.angle)),
-            )
-        except InputError as error:
-            raise EngineError(str(error)) from None
+        data = {"command": protocol.command_to_json(scene, command)}
+        if self.setting:
+            data["setting"] = self.setting
+        n = len(command.angle)
+        return self._ask(
+            "answer",
+            scene,
+            data,
+            n,
+            partial(protocol.answer_from_json, self.name, command),
+        )
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Return the released motion as the guest integrates it."""
-        if refusal := self._explain_refusal(list_needs(scene)):
+        if refusal := self._explain_refusal(scene):
             return ReleasedAnswer.refused(self.name, "-", refusal)
-        data = {
-            "ask": "release",
-            "scene": protocol.scene_to_json(scene),
-            **protocol.release_to_json(scene),
-        }
-        data |= {} if self.step is None else {"step": self.step}
-        try:
-            return protocol.released_from_json(
-                self.name,
-                len(times),
-                self._ask(data, len(times)),
-            )
-        except InputError as error:
-            raise EngineError(str(error)) from None
+        data = protocol.release_to_json(scene)
+        if self.step is not None:
+            data["step"] = self.step
+        n = len(times)
+        return self._ask(
+            "release",
+            scene,
+            data,
+            n,
+            partial(protocol.released_from_json, self.name, n),
+        )
 
-    def _explain_refusal(self, needs: Iterable[str]) -> str:
-        if self._trouble:
-            raise EngineError(self._trouble)
-        lacking = [need for need in needs if need not in self._hello.effects]
-        name = self._setting.get("setting", {}).get("name")
-        if name is not None and name not in self._hello.settings:
+    def _explain_refusal(self, scene: Scene) -> str:
+        if self.trouble:
+            raise EngineError(self.trouble)
+        name = self.setting.get("name")
+        if name is not None and name not in self.hello.settings:
             return f"the engine's hello does not list {name!r} in settings"
+        needs = list_needs(scene)
+        lacking = [need for need in needs if need not in self.hello.effects]
         if lacking:
             return f"the engine's hello does not list {', '.join(lacking)} in effects"
         return ""
 
-    def _ask(self, question: dict[str, Any], positions: int) -> dict[str, Any]:
-        running = _RUNNING.setdefault(self._program, Running(self._program))
-        return running.ask_again(question, positions, self._greet)
+    def _ask(
+        self,
+        what: str,
+        scene: Scene,
+        data: dict[str, Any],
+        positions: int,
+        read: Callable[[Any], _Read],
+    ) -> _Read:
+        """Ask about positions of a scene; EngineError where the reply is no answer."""
+        question = {"ask": what, "scene": protocol.scene_to_json(scene), **data}
+        running = _RUNNING.setdefault(self.program, Running(self.program))
+        try:
+            return read(running.ask_again(question, positions, self._greet))
+        except InputError as error:
+            raise EngineError(str(error)) from None
 
     def _greet(self, ask: Ask) -> None:
-        if _read_hello(ask(HELLO, 0)) != self._hello:
+        if _read_hello(ask(HELLO, 0)) != self.hello:
             raise EngineError("the engine's hello changed after a restart")
 
 

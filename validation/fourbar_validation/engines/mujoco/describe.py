@@ -8,7 +8,7 @@ generated file.
 
 import math
 from collections.abc import Iterator, Mapping
-from itertools import count
+from itertools import chain, count
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -85,266 +85,244 @@ def describe_model(seen: SeenLoop, flywheel: float = 0.0) -> Described:
     `flywheel`: the part of the armature of pin O2 that drives, kg m^2, and so is no
     inertia of the input.
     """
-    model = seen.model
-    skew = seen.loop.misaligned
-    described = {
-        "plane": ModelEntry(seen.plane),
-        "skew": ModelEntry(skew if skew > PARALLEL_AXES else 0.0),
-    }
-    for name, length in zip(BAR_NAMES.values(), seen.loop.lengths, strict=True):
-        described[f"lengths.{name}"] = ModelEntry(length)
-    for bar in MOVING_BARS:
-        described |= _describe_bar(seen, bar, flywheel)
-    gravity = model.opt.gravity * is_enabled(model, "gravity")
-    for axis, size in zip("xy", seen.in_plane(gravity), strict=True):
-        described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
-    described["gravity.across"] = ModelEntry(
-        float(gravity @ seen.normal),
-        "option",
-        "gravity",
-    )
-    for pin in PINS:
-        described |= _describe_pin(seen, pin)
-    described |= (
-        _describe_closure(seen) | _describe_loads(seen) | _describe_tendons(seen)
-    )
-    for name in COMPARED_OPTIONS:
-        setting = getattr(model.opt, name)
-        if name in ENUMERATIONS:
-            kind = ENUMERATIONS[name](setting).name.partition("_")[2]
-        else:
-            kind = ""
-        described[f"option.{name}"] = ModelEntry(
-            MJCF_WORDS.get(kind, kind) or _read_field(setting),
-            "option",
-            name,
+    return _Description(seen, flywheel).described
+
+
+class _Description:
+    """The entries of one loop, put together part by part."""
+
+    def __init__(self, seen: SeenLoop, flywheel: float) -> None:
+        self.seen = seen
+        self.model = model = seen.model
+        self.pins = {joint: pin for pin, joint in seen.hinge.items()}
+        self.described: Described = {}
+        skew = seen.loop.misaligned
+        self.put("plane", seen.plane)
+        self.put("skew", skew if skew > PARALLEL_AXES else 0.0)
+        for name, length in zip(BAR_NAMES.values(), seen.loop.lengths, strict=True):
+            self.put(f"lengths.{name}", length)
+        for bar in MOVING_BARS:
+            self.add_bar(bar, flywheel if bar == 2 else 0.0)
+        gravity = model.opt.gravity * is_enabled(model, "gravity")
+        for axis, size in zip("xy", seen.in_plane(gravity), strict=True):
+            self.put(f"gravity.{axis}", size, "option", "gravity")
+        self.put("gravity.across", gravity @ seen.normal, "option", "gravity")
+        for pin in PINS:
+            self.add_pin(pin)
+        self.add_closure()
+        self.add_loads()
+        self.add_tendons()
+        for name in COMPARED_OPTIONS:
+            setting = getattr(model.opt, name)
+            if name in ENUMERATIONS:
+                kind = ENUMERATIONS[name](setting).name.partition("_")[2]
+                setting = MJCF_WORDS.get(kind, kind)
+            self.put(f"option.{name}", setting, "option", name)
+        touching = model.npair or (
+            model.geom_contype.any() and model.geom_conaffinity.any()
         )
-    touching = model.npair or (
-        model.geom_contype.any() and model.geom_conaffinity.any()
-    )
-    touching = touching and seen.is_alone and is_enabled(model, "contact")
-    described["contacts"] = ModelEntry("possible" if touching else "off")
-    return described
+        touching = touching and seen.is_alone and is_enabled(model, "contact")
+        self.put("contacts", "possible" if touching else "off")
+
+    def put(
+        self, key: str, value: object, element: str = "", attribute: str = ""
+    ) -> None:
+        """Put an entry; numbers of NumPy become plain ones."""
+        if not isinstance(value, str):
+            read = np.asarray(value, dtype=float).tolist()
+            value = tuple(read) if isinstance(read, list) else read
+        self.described[key] = ModelEntry(value, element, attribute)
+
+    def add_bar(self, bar: int, flywheel: float) -> None:
+        """Describe mass, inertia about the mass centre, and its place.
+
+        The place is from the first pin; all that is welded to the bar is included. The
+        armature of a hinge on the ground turns with the bar, and is inertia of it.
+        """
+        seen = self.seen
+        mass, (distance, angle), inertia = seen.lump(bar)
+        key = f"bars.{BAR_NAMES[bar]}"
+        element = f'body "{self.model.body(seen.loop.bodies[bar][0]).name}"'
+        self.put(f"{key}.mass", mass, element, "inertial")
+        self.put(f"{key}.inertia", inertia, element, "inertial")
+        self.put(f"{key}.centre.distance", distance, element, "inertial")
+        self.put(f"{key}.centre.angle", angle, element, "inertial")
+        pin = FIRST_PIN[bar]
+        joint = seen.hinge.get(pin)
+        if pin in _GROUND_PINS and joint is not None:
+            armature = self.model.dof_armature[self.model.jnt_dofadr[joint]] - flywheel
+            if armature:
+                hinge = _name_element("joint", self.model.joint(joint).name, joint)
+                where = f"{element} inertial and {hinge}"
+                self.put(f"{key}.inertia", inertia + armature, where, "armature")
+        lifted = list_lifted_masses(self.model)[seen.list_parts(bar)].sum()
+        self.put(f"lift.{BAR_NAMES[bar]}", lifted, element, "gravcomp")
+
+    def add_pin(self, pin: str) -> None:
+        """Describe what acts at a pin; nothing acts where the loop is cut."""
+        seen = self.seen
+        model = self.model
+        key = f"pins.{pin}"
+        joint = seen.hinge.get(pin)
+        if joint is None:
+            for name in PIN_PROPERTIES:
+                self.put(f"{key}.{name}", 0.0)
+            self.put(f"{key}.range", UNLIMITED_RANGE)
+            return
+        dof = int(model.jnt_dofadr[joint])
+        element = _name_element("joint", model.joint(joint).name, joint)
+        acting = {}
+        for name, (field, attribute, flag) in PIN_PROPERTIES.items():
+            if name == "armature" and pin in _GROUND_PINS:
+                continue  # it is inertia of the bar there
+            size = getattr(model, field)[joint if field.startswith("jnt") else dof]
+            acting[name] = size * (not flag or is_enabled(model, flag))
+            self.put(f"{key}.{name}", acting[name], element, attribute)
+        if acting["friction"]:
+            for field, attribute in FRICTION_COMPLIANCE.items():
+                value = getattr(model, field)[dof]
+                self.put(f"{key}.{attribute}", value, element, attribute)
+        if acting["stiffness"]:
+            angle = seen.rest_angle(pin, spring=True)
+            self.put(f"{key}.spring angle", angle, element, "springref")
+        stops = seen.stops(pin) if seen.is_alone else None
+        self.put(f"{key}.range", stops or UNLIMITED_RANGE, element, "range")
+        sense = "counter-clockwise" if seen.sense[pin] > 0 else "clockwise"
+        self.put(f"{key}.positive", sense, element, "axis")
+
+    def add_closure(self) -> None:
+        """Describe how the loop is closed, and how softly."""
+        seen = self.seen
+        model = self.model
+        number = seen.closure
+        self.put("closure.pin", seen.loop.cut or "within a bar")
+        self.put("closure.by", seen.closed_by)
+        self.put("closure.out of plane", seen.measure_offset())
+        names = [
+            model.equality(i).name or f"(unnamed {i})"
+            for i in range(model.neq)
+            if i not in seen.loop.closures and model.eq_active0[i]
+        ]
+        self.put("other equalities", ", ".join(names) or NONE_IN_WORDS)
+        if not model.eq_active0[number]:
+            return
+        kind = seen.closed_by.partition(" ")[0]
+        element = _name_element(kind, model.equality(number).name, number)
+        self.put("closure.solref", model.eq_solref[number], element, "solref")
+        self.put("closure.solimp", model.eq_solimp[number], element, "solimp")
+        # MuJoCo's inverse weights of the two bodies that the equality joins, 1/kg
+        bodies = [model.eq_obj1id[number], model.eq_obj2id[number]]
+        if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
+            bodies = [model.site_bodyid[site] for site in bodies]
+        weight = float(model.body_invweight0[bodies, 0].sum())
+        impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
+        softness = (1.0 - impedance) / impedance * weight
+        self.put("closure.softness", softness, element, "solimp")
+
+    def add_loads(self) -> None:
+        """Describe what actuators exert with a control of 0.
+
+        At sites it is the sum on each bar, at hinges the couple. Forces that keep their
+        axes add up to one force, one couple, and the first moments r x F and r . F
+        about the bar's first pin, which tell where the force acts. The drive is taken
+        off, and is no load.
+        """
+        seen = self.seen
+        model = self.model
+        sums: dict[str, Array] = {}
+        for i in range(len(model.actuator_trntype)):
+            bias = _read_bias(model, i)
+            if i in seen.drives or not bias.any():
+                continue  # it exerts what it is told to, and it is told nothing
+            number = int(model.actuator_trnid[i, 0])
+            exerted = model.actuator_gear[i, 0] * bias
+            kind = model.actuator_trntype[i]
+            name = model.actuator(i).name
+            element = _name_element("actuator", name, i)
+            bar = None
+            if kind == mujoco.mjtTrn.mjTRN_SITE:
+                bar = seen.bar(model.site_bodyid[number])
+            if kind == mujoco.mjtTrn.mjTRN_JOINT:
+                if number in self.pins and seen.is_alone:
+                    pin = self.pins[number]
+                    self.put(f"pins.{pin}.motor", seen.sense[pin] * exerted, element)
+            elif kind == mujoco.mjtTrn.mjTRN_TENDON:
+                if seen.touches_tendon(number):
+                    self.put(f"{self.name_tendon(number)}.tension", exerted, element)
+            elif bar in MOVING_BARS:
+                key, load = _read_load(seen, i, bar, bias[0])
+                sums[key] = sums.get(key, np.zeros(5)) + load
+            elif seen.is_alone:
+                words = "acts on no pin, bar or tendon"
+                self.put(f"actuators.{name or i}", words, element)
+        for key, total in sums.items():
+            fx, fy, couple, turning, along = total.tolist()
+            squared = fx * fx + fy * fy
+            x = y = 0.0
+            if squared:
+                x = (fx * along + fy * turning) / squared
+                y = (fy * along - fx * turning) / squared
+                turning = 0.0
+            self.put(f"{key}.force", (fx, fy))
+            self.put(f"{key}.point", (x, y))
+            self.put(f"{key}.couple", couple + turning)
+
+    def name_tendon(self, number: int) -> str:
+        """Return a tendon's name: its pins, or else the bars that it runs between."""
+        parts = []
+        for kind, index, _ in _list_wraps(self.model, number):
+            if kind == mujoco.mjtWrap.mjWRAP_JOINT:
+                parts.append(self.pins.get(index, "another joint"))
+            elif kind == mujoco.mjtWrap.mjWRAP_SITE:
+                bar = self.seen.bar(self.model.site_bodyid[index])
+                parts.append("no bar" if bar is None else BAR_NAMES[bar])
+            else:
+                parts.append(kind.name.removeprefix("mjWRAP_").lower())
+        return f"tendons.{' '.join(sorted(parts))}"
+
+    def add_tendons(self) -> None:
+        """Describe every tendon by its path, and what it does.
+
+        The path tells several tendons between the same bars apart.
+        """
+        seen = self.seen
+        model = self.model
+        tendons = list[tuple[str, tuple[float, ...], int]]()
+        rest: dict[int, float] = {}
+        for i in filter(seen.touches_tendon, range(model.ntendon)):
+            path: list[tuple[Any, ...]] = []
+            for kind, index, by_turn in _list_wraps(model, i):
+                if kind == mujoco.mjtWrap.mjWRAP_JOINT and index in self.pins:
+                    pin = self.pins[index]
+                    coefficient = seen.sense[pin] * by_turn
+                    path.append((pin, coefficient))
+                    before = rest.get(i, -float(model.tendon_length0[i]))
+                    rest[i] = before + coefficient * seen.rest_angle(pin)
+                elif kind == mujoco.mjtWrap.mjWRAP_SITE:
+                    bar = seen.bar(model.site_bodyid[index])
+                    place = bar and seen.along_bar(bar, seen.data.site_xpos[index])
+                    path.append((str(bar), *(place or ())))
+            numbers = tuple(number for _, *place in sorted(path) for number in place)
+            tendons.append((self.name_tendon(i), numbers, i))
+        for name, numbers, i in sorted(tendons):
+            counted = (f"{name} ({number})" for number in count(2))
+            keys = chain([name], counted)
+            key = next(one for one in keys if one not in self.described)
+            element = _name_element("tendon", model.tendon(i).name, i)
+            self.put(key, "present", element)
+            self.put(f"{key}.path", numbers, element)
+            for attribute, written in _TENDON.items():
+                if model.tendon_frictionloss[i] or not attribute.endswith("_fri"):
+                    value = getattr(model, f"tendon_{attribute}")[i]
+                    self.put(f"{key}.{written}", value, element, written)
+            if model.tendon_stiffness[i]:
+                end = "springlength angle" if i in rest else "springlength"
+                lengths = model.tendon_lengthspring[i] + rest.get(i, 0.0)
+                self.put(f"{key}.{end}", lengths, element, "springlength")
 
 
-def _read_field(entry: object) -> Value:
-    return (
-        float(entry)  # type: ignore[arg-type]
-        if np.ndim(entry) == 0  # type: ignore[arg-type]
-        else tuple(np.asarray(entry, dtype=float).tolist())
-    )
-
-
-def _name_element(
-    tag: str,
-    name: str,
-    number: int,
-) -> str:
-    if name:
-        return f'{tag} "{name}"'
-    return f"{tag} {number} (unnamed)"
-
-
-def _describe_bar(
-    seen: SeenLoop,
-    bar: int,
-    flywheel: float,
-) -> Described:
-    """Describe mass, inertia about the mass centre, and its place.
-
-    The place is from the first pin; all that is welded to the bar is included. The
-    armature of a hinge on the ground turns with the bar, and is inertia of it.
-    """
-    model = seen.model
-    mass, (distance, angle), inertia = seen.lump(bar)
-    key = f"bars.{BAR_NAMES[bar]}"
-    element = f'body "{model.body(seen.loop.bodies[bar][0]).name}"'
-    values = {
-        "mass": mass,
-        "inertia": inertia,
-        "centre.distance": distance,
-        "centre.angle": angle,
-    }
-    described = {
-        f"{key}.{name}": ModelEntry(value, element, "inertial")
-        for name, value in values.items()
-    }
-    armature = _find_armature(seen, FIRST_PIN[bar])
-    if bar == 2:
-        armature -= flywheel
-    if FIRST_PIN[bar] in _GROUND_PINS and armature:
-        joint = seen.hinge[FIRST_PIN[bar]]
-        hinge = _name_element("joint", model.joint(joint).name, joint)
-        described[f"{key}.inertia"] = ModelEntry(
-            inertia + armature,
-            f"{element} inertial and {hinge}",
-            "armature",
-        )
-    lifted = float(list_lifted_masses(model)[seen.list_parts(bar)].sum())
-    described[f"lift.{BAR_NAMES[bar]}"] = ModelEntry(lifted, element, "gravcomp")
-    return described
-
-
-def _find_armature(seen: SeenLoop, pin: str) -> float:
-    """Find the armature of a pin's hinge, kg m^2; 0 where the loop is cut."""
-    if pin not in seen.hinge:
-        return 0.0
-    dof = seen.model.jnt_dofadr[seen.hinge[pin]]
-    return float(seen.model.dof_armature[dof])
-
-
-def _describe_pin(seen: SeenLoop, pin: str) -> Described:
-    """Describe what acts at a pin; nothing acts where the loop is cut."""
-    model = seen.model
-    key = f"pins.{pin}"
-    joint = seen.hinge.get(pin)
-    if joint is None:
-        return {f"{key}.{name}": ModelEntry(0.0) for name in PIN_PROPERTIES} | {
-            f"{key}.range": ModelEntry(UNLIMITED_RANGE)
-        }
-    dof = int(model.jnt_dofadr[joint])
-    element = _name_element("joint", model.joint(joint).name, joint)
-    described = {}
-    for name, (field, attribute, flag) in PIN_PROPERTIES.items():
-        if name == "armature" and pin in _GROUND_PINS:
-            continue  # it is inertia of the bar there
-        size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
-        acts = not flag or is_enabled(model, flag)
-        described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)
-    if described[f"{key}.friction"].value:
-        for field, attribute in FRICTION_COMPLIANCE.items():
-            described[f"{key}.{attribute}"] = ModelEntry(
-                _read_field(getattr(model, field)[dof]),
-                element,
-                attribute,
-            )
-    if described[f"{key}.stiffness"].value:
-        described[f"{key}.spring angle"] = ModelEntry(
-            seen.rest_angle(pin, spring=True),
-            element,
-            "springref",
-        )
-    stops = seen.stops(pin) if seen.is_alone else None
-    described[f"{key}.range"] = ModelEntry(
-        UNLIMITED_RANGE if stops is None else stops,
-        element,
-        "range",
-    )
-    sense = "counter-clockwise" if seen.sense[pin] > 0 else "clockwise"
-    return described | {f"{key}.positive": ModelEntry(sense, element, "axis")}
-
-
-def _describe_closure(seen: SeenLoop) -> Described:
-    model = seen.model
-    number = seen.closure
-    described = {
-        "closure.pin": ModelEntry(seen.loop.cut or "within a bar"),
-        "closure.by": ModelEntry(seen.closed_by),
-        "closure.out of plane": ModelEntry(seen.measure_offset()),
-    }
-    others = [
-        i
-        for i in range(model.neq)
-        if i not in seen.loop.closures and model.eq_active0[i]
-    ]
-    names = [model.equality(i).name or f"(unnamed {i})" for i in others]
-    described["other equalities"] = ModelEntry(", ".join(names) or NONE_IN_WORDS)
-    if not model.eq_active0[number]:
-        return described
-    element = _name_element(
-        seen.closed_by.partition(" ")[0],
-        model.equality(number).name,
-        number,
-    )
-    impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
-    softness = (1.0 - impedance) / impedance * _sum_inverse_weights(seen, number)
-    described["closure.solref"] = ModelEntry(
-        _read_field(model.eq_solref[number]),
-        element,
-        "solref",
-    )
-    described["closure.solimp"] = ModelEntry(
-        _read_field(model.eq_solimp[number]),
-        element,
-        "solimp",
-    )
-    return described | {"closure.softness": ModelEntry(softness, element, "solimp")}
-
-
-def _sum_inverse_weights(seen: SeenLoop, number: int) -> float:
-    """Sum MuJoCo's inverse weights of the two bodies that an equality joins, 1/kg."""
-    model = seen.model
-    bodies = [int(model.eq_obj1id[number]), int(model.eq_obj2id[number])]
-    if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-        bodies = [int(model.site_bodyid[site]) for site in bodies]
-    return float(model.body_invweight0[bodies, 0].sum())
-
-
-def _describe_loads(seen: SeenLoop) -> Described:
-    """Describe what actuators exert with a control of 0.
-
-    At sites it is the sum on each bar, at hinges the couple. Forces that keep their
-    axes add up to one force, one couple, and the first moments r x F and r . F about
-    the bar's first pin, which tell where the force acts. The drive is taken off, and is
-    no load.
-    """
-    model = seen.model
-    sums: dict[str, Array] = {}
-    described: Described = {}
-    pins = {joint: pin for pin, joint in seen.hinge.items()}
-    for i in range(len(model.actuator_trntype)):
-        if i in seen.drives:
-            continue
-        bias = _read_bias(model, i)
-        if not bias.any():
-            continue  # it exerts what it is told to, and it is told nothing
-        number = int(model.actuator_trnid[i, 0])
-        gear = model.actuator_gear[i]
-        kind = model.actuator_trntype[i]
-        element = _name_element("actuator", model.actuator(i).name, i)
-        bar = None
-        if kind == mujoco.mjtTrn.mjTRN_SITE:
-            bar = seen.bar(model.site_bodyid[number])
-        if kind == mujoco.mjtTrn.mjTRN_JOINT:
-            if number in pins and seen.is_alone:
-                pin = pins[number]
-                described[f"pins.{pin}.motor"] = ModelEntry(
-                    _read_field(seen.sense[pin] * gear[0] * bias), element
-                )
-        elif kind == mujoco.mjtTrn.mjTRN_TENDON:
-            if seen.touches_tendon(number):
-                described[f"{_name_tendon(seen, number)}.tension"] = ModelEntry(
-                    _read_field(gear[0] * bias), element
-                )
-        elif bar in MOVING_BARS:
-            key, load = _read_load(seen, i, bar, bias[0])
-            sums[key] = sums.get(key, np.zeros(5)) + load
-        elif seen.is_alone:
-            described[f"actuators.{model.actuator(i).name or i}"] = ModelEntry(
-                "acts on no pin, bar or tendon", element
-            )
-    for key, total in sums.items():
-        described |= _describe_load(key, *total.tolist())
-    return described
-
-
-def _describe_load(
-    key: str, fx: float, fy: float, couple: float, turning: float, along: float
-) -> Described:
-    """Describe the sum of loads on a bar: force, the point where it acts, couple."""
-    squared = fx * fx + fy * fy
-    point = (0.0, 0.0)
-    if squared:
-        point = (
-            (fx * along + fy * turning) / squared,
-            (fy * along - fx * turning) / squared,
-        )
-        turning = 0.0
-    return {
-        f"{key}.force": ModelEntry((fx, fy)),
-        f"{key}.point": ModelEntry(point),
-        f"{key}.couple": ModelEntry(couple + turning),
-    }
+def _name_element(tag: str, name: str, number: int) -> str:
+    return f'{tag} "{name}"' if name else f"{tag} {number} (unnamed)"
 
 
 def _read_load(
@@ -393,21 +371,6 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
     return np.zeros(3)
 
 
-def _name_tendon(seen: SeenLoop, number: int) -> str:
-    """Return a tendon's name: its pins, or else the bars that it runs between."""
-    joints = {joint: pin for pin, joint in seen.hinge.items()}
-    parts = []
-    for kind, index, _ in _list_wraps(seen.model, number):
-        if kind == mujoco.mjtWrap.mjWRAP_JOINT:
-            parts.append(joints.get(index, "another joint"))
-        elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-            bar = seen.bar(seen.model.site_bodyid[index])
-            parts.append("no bar" if bar is None else BAR_NAMES[bar])
-        else:
-            parts.append(kind.name.removeprefix("mjWRAP_").lower())
-    return f"tendons.{' '.join(sorted(parts))}"
-
-
 def _list_wraps(
     model: mujoco.MjModel, tendon: int
 ) -> Iterator[tuple[mujoco.mjtWrap, int, float]]:
@@ -416,58 +379,6 @@ def _list_wraps(
     for wrap in range(first, first + model.tendon_num[tendon]):
         kind = mujoco.mjtWrap(model.wrap_type[wrap])
         yield kind, int(model.wrap_objid[wrap]), float(model.wrap_prm[wrap])
-
-
-def _describe_tendons(seen: SeenLoop) -> Described:
-    """Describe every tendon by its path, and what it does.
-
-    The path tells several tendons between the same bars apart.
-    """
-    model = seen.model
-    data = seen.data
-    pins = {joint: pin for pin, joint in seen.hinge.items()}
-    tendons = list[tuple[str, tuple[float, ...], int]]()
-    rest: dict[int, float] = {}
-    for i in filter(seen.touches_tendon, range(model.ntendon)):
-        path: list[tuple[Any, ...]] = []
-        for kind, index, by_turn in _list_wraps(model, i):
-            if kind == mujoco.mjtWrap.mjWRAP_JOINT and index in pins:
-                pin = pins[index]
-                coefficient = seen.sense[pin] * by_turn
-                path.append((pin, coefficient))
-                before = rest.get(i, -float(model.tendon_length0[i]))
-                rest[i] = before + coefficient * seen.rest_angle(pin)
-            elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-                bar = seen.bar(model.site_bodyid[index])
-                place = bar and seen.along_bar(bar, data.site_xpos[index])
-                path.append((str(bar), *(place or ())))
-        numbers = tuple(number for _, *place in sorted(path) for number in place)
-        tendons.append((_name_tendon(seen, i), numbers, i))
-    described: Described = {}
-    for name, numbers, i in sorted(tendons):
-        key = name
-        for number in count(2):
-            if key not in described:
-                break
-            key = f"{name} ({number})"
-        element = _name_element("tendon", model.tendon(i).name, i)
-        described[key] = ModelEntry("present", element)
-        described[f"{key}.path"] = ModelEntry(numbers, element)
-        for attribute, written in _TENDON.items():
-            described[f"{key}.{written}"] = ModelEntry(
-                _read_field(getattr(model, f"tendon_{attribute}")[i]),
-                element,
-                written,
-            )
-        if model.tendon_stiffness[i]:
-            end = "springlength angle" if i in rest else "springlength"
-            lengths = model.tendon_lengthspring[i] + rest.get(i, 0.0)
-            described[f"{key}.{end}"] = ModelEntry(
-                _read_field(lengths), element, "springlength"
-            )
-        if not model.tendon_frictionloss[i]:
-            del described[f"{key}.solreffriction"], described[f"{key}.solimpfriction"]
-    return described
 
 
 def set_entry(
