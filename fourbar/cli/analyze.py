@@ -438,7 +438,7 @@ def _write_positions(
     from fourbar.solution import write_csv, write_json
 
     scene = solution.scene
-    columns = [] if names is None else choose_columns(scene, solution, names)
+    columns = [] if names is None else choose_columns(solution, names)
     if form == "json":
         motor = list_duty(solution, units)
         notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]

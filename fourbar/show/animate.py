@@ -25,7 +25,7 @@ from fourbar.files import dump
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES, Array
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.derived import derive
@@ -201,7 +201,12 @@ def _collect_sweep(
     return {
         "theta_2": null_nan(theta_2),
         "time": None,
-        "over": _over(name, name, places, motion.speed),
+        "over": {
+            "name": name,
+            "commanded": name,
+            "values": None if name == "theta_2" else places.tolist(),
+            "speed": None if isinstance(motion.speed, np.ndarray) else motion.speed,
+        },
         "rate": None,
         "start": _find_start(scene, shown),
         "branches": branches,
@@ -225,24 +230,6 @@ def _find_start(scene: Scene, shown: Command) -> int | None:
     return int(np.argmin(np.abs(away)))
 
 
-def _over(
-    name: str,
-    commanded: str,
-    values: Array,
-    speed: float | Array | None = None,
-) -> dict[str, Any]:
-    """Return what curves and slider run over: "time" or what is commanded.
-
-    Values are included where they are not those of theta_2, a speed where it is one.
-    """
-    return {
-        "name": name,
-        "commanded": commanded,
-        "values": None if name == "theta_2" else values.tolist(),
-        "speed": None if isinstance(speed, np.ndarray) else speed,
-    }
-
-
 def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
     motion = solve(scene)
@@ -254,11 +241,24 @@ def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
         for name in DRIVE_SCALARS:
             columns.pop(name, None)
         columns["energy"] = compute_energies(scene, solution).kinetic
-    rate = _choose_rate(float(time[-1] - time[0]))
+    # a power of ten, of a motion that is too short or too long to watch
+    duration = float(time[-1] - time[0])
+    shortest, longest = _WATCHED
+    power = 0
+    if 0.0 < duration < shortest:
+        power = math.floor(math.log10(duration / shortest))
+    elif duration > longest:
+        power = math.ceil(math.log10(duration / longest))
+    rate = float(10.0**power)
     return {
         "theta_2": null_nan(solution.theta_2),
         "time": time.tolist(),
-        "over": _over("time", motion.commanded, time),
+        "over": {
+            "name": "time",
+            "commanded": motion.commanded,
+            "values": time.tolist(),
+            "speed": None,
+        },
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
@@ -273,20 +273,6 @@ def thin_out(positions: Command) -> Command:
     if n <= MAX_ROWS:
         return positions
     return positions.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
-
-
-def _choose_rate(duration: float) -> float:
-    """Return the seconds of a motion shown in one second: 1, or a power of ten.
-
-    A motion has another rate than 1 if that were too short or too long to watch.
-    """
-    shortest, longest = _WATCHED
-    power = 0
-    if 0.0 < duration < shortest:
-        power = math.floor(math.log10(duration / shortest))
-    elif duration > longest:
-        power = math.ceil(math.log10(duration / longest))
-    return float(10.0**power)
 
 
 def _describe_pace(motion: Solution, rate: float, shown: int) -> str:

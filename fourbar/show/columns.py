@@ -72,7 +72,7 @@ class Column(NamedTuple):
         return self.values * (above / below)
 
 
-def choose_columns(scene: Scene, solution: Solution, names: str) -> list[Column]:
+def choose_columns(solution: Solution, names: str) -> list[Column]:
     """Read the columns of a list like "theta_2,torque,F12,omega_4/omega_2".
 
     Headings of the CSV may stand for the names: "torque [N m]", "|F12|".
@@ -84,38 +84,31 @@ def choose_columns(scene: Scene, solution: Solution, names: str) -> list[Column]
     for word in names.split(","):
         name = _HEADING_MARKS.sub("", word.strip())
         if _is_place(solution, name):
-            columns += [
-                read_column(scene, solution, f"{name}{axis}") for axis in COLUMN_AXES
-            ]
+            columns += [read_column(solution, f"{name}{axis}") for axis in COLUMN_AXES]
         else:
-            columns.append(read_column(scene, solution, name))
+            columns.append(read_column(solution, name))
     return columns
 
 
-def read_column(scene: Scene, solution: Solution, name: str) -> Column:
+def read_column(solution: Solution, name: str) -> Column:
     """Read one column by its name; InputError as of `choose_columns`."""
-    for first, second in _split_difference(solution, name):
-        return _subtract(
-            name,
-            read_column(scene, solution, first),
-            read_column(scene, solution, second),
-        )
+    for parts in _split_difference(solution, name):
+        return _subtract(name, *(read_column(solution, part) for part in parts))
     if _is_number(solution, name) or "/" not in name:
-        unit, values, size = _find_number(scene, solution, name)
-        return Column(name, unit, values, size=size)
+        return _read_number(solution, name)
     above, _, below = (part.strip() for part in name.partition("/"))
     if _is_force_along_path(solution, above) and _is_force_along_path(solution, below):
         # by virtual work the forces are as the speeds, the other way round
         above, below = (f"v_{part.removeprefix(_ALONG)}" for part in (below, above))
     of = solution
     if _is_velocity(above) and _is_velocity(below):
-        of = _solve_at_unit_speed(scene, solution)
-    unit, numerator, _ = _find_number(scene, of, above)
-    divisor, denominator, _ = _find_number(scene, of, below)
+        of = _solve_at_unit_speed(solution)
+    numerator = _read_number(of, above)
+    denominator = _read_number(of, below)
     with np.errstate(all="ignore"):
-        ratio = numerator / denominator
+        ratio = numerator.values / denominator.values
     ratio = np.where(np.isfinite(ratio), ratio, np.nan)
-    return Column(name, unit, ratio, divisor)
+    return Column(name, numerator.unit, ratio, denominator.unit)
 
 
 def _split_difference(solution: Solution, name: str) -> Iterator[tuple[str, str]]:
@@ -157,12 +150,8 @@ def _subtract(name: str, first: Column, second: Column) -> Column:
     return first._replace(name=name, values=values)
 
 
-def _find_number(
-    scene: Scene,
-    solution: Solution,
-    name: str,
-) -> tuple[str, Array, Array | float]:
-    """Return the SI unit of a number of each position, its values and their size."""
+def _read_number(solution: Solution, name: str) -> Column:
+    """Read a number of each position."""
     values: Array | None
     if name == "time":
         values = solution.time
@@ -171,28 +160,31 @@ def _find_number(
         if values is None:
             none = "passed at no one speed, without a law, the positions have no time"
             raise InputError("--columns", name, none)
-        return "s", values, 0.0
+        return Column(name, "s", values)
     stem, axis = _split_axis(name)
     if not _is_number(solution, name):
-        raise _refuse_name(scene, solution, name)
+        raise _refuse_name(solution, name)
     find = find_values if find_derived(stem) is None else derive
     values = find(solution, stem)
     if values is None:
-        raise _ask_for_speed(scene, name)
+        raise _ask_for_speed(solution.scene, name)
     unit = find_unit_of_quantity(stem)
     if is_scalar(stem):
-        return unit, values, float(unit == "1")
+        return Column(name, unit, values, size=float(unit == "1"))
     size = np.hypot(values[..., 0], values[..., 1])
     if axis is not None:
-        return unit, values[..., axis], size
+        return Column(name, unit, values[..., axis], size=size)
     if _is_place(solution, stem):
         raise InputError("--columns", name, f"is a place: {name}_x or {name}_y")
-    return unit, size, 0.0
+    return Column(name, unit, size)
 
 
-def _refuse_name(scene: Scene, solution: Solution, name: str) -> InputError:
+def _refuse_name(solution: Solution, name: str) -> InputError:
     """Make the error of a name that no column has, or none without a speed."""
-    with_speed = _solve_at_rest(scene, solution)
+    scene = solution.scene
+    with_speed = solution
+    if solution.at.speed is None:
+        with_speed = solve(replace(scene, motion=scene.motion.replace(speed=0.0)))
     if names_other_mechanism(_split_axis(name)[0]):
         return InputError("--columns", name, f"unknown; {ELSEWHERE}")
     if _is_number(with_speed, name):
@@ -258,12 +250,11 @@ def _is_force_along_path(solution: Solution, name: str) -> bool:
 
 def explain_static(scene: Scene) -> str:
     """Say what asks for forces where a scene states positions alone."""
-    unit, what = (
-        ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
-    )
-    return (
-        f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
-    )
+    motion = scene.motion
+    gives = '"0 m/s" gives the static force'
+    if motion.stroke is None:
+        gives = '"0 rad/s" gives the static torque'
+    return f"{motion.names[1]} = {gives} and pin forces"
 
 
 def _ask_for_speed(scene: Scene, name: str) -> InputError:
@@ -274,18 +265,12 @@ def _ask_for_speed(scene: Scene, name: str) -> InputError:
     )
 
 
-def _solve_at_rest(scene: Scene, solution: Solution) -> Solution:
-    """Solve with speed 0 a scene that states positions alone; no other is changed."""
-    if solution.at.speed is not None:
-        return solution
-    return solve(replace(scene, motion=scene.motion.replace(speed=0.0)))
-
-
-def _solve_at_unit_speed(scene: Scene, solution: Solution) -> Solution:
+def _solve_at_unit_speed(solution: Solution) -> Solution:
     """Solve the same positions with speed 1 of the command.
 
     Ratios of speeds exist at rest too.
     """
+    scene = solution.scene
     if solution.at.moves_stroke:
         motion = scene.motion.replace(speed=1.0, acceleration=0.0)
         at = command_at(replace(scene, motion=motion), solution.at.stated[0])

@@ -48,7 +48,11 @@ def derive(solution: Solution, name: str) -> Any:
         if of_spring is None:
             values = _COMPUTE[name](solution)
         else:
-            values = _measure_spring(solution, int(of_spring[1]), of_spring[2])
+            spring = list_springs(solution.scene)[int(of_spring[1])]
+            distance = measure_end_distance(solution.scene, spring, solution.at)
+            values = where_assembled(solution, distance)
+            if of_spring[2] != "length":
+                values = np.asarray(spring.pull(values))
         return np.where(np.isfinite(values), values, np.nan)
 
 
@@ -61,16 +65,6 @@ def list_derived_names(solution: Solution) -> list[str]:
         for quantity in SPRING_QUANTITIES
     ]
     return [*DERIVED_NAMES, *springs]
-
-
-def _measure_spring(solution: Solution, number: int, kind: str) -> Array:
-    """Measure the length of a spring, m, or its pull, N."""
-    spring = list_springs(solution.scene)[number]
-    distance = measure_end_distance(solution.scene, spring, solution.at)
-    distance = where_assembled(solution, distance)
-    if kind == "length":
-        return distance
-    return np.asarray(spring.pull(distance))
 
 
 def _compute_transmission(solution: Solution) -> Array:

@@ -162,11 +162,11 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
         worst = np.argmax(np.nan_to_num(load, nan=-1.0), axis=-1)[..., None]
         theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
         place = _reduce_to_number(np.take_along_axis(theta_2, worst, axis=-1)[..., 0])
-        return BearingLoad(_find_peak_value(load), _find_rms(solution, load), place)
+        return BearingLoad(_reduce(np.nanmax, load), _find_rms(solution, load), place)
     motion = describe_motion(solution)
-    if not motion.panels.has_value(name):
+    peak = motion.find_peak(name)
+    if peak is None:
         return BearingLoad(None, None, None)
-    peak = motion.panels.find_peak(name)
     where = motion.find_theta_2(peak.place)
     return BearingLoad(peak.value, motion.find_rms(name), where)
 
@@ -222,9 +222,8 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
     whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
 
     def find_largest(curve: str) -> float | None:
-        if not panels.has_value(curve):
-            return None
-        return abs(panels.find_peak(curve).value)
+        peak = motion.find_peak(curve)
+        return peak and abs(peak.value)
 
     peak = find_largest(name)
     rms = motion.find_rms(name)
@@ -264,7 +263,7 @@ def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
     power = _require_quantity(solution, "power")
     speed = where_assembled(solution, _require_quantity(solution, drive.speed_key))
     closed = is_once_round(solution)
-    peak = _find_peak_value(values)
+    peak = _reduce(np.nanmax, np.abs(values))
     rms = _find_rms(solution, values)
     spans = _compute_spans(solution, power)
     energy_in, energy_out = _integrate_power(spans, power)
@@ -275,8 +274,8 @@ def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
         mean_torque = _find_mean_torque(solution, work)
     return MotorDuty(
         **_name_effort(solution, peak, rms),
-        peak_speed=_find_peak_value(speed),
-        peak_power=_find_peak_value(power),
+        peak_speed=_reduce(np.nanmax, np.abs(speed)),
+        peak_power=_reduce(np.nanmax, np.abs(power)),
         rms_power=_find_rms(solution, power),
         energy_in=energy_in,
         energy_out=energy_out,
@@ -371,10 +370,6 @@ def _find_mean_torque(solution: Solution, work: Any) -> Any:
     return _reduce_to_number(work / turned)
 
 
-def _find_peak_value(values: Array) -> Any:
-    return _reduce(np.nanmax, np.abs(values))
-
-
 def _find_rms(solution: Solution, values: Array) -> Any:
     """Return the root mean square over the positions.
 
@@ -460,14 +455,14 @@ def compute_energies(scene: Scene, motion: Solution) -> _Energies:
     groups |= {effect.key: (effect,) for effect in scene.effects}
     work = {}
     for name, terms in groups.items():
-        actions = Actions(state, list_bodies(scene.linkage)).add(terms)
-        Q, _ = actions.generalized_forces()
+        Q, _ = (
+            Actions(state, list_bodies(scene.linkage)).add(terms).generalized_forces()
+        )
         power = np.zeros(len(motion)) + Q * motion.omega_2
         finite = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(finite) > 1 and np.any(power[finite]):
             spline = CubicSpline(motion.time[finite], power[finite])
-            integral = spline.antiderivative()
-            work[name] = integral(motion.time)
+            work[name] = spline.antiderivative()(motion.time)
     bodies = list_bodies(scene.linkage, scene.effects)
     length = scene.linkage.input.length
     J = sum(inertia(length, bodies, state.position, state.k))

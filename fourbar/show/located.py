@@ -80,14 +80,14 @@ class _LocatedSearch:
         self.course = MotionCourse(scene, stage)
         self.places = self.course.places
         self.commanded = self.course.commanded
-        column = read_column(scene, self.course.solution, name)
+        column = read_column(self.course.solution, name)
         self.unit = _find_column_unit(column)
         self.values = where_assembled(self.course.solution, column.values)
 
     def _read(self, places: Array) -> Array:
         """Return the column at places in an array of any shape."""
         solution = self.course.solve(np.ravel(places))
-        column = read_column(self.scene, solution, self.name)
+        column = read_column(solution, self.name)
         return where_assembled(solution, column.values).reshape(np.shape(places))
 
     def _gap(self, places: Array) -> Array:

@@ -216,12 +216,14 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         share = np.ones(len(solution))
         if is_once_round(solution):
             share[-1] = 0.0  # the first position again
-        panels = _take_positions(solution, _list_curves(scene, solution), share)
+        curves = _list_curves(scene, solution)
+        panels = Panels.of_positions(solution.at.places, curves, share)
         extremes = solution
         if solution.with_extremes is not None:
             extremes = solve(scene, "position", at=solution.with_extremes)
         curves = _list_position_curves(extremes)
-        positions = _take_positions(extremes, curves, np.ones(len(extremes)))
+        share = np.ones(len(extremes))
+        positions = Panels.of_positions(extremes.at.places, curves, share)
         _mark_poles(scene, solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], [], np.zeros(0))
     exact, even = _cut(scene, solution)
@@ -273,13 +275,6 @@ def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
         values = np.abs([curves[name].reshape(len(rows), -1) for curves in beside])
         sizes = values.max(axis=-1)
         curve.poles = rows[(sizes[2:] > 2.0 * sizes[:2]).any(axis=0)].tolist()
-
-
-def _take_positions(
-    solution: Solution, curves: dict[str, Array], share: Array
-) -> Panels:
-    """Take the positions of a solution for panels with nothing between them."""
-    return Panels.of_positions(solution.at.places, curves, share)
 
 
 def goes_on_between(scene: Scene, solution: Solution) -> bool:
@@ -464,29 +459,26 @@ def compute_bending(solution: Solution) -> dict[int, Bending]:
     Many positions are solved again block by block: the forces along the bars of all of
     them would take several times the memory of the solution.
     """
+    scene = solution.scene
     count = len(solution)
-    if count <= POSITIONS_OF_A_BLOCK or isinstance(solution.at.origin, ReleaseOrigin):
-        return _compute_bending_of_block(solution)
-    blocks = [
-        _compute_bending_of_block(solve(solution.scene, at=solution.at.part(rows)))
-        for rows in split(count, POSITIONS_OF_A_BLOCK)
-    ]
-    return {
-        bar: Bending(
-            *map(np.concatenate, zip(*(block[bar] for block in blocks), strict=True))
-        )
-        for bar in MOVING_BARS
-    }
-
-
-def _compute_bending_of_block(solution: Solution) -> dict[int, Bending]:
+    released = isinstance(solution.at.origin, ReleaseOrigin)
+    if count > POSITIONS_OF_A_BLOCK and not released:
+        blocks = [
+            compute_bending(solve(scene, at=solution.at.part(rows)))
+            for rows in split(count, POSITIONS_OF_A_BLOCK)
+        ]
+        return {
+            bar: Bending(*map(np.concatenate, zip(*columns, strict=True)))
+            for bar in MOVING_BARS
+            for columns in [[block[bar] for block in blocks]]
+        }
     forces = [*compute_pin_loads(solution).values()]
     if solution.drive_force is not None:
         forces.append(np.abs(solution.drive_force))
-    size = max(solution.scene.linkage.lengths) * np.max(forces, axis=0)
+    size = max(scene.linkage.lengths) * np.max(forces, axis=0)
     bending = {}
     for bar in MOVING_BARS:
-        largest = largest_bending(solution.scene, solution, bar)
+        largest = largest_bending(scene, solution, bar)
         # a two-force bar has none
         is_round_off = np.abs(largest.moment) <= _NO_BENDING * size
         moment = np.where(is_round_off, 0.0, largest.moment)

@@ -167,7 +167,14 @@ class PositionSheet:
             values = derive(self.solution, name)
             label = "transmission angle" if name == "transmission" else name
             rows.append(self._write_number(label, values, DERIVED_NAMES[name].unit))
-        rows.append(self._write_advantage())
+        values = derive(self.solution, "mechanical_advantage")
+        label = "mechanical advantage"
+        if np.isfinite(values[0]):
+            after = "  (torque of bar 4 to bar 2)"
+            rows.append(self._write_number(label, values, "1", after))
+        else:
+            bound = "without a bound: bar 4 stands still"
+            rows.append(f"{label:<{_NUMBER_LABEL}}{bound}")
         rows += self._write_force_ratios()
         for name in ("I13", "I24"):
             centre = derive(self.solution, name)
@@ -178,13 +185,6 @@ class PositionSheet:
             else:
                 rows.append(_write_row(label, ("at infinity",)))
         return rows
-
-    def _write_advantage(self) -> str:
-        values = derive(self.solution, "mechanical_advantage")
-        label = "mechanical advantage"
-        if not np.isfinite(values[0]):
-            return f"{label:<{_NUMBER_LABEL}}without a bound: bar 4 stands still"
-        return self._write_number(label, values, "1", "  (torque of bar 4 to bar 2)")
 
     def _write_force_ratios(self) -> Iterator[str]:
         """Write ratios of forces along the paths of two points, and to the drive's.
@@ -199,7 +199,7 @@ class PositionSheet:
             [point.name for point in points if point.bar == bar] for bar in (2, 4)
         )
         for start, end in product(of_input, of_output):
-            ratio = read_column(self.scene, self.solution, f"v_{start}/v_{end}")
+            ratio = read_column(self.solution, f"v_{start}/v_{end}")
             text = f"  (forces along the paths of {end} and {start})"
             yield self._write_number(f"F_{end}/F_{start}", ratio.values, "1", text)
         if self.scene.drive is None:
@@ -208,7 +208,7 @@ class PositionSheet:
         for point in points:
             if point.bar in {2, 4} - driven:
                 column = f"stroke_speed/v_{point.name}"
-                values = np.abs(read_column(self.scene, self.solution, column).values)
+                values = np.abs(read_column(self.solution, column).values)
                 label = f"F_{point.name}/drive_force"
                 text = f"  (force along the path of {point.name} to the drive's)"
                 yield self._write_number(label, values, "1", text)

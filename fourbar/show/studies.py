@@ -52,9 +52,6 @@ from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
 from fourbar.writing import write_object
 
-Ends = tuple[RestPosition, RestPosition]
-"""Positions between which a range lies."""
-
 
 def write_type(
     linkage: FourBar,
@@ -202,54 +199,50 @@ def _write_angle(angle: float) -> str:
     return f"{_write_degrees(angle)} deg"
 
 
-_SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
-
-
-def list_shown(derivatives: Sensitivity) -> list[str]:
-    """List torque, with friction at rest what it holds, pin forces and points.
-
-    If the scene states no speed, angles replace torque and forces.
-    """
-    points = [point.name for point in derivatives.scene.points]
-    drive = [name for name in (*COUPLE, *LINE) if name in derivatives.by]
-    if drive:
-        return [*drive, *PIN_FORCES, *points]
-    return ["theta_3", "theta_4", *points]
-
-
-def find_largest(derivatives: Sensitivity, quantity: str) -> float:
-    """Return the largest magnitude of a quantity; NaN if no position has a value."""
-    value = derivatives.value(quantity)
-    size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-    return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
-
-
 def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     """Write the numbers that matter most, as lines and a table.
 
-    The lines above the table say what each quantity depends on most.
+    Shown are torque, with friction at rest what it holds, pin forces and points; if the
+    scene states no speed, angles replace torque and forces. The lines above the table
+    say what each quantity depends on most. The rank of a number follows from its
+    largest share of a largest value.
 
     `width`: that of a terminal.
     """
-    names = list_shown(derivatives)
-    influences = {name: derivatives.influences(name) for name in names}
+    solution = derivatives.solution
+    names = [name for name in (*COUPLE, *LINE) if name in derivatives.by]
+    names = [*names, *PIN_FORCES] if names else ["theta_3", "theta_4"]
+    names += [point.name for point in derivatives.scene.points]
     lines = [
         f"largest change over the positions {derivatives.describe_steps()};"
         " pin forces by their magnitude"
     ]
-    symbol, si = name_places(derivatives.solution)
+    symbol, si = name_places(solution)
     unit, factor = find_unit_in(si, DEGREES)
-    for name, ranked in influences.items():
+    shares: dict[str, float] = {}
+    largest = ["largest value"]
+    changes = []
+    for name in names:
+        value = derivatives.value(name)
+        sizes = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
+        size = float(np.nanmax(sizes)) if np.isfinite(sizes).any() else math.nan
+        largest.append(write_cell(size, ".4g"))
         most = dict[bool, str]()
+        ranked = derivatives.influences(name)
         for row in ranked:
-            place = factor * derivatives.solution.at.places[row.row]
+            place = factor * solution.at.places[row.row]
             most.setdefault(
                 derivatives.keys[row.key].unit == "rad",
                 f"{row.key} (at {symbol} = {place:.6g} {unit})",
             )
+            share = abs(row.change) / size if size > 0.0 else 0.0
+            shares[row.key] = max(shares.get(row.key, 0.0), share)
         if most:
             named = ", of the angles on ".join(most[key] for key in sorted(most))
             lines.append(f"{name} depends most on {named}")
+        no_change = 0.0 if np.isfinite(derivatives.by[name]).any() else math.nan
+        of_name = dict.fromkeys(derivatives.keys, no_change)
+        changes.append(of_name | {row.key: row.change for row in ranked})
     without = [status for status in derivatives.status if status != "ok"]
     if without:
         counts = ", ".join(
@@ -257,36 +250,12 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
             for word in dict.fromkeys(without)
         )
         lines.append(f"positions without all derivatives: {counts}")
-    changes = {
-        name: {row.key: row.change for row in influences[name]} for name in names
-    }
-    others = {
-        name: 0.0 if np.isfinite(derivatives.by[name]).any() else math.nan
-        for name in names
-    }
-    largest = (find_largest(derivatives, name) for name in names)
-    rows = [["largest value", *(write_cell(value, ".4g") for value in largest)]]
-    for key in rank_numbers(derivatives, names):
-        moved = (changes[name].get(key, others[name]) for name in names)
-        rows.append([key, *(write_cell(change, ".3g") for change in moved)])
+    rows = [largest]
+    for key in sorted(shares, key=lambda key: -shares[key]):
+        rows.append([key, *(write_cell(of_name[key], ".3g") for of_name in changes)])
     heads = [f"{name}\n{find_unit_of_quantity(name)}" for name in names]
     table = make_plain_table(["", *heads], rows, left=("",), gap=0)
-    title = derivatives.solution.title
-    return write_table(title, lines, table, width=width or BLOCK_WIDTH)
-
-
-def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
-    """Rank the numbers that any of the quantities depends on.
-
-    The rank follows from their largest share of a largest value.
-    """
-    shares: dict[str, float] = {}
-    for name in names:
-        size = find_largest(derivatives, name)
-        for row in derivatives.influences(name):
-            share = abs(row.change) / size if size > 0.0 else 0.0
-            shares[row.key] = max(shares.get(row.key, 0.0), share)
-    return sorted(shares, key=lambda key: -shares[key])
+    return write_table(solution.title, lines, table, width=width or BLOCK_WIDTH)
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
@@ -295,7 +264,7 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
     Vectors are [x, y]; null stands for no value.
     """
     return write_object(
-        _SENSITIVITY_SCHEMA,
+        "fourbar-sensitivity/1",
         title=derivatives.solution.title,
         drive_bar=derivatives.solution.drive_bar,
         status=derivatives.status,
@@ -315,7 +284,6 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
     )
 
 
-_EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
 _WITHOUT_MOVE = (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND, CHANGE_POINT)
 """Statuses at which no force says how a released linkage moves."""
 _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
@@ -334,17 +302,16 @@ def write_equilibria(
     `units`: units of the numbers; one that is left out is the SI unit. `width`: that
     of a terminal.
     """
-    rest = _name_assemblies(rest)
     reached = [position for position in rest.found if position.reached]
     others = [position for position in rest.found if not position.reached]
     lines = _count_equilibria(rest, len(reached), units)
-    blocks = [_write_resting(title, lines, reached, units, width)]
+    blocks = [_write_resting(title, lines, rest, reached, units, width)]
     if others:
         line = (
             f"{_write_count(len(others))} in the other assembly at angles theta_2 of"
             " this sweep, which does not reach it"
         )
-        blocks.append(_write_resting("", [line], others, units, width))
+        blocks.append(_write_resting("", [line], rest, others, units, width))
     blocks.append(write_table("", *_write_holding(rest, units), width=width))
     return "\n\n".join(block.rstrip("\n") for block in blocks) + "\n"
 
@@ -352,6 +319,7 @@ def write_equilibria(
 def _write_resting(
     title: str,
     lines: list[str],
+    rest: Equilibria,
     found: list[Equilibrium],
     units: Conversion,
     width: int | None,
@@ -360,7 +328,15 @@ def _write_resting(
     if not found:
         headed = [*([clean_line(title)] if title else []), *lines]
         return "\n".join(part for line in headed for part in wrap_line(line, width))
-    torque = find_unit_in("N m", units)[0]
+    torque, per_torque = find_unit_in("N m", units)
+    inertia = "kg m^2"
+    per_inertia = 1.0
+    if "kg" in units and "m" in units:
+        # as lb and in make lb in^2
+        mass, per_mass = units["kg"]
+        length, per_length = units["m"]
+        inertia = f"{mass} {length}^2"
+        per_inertia = per_mass * per_length**2
     heads = [
         "theta_2\n(deg)",
         "theta_4\n(deg)",
@@ -368,13 +344,27 @@ def _write_resting(
         "",
         "by",
         f"dQ/dq\n({torque}/rad)",
-        f"J\n({_find_inertia_unit(units)[0]})",
+        f"J\n({inertia})",
         "frequency\n(Hz)",
     ]
-    rows = [_write_equilibrium(position, units) for position in found]
+    rows = []
+    for position in found:
+        place = position.place
+        frequency = position.frequency
+        row = [
+            _write_degrees(place.theta_2),
+            _write_degrees(place.theta_4),
+            BRANCH_NAMES.get(_find_assembly(rest, place), "limit"),
+            position.stability,
+            position.angle,
+            f"{per_torque * position.slope:.6g}",
+            f"{per_inertia * position.inertia:.6g}",
+            "-" if frequency is None else f"{frequency:.6g}",
+        ]
+        rows.append(row)
     table = make_plain_table(heads, rows, left=("branch", "", "by"), gap=0)
     held = [
-        f"friction holds {_write_range(position.held)} about theta_2 ="
+        f"friction holds {_write_range(rest, position.held)} about theta_2 ="
         f" {_write_degrees(position.place.theta_2)} deg"
         for position in found
         if position.held is not None
@@ -382,43 +372,10 @@ def _write_resting(
     return write_table(title, lines, table, held, width)
 
 
-def _find_inertia_unit(units: Conversion) -> tuple[str, float]:
-    """Return the unit of a moment of inertia and its factor from kg m^2.
-
-    Units of mass and length that are both asked for make this unit, as lb and in make
-    lb in^2; otherwise kg m^2 is returned.
-    """
-    if "kg" not in units or "m" not in units:
-        return "kg m^2", 1.0
-    mass, per_mass = units["kg"]
-    length, per_length = units["m"]
-    return f"{mass} {length}^2", per_mass * per_length**2
-
-
-def _name_assemblies(rest: Equilibria) -> Equilibria:
-    """Return equilibria and ranges with the assembly in place of the sign."""
-    scene = rest.positions.scene
-    linkage = scene.linkage
-
-    def name(place: RestPosition) -> RestPosition:
-        theta_2 = np.array([place.theta_2])
-        assembly = find_signs(linkage, theta_2, place.branch)[0]
-        return place._replace(branch=int(assembly))
-
-    def name_both(ends: Ends) -> Ends:
-        first, last = ends
-        return name(first), name(last)
-
-    found = []
-    for equilibrium in rest.found:
-        held = equilibrium.held and name_both(equilibrium.held)
-        place = name(equilibrium.place)
-        found.append(equilibrium._replace(place=place, held=held))
-    return rest._replace(
-        found=tuple(found),
-        indifferent=tuple(map(name_both, rest.indifferent)),
-        held=tuple(map(name_both, rest.held)),
-    )
+def _find_assembly(rest: Equilibria, place: RestPosition) -> int:
+    """Return the assembly of a place, whose branch is a sign."""
+    theta_2 = np.array([place.theta_2])
+    return int(find_signs(rest.positions.scene.linkage, theta_2, place.branch)[0])
 
 
 def _write_count(count: int) -> str:
@@ -440,11 +397,11 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
             " has two ways to move"
         )
     lines += [
-        f"indifferent (Q = 0 throughout): {_write_range(ends)}"
+        f"indifferent (Q = 0 throughout): {_write_range(rest, ends)}"
         for ends in rest.indifferent
     ]
     lines += [
-        f"friction alone holds, without an equilibrium: {_write_range(ends)}"
+        f"friction alone holds, without an equilibrium: {_write_range(rest, ends)}"
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]
@@ -468,20 +425,17 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     else:
         columns[f"from ({unit})"] = write_cells(factor * low)
         columns[f"to ({unit})"] = write_cells(factor * high)
+    moves = np.array([_MOVES[move] for move in rest.moves])
     undecided = np.isin(positions.status_code, _WITHOUT_MOVE)
-    columns["released"] = [
-        status if is_undecided else _MOVES[move]
-        for status, is_undecided, move in zip(
-            positions.status, undecided, rest.moves, strict=True
-        )
-    ]
+    columns["released"] = np.where(undecided, positions.status, moves).tolist()
     rows = list(zip(*columns.values(), strict=True))
     every = math.ceil(len(positions) / MOST_ROWS_PRINTED)
 
     on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
-    if np.nanmax(np.abs(values), initial=0.0) > 0.0:
-        most = int(np.nanargmax(np.abs(values)))
+    sizes = np.nan_to_num(np.abs(values))
+    most = int(np.argmax(sizes))
+    if sizes[most] > 0.0:
         largest = "largest" if low is None else "largest without friction"
         lines.append(
             f"{largest}: {factor * values[most]:.6g} {unit} at theta_2 ="
@@ -490,28 +444,11 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     return lines, make_plain_table([*columns], rows[::every], left=("released",))
 
 
-def _write_equilibrium(equilibrium: Equilibrium, units: Conversion) -> list[str]:
-    place = equilibrium.place
-    frequency = equilibrium.frequency
-    slope = find_unit_in("N m", units)[1] * equilibrium.slope
-    inertia = _find_inertia_unit(units)[1] * equilibrium.inertia
-    return [
-        _write_degrees(place.theta_2),
-        _write_degrees(place.theta_4),
-        BRANCH_NAMES.get(place.branch, "limit"),
-        equilibrium.stability,
-        equilibrium.angle,
-        f"{slope:.6g}",
-        f"{inertia:.6g}",
-        "-" if frequency is None else f"{frequency:.6g}",
-    ]
-
-
-def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
+def _write_range(rest: Equilibria, ends: tuple[RestPosition, RestPosition]) -> str:
     first, last = ends
     apart = math.remainder(last.theta_2 - first.theta_2, TURN)
     text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"
-    if first.branch != last.branch:
+    if _find_assembly(rest, first) != _find_assembly(rest, last):
         return f"{text} through a limit"
     return "everywhere on its circuit" if abs(apart) < _SAME_PLACE else text
 
@@ -531,7 +468,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
     positions = rest.positions
     keys = read_drive_demand(rest.positions).keys
     return write_object(
-        _EQUILIBRIUM_SCHEMA,
+        "fourbar-equilibrium/1",
         title=title,
         samples=rest.samples,
         equilibria=rest.found,

@@ -69,11 +69,12 @@ def write_table(
     console = Console(file=text, width=width or 10_000, color_system=None)
     if title:
         console.print(Text(clean_line(title)))
-    for line in lines:
-        console.print(Text("\n".join(wrap_line(line, width))))
-    console.print(shown)
-    for line in after:
-        console.print(Text("\n".join(wrap_line(line, width))))
+    above, below = (
+        [Text("\n".join(wrap_line(line, width))) for line in part]
+        for part in (lines, after)
+    )
+    for part in (*above, shown, *below):
+        console.print(part)
     return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
 
 
@@ -139,9 +140,10 @@ def print_positions(
     notes = [line for note in told for line in wrap_line(note)]
     if step > 1:
         more = "; --all shows each" if every is None else ""
-        which = (
-            f"every {step}{_choose_ordinal_suffix(step)} of the {len(rows)} positions"
-        )
+        suffix = {1: "st", 2: "nd", 3: "rd"}.get(step % 10, "th")
+        if step % 100 in (11, 12, 13):
+            suffix = "th"
+        which = f"every {step}{suffix} of the {len(rows)} positions"
         notes.append(f"shown: {which}{more}")
     if left_out := [name.split("\n")[0] for name in cells if name not in kept]:
         notes.append(
@@ -170,12 +172,6 @@ def _choose_step(count: int) -> int:
     return next((step for step in ROW_STEPS if step >= wanted), multiple)
 
 
-def _choose_ordinal_suffix(number: int) -> str:
-    if number % 100 in (11, 12, 13):
-        return "th"
-    return {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
-
-
 def list_columns(
     solution: Solution,
     units: Conversion = DEGREES,
@@ -192,7 +188,7 @@ def list_columns(
     vectors = filter(has_size, (*PIN_FORCES, *DERIVED_NAMES))
     headings |= {name: f"|{name}|" for name in vectors}
     for name in _list_names(solution):
-        column = read_column(solution.scene, solution, name)
+        column = read_column(solution, name)
         shown |= _write_column(column, headings.get(name, name), units)
         if name != "sin_mu" or solution.time is not None or drive.error is None:
             continue
@@ -206,7 +202,8 @@ def _write_column(
 ) -> dict[str, list[str]]:
     """Write the cells of a column, by its heading with the unit."""
     column = column._replace(values=drop_rounding(column.values, column.size))
-    cells = write_cells(column.shown(units), _choose_form(column.unit))
+    form = ".4f" if column.unit == "rad" else ".6g"  # angles line up at the point
+    cells = write_cells(column.shown(units), form)
     return {f"{heading}\n{column.label(units)}": cells}
 
 
@@ -251,11 +248,6 @@ def _list_derived_columns(solution: Solution, has_forces: bool) -> Iterator[str]
             yield name
         if not is_scalar(name):
             yield from (f"{name}_x", f"{name}_y")
-
-
-def _choose_form(unit: str) -> str:
-    """Choose the form of numbers of an SI unit: angles line up at the point."""
-    return ".4f" if unit == "rad" else ".6g"
 
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:

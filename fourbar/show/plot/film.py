@@ -6,7 +6,6 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,6 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
-from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage_figure import (
     choose_drawing_scale,
@@ -25,11 +23,12 @@ from fourbar.show.plot.linkage_figure import (
 from fourbar.show.plot.style import (
     TITLE,
     apply_style,
+    place_legend,
     shorten_text,
     split_complex,
     split_points,
-    write_path_legend,
 )
+from fourbar.show.plot.symbols import draw_vectors
 from fourbar.show.plot.view import View, make_view
 from fourbar.show.shown_units import write_cell
 from fourbar.show.tables import show_running
@@ -93,9 +92,7 @@ def write_film(
             f"must be more than 0 and at most {_MAX_FRAMES // FRAMES_PER_SECOND}",
         )
     with apply_style():
-        write = _write_gif
-        if kind == "mp4":
-            write = partial(_write_mp4, program=_find_ffmpeg())
+        program = _find_ffmpeg() if kind == "mp4" else ""
         shown = make_view(scene)
         shown.units = units
         if seconds is None:
@@ -112,7 +109,11 @@ def write_film(
             show_running(f"{len(order)} frames are drawn") as progress,
         ):
             draft = Path(folder) / f"film.{kind}"
-            write(draft, _draw_frames(shown, order, moving, progress))
+            frames = _draw_frames(shown, order, moving, progress)
+            if program:
+                _write_mp4(draft, frames, program)
+            else:
+                _write_gif(draft, frames)
             write_bytes(path, draft.read_bytes())
     return len(order)
 
@@ -203,19 +204,15 @@ def choose_frames(shown: View, count: int) -> list[int]:
     first = max(gaps[gaps < here], default=-1) + 1
     last = min(gaps[gaps > here], default=len(assembled)) - 1
 
-    def spread(number: int, *, endpoint: bool = True) -> list[int]:
-        places = np.linspace(first, last, number, endpoint=endpoint)
-        return [round(place) for place in places.tolist()]
-
-    if shown.time is not None:
-        return spread(count)
+    over_time = shown.time is not None
     covered = positions.angle[last] - positions.angle[first]
-    is_one_turn = abs(covered - math.tau) < 1e-6
-    if is_one_turn:
-        return spread(count, endpoint=False)
-    forward = spread(max(2, count // 2))
-    back = forward[-2:0:-1]
-    return forward + back
+    is_one_turn = abs(covered - math.tau) < 1e-6 and not over_time
+    there_and_back = not (over_time or is_one_turn)
+    if there_and_back:
+        count = max(2, count // 2)
+    places = np.linspace(first, last, count, endpoint=not is_one_turn)
+    order = [round(place) for place in places.tolist()]
+    return order + order[-2:0:-1] if there_and_back else order
 
 
 def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
@@ -231,10 +228,9 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes = figure.subplots()
     figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_paths(axes, shown, Labels())
+    move_vectors = None
     if moving and shown.moves:
-        move_vectors = symbols.draw_vectors(axes, shown, sweep, factor, size)
-    else:
-        move_vectors = None
+        move_vectors = draw_vectors(axes, shown, sweep, factor, size)
     drawn = list[Any]()
 
     def put(index: int) -> Labels:
@@ -254,7 +250,7 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title="θ")
-    pad = write_path_legend(axes)
+    pad = place_legend(axes, 3)
     figure.draw_without_rendering()
     axes.set_autoscale_on(False)  # nothing jumps from frame to frame
     figure.set_layout_engine(None)
@@ -262,13 +258,14 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     def move(index: int) -> list[Any]:
         put(index)
         axis = shown.axis
-        places = sweep.at.places
-        theta = write_cell(axis.factor * places[index], ".1f").replace("-", "−")
-        caption = f"{axis.symbol} = {theta}{axis.unit}"
+        caption = f"{axis.symbol} = "
+        unit = axis.unit
+        place = axis.factor * sweep.at.places[index]
         if shown.time is not None:
-            theta = write_cell(math.degrees(sweep.theta_2[index]), ".1f")
-            theta = theta.replace("-", "−")
-            caption = f"t = {shown.time[index]:.2f} s, θ₂ = {theta}°"
+            caption = f"t = {shown.time[index]:.2f} s, θ₂ = "
+            unit = "°"
+            place = math.degrees(sweep.theta_2[index])
+        caption += write_cell(place, ".1f").replace("-", "−") + unit
         title = axes.set_title(f"{caption}, {shown.branch_name} branch", pad=pad)
         arrows = [] if move_vectors is None else move_vectors(index)
         return [*drawn, *arrows, title]

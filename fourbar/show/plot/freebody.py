@@ -2,18 +2,14 @@
 
 import math
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number
-from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
-from fourbar.scene import Scene
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.linkage_figure import (
     draw_mass_centre,
@@ -58,8 +54,7 @@ arrow would be shorter than its head.
 """
 
 
-@dataclass(slots=True)
-class Arrow:
+class Arrow(NamedTuple):
     """A force on a bar: its point and its vector, N.
 
     The point is from the bar's first pin in world axes, m.
@@ -68,61 +63,82 @@ class Arrow:
     text: str
     at: complex
     force: complex
-    colour: str
+    colour: str = INK
     dashed: bool = False
 
 
-@dataclass(slots=True)
-class Couple:
+class Couple(NamedTuple):
     """A couple on a bar, N m."""
 
     text: str
     moment: float
 
 
-def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
-    """List every force and couple on a bar at the drawn position.
+def _take_one(vector: Any) -> complex:
+    """Return the one complex number of an array, at the position drawn."""
+    return complex(np.ravel(vector)[0])
 
-    With d'Alembert's they add up to zero.
+
+class FreedBar(Actions):
+    """A bar freed from its pins at the drawn position, and what acts on it.
+
+    With d'Alembert's forces and couples all add up to zero.
     """
-    pins = locate_pins(view)
-    arrows: list[Arrow] = []
-    couples: list[Couple] = []
-    for pin in ENDS[bar]:
-        name = PIN_FORCE[pin]
-        force = complex(*getattr(view.here, name)[0])
-        shown = name
-        if name[2] != str(bar):
-            force = -force
-            shown = f"F{name[2]}{name[1]}"
-        arm = pins[pin] - pins[FIRST_PIN[bar]]
-        arrows.append(Arrow(write_force_name(shown), arm, force, FORCE_COLOURS[name]))
-    if view.scene.drive_bar == bar and view.scene.motion.free is None:
-        couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))
-    recorder = _record_actions(view)
-    arrows += recorder.arrows[bar]
-    couples += recorder.turns[bar]
-    described = view.scene.linkage.bar(bar)
-    G = _take_one(described.to_centre * view.state().direction(bar))
-    inertial = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
-    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", G, inertial, INK, dashed=True))
-    alpha = float(getattr(view.here, f"alpha_{bar}")[0])
-    carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
-    couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
-    arrows = [arrow for arrow in arrows if arrow.force != 0.0]
-    couples = [couple for couple in couples if couple.moment != 0.0]
-    return arrows, couples
 
+    def __init__(self, view: View, bar: int) -> None:
+        super().__init__(view.state(), list_bodies(view.scene.linkage))
+        self.bar = bar
+        self.arrows: list[Arrow] = []
+        self.turns: list[Couple] = []
+        self.name = ""
+        """Name of what acts."""
+        described = view.scene.linkage.bar(bar)
+        u = self.state.direction(bar)
+        self.G = _take_one(described.to_centre * u)
+        """Mass centre, from the bar's first pin, m."""
+        first, second = ENDS[bar]
+        pins = locate_pins(view)
+        self.pins = {first: 0.0j, second: pins[second] - pins[first]}
+        for pin, arm in self.pins.items():
+            of_pin = PIN_FORCE[pin]
+            force = complex(*getattr(view.here, of_pin)[0])
+            shown = of_pin
+            if of_pin[2] != str(bar):
+                force = -force
+                shown = f"F{of_pin[2]}{of_pin[1]}"
+            colour = FORCE_COLOURS[of_pin]
+            self.arrows.append(Arrow(write_force_name(shown), arm, force, colour))
+        self._add_actions(view)
+        inertial = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
+        text = rf"$-m_{bar}\,a_{{G{bar}}}$"
+        self.arrows.append(Arrow(text, self.G, inertial, dashed=True))
+        alpha = float(getattr(view.here, f"alpha_{bar}")[0])
+        carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
+        self.turns.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
+        self.arrows = [arrow for arrow in self.arrows if arrow.force != 0.0]
+        self.turns = [couple for couple in self.turns if couple.moment != 0.0]
 
-class _ActionRecorder(Actions):
-    """Forces and couples, kept one by one under the name of their source."""
-
-    name = ""
-
-    def __init__(self, scene: Scene, state: State) -> None:
-        super().__init__(state, list_bodies(scene.linkage))
-        self.arrows: dict[int, list[Arrow]] = {bar: [] for bar in BAR_NAMES}
-        self.turns: dict[int, list[Couple]] = {bar: [] for bar in BAR_NAMES}
+    def _add_actions(self, view: View) -> None:
+        """Add what the drive, loads and effects put on the bar."""
+        scene = view.scene.settled()
+        here = view.here
+        if scene.motion.free is None:
+            self.name = f"$T_{self.bar}$"
+            if scene.drive_bar == self.bar:
+                self.couple(self.bar, here.torque)
+            self.name = "$F$"
+            if scene.drive is not None:
+                scene.drive.act(self, here.drive_force)
+        for count, load in enumerate(scene.loads, start=1):
+            self.name = f"load {count}"
+            load.act(self, self.state)
+        forces = {name: getattr(here, name) for name in PIN_FORCE.values()}
+        for effect in scene.effects:
+            self.name = effect.key.replace("_", " ")
+            if effect.key == "gravity":
+                self.name = rf"$m_{self.bar}\,g$"
+            effect.act(self, self.state)
+            effect.act_known(self, forces)
 
     def force(
         self,
@@ -135,9 +151,10 @@ class _ActionRecorder(Actions):
 
         `beyond`: arm from there in world axes.
         """
+        if bar != self.bar:
+            return
         arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
-        name = self.name.replace("#", str(bar))
-        self.arrows[bar].append(Arrow(name, _take_one(arm), _take_one(force), INK))
+        self.arrows.append(Arrow(self.name, _take_one(arm), _take_one(force)))
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add both forces, between neighbours too.
@@ -146,10 +163,10 @@ class _ActionRecorder(Actions):
         """
         self.pull_ends(start, end, force)
 
-    def couple(self, bar: int, moment: Number) -> None:
-        """Add a pure couple on a bar."""
-        name = self.name.replace("#", str(bar))
-        self.turns[bar].append(Couple(name, _take_one(moment).real))
+    def couple(self, bar: int, moment: Number, at: str = "") -> None:
+        """Add a pure couple on a bar, `at` a pin that its name says."""
+        if bar == self.bar:
+            self.turns.append(Couple(self.name + at, _take_one(moment).real))
 
     def pin_couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars at a pin, N m, and name the pin.
@@ -157,34 +174,7 @@ class _ActionRecorder(Actions):
         The first bar gets the opposite couple.
         """
         for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True):
-            self.couple(bar, sense * couple)
-            self.turns[bar][-1].text += f" at {pin_name(pin)}"
-
-
-def _take_one(vector: Any) -> complex:
-    """Return the one complex number of an array, at the position drawn."""
-    return complex(np.ravel(vector)[0])
-
-
-def _record_actions(view: View) -> _ActionRecorder:
-    """Record what a drive that exerts a force, loads and effects put on the bars."""
-    scene = view.scene.settled()
-    state = view.state()
-    recorder = _ActionRecorder(scene, state)
-    if scene.drive is not None and scene.motion.free is None:
-        recorder.name = "$F$"
-        scene.drive.act(recorder, view.here.drive_force)
-    for count, load in enumerate(scene.loads, start=1):
-        recorder.name = f"load {count}"
-        load.act(recorder, state)
-    forces = {name: getattr(view.here, name) for name in PIN_FORCE.values()}
-    for effect in scene.effects:
-        recorder.name = effect.key.replace("_", " ")
-        if effect.key == "gravity":
-            recorder.name = r"$m_#\,g$"
-        effect.act(recorder, state)
-        effect.act_known(recorder, forces)
-    return recorder
+            self.couple(bar, sense * couple, f" at {pin_name(pin)}")
 
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
@@ -193,29 +183,34 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     All arrows have one scale.
     """
     _require_forces(view, "freebody")
-    freed = [(bar, *list_actions(view, bar)) for bar in MOVING_BARS]
-    lines = max(1, *(len(couples) for *_, couples in freed))  # or "no couples"
+    freed = [FreedBar(view, bar) for bar in MOVING_BARS]
+    lines = max(1, *(len(bar.turns) for bar in freed))  # or "no couples"
     panels, below = figure.subplots(2, 3, height_ratios=[_PANEL, LINE_HEIGHT * lines])
-    sizes = [abs(arrow.force) for _, arrows, _ in freed for arrow in arrows]
+    sizes = [abs(arrow.force) for bar in freed for arrow in bar.arrows]
     biggest = max(sizes, default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
-    windows = [_find_window(view, bar, arrows, scale) for bar, arrows, _ in freed]
+    windows = []
+    for bar in freed:
+        points = [*bar.pins.values(), bar.G]
+        for arrow in bar.arrows:
+            points += [arrow.at, arrow.at + scale * arrow.force]
+        places = split_points(points)
+        windows.append(np.array([places.min(axis=0), places.max(axis=0)]))
     # one window size: the bars, too, are to one scale
     span = LABEL_SPACE * max(float(np.ptp(window, axis=0).max()) for window in windows)
     view.note(f"At {view.at}.")
-    for axes, text, (bar, arrows, couples), window in zip(
-        panels, below, freed, windows, strict=True
-    ):
-        _draw_one(axes, view, bar, arrows, scale, biggest, labels)
+    for axes, text, bar, window in zip(panels, below, freed, windows, strict=True):
+        _draw_one(axes, view, bar, scale, biggest, labels)
         low, high = window.mean(axis=0) + 0.5 * span * np.array([[-1.0], [1.0]])
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        _write_couples(text, view, couples)
-    _scale_bar(panels[0], scale, biggest, view.units)
+        _write_couples(text, view, bar.turns)
+    if scale:
+        _draw_scale(panels[0], scale, biggest, view.units)
     view.note(
         "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a"
         " at G (d'Alembert), with which the forces and the moments on each bar add up"
-        " to zero.",
+        " to zero."
     )
 
 
@@ -272,78 +267,61 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
     )
 
 
-def _find_window(
-    view: View, bar: int, arrows: list[Arrow], scale: float
-) -> NDArray[np.float64]:
-    """Return the lower left and the upper right corner of what a bar's panel shows.
-
-    Places are from the bar's first pin, m, (2, 2).
-    """
-    described = view.scene.linkage.bar(bar)
-    u = view.state().direction(bar)
-    points = [0.0j, _take_one(described.length * u), _take_one(described.to_centre * u)]
-    for arrow in arrows:
-        points += [arrow.at, arrow.at + scale * arrow.force]
-    places = split_points(points)
-    return np.array([places.min(axis=0), places.max(axis=0)])
-
-
 def _draw_one(
     axes: "Axes",
     view: View,
-    bar: int,
-    arrows: list[Arrow],
+    freed: FreedBar,
     scale: float,
     biggest: float,
     labels: Labels,
 ) -> None:
     """Draw a bar freed from its pins, with the arrows of the forces on it."""
-    pins = locate_pins(view)
-    first_pin, second_pin = ENDS[bar]
-    end = pins[second_pin] - pins[first_pin]
+    bar = freed.bar
+    pins = freed.pins
+    start, end = pins.values()
     middle = 0.5 * end
-    look: dict[str, Any] = {
-        "lw": 5.0,
-        "alpha": 0.45,
-        "solid_capstyle": "round",
-        "zorder": 2,
-    }
-    plot_points(axes, [0.0j, end], color=BAR_COLOURS[bar], **look)
-    labels.keep_off(axes, 0.0j, end, width=5.0)
-    for name, pin in ((first_pin, 0.0j), (second_pin, end)):
+    plot_points(
+        axes,
+        [start, end],
+        color=BAR_COLOURS[bar],
+        lw=5.0,
+        alpha=0.45,
+        solid_capstyle="round",
+        zorder=2,
+    )
+    labels.keep_off(axes, start, end, width=5.0)
+    for name, pin in pins.items():
         plot_points(axes, pin, "o", ms=5.5, mew=1.1, zorder=6, **RING_MARK)
         labels.add(Label(axes, pin_name(name), pin, middle, MUTED, 8.0, 2.5))
     short: list[str] = []
-    for arrow in arrows:
+    for arrow in freed.arrows:
         size = abs(arrow.force)
         value = write_labelled_quantity(size, "N", view.units)
         if size < LEAST_DRAWN_FORCE * biggest:
             plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " "))
-            plain = plain.replace("-", "−")
-            short.append(f"{plain} = {value}")
+            short.append(f"{plain.replace('-', '−')} = {value}")
             continue
-        draw_plate(axes, bar, (0.0j, arrow.at, end), labels)
+        draw_plate(axes, bar, (start, arrow.at, end), labels)
         tip = arrow.at + scale * arrow.force
-        look = {"color": arrow.colour, "ls": "--" if arrow.dashed else "-"}
+        colour = arrow.colour
+        ls = "--" if arrow.dashed else "-"
         axes.annotate(
             "",
             split_complex(tip),
             split_complex(arrow.at),
-            arrowprops={**HEADED, "mutation_scale": 9, **look},
+            arrowprops={**HEADED, "mutation_scale": 9, "color": colour, "ls": ls},
             zorder=5,
             annotation_clip=False,
         )
         labels.keep_off(axes, arrow.at, tip)
         text = f"{arrow.text} = {value}"
-        labels.add(Label(axes, text, tip, arrow.at, arrow.colour, 7.5))
+        labels.add(Label(axes, text, tip, arrow.at, colour, 7.5))
     if short:
         view.note(f"Too short to draw on bar {bar}: {', '.join(short)}.")
-    described = view.scene.linkage.bar(bar)
-    if described.mass > 0.0:
-        G = _take_one(described.to_centre * view.state().direction(bar))
-        draw_plate(axes, bar, (0.0j, G, end), labels)
-        draw_mass_centre(axes, G, 6.0)
-        labels.add(Label(axes, f"$G_{bar}$", G, middle, MUTED, 8.0, 3.0))
+    if view.scene.linkage.bar(bar).mass > 0.0:
+        draw_plate(axes, bar, (start, freed.G, end), labels)
+        draw_mass_centre(axes, freed.G, 6.0)
+        labels.add(Label(axes, f"$G_{bar}$", freed.G, middle, MUTED, 8.0, 3.0))
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
@@ -356,24 +334,28 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
         size = write_labelled_quantity(abs(couple.moment), "N m", view.units)
         lines.append(f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} = {size}")
     axes.set_axis_off()
-    text = "\n".join(lines) or "no couples"
-    look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45}
-    colour = INK if lines else MUTED
-    axes.text(0.0, 1.0, text, transform=axes.transAxes, color=colour, **look)
+    axes.text(
+        0.0,
+        1.0,
+        "\n".join(lines) or "no couples",
+        transform=axes.transAxes,
+        color=INK if lines else MUTED,
+        va="top",
+        size=7.5,
+        linespacing=1.45,
+    )
 
 
-def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
+def _draw_scale(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
     """Draw a round force as a length, under the first panel."""
-    if scale == 0.0:
-        return
     factor, unit = choose_unit(biggest, "N", units)
     step = 10.0 ** math.floor(math.log10(factor * biggest))
     fitting = (m * step for m in (5.0, 2.0) if 2.0 * m * step <= factor * biggest)
     round_force = next(fitting, step) / factor
     x = axes.get_xlim()[0]
     y = axes.get_ylim()[0]
-    look: dict[str, Any] = {"lw": 2.0, "solid_capstyle": "butt", "clip_on": False}
-    axes.plot([x, x + scale * round_force], [y, y], color=INK, **look)
+    ends = [x, x + scale * round_force]
+    axes.plot(ends, [y, y], color=INK, lw=2.0, solid_capstyle="butt", clip_on=False)
     axes.annotate(
         f"{factor * round_force:g} {unit}",
         (x, y),

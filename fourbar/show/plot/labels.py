@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Box = tuple[complex, complex]
-"""Lower left and upper right corner."""
 _REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0, 60.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
 LABEL_DIRECTIONS = 24
@@ -98,9 +96,7 @@ class Labels:
                 for text in axes.texts
                 if text.get_text() or getattr(text, "xycoords", "data") != "data"
             ]
-            room.boxes += [
-                _read_box(text.get_window_extent(renderer)) for text in texts
-            ]
+            room.boxes += [text.get_window_extent(renderer) for text in texts]
             rooms[axes] = room
         for axes, points, width in self.lines:
             rooms[axes].keep_off(_transform(axes.transData, points), width)
@@ -115,15 +111,21 @@ class Labels:
                 zorder=9,
                 clip_on=False,
             )
-            lower, upper = _read_box(text.get_window_extent(renderer))
-            centre, leader = rooms[label.axes].place(label, 0.5 * (upper - lower))
+            box = text.get_window_extent(renderer)
+            half = 0.5 * complex(box.x1 - box.x0, box.y1 - box.y0)
+            centre, leader = rooms[label.axes].place(label, half)
             to_data = label.axes.transData.inverted()
             text.set_position(split_complex(_transform(to_data, centre)[0]))
             if leader is not None:
                 # the limits stay, by which the labels were placed
-                look: dict[str, Any] = {"lw": 0.5, "scalex": False, "scaley": False}
-                line = split_points(_transform(to_data, leader)).T
-                label.axes.plot(*line, color=label.colour, zorder=8.5, **look)
+                label.axes.plot(
+                    *split_points(_transform(to_data, leader)).T,
+                    color=label.colour,
+                    zorder=8.5,
+                    lw=0.5,
+                    scalex=False,
+                    scaley=False,
+                )
 
 
 class _Room:
@@ -131,10 +133,10 @@ class _Room:
 
     def __init__(self, axes: "Axes", per_point: float) -> None:
         self.axes = axes
-        self.inside = _read_box(axes.get_window_extent())
+        self.inside = axes.get_window_extent()
         self.per_point = per_point
         """Pixels of a typographic point."""
-        self.boxes: list[Box] = []
+        self.boxes: list[Any] = []
         """Boxes of texts."""
         self.leaders: list[Points] = []
         """Ends of the lines that lead labels to their points."""
@@ -178,16 +180,17 @@ class _Room:
             hit_in_x = np.abs(dots.real - centre.real) < half.real + edge
             hit_in_y = np.abs(dots.imag - centre.imag) < half.imag + edge
             covered = float((hit_in_x & hit_in_y) @ widths)
-            box = (centre - half, centre + half)
-            clashes = sum(_overlaps(box, other) for other in self.boxes)
-            cost = 100.0 * clashes + 30.0 * self._leaves(box)
+            box = _make_box(centre, half)
+            inside = self.inside.contains(*box.min) and self.inside.contains(*box.max)
+            clashes = box.count_overlaps(self.boxes) if self.boxes else 0
+            cost = 100.0 * clashes + 30.0 * (not inside)
             if reach > _LED:
                 crossed = self._count_crossed(start, _clip(start, box))
                 cost += _COST_OF_A_LEADER + 40.0 * crossed
             cost += covered + 0.04 * reach + 0.05 * k
             best = min(best, (cost, centre, start), key=itemgetter(0))
         _, centre, start = best
-        box = (centre - half, centre + half)
+        box = _make_box(centre, half)
         self.boxes.append(box)
         leader = np.array([start, _clip(start, box)])
         length = math.dist(*split_points(leader))
@@ -197,25 +200,20 @@ class _Room:
         self.keep_off(leader, _LEADER_WIDTH)
         return centre, leader
 
-    def _leaves(self, box: Box) -> bool:
-        """Return True if a label does not lie inside the axes."""
-        below = box[0] - self.inside[0]
-        above = self.inside[1] - box[1]
-        return min(below.real, below.imag, above.real, above.imag) < 0.0
-
     def _count_crossed(self, start: complex, end: complex) -> int:
         """Count the texts and leaders that the leader of a label would cross."""
         crossed = sum(_lines_cross(start, end, *leader) for leader in self.leaders)
-        for lower, upper in self.boxes:
-            corners = complex(lower.real, upper.imag), complex(upper.real, lower.imag)
-            one = _lines_cross(start, end, lower, upper)
-            crossed += one or _lines_cross(start, end, *corners)
+        for box in self.boxes:
+            a, b, c, d = (complex(*corner) for corner in box.corners())
+            crossed += _lines_cross(start, end, a, d) or _lines_cross(start, end, b, c)
         return crossed
 
 
-def _read_box(box: Any) -> Box:
-    """Return the corners of a box of matplotlib."""
-    return complex(box.x0, box.y0), complex(box.x1, box.y1)
+def _make_box(centre: complex, half: complex) -> Any:
+    """Make a box of matplotlib about a centre, from half its width and height."""
+    from matplotlib.transforms import Bbox
+
+    return Bbox([split_complex(centre - half), split_complex(centre + half)])
 
 
 def _transform(transform: Any, points: Any) -> Points:
@@ -224,11 +222,9 @@ def _transform(transform: Any, points: Any) -> Points:
     return np.asarray(x + 1j * y)
 
 
-def _clip(point: complex, box: Box) -> complex:
+def _clip(point: complex, box: Any) -> complex:
     """Return the point of a box that is nearest to a point."""
-    lower, upper = box
-    x = min(max(point.real, lower.real), upper.real)
-    return complex(x, min(max(point.imag, lower.imag), upper.imag))
+    return complex(*np.clip(split_complex(point), box.min, box.max))
 
 
 def _lines_cross(p: complex, q: complex, r: complex, s: complex) -> bool:
@@ -255,10 +251,3 @@ def _sample_line(points: Points, per_point: float) -> Points:
         between = int(min(abs(q - p) / step, 2000))
         pieces.append(p + np.linspace(0.0, 1.0, 2 + between) * (q - p))
     return np.concatenate(pieces)
-
-
-def _overlaps(box: Box, other: Box) -> bool:
-    """Return True if two boxes overlap."""
-    right = other[1] - box[0]
-    left = box[1] - other[0]
-    return min(right.real, right.imag, left.real, left.imag) > 0.0

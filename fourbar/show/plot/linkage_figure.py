@@ -28,7 +28,6 @@ from fourbar.show.plot.style import (
     plot_points,
     split_points,
     write_labelled_quantity,
-    write_path_legend,
 )
 from fourbar.show.plot.symbols import (
     BARREL,
@@ -60,7 +59,7 @@ def _label_plane(
     axes: "Axes", view: View, title: str, factor: float, unit: str
 ) -> None:
     """Label the axes of a drawing to scale, with round numbers of its coordinates."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
+    from matplotlib.ticker import MaxNLocator
 
     class ShiftedLocator(MaxNLocator):
         """Ticks at round numbers of the drawing."""
@@ -84,7 +83,7 @@ def _label_plane(
             return f"{value + shift:.6g}".replace("-", "−")
 
         axis.set_major_locator(ShiftedLocator(shift))
-        axis.set_major_formatter(FuncFormatter(write_tick))
+        axis.set_major_formatter(write_tick)
 
 
 def locate_pins(view: View, factor: float = 1.0) -> dict[str, complex]:
@@ -115,14 +114,16 @@ def draw_mechanism(
     for number in MOVING_BARS:
         start, stop = (pins[pin] for pin in ENDS[number])
         colour = BAR_COLOURS[number]
-        look: dict[str, Any] = {"lw": 4.5, "solid_capstyle": "round", "zorder": 4}
-        drawn += plot_points(axes, [start, stop], color=colour, **look)
+        ends = [start, stop]
+        drawn += plot_points(
+            axes, ends, color=colour, lw=4.5, solid_capstyle="round", zorder=4
+        )
         labels.keep_off(axes, start, stop, width=4.5)
         name = _write_bar_name(view, number)
         named_at = start + _NAMED_AT * (stop - start)
         labels.add(Label(axes, name, named_at, middle, colour, 9.0, 2.0))
-    look = {"ms": 6.0, "mew": 1.2, "zorder": 6, **RING_MARK}
-    drawn += plot_points(axes, [*pins.values()], "o", **look)
+    joints = [*pins.values()]
+    drawn += plot_points(axes, joints, "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK)
     for name, point in pins.items():
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
@@ -186,9 +187,15 @@ def draw_plate(
         return []
     colour = BAR_COLOURS.get(bar, MUTED)
     labels.keep_off(axes, *corners)
-    look: dict[str, Any] = {"ec": colour, "lw": 0.8, "ls": ":", "zorder": 1.5}
-    shade = to_rgba(colour, 0.08 if bar > 1 else 0.0)
-    plate = Polygon(split_points(corners), closed=False, fc=shade, **look)
+    plate = Polygon(
+        split_points(corners),
+        closed=False,
+        fc=to_rgba(colour, 0.08 if bar > 1 else 0.0),
+        ec=colour,
+        lw=0.8,
+        ls=":",
+        zorder=1.5,
+    )
     return [axes.add_patch(plate)]
 
 
@@ -204,11 +211,12 @@ def draw_mass_centre(
     ms: float = 7.0,
 ) -> "list[Line2D]":
     """Draw the quartered circle that marks a mass centre."""
-    look: dict[str, Any] = {"ms": ms, "zorder": 7}
-    quarters: dict[str, Any] = {"marker": _make_quarters(), "mfc": INK, "mec": "none"}
+    quarters: Any = _make_quarters()
+    disc = {"ms": ms, "zorder": 7, "mec": INK, "mew": 0.8, "mfc": "white"}
+    dark = {"ms": ms, "zorder": 7, "mec": "none", "mfc": INK}
     return [
-        *plot_points(axes, point, "o", **look, mfc="white", mec=INK, mew=0.8),
-        *plot_points(axes, point, **look, **quarters),
+        *plot_points(axes, point, "o", **disc),
+        *plot_points(axes, point, marker=quarters, **dark),
     ]
 
 
@@ -229,9 +237,16 @@ def draw_support(axes: "Axes", pin: complex, size: float, labels: Labels) -> Non
     foot = y - wide
     corners = [(x, y), (x - size, foot), (x + size, foot)]
     triangle = Polygon(corners, closed=True, fc="white", ec=INK, lw=1.0, zorder=3)
-    below = (x - wide, foot - 0.8 * size)
-    look: dict[str, Any] = {"fc": "none", "ec": INK, "lw": 0.0, "hatch": "//////"}
-    hatching = Rectangle(below, 2.0 * wide, 0.8 * size, zorder=2, **look)
+    hatching = Rectangle(
+        (x - wide, foot - 0.8 * size),
+        2.0 * wide,
+        0.8 * size,
+        fc="none",
+        ec=INK,
+        lw=0.0,
+        hatch="//////",
+        zorder=2,
+    )
     axes.add_patch(triangle)
     axes.add_patch(hatching)
     axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
@@ -306,7 +321,7 @@ def draw_linkage(
     axes.margins(0.08)
     title = f"Linkage at {view.at}, {view.branch_name} branch"
     _label_plane(axes, view, title, factor, unit)
-    write_path_legend(axes)
+    place_legend(axes, 3)
 
 
 def _mark_paths(axes: "Axes", view: View, factor: float, labels: Labels) -> None:
@@ -322,9 +337,10 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw what does not move: paths of points, ground line and supports."""
     factor, _, size = choose_drawing_scale(view)
     for path, colour, dashes, name in _list_paths(view):
-        look: dict[str, Any] = {"color": colour, "ls": (0, dashes), "label": name}
-        plot_points(axes, factor * path, lw=1.0, zorder=2, **look)
-        labels.keep_off(axes, *(factor * path[:: max(1, len(path) // 120)]))
+        scaled = factor * path
+        dashed = (0, dashes)
+        plot_points(axes, scaled, color=colour, ls=dashed, label=name, lw=1.0, zorder=2)
+        labels.keep_off(axes, *scaled[:: max(1, len(path) // 120)])
     pins = locate_pins(view, factor)
     ends = pins["O2"], pins["O4"]
     plot_points(axes, ends, **GROUND_LINE)
@@ -371,9 +387,15 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     for (name, points), (colour, dashes) in zip(
         curves, cycle(_COUPLER_CURVES), strict=False
     ):
-        lw = 1.8 if name in (*names, "0.5") else 1.1
-        look: dict[str, Any] = {"color": colour, "ls": dashes, "label": name}
-        plot_points(axes, factor * traced.path(points), lw=lw, zorder=3, **look)
+        plot_points(
+            axes,
+            factor * traced.path(points),
+            color=colour,
+            ls=dashes,
+            label=name,
+            lw=1.8 if name in (*names, "0.5") else 1.1,
+            zorder=3,
+        )
     faint: dict[str, Any] = {
         "color": MUTED,
         "alpha": 0.55,
@@ -449,11 +471,11 @@ def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
         if np.abs(here - middle) <= reach:
             plot_points(axes, factor * here, "o", ms=4.5, color=colour, zorder=6)
     draw_mechanism(axes, view, view.here, 0, labels)
-    axes.set_aspect("equal", adjustable="datalim")
     axes.grid(color=MUTED, alpha=0.2)
     title = f"Instant centres at {view.at}"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
     place_legend(axes)
+    axes.set_aspect("equal", adjustable="datalim")
     view.note(
         f"Centres further than {FARTHEST_CENTRE:g} longest bars away are left out.",
     )

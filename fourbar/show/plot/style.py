@@ -61,12 +61,12 @@ def choose_bar_line(bar: int) -> dict[str, Any]:
 
 def choose_force_line(name: str) -> dict[str, Any]:
     """Return the style and the label of the curve of a pin force."""
-    look = {
+    return {
         "color": FORCE_COLOURS[name],
         "ls": FORCE_DASHES[name],
         "lw": _FORCE_WIDTHS[name],
+        "label": write_force_name(name),
     }
-    return {**look, "label": write_force_name(name)}
 
 
 def write_force_name(name: str) -> str:
@@ -74,20 +74,9 @@ def write_force_name(name: str) -> str:
     return f"$F_{{{name[1:]}}}$"
 
 
-TITLE: dict[str, Any] = {
-    "parse_math": False,
-    "size": 10.5,
-    "weight": "bold",
-    "x": 0.012,
-    "ha": "left",
-}
-CAPTION_STYLE: dict[str, Any] = {
-    "parse_math": False,
-    "size": 6.8,
-    "color": MUTED,
-    "x": 0.012,
-    "ha": "left",
-}
+_AT_EDGE: dict[str, Any] = {"parse_math": False, "x": 0.012, "ha": "left"}
+TITLE: dict[str, Any] = {**_AT_EDGE, "size": 10.5, "weight": "bold"}
+CAPTION_STYLE: dict[str, Any] = {**_AT_EDGE, "size": 6.8, "color": MUTED}
 """Styles of the texts of a whole figure, above and below its panels."""
 RING_MARK: dict[str, Any] = {"mfc": "white", "mec": INK}
 """A mark that is a ring."""
@@ -186,7 +175,7 @@ class Drawing:
         self.figure = figure
 
     def _repr_svg_(self) -> str:
-        return self._render("svg").decode("utf-8")
+        return self._render("svg").decode()
 
     def save(self, path: str | Path) -> None:
         """Save it as SVG, PNG or PDF, by the ending of the path.
@@ -283,27 +272,20 @@ def set_degree_ticks(axis: Any, span: float) -> None:
             return
 
 
-def place_legend(axes: "Axes", columns: int = 4) -> None:
+def place_legend(axes: "Axes", columns: int = 4) -> float:
     """Place the legend, if a curve has a value, between title and panel.
 
-    No curve is covered there.
-    """
-    if not axes.get_legend_handles_labels()[1]:
-        return
-    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)
-    legend.set_in_layout(False)  # it would make its panel narrower
-    rows = math.ceil(len(legend.get_texts()) / columns)
-    axes.set_title(axes.get_title(loc="left"), pad=7.0 + 11.0 * rows)
-
-
-def write_path_legend(axes: "Axes", columns: int = 3) -> float:
-    """Write the legend of the paths above the drawing.
+    No curve is covered there; a drawing to scale has a narrower legend.
 
     Return the distance of the title over it, typographic points.
     """
-    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=columns)
+    if not axes.get_legend_handles_labels()[1]:
+        return 0.0
+    to_scale = axes.get_aspect() == 1.0
+    above, pad, line = (1.005, 6.0, 12.0) if to_scale else (1.02, 7.0, 11.0)
+    legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, above), ncols=columns)
     legend.set_in_layout(False)  # it would make its panel narrower
-    pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / columns)
+    pad += line * math.ceil(len(legend.get_texts()) / columns)
     axes.set_title(axes.get_title(loc="left"), pad=pad)
     return pad
 
@@ -320,10 +302,9 @@ def fit_legends(figure: "Figure") -> None:
         legend = axes.get_legend()
         if legend is None or legend.get_in_layout():
             continue
-        place = write_path_legend if axes.get_aspect() == 1.0 else place_legend
         columns = len(legend.get_texts())
         while legend and legend.get_window_extent().width > axes.bbox.width and columns:
-            place(axes, columns)
+            place_legend(axes, columns)
             legend = axes.get_legend()
             columns -= 1
             is_changed = True

@@ -197,27 +197,24 @@ def _make_drive(scene: Scene) -> Symbol:
     if drive is None:
         return Symbol("drive", f"T{bar}", bar, pin=FIRST_PIN[bar])
     assert isinstance(drive, PointDrive)
-    at = drive.place.vector()
+    place = drive.place
     direction = cmath.rect(1.0, drive.direction)
     turns = drive.frame == "bar"
-    return Symbol("push", "F", drive.place.bar, at, vector=direction, turns=turns)
+    at = place.vector()
+    return Symbol("push", "F", place.bar, at, vector=direction, turns=turns)
 
 
 def _join_ends(kind: str, name: str, line: Any) -> Symbol:
     """Make the symbol of a line between two points."""
-    start = line.start
-    end = line.end
-    end_of_line = (end.bar, end.vector())
-    return Symbol(kind, name, start.bar, start.vector(), end=end_of_line)
+    start, end = ((place.bar, place.vector()) for place in (line.start, line.end))
+    return Symbol(kind, name, *start, end=end)
 
 
 class Pose(NamedTuple):
     """Position of the linkage in the units of a drawing."""
 
-    foot: dict[int, complex]
-    """First pin of each bar, 1 to 4."""
     u: dict[int, complex]
-    """Direction of each bar."""
+    """Direction of each bar, 1 to 4."""
     pins: dict[str, complex]
     factor: float
     """Factor from m to the unit of the drawing."""
@@ -242,15 +239,11 @@ class Pose(NamedTuple):
 
     def point(self, bar: int, z: complex) -> complex:
         """Place a point given in the frame of a bar."""
-        return self.foot[bar] + self.factor * z * self.u[bar]
+        return self.pins[FIRST_PIN[bar]] + self.factor * z * self.u[bar]
 
     def tail(self, symbol: Symbol) -> complex:
         """Place the foot of a load's arrow."""
         return self.point(symbol.bar, symbol.at) + self.factor * symbol.beyond
-
-    def direction(self, symbol: Symbol) -> complex:
-        """Return the axes in which a load's force is stated."""
-        return self.u[symbol.bar] if symbol.turns else 1.0
 
 
 @dataclass(slots=True)
@@ -273,9 +266,9 @@ class _Pen:
 
     def draw_line(self, points: Any, width: float) -> None:
         """Draw a line over the supports and under the bars."""
-        look: dict[str, Any] = {"color": self.colour, "lw": width, "zorder": 3.5}
-        self.drawn += plot_points(self.axes, points, **look)
-        self.labels.keep_off(self.axes, *points)
+        axes = self.axes
+        self.drawn += plot_points(axes, points, color=self.colour, lw=width, zorder=3.5)
+        self.labels.keep_off(axes, *points)
 
     def draw_arrow(self, tail: complex, tip: complex) -> None:
         """Draw an arrow over the bars."""
@@ -312,11 +305,10 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
         "B": factor * complex(*solution.B[index]),
         "O4": factor * cmath.rect(linkage.ground, linkage.ground_angle),
     }
-    feet = {1: pins["O2"], 2: pins["O2"], 3: pins["A"], 4: pins["O4"]}
     torque = math.nan
     if solution.torque is not None:
         torque = float(solution.torque[index])
-    return Pose(feet, directions, pins, factor, angles[2], torque)
+    return Pose(directions, pins, factor, angles[2], torque)
 
 
 def draw_symbol(
@@ -354,8 +346,8 @@ def _draw_between_ends(pen: _Pen, other_end: tuple[int, complex]) -> None:
         pen.draw_line(start + np.array([0.1, 1.0]) * place.barrel * along, 4.5)
         middle = start + 0.5 * place.barrel * along
         pen.write(f"${symbol.name}$", middle, 1j * along)
-    look: dict[str, Any] = {"ms": 3.5, "color": pen.colour, "zorder": 5.5}
-    pen.drawn += plot_points(pen.axes, [start, end], "o", **look)
+    ends = [start, end]
+    pen.drawn += plot_points(pen.axes, ends, "o", ms=3.5, color=pen.colour, zorder=5.5)
 
 
 def _draw_couple(pen: _Pen) -> None:
@@ -364,7 +356,7 @@ def _draw_couple(pen: _Pen) -> None:
     place = pen.place
     text = symbol.name
     if symbol.kind == "moment":
-        centre = place.point(symbol.bar, symbol.at) + symbol.beyond
+        centre = place.tail(symbol)
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
     else:
         centre = place.pins[symbol.pin]
@@ -387,19 +379,13 @@ def _draw_ring(pen: _Pen) -> None:
     """Draw what acts at a pin or a place as a ring; a torsion spring is a spiral."""
     symbol = pen.symbol
     place = pen.place
-    kind = pen.symbol.kind
-    centre = place.point(symbol.bar, symbol.at)
-    if symbol.pin:
-        centre = place.pins[symbol.pin]
+    kind = symbol.kind
+    centre = place.pins.get(symbol.pin, place.point(symbol.bar, symbol.at))
     relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
     radius = pen.shrink() * relative
-    radii: Any = radius
-    turns = 1.0
-    if kind == "torsion":
-        radii = np.linspace(0.3 * radius, radius, 90)
-        turns = 2.5
-    angles = np.linspace(0.0, turns * math.tau, 90)
-    ring = centre + radii * np.exp(1j * angles)
+    inner, turns = (0.3, 2.5) if kind == "torsion" else (1.0, 1.0)
+    radii = np.linspace(inner * radius, radius, 90)
+    ring = centre + radii * np.exp(1j * np.linspace(0.0, turns * math.tau, 90))
     pen.draw_line(ring, 2.2 if kind == "flywheel" else 1.2)
     away = cmath.rect(1.0, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
     pen.write(symbol.name, centre, away, radius)
@@ -413,7 +399,8 @@ def _draw_force(pen: _Pen) -> None:
     sign = symbol.sign(place.theta_2)
     if sign == 0.0:
         return
-    towards = place.direction(symbol) * symbol.vector / abs(symbol.vector)
+    axes = place.u[symbol.bar] if symbol.turns else 1.0
+    towards = axes * symbol.vector / abs(symbol.vector)
     tip = tail + sign * SYMBOL_SIZES["force"] * pen.size * towards
     pen.draw_arrow(tail, tip)
     pen.write(symbol.name, tip, (tip - tail) / abs(tip - tail))
@@ -445,18 +432,12 @@ def _draw_gravity(pen: _Pen) -> None:
         "annotation_clip": False,
     }
     style = {**HEADED, "color": pen.colour, "lw": 1.3}
-    name: dict[str, Any] = {"color": pen.colour, "size": 9.0}
     pen.drawn += [
         pen.axes.annotate("", xytext=(-x, -y), arrowprops=style, **corner),
-        pen.axes.annotate("$g$", xytext=(-x - 8.0, -y), **name, **corner),
+        pen.axes.annotate(
+            "$g$", xytext=(-x - 8.0, -y), color=pen.colour, size=9.0, **corner
+        ),
     ]
-
-
-def _locate(solution: Solution, name: str) -> Any:
-    """Return the places of a pin, a mass centre or a point of the scene, (n, 2)."""
-    if name in solution.points:
-        return solution.points[name]
-    return getattr(solution, name)
 
 
 def draw_vectors(
@@ -473,27 +454,31 @@ def draw_vectors(
     Returns the function that moves them to another position, and returns them.
     """
     drawn = []
-    look: dict[str, Any] = {
-        "angles": "xy",
-        "scale_units": "xy",
-        "scale": 1.0,
-        "width": 0.0045,
-        "zorder": 7,
-    }
     for letter, (colour, label) in _ARROWS.items():
         of_sweep = collect_point_vectors(view.scene, view.sweep, letter)
         sizes = [np.hypot(*values.T) for values in of_sweep.values()]
         if not (top := choose_limit(sizes) or largest_magnitude(*sizes)):
             continue
         vectors = collect_point_vectors(view.scene, solution, letter)
-        feet = np.array([factor * _locate(solution, name) for name in vectors])
+        places = vars(solution) | solution.points
+        feet = np.array([factor * places[name] for name in vectors])
         shafts = np.array([*vectors.values()])
         longest = np.maximum(np.hypot(*np.moveaxis(shafts, -1, 0)), top)
         shafts = LONGEST_ARROW * size * shafts / longest[..., None]
         tips = (feet + shafts).reshape(-1, 2)
         axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
         start = np.zeros((2, len(vectors)))
-        arrows = axes.quiver(*start, *start, color=colour, label=label, **look)
+        arrows = axes.quiver(
+            *start,
+            *start,
+            color=colour,
+            label=label,
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            width=0.0045,
+            zorder=7,
+        )
         drawn.append((arrows, feet, np.nan_to_num(shafts)))
 
     def move(index: int) -> list[Any]:

@@ -57,11 +57,8 @@ class View:
         """Quantity on the horizontal axis: time, or the commanded quantity."""
         if self.time is None:
             return axis_of(self.scene, self.sweep.at, self.units)
-        longest = float(self.time[-1])
-        factor = 1.0
-        unit = "s"
-        if longest < 1.0:
-            factor, unit = choose_unit(longest, "s")
+        # s, or a smaller unit of a shorter motion
+        factor, unit = choose_unit(min(float(self.time[-1]), 1.0), "s")
         return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
 
     @property
@@ -235,11 +232,14 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     ------
     NotAssembledError : no position of the sweep assembles, or the one named does not.
     """
-    if is_over_time(scene):
-        return _view_motion(scene, position)
-    positions = list_sweep(scene)
-    sweep = solve(scene, at=positions)
-    _require_drawable(sweep)
+    over_time = is_over_time(scene)
+    sweep = solve(scene) if over_time else solve(scene, at=list_sweep(scene))
+    if not sweep.assembled.any():
+        raise NotAssembledError(
+            "nothing to draw: the linkage assembles at none of the scene's positions"
+        )
+    if over_time:
+        return _view_motion(sweep, position)
     of_scene = command(scene)
     if position is None and len(of_scene.angle) == 1:
         position = float(of_scene.places[0])
@@ -255,21 +255,13 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     return View(scene, sweep, here, stated=stated)
 
 
-def _require_drawable(sweep: Solution) -> None:
-    if not sweep.assembled.any():
-        raise NotAssembledError(
-            "nothing to draw: the linkage assembles at none of the scene's positions"
-        )
-
-
-def _view_motion(scene: Scene, position: float | None) -> View:
+def _view_motion(sweep: Solution, position: float | None) -> View:
     """Return the view of a motion through time.
 
     The drawn instant is the first that assembles, or that whose theta_2 comes nearest
     to the position.
     """
-    sweep = solve(scene)
-    _require_drawable(sweep)
+    scene = sweep.scene
     angle = sweep.at.angle
     name = sweep.commanded
     if position is None:

@@ -24,7 +24,7 @@ MODELS = Path(__file__).parents[3] / "models"
 
 
 def columns(scene, names):
-    read = choose_columns(scene, solve(scene), names)
+    read = choose_columns(solve(scene), names)
     return {column.name: column.values for column in read}
 
 
@@ -45,7 +45,7 @@ def test_a_vector_is_its_size_and_a_place_two_coordinates():
 
 def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     s = solve(TURN)
-    torque, ratio = choose_columns(TURN, s, "torque/F12,F12/F14")
+    torque, ratio = choose_columns(s, "torque/F12,F12/F14")
     assert ratio.values == approx(np.hypot(*s.F12.T) / np.hypot(*s.F14.T))
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     shown = torque.shown({"N m": ("N mm", 1e3)})
@@ -147,7 +147,7 @@ def test_what_has_no_value_is_a_dash_and_what_is_rounding_zero():
     assert np.isnan(derive(s, "I13")).all()
     assert derive(s, "omega_4/omega_2") == approx(1.0)
     assert " - " in print_positions(s, None, DEGREES)
-    columns = choose_columns(scene, s, "shaking_force_x,omega_3/omega_2")
+    columns = choose_columns(s, "shaking_force_x,omega_3/omega_2")
     *_, first, last = print_positions(s, None, columns=columns).splitlines()
     assert first.split() == last.split() == ["0", "0"]
 

@@ -211,7 +211,7 @@ def test_springs_have_their_length_and_pull_as_columns():
         )
     )
     solution = solve(scene)
-    length, force = choose_columns(scene, solution, "spring_0_length,spring_0_force")
+    length, force = choose_columns(solution, "spring_0_length,spring_0_force")
     distance = np.sqrt(0.8**2 + 0.5**2 + 0.8 * np.cos(solution.theta_2))
     assert length.unit == "m" and length.values == approx(distance, rel=1e-13)
     assert force.unit == "N"

@@ -50,7 +50,7 @@ from fourbar.show.plot.curves import (
 )
 from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
 from fourbar.show.plot.film import choose_frames
-from fourbar.show.plot.freebody import list_actions
+from fourbar.show.plot.freebody import FreedBar
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage_figure import draw_mechanism
 from fourbar.show.plot.style import INK, shorten_text, write_number
@@ -389,7 +389,9 @@ def test_free_bodies_balance(drive):
         crank_rocker(drive_bar=drive_bar, drive=line, effects=loads(EVERYTHING).effects)
     )
     for bar in (2, 3, 4):
-        arrows, couples = list_actions(shown, bar)
+        freed = FreedBar(shown, bar)
+        arrows = freed.arrows
+        couples = freed.turns
         forces = np.array([arrow.force for arrow in arrows])
         assert np.abs(forces.sum()) <= BALANCE * np.abs(forces).max()
         moments = [(arrow.at.conjugate() * arrow.force).imag for arrow in arrows]
