@@ -110,15 +110,13 @@ def _write_comment(
     notes = NOTES["assembled"]
     bar = scene.drive_bar
     joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""
+    opens = notes["opens"].strip()
     lines = [
-        notes["opens"]
-        .strip()
-        .format(*map(repr, assembly.numbers), form=form, at_B=at_B)
-    ]
-    lines += [
+        opens.format(*map(repr, assembly.numbers), form=form, at_B=at_B),
         notes["drive"].format(bar=bar, joint=joint),
-        *([notes["without_loads"]] if scene.loads else []),
     ]
+    if scene.loads:
+        lines.append(notes["without_loads"])
     if plane.is_moved:
         lines.append(notes["moved"].format(origin=write_exactly(*plane.origin)))
     if plane.is_tilted:
@@ -166,25 +164,17 @@ def write_sdf(
     form = f"SDF for {reader}"
     assembled = assemble(scene, start, form, reader, without_loads=without_loads)
     turn, foot, numbers, inertia, gravity, dynamics = assembled
-    if reader == "drake" and "B" in dynamics:
-        raise LimitError("Drake's ball constraint at pin B has no damping")
-    omega_2, at_A, omega_4 = numbers[3:]
-    root = ET.Element(
-        "sdf",
-        {
-            "version": "1.9",
-            **({"xmlns:drake": DRAKE_NAMESPACE} if reader == "drake" else {}),
-        },
-    )
-    at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    for line in _write_comment(
-        scene,
-        "SDF",
-        reader,
-        assembled,
-        at_B,
-        plane,
-    ).splitlines():
+    root = ET.Element("sdf", version="1.9")
+    at_B = ""
+    if reader == "gazebo":
+        omega_2, at_A, omega_4 = numbers[3:]
+        at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s"
+    else:
+        root.set("xmlns:drake", DRAKE_NAMESPACE)
+        if "B" in dynamics:
+            raise LimitError("Drake's ball constraint at pin B has no damping")
+    comment = _write_comment(scene, "SDF", reader, assembled, at_B, plane)
+    for line in comment.splitlines():
         root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
     _add_numbers(world, "gravity", *plane.turn(*gravity))
@@ -195,9 +185,10 @@ def write_sdf(
     _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
     for number in MOVING_BARS:
         bar = linkage.bar(number)
+        name = BAR_NAMES[number]
         _add_link(
             model,
-            BAR_NAMES[number],
+            name,
             foot[number],
             turn[number],
             bar.mass,
@@ -205,22 +196,22 @@ def write_sdf(
             bar.to_centre,
         )
         pin = FIRST_PIN[number]
-        parent = BAR_NAMES[_PARENT[number]]
         at_pin = dynamics.get(pin, {})
-        _add_joint(model, pin, "revolute", parent, BAR_NAMES[number], at_pin)
+        _add_joint(model, pin, "revolute", BAR_NAMES[_PARENT[number]], name, at_pin)
+    _, coupler, output = (BAR_NAMES[number] for number in MOVING_BARS)
     length_3 = linkage.coupler.length
-    length_4 = linkage.output.length
     if reader == "gazebo":
         at_pin = dynamics.get("B", {})
-        joint = _add_joint(model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], at_pin)
+        joint = _add_joint(model, "B", "revolute", output, coupler, at_pin)
         # in the frame of its child
         _add_numbers(joint, "pose", length_3, 0, 0, 0, 0, 0)
     else:
-        ball = ET.SubElement(model, "drake:ball_constraint")
-        for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
-            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
-        for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
-            _add_numbers(ball, f"drake:ball_constraint_{key}", length, 0, 0)
+        name = "drake:ball_constraint"
+        ball = ET.SubElement(model, name)
+        ET.SubElement(ball, f"{name}_body_A").text = coupler
+        ET.SubElement(ball, f"{name}_body_B").text = output
+        _add_numbers(ball, f"{name}_p_AP", length_3, 0, 0)
+        _add_numbers(ball, f"{name}_p_BQ", linkage.output.length, 0, 0)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

@@ -19,18 +19,18 @@ from fourbar.errors import (
     write_in_units,
 )
 from fourbar.formulas.mobility import change_points, choose_range, turns_fully
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, uniform
+from fourbar.linkage import BAR_NAMES, FourBar, uniform
 from fourbar.mjcf.model import (
     RECIPE,
     Model,
     Settings,
     add_appearance,
+    add_element,
     make_constant_motor,
     make_motor,
     make_servo,
     require_carriable,
     unwind,
-    write_exactly,
 )
 from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.quantities import OK, Array
@@ -120,17 +120,18 @@ def write_mjcf(
     if settings.pad == "fitted":
         settings = replace(settings, pad=fit_pad(scene))
     start = (start or find_start(scene)) if keyframe else None
-    model = Model(scene.linkage, settings, _choose_timestep(settings, start))
+    timestep = _choose_timestep(settings, start)
+    # MuJoCo alone reads motors without a control
+    passive = drive == "motor" and reader == "mujoco"
+    model = Model(scene.linkage, settings, timestep, passive=passive)
     if isinstance(scene.drive, LinearDrive) and not is_released:
         model.cylinder = scene.drive
     for term in (*scene.effects, *scene.loads):
         term.add_to_mjcf(model)
-    # MuJoCo alone reads motors without a control
-    passive = drive == "motor" and reader == "mujoco"
     root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
     for line in _write_comments(scene, drive, reader, passive=passive and model.exerts):
         root.append(ET.Comment(f" {line} "))
-    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    add_element(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root)
     add_appearance(root, scene.linkage)
     if start is not None:
@@ -146,16 +147,10 @@ def write_mjcf(
     else:
         speed = None if start is None else start.qvel[0]
         actuator = _keep_speed(scene, armature, model.timestep, speed)
-    model.add_actuators(root, actuator, driven=drive == "flywheel", passive=passive)
+    model.add_actuators(root, actuator, driven=drive == "flywheel")
     if start is not None:
-        frame = ET.SubElement(root, "keyframe")
-        ET.SubElement(
-            frame,
-            "key",
-            name="start",
-            qpos=write_exactly(*start.qpos),
-            qvel=write_exactly(*start.qvel),
-        )
+        frame = add_element(root, "keyframe")
+        add_element(frame, "key", name="start", qpos=start.qpos, qvel=start.qvel)
     if plane.is_moved:
         plane.move_mjcf(root)
     if plane.is_tilted:
@@ -169,7 +164,7 @@ def _keep_speed(
     armature: float,
     timestep: float,
     speed: float | None,
-) -> dict[str, str]:
+) -> dict[str, Any]:
     """Return attributes of the drive beside a flywheel; none has an empty dict.
 
     `speed`: of the input in the keyframe, rad/s; None: there is no keyframe.
@@ -199,11 +194,8 @@ def _choose_timestep(settings: Settings, start: "Start | None") -> float:
     if start is not None:
         return start.run.timestep(settings)
     if settings.timestep is None:
-        raise InputError(
-            "timestep",
-            None,
-            "is missing: state it, or request a keyframe",
-        )
+        allowed = "is missing: state it, or request a keyframe"
+        raise InputError("timestep", None, allowed)
     return settings.timestep * settings.timestep_scale
 
 
@@ -282,14 +274,13 @@ def _list_left_out_by_genesis(scene: Scene) -> list[str]:
     """
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
-        if effect.key == "springs":
-            names.append("springs")
-        if not isinstance(effect, PinRows):
-            continue
-        pins = {pin for pin, *_ in effect.rows}
+        key = effect.key
+        if key == "springs":
+            names.append(key)
+        pins = {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else {}
         if "B" in pins:
-            names.append(f"{effect.key} at B")
-        if effect.key == "torsion" and pins - {"B"}:
+            names.append(f"{key} at B")
+        if key == "torsion" and {*pins} - {"B"}:
             names.append("rest angles of torsion (it rests as assembled)")
     return names
 
@@ -332,15 +323,11 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     linkage takes little energy out.
     """
     by_loads = compute_load_ratio(scene) * _compute_acceleration_scale(scene)
-    speed = (
-        math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + by_loads) or SPEED_LAID_OUT_FOR
-    )
-    settings = replace(
-        settings,
-        flywheel=0.0,
-        timestep=settings.timestep or math.tau / (_RELEASED_STEPS * speed),
-    )
-    if scene.motion.free is None:
+    motion = scene.motion
+    speed = math.sqrt((motion.omega_2 or 0.0) ** 2 + by_loads) or SPEED_LAID_OUT_FOR
+    timestep = settings.timestep or math.tau / (_RELEASED_STEPS * speed)
+    settings = replace(settings, flywheel=0.0, timestep=timestep)
+    if motion.free is None:
         return settings
     return replace(settings, pad=None, time_constant_steps=_RELEASED_CLOSURE)
 
@@ -382,20 +369,16 @@ def _compute_acceleration_scale(scene: Scene) -> float:
 
     The accelerations of all bars grow with it.
     """
-    return float(
-        max(
-            (scene.motion.omega_2 or SPEED_LAID_OUT_FOR) ** 2,
-            abs(scene.motion.alpha_2),
-        )
-    )
+    motion = scene.motion
+    speed = motion.omega_2 or SPEED_LAID_OUT_FOR
+    return float(max(speed**2, abs(motion.alpha_2)))
 
 
 def _sum_inertia(linkage: FourBar) -> float:
     """Return the sum of m L^2 + I of the moving bars, kg m^2."""
     longest = max(linkage.lengths)
     inertia = 0.0
-    for number in MOVING_BARS:
-        bar = linkage.bar(number)
+    for bar in linkage.moving:
         arm = max(longest, abs(bar.mass_centre[0]))
         inertia += bar.mass * arm * arm + bar.moment_of_inertia
     return inertia
@@ -448,9 +431,9 @@ class WindowMotion:
         angle = theta_2 - self.start
         squared = self.omega**2 + 2.0 * self.alpha * angle
         if squared <= 0.0:
+            there = write_in_units("rad", theta_2)
             raise LimitError(
-                "alpha_2 brings the input to rest before theta_2 ="
-                f" {write_in_units('rad', theta_2)}"
+                f"alpha_2 brings the input to rest before theta_2 = {there}"
             )
         return (
             2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
@@ -470,10 +453,9 @@ class WindowMotion:
         # at the greatest speed throughout: an input that speeds up covers the end of
         # its window in few steps
         width = abs(self.stop - self.start)
+        window = 1.0
         if 0.0 < width < FULL_TURN:
             window = settings.steps_per_window * duration * self.fastest / width
-        else:
-            window = 1.0
         # a window of 628 steps per revolution must not become one more by a rounding
         steps = max(math.ceil(max(per_revolution, window) * (1.0 - 1e-9)), at_least)
         return duration / steps * settings.timestep_scale
@@ -492,11 +474,9 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
     The motion is counter-clockwise from the least, or clockwise from the greatest.
     """
-    least = float(np.min(theta_2))
-    most = float(np.max(theta_2))
-    if omega > 0.0:
-        return WindowMotion(least, most, omega, alpha)
-    return WindowMotion(most, least, omega, alpha)
+    ends = float(np.min(theta_2)), float(np.max(theta_2))
+    start, stop = ends if omega > 0.0 else ends[::-1]
+    return WindowMotion(start, stop, omega, alpha)
 
 
 def find_start(scene: Scene) -> Start:
@@ -504,11 +484,8 @@ def find_start(scene: Scene) -> Start:
     at = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
-    solution = solve(
-        scene,
-        "velocity",
-        at=Command(at.theta_2, at.branch, speed, alpha),
-    )
+    at = Command(at.theta_2, at.branch, speed, alpha)
+    solution = solve(scene, "velocity", at=at)
     usable = np.flatnonzero(solution.status_code == OK)
     if not len(usable):
         raise NotAssembledError(
@@ -571,14 +548,12 @@ def write_mjcf_for(
     Raises InputError for no such simulator, or a motor for one that does not take it,
     and as `write_mjcf` does.
     """
-    if simulator not in SIMULATORS:
-        raise InputError(
-            "simulator",
-            simulator,
-            f"must be one of {', '.join(SIMULATORS)}",
-        )
-    if drive not in get_args(Drive):
-        raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
+    given = {"simulator": simulator, "drive": drive}
+    for (name, word), words in zip(
+        given.items(), (SIMULATORS, get_args(Drive)), strict=True
+    ):
+        if word not in words:
+            raise InputError(name, word, f"must be one of {', '.join(words)}")
     if drive == "motor" and simulator in _OWN_MOTORS:
         raise InputError(
             "drive",
@@ -586,13 +561,8 @@ def write_mjcf_for(
             f"only mujoco, warp and mjx read it; leave it out for {simulator}",
         )
     settings = SIMULATORS[simulator]
-    return write_mjcf(
-        scene,
-        settings,
-        simulator,
-        drive=drive,
-        plane=plane.moved(*scene.origin),
-    )
+    plane = plane.moved(*scene.origin)
+    return write_mjcf(scene, settings, simulator, drive=drive, plane=plane)
 
 
 _PER_METRE = 1.0
@@ -623,12 +593,9 @@ def make_scene(
 def list_defaults(scene: Scene) -> list[str]:
     """List the lengths that `make_scene` was given and its defaults, one line each."""
     theta_2 = scene.motion.theta_2
+    lengths = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     return [
-        "lengths in m: "
-        + ", ".join(
-            f"{n} {x!r}"
-            for n, x in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
-        ),
+        f"lengths in m: {', '.join(f'{name} {length!r}' for name, length in lengths)}",
         f"bars: uniform and slender, {_PER_METRE:g} kg/m",
         "branch: open",
         f"omega_2: {scene.motion.omega_2!r} rad/s, alpha_2: 0",

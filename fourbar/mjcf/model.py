@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from xml.etree import ElementTree as ET
@@ -93,58 +93,55 @@ def _find_view(linkage: FourBar) -> tuple[float, float, float]:
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     """Add the extent and free camera of the viewer, light and background."""
     x, y, distance = _find_view(linkage)
-    ET.SubElement(
-        root,
-        "statistic",
-        extent=write_six_digits(distance / 1.5),
-        center=write_six_digits(x, y, 0),
-    )
-    visual = ET.SubElement(root, "visual")
+    extent = write_six_digits(distance / 1.5)
+    add_element(root, "statistic", extent=extent, center=write_six_digits(x, y, 0))
+    visual = add_element(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks
     # straight down on the plane
-    ET.SubElement(
+    add_element(
         visual,
         "global",
-        azimuth="90",
-        elevation="-90",
-        fovy=f"{_FOVY:g}",
-        offwidth="1280",
-        offheight="960",
+        azimuth=90,
+        elevation=-90,
+        fovy=_FOVY,
+        offwidth=1280,
+        offheight=960,
     )
-    ET.SubElement(
+    add_element(
         visual,
         "headlight",
         ambient=".45 .45 .45",
         diffuse=".35 .35 .35",
         specular=".1 .1 .1",
     )
-    ET.SubElement(visual, "rgba", haze="1 1 1 1")
-    sky: dict[str, Any] = {
-        "rgb1": ".95 .96 .98",
-        "rgb2": ".95 .96 .98",
-        "width": "32",
-        "height": "192",
-    }
-    ET.SubElement(
-        ET.SubElement(root, "asset"),
+    add_element(visual, "rgba", haze="1 1 1 1")
+    add_element(
+        add_element(root, "asset"),
         "texture",
         type="skybox",
         builtin="flat",
-        **sky,
+        rgb1=".95 .96 .98",
+        rgb2=".95 .96 .98",
+        width=32,
+        height=192,
     )
 
 
 def _add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
     place = write_six_digits(*_find_view(linkage))
-    shining = {
-        "diffuse": ".2 .2 .2",  # with the headlight 1
-        "specular": ".1 .1 .1",
-        "directional": "true",
-        "castshadow": "false",
-    }
-    ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")
-    ET.SubElement(world, "camera", name="plane", pos=place, fovy=f"{_FOVY:g}")
+    add_element(
+        world,
+        "light",
+        diffuse=".2 .2 .2",  # with the headlight 1
+        specular=".1 .1 .1",
+        directional="true",
+        castshadow="false",
+        name="light",
+        pos=place,
+        dir="0 0 -1",
+    )
+    add_element(world, "camera", name="plane", pos=place, fovy=_FOVY)
 
 
 CYLINDER = "cylinder"
@@ -177,13 +174,13 @@ def write_exactly(*numbers: float) -> str:
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
 
-def _write_attributes(
-    numbers: Mapping[str, float | tuple[float, ...]],
-) -> dict[str, str]:
-    """Write numbers as attributes of an element."""
-    return {
-        name: write_exactly(*np.atleast_1d(number)) for name, number in numbers.items()
+def add_element(parent: ET.Element, tag: str, **stated: Any) -> ET.Element:
+    """Add an element; numbers among its attributes are written exactly."""
+    attributes = {
+        name: value if isinstance(value, str) else write_exactly(*np.ravel(value))
+        for name, value in stated.items()
     }
+    return ET.SubElement(parent, tag, attributes)
 
 
 def _find_bar_element(root: ET.Element, bar: int) -> ET.Element:
@@ -203,33 +200,25 @@ MuJoCo 3 refuses a motor constant of 0. The back-EMF goes as its square, and tha
 """
 
 
-def make_constant_motor(force: float) -> dict[str, str]:
+def make_constant_motor(force: float) -> dict[str, Any]:
     """Return attributes of a motor on pin O2 that ignores its control.
 
     A force of 0 has no motor, and an empty dict.
     """
     if force:
-        return {
-            **_UNCONTROLLED,
-            "joint": "O2",
-            "biasprm": write_exactly(force, 0.0, 0.0),
-        }
+        return {**_UNCONTROLLED, "joint": "O2", "biasprm": (force, 0.0, 0.0)}
     return {}
 
 
-def make_servo(gain: float, omega: float) -> dict[str, str]:
+def make_servo(gain: float, omega: float) -> dict[str, Any]:
     """Return the attributes of a drive that exerts the couple gain (omega - speed).
 
     The drive needs no control.
     """
-    return {
-        **_UNCONTROLLED,
-        "joint": "O2",
-        "biasprm": write_exactly(gain * omega, 0.0, -gain),
-    }
+    return {**_UNCONTROLLED, "joint": "O2", "biasprm": (gain * omega, 0.0, -gain)}
 
 
-def make_motor(bar: int | None, most: float) -> dict[str, str]:
+def make_motor(bar: int | None, most: float) -> dict[str, Any]:
     """Make the drive a motor whose control is its effort.
 
     The effort is the couple of ground on a bar, N m, or the push of the cylinder, N.
@@ -242,7 +231,7 @@ def make_motor(bar: int | None, most: float) -> dict[str, str]:
         placed = {"joint": FIRST_PIN[bar]}
     if bar == 3:
         placed = {"site": "B3", "gear": "0 0 0 0 0 1"}
-    return {**placed, "ctrlrange": write_exactly(-most, most), "ctrllimited": "false"}
+    return {**placed, "ctrlrange": (-most, most), "ctrllimited": "false"}
 
 
 _A_MILLIONTH = 1e-6
@@ -258,13 +247,12 @@ def require_carriable(linkage: FourBar) -> None:
 
     The error says which mass it carries.
     """
-    heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
+    heaviest = max(bar.mass for bar in linkage.moving)
+    enough = MASS_OF_MASSLESS_BARS
+    part = "which all bars can have where loads alone act"
     if heaviest:
         enough = max(_A_MILLIONTH * heaviest, 2.0 * LEAST_MASS)
         part = "a millionth of the heaviest bar's"
-    else:
-        enough = MASS_OF_MASSLESS_BARS
-        part = "which all bars can have where loads alone act"
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         for key, value, unit in (
@@ -288,7 +276,11 @@ class Model:
     Loads and effects add to this content.
     """
 
-    def __init__(self, linkage: FourBar, settings: Settings, timestep: float) -> None:
+    def __init__(
+        self, linkage: FourBar, settings: Settings, timestep: float, *, passive: bool
+    ) -> None:
+        self.passive = passive
+        """True if loads and springs have no controls."""
         self.linkage = linkage
         self.settings = settings
         self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
@@ -346,16 +338,16 @@ class Model:
         Flags switch off what a closed loop and this model do not need.
         """
         settings = self.settings
-        options = {
-            "timestep": write_exactly(self.timestep),
-            "integrator": settings.integrator,
-            "solver": settings.solver,
-            "tolerance": write_exactly(settings.tolerance),
-            "iterations": str(settings.iterations),
-        }
-        for key, value in self.option.items():
-            options[key] = write_exactly(*value)
-        option = ET.SubElement(root, "option", options)
+        option = add_element(
+            root,
+            "option",
+            timestep=self.timestep,
+            integrator=settings.integrator,
+            solver=settings.solver,
+            tolerance=settings.tolerance,
+            iterations=settings.iterations,
+            **self.option,
+        )
         unneeded = list(_NEVER_NEEDED)
         if not self.springs and not self.used("stiffness"):
             unneeded.append("spring")
@@ -363,14 +355,14 @@ class Model:
             unneeded.append("frictionloss")
         if not self.used("damping"):
             unneeded.append("damper")
-        ET.SubElement(option, "flag", dict.fromkeys(unneeded, "disable"))
+        add_element(option, "flag", **dict.fromkeys(unneeded, "disable"))
 
     def add_bodies(self, root: ET.Element, flywheel: float) -> None:
         """Add ground > (input > coupler), output; light and camera face the plane."""
-        world = ET.SubElement(root, "worldbody")
+        world = add_element(root, "worldbody")
         _add_camera(world, self.linkage)
-        ground = ET.SubElement(world, "body", name="ground")
-        ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+        ground = add_element(world, "body", name="ground")
+        add_element(ground, "inertial", pos="0 0 0", mass=1, diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
         O4 = self.linkage.ground * self.along_ground
         self._add_site(ground, "O2", 0.0)
@@ -392,39 +384,26 @@ class Model:
         """
         bar = self.linkage.bar(number)
         pin = FIRST_PIN[number]
-        body = ET.SubElement(
-            parent,
-            "body",
-            name=BAR_NAMES[number],
-            pos=write_exactly(at.real, at.imag, 0.0),
-        )
+        pos = at.real, at.imag, 0.0
+        body = add_element(parent, "body", name=BAR_NAMES[number], pos=pos)
         if self.rest is not None:
             angle = self.rest[number - 2]
             body.set("axisangle", write_exactly(0.0, 0.0, 1.0, angle))
             drive["ref"] = angle
+        G = bar.to_centre
         # only the z-component acts in the plane; three equal ones satisfy the triangle
         # inequality
-        ET.SubElement(
+        add_element(
             body,
             "inertial",
-            pos=write_exactly(bar.to_centre.real, bar.to_centre.imag, 0.0),
-            mass=write_exactly(bar.mass),
-            diaginertia=write_exactly(
-                *[bar.moment_of_inertia + self.inertia[number]] * 3
-            ),
+            pos=(G.real, G.imag, 0.0),
+            mass=bar.mass,
+            diaginertia=[bar.moment_of_inertia + self.inertia[number]] * 3,
         )
-        joint = _write_attributes({**drive, **self.pin[pin]})
-        ET.SubElement(
-            body,
-            "joint",
-            {"name": pin, "type": "hinge", "axis": "0 0 1", **joint},
-        )
-        self._add_capsule(
-            body,
-            number,
-            bar.length,
-            self.radius if number == 3 else -self.radius,
-        )
+        stated = {**drive, **self.pin[pin]}
+        add_element(body, "joint", name=pin, type="hinge", axis="0 0 1", **stated)
+        z = self.radius if number == 3 else -self.radius
+        self._add_capsule(body, number, bar.length, z)
         if number == 2:
             self._add_site(body, "A", bar.length)
             return body
@@ -433,20 +412,16 @@ class Model:
             assert not isinstance(self.settings.pad, str)  # the document has fitted it
             # massless and welded: it only moves the point at which MuJoCo measures how
             # soft the closure may be
-            end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
-            place = write_exactly(self.settings.pad * bar.length, 0.0, 0.0)
-            ET.SubElement(end, "inertial", pos=place, mass="0", diaginertia="0 0 0")
+            end = add_element(body, "body", name=f"{BAR_NAMES[number]}_pad")
+            place = self.settings.pad * bar.length, 0.0, 0.0
+            add_element(end, "inertial", pos=place, mass=0, diaginertia="0 0 0")
         self._add_site(end, f"B{number}", bar.length)
         return body
 
     def _add_site(self, body: ET.Element, name: str, at: complex) -> None:
-        ET.SubElement(
-            body,
-            "site",
-            name=name,
-            pos=write_exactly(at.real, at.imag, 0.0),
-            size=write_six_digits(self.radius),
-        )
+        pos = at.real, at.imag, 0.0
+        size = write_six_digits(self.radius)
+        add_element(body, "site", name=name, pos=pos, size=size)
 
     def _add_capsule(
         self,
@@ -458,28 +433,31 @@ class Model:
         """Add a bar's shape: for the eye only, without mass and without contact."""
         along = self.along_ground if number == 1 else 1.0
         middle = 0.5 * length * along
-        shape = {
-            "name": BAR_NAMES[number],
-            "type": "capsule",
-            "size": write_six_digits(self.radius, length / 2.0),
-            "pos": write_six_digits(middle.real, middle.imag, z),
-            "zaxis": write_six_digits(along.real, along.imag, 0.0),
-            "rgba": RGBA_OF_BARS[number],
-        }
-        ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
+        add_element(
+            body,
+            "geom",
+            name=BAR_NAMES[number],
+            type="capsule",
+            size=write_six_digits(self.radius, length / 2.0),
+            pos=write_six_digits(middle.real, middle.imag, z),
+            zaxis=write_six_digits(along.real, along.imag, 0.0),
+            rgba=RGBA_OF_BARS[number],
+            mass=0,
+            contype=0,
+            conaffinity=0,
+        )
 
     def add_closure(self, root: ET.Element) -> None:
         """Close the loop at B."""
         s = self.settings
-        pair = {"name": "B", "site1": "B3", "site2": "B4"}
-        solref = write_exactly(s.time_constant_steps * self.timestep, 1.0)
-        solimp = write_exactly(s.impedance, s.impedance, 0.001, 0.5, 2.0)
-        ET.SubElement(
-            ET.SubElement(root, "equality"),
+        add_element(
+            add_element(root, "equality"),
             "connect",
-            pair,
-            solref=solref,
-            solimp=solimp,
+            name="B",
+            site1="B3",
+            site2="B4",
+            solref=(s.time_constant_steps * self.timestep, 1.0),
+            solimp=(s.impedance, s.impedance, 0.001, 0.5, 2.0),
         )
 
     def add_tendons(self, root: ET.Element) -> None:
@@ -487,24 +465,27 @@ class Model:
 
         Springs have a tendon each, between two sites.
         """
-        if not self.pin["B"] and not self.springs and self.cylinder is None:
-            return
-        tendons = ET.SubElement(root, "tendon")
+        tendons = ET.Element("tendon")
         if self.pin["B"]:
-            attributes = {"name": "B", **_write_attributes(self.pin["B"])}
-            fixed = ET.SubElement(tendons, "fixed", attributes)
+            fixed = add_element(tendons, "fixed", name="B", **self.pin["B"])
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
-                ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
+                add_element(fixed, "joint", joint=joint, coef=coefficient)
         for index, spring in enumerate(self.springs, 1):
             tendon = self._add_line(root, tendons, f"spring_{index}", spring)
+            length = "0"
             if _is_slack_somewhere(spring):
-                tendon.set("stiffness", write_exactly(spring.stiffness))
                 free = write_exactly(-spring.slack / spring.stiffness)
                 # between two lengths a tendon has no force
                 dead_band = {"push": f"{free} {_NEVER_REACHED}", "pull": f"0 {free}"}
-                tendon.set("springlength", dead_band.get(spring.acts or "", free))
+                length = dead_band.get(spring.acts or "", free)
+            elif not self.passive:
+                continue
+            tendon.set("stiffness", write_exactly(spring.stiffness))
+            tendon.set("springlength", length)
         if self.cylinder is not None:
             self._add_line(root, tendons, CYLINDER, self.cylinder)
+        if len(tendons):
+            root.append(tendons)
 
     def _add_line(
         self,
@@ -514,9 +495,9 @@ class Model:
         line: "Spring | LinearDrive",
     ) -> ET.Element:
         """Add a tendon between two points of bars, with a site at each."""
-        tendon = ET.SubElement(tendons, "spatial", name=name)
+        tendon = add_element(tendons, "spatial", name=name)
         for which, point in (("start", line.start), ("end", line.end)):
-            ET.SubElement(tendon, "site", site=f"{name}_{which}")
+            add_element(tendon, "site", site=f"{name}_{which}")
             at = point.vector()
             if point.bar == 1:
                 at = at * self.along_ground
@@ -531,44 +512,25 @@ class Model:
             self._add_site(body, f"load_{index}", z)
 
     def add_actuators(
-        self,
-        root: ET.Element,
-        drive: dict[str, str],
-        *,
-        driven: bool,
-        passive: bool,
+        self, root: ET.Element, drive: dict[str, Any], *, driven: bool
     ) -> None:
         """Add actuators: the drive, if it has attributes; loads; and some springs.
 
         Actuators of loads and springs ignore their controls.
 
         `driven`: a flywheel drives, and the cylinder's force is 0 without a control.
-        `passive`: loads and springs have no controls.
         """
-        springs = {
-            f"spring_{i}": s
-            for i, s in enumerate(self.springs, 1)
-            if not _is_slack_somewhere(s)
-        }
-        has_cylinder = driven and self.cylinder is not None
-        if not drive and not has_cylinder and not self.loads and not springs:
-            return
-        actuators = ET.SubElement(root, "actuator")
+        actuators = ET.Element("actuator")
         if drive:
             name = CYLINDER if drive.get("tendon") == CYLINDER else "drive"
-            ET.SubElement(actuators, "general", drive, name=name)
-        if has_cylinder:
-            ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
-        for name, spring in springs.items():
-            placed = {"name": name, "tendon": name}
-            stiffness = spring.stiffness
-            if passive:
-                tendon = root.find(f"tendon/spatial[@name='{name}']")
-                assert tendon is not None
-                tendon.set("stiffness", write_exactly(stiffness))
-                tendon.set("springlength", "0")
-                stiffness = 0.0
-            _add_force(actuators, placed, -spring.slack, stiffness, passive=passive)
+            add_element(actuators, "general", **drive, name=name)
+        if driven and self.cylinder is not None:
+            add_element(actuators, "general", name=CYLINDER, tendon=CYLINDER)
+        for index, spring in enumerate(self.springs, 1):
+            if not _is_slack_somewhere(spring):
+                name = f"spring_{index}"
+                placed = {"name": name, "tendon": name}
+                self._add_force(actuators, placed, -spring.slack, spring.stiffness)
         for index, load in enumerate(self.loads, 1):
             force = 0j if load.force is None else cmath.rect(*load.force)
             couple = load.moment
@@ -580,30 +542,29 @@ class Model:
             if load.frame == "world":
                 placed["refsite"] = "O2"
             placed["gear"] = write_exactly(force.real, force.imag, 0, 0, 0, couple)
-            _add_force(actuators, placed, 1.0, passive=passive)
+            self._add_force(actuators, placed, 1.0)
+        if len(actuators):
+            root.append(actuators)
 
+    def _add_force(
+        self,
+        actuators: ET.Element,
+        placed: dict[str, str],
+        force: float,
+        stiffness: float = 0.0,
+    ) -> None:
+        """Add an actuator that exerts a force less stiffness times its tendon's length.
 
-def _add_force(
-    actuators: ET.Element,
-    placed: dict[str, str],
-    force: float,
-    stiffness: float = 0.0,
-    *,
-    passive: bool,
-) -> None:
-    """Add an actuator that exerts a force less stiffness times its tendon's length.
-
-    The force is in N, or a factor on the gear; its control does nothing.
-
-    `passive`: it has no control, and no stiffness.
-    """
-    if passive:
-        cogging = write_exactly(force, 0.0, math.pi / 2.0)
-        ET.SubElement(actuators, "dcmotor", {**_PASSIVE, "cogging": cogging, **placed})
-    else:
-        tension = write_exactly(force, 0.0 - stiffness, 0.0)
-        attributes = {**_UNCONTROLLED, **placed}
-        ET.SubElement(actuators, "general", attributes, biasprm=tension)
+        The force is in N, or a factor on the gear; its control does nothing. Without a
+        control it has no stiffness, which then is that of the tendon.
+        """
+        if self.passive:
+            cogging = force, 0.0, math.pi / 2.0
+            add_element(actuators, "dcmotor", **_PASSIVE, cogging=cogging, **placed)
+        else:
+            tension = force, 0.0 - stiffness, 0.0
+            stated = {**_UNCONTROLLED, **placed}
+            add_element(actuators, "general", **stated, biasprm=tension)
 
 
 def _is_slack_somewhere(spring: "Spring") -> bool:

@@ -134,33 +134,27 @@ class Plane:
         Gravity turns; ground, light, camera and the view move, and turn if the plane is
         tilted.
         """
-        moved = ("statistic", "worldbody/body", "worldbody/light", "worldbody/camera")
-        for path in moved:
+        light = "worldbody/light"
+        camera = "worldbody/camera"
+        body = "worldbody/body"
+        changes = [("statistic", "center", self.place)]
+        changes += ((path, "pos", self.place) for path in (body, light, camera))
+        if self.is_tilted:
+            changes += [("option", "gravity", self.turn), (light, "dir", self.turn)]
+        for path, name, change in changes:
             for element in root.iterfind(path):
-                name = "center" if path == "statistic" else "pos"
-                point = _read_vector(element.get(name, "0 0 0"))
-                element.set(name, write_exactly(*self.place(*point)))
-        if not self.is_tilted:
-            return
-        for path, name in (("option", "gravity"), ("worldbody/light", "dir")):
-            for element in root.iterfind(path):
-                vector = _read_vector(element.get(name, "0 0 0"))
-                element.set(name, write_exactly(*self.turn(*vector)))
-        quaternion = write_exactly(*self.quaternion)
-        for path in ("worldbody/body", "worldbody/camera"):
-            for element in root.iterfind(path):
-                element.set("quat", quaternion)
+                vector = map(float, element.get(name, "0 0 0").split())
+                element.set(name, write_exactly(*change(*vector)))
+        if self.is_tilted:
+            for path in (body, camera):
+                for element in root.iterfind(path):
+                    element.set("quat", write_exactly(*self.quaternion))
 
 
 def _require_three(name: str, value: object) -> tuple[float, ...]:
     if not isinstance(value, (tuple, list)) or len(value) != 3:
         raise InputError(name, value, "must be three numbers")
     return tuple(require(name, number) for number in value)
-
-
-def _read_vector(text: str) -> Vector:
-    x, y, z = map(float, text.split())
-    return x, y, z
 
 
 LEVEL = Plane()

@@ -63,6 +63,14 @@ DEFAULT_STEPS = 360
 """Number of steps of the default range, which is swept if a motion names no angle."""
 STEPS = Whole(1, MOST_INTERVALS)
 """Declaration of the number of intervals of any motion."""
+_Steps = Annotated[int, STEPS]
+_Angle = Annotated[float, Declared("rad")]
+_FirstAngle = Annotated[float | None, Declared("rad")]
+_Duration = Annotated[float, Declared("s", POSITIVE)]
+_Pause = Annotated[float, Declared("s", AT_LEAST_ZERO)]
+_Angles = Annotated[tuple[float, ...] | None, Listed("rad")]
+_Speeds = Annotated[tuple[float, ...] | None, Listed("rad/s")]
+_Accelerations = Annotated[tuple[float, ...] | None, Listed("rad/s^2")]
 SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """End conditions of a law's spline: none, at rest, or one period of a motion."""
 FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
@@ -89,19 +97,19 @@ class Sweep:
     """SI unit of ends that were texts: "rad" or "m"; None: numbers have none."""
 
     def __post_init__(self) -> None:
-        set_field = object.__setattr__  # the class is frozen; this is its constructor
-        start = self.start
-        stop = self.stop
-        if isinstance(start, str) or isinstance(stop, str):
-            set_field(self, "unit", "m" if is_length(start, stop) else "rad")
-        unit = self.unit or "rad"
-        set_field(self, "start", require("motion.theta_2.from", start, unit))
-        set_field(self, "stop", require("motion.theta_2.to", stop, unit))
-        if not math.isfinite(self.stop - self.start):
-            allowed = f"must be within the range of doubles from {self.start!r}"
-            raise InputError("motion.theta_2.to", self.stop, allowed)
+        ends = self.start, self.stop
+        unit = "m" if is_length(*ends) else "rad"
+        start = require("motion.theta_2.from", self.start, unit)
+        stop = require("motion.theta_2.to", self.stop, unit)
+        if not math.isfinite(stop - start):
+            allowed = f"must be within the range of doubles from {start!r}"
+            raise InputError("motion.theta_2.to", stop, allowed)
         steps = STEPS.check("motion.theta_2.steps", self.steps)
-        set_field(self, "steps", steps)
+        stated = unit if any(isinstance(end, str) for end in ends) else None
+        checked = {"start": start, "stop": stop, "steps": steps, "unit": stated}
+        for name, value in checked.items():
+            # the class is frozen; this is its constructor
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +120,7 @@ class FromLimit(Described):
     """
 
     limit: Annotated[int, Whole(1, 4)]
-    offset: Annotated[float, Declared("rad")] = 0.0
+    offset: _Angle = 0.0
     stated_at: ClassVar[str] = "motion.theta_2"
 
 
@@ -123,8 +131,8 @@ class Free(Described):
     Loads and effects alone move the linkage.
     """
 
-    duration: Annotated[float, Declared("s", POSITIVE)]
-    steps: Annotated[int, STEPS]
+    duration: _Duration
+    steps: _Steps
     stated_at: ClassVar[str] = "motion.free"
 
 
@@ -183,17 +191,17 @@ class Law(Described, _OverTime):
     """
 
     time: Annotated[tuple[float, ...], Listed("s")]
-    theta_2: Annotated[tuple[float, ...] | None, Listed("rad")] = None
-    steps: Annotated[int, STEPS] = 360
+    theta_2: _Angles = None
+    steps: _Steps = 360
     ends: Annotated[str, OneOf((*SPLINES,))] = "free"
-    theta_3: Annotated[tuple[float, ...] | None, Listed("rad")] = None
-    theta_4: Annotated[tuple[float, ...] | None, Listed("rad")] = None
-    omega_2: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
-    omega_3: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
-    omega_4: Annotated[tuple[float, ...] | None, Listed("rad/s")] = None
-    alpha_2: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
-    alpha_3: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
-    alpha_4: Annotated[tuple[float, ...] | None, Listed("rad/s^2")] = None
+    theta_3: _Angles = None
+    theta_4: _Angles = None
+    omega_2: _Speeds = None
+    omega_3: _Speeds = None
+    omega_4: _Speeds = None
+    alpha_2: _Accelerations = None
+    alpha_3: _Accelerations = None
+    alpha_4: _Accelerations = None
     stated_at: ClassVar[str] = "motion.law"
 
     def __post_init__(self) -> None:
@@ -254,12 +262,9 @@ class Law(Described, _OverTime):
         time = require_numbers("time", time)
         if self.omega is not None:
             rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
-            theta, omega, alpha = _fit_rates(self.time, self.angle, *rates)
-            return (
-                np.asarray(theta(time)),
-                np.asarray(omega(time)),
-                np.asarray(alpha(time)),
-            )
+            curves = _fit_rates(self.time, self.angle, *rates)
+            theta, omega, alpha = (np.asarray(curve(time)) for curve in curves)
+            return theta, omega, alpha
         t = np.array(self.time)
         angle = np.array(self.angle)
         mean = 0.0
@@ -269,9 +274,7 @@ class Law(Described, _OverTime):
             angle = angle - mean * (t - t[0])
             angle[-1] = angle[0]
         curve = CubicSpline(t, angle, bc_type=SPLINES[self.ends])
-        theta = np.asarray(curve(time, 0))
-        omega = np.asarray(curve(time, 1))
-        alpha = np.asarray(curve(time, 2))
+        theta, omega, alpha = (np.asarray(curve(time, order)) for order in range(3))
         return theta + mean * (time - t[0]), omega + mean, alpha
 
 
@@ -320,13 +323,13 @@ class Rise(Described, _OverTime):
 
     kind: Annotated[str, OneOf(RISE_LAWS)]
     rise: Annotated[tuple[float, float], Declared("rad", pair="s")]
-    theta_2: Annotated[float | None, Declared("rad")] = None
-    dwell: Annotated[float, Declared("s", AT_LEAST_ZERO)] = 0.0
+    theta_2: _FirstAngle = None
+    dwell: _Pause = 0.0
     fall: Annotated[float | None, Declared("s", POSITIVE)] = None
-    rest: Annotated[float, Declared("s", AT_LEAST_ZERO)] = 0.0
-    steps: Annotated[int, STEPS] = 360
-    theta_3: Annotated[float | None, Declared("rad")] = None
-    theta_4: Annotated[float | None, Declared("rad")] = None
+    rest: _Pause = 0.0
+    steps: _Steps = 360
+    theta_3: _FirstAngle = None
+    theta_4: _FirstAngle = None
     stated_at: ClassVar[str] = "motion.law"
 
     def __post_init__(self) -> None:
@@ -387,12 +390,12 @@ class Sine(Described, _OverTime):
     [1.523599, 0.0, -5.167713]
     """
 
-    mean: Annotated[float, Declared("rad")]
-    amplitude: Annotated[float, Declared("rad")]
+    mean: _Angle
+    amplitude: _Angle
     frequency: Annotated[float, Declared("rad/s", POSITIVE)]
-    duration: Annotated[float, Declared("s", POSITIVE)]
-    phase: Annotated[float, Declared("rad")] = 0.0
-    steps: Annotated[int, STEPS] = 360
+    duration: _Duration
+    phase: _Angle = 0.0
+    steps: _Steps = 360
     stated_at: ClassVar[str] = "motion.law"
     kind: ClassVar[str] = SINE_LAW
     bar: ClassVar[int] = 2
@@ -421,6 +424,9 @@ def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> tuple[Any
 
     pieces = BPoly.from_derivatives(np.array(time), np.stack(values, axis=1))
     return pieces, pieces.derivative(1), pieces.derivative(2)
+
+
+Commanded = float | Array | Sweep | FromLimit | None
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -460,7 +466,7 @@ class Motion:
     """Number of the commanded bar, 2, 3 or 4. If a stroke is commanded, the scene's
     drive determines it.
     """
-    angle: float | Array | Sweep | FromLimit | None
+    angle: Commanded
     """Commanded angle, rad, or stroke, m, as it is stated."""
     speed: float | Array | None
     """Commanded speed, rad/s, or m/s of a stroke; (n,) if each angle has its own."""
@@ -480,16 +486,16 @@ class Motion:
 
     def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,
-        theta_2: float | Array | Sweep | FromLimit | None = None,
+        theta_2: Commanded = None,
         omega_2: float | Array | None = None,
         alpha_2: float | Array = 0.0,
         branch: int = OPEN,
         free: Free | None = None,
         law: Law | Rise | Sine | None = None,
-        theta_3: float | Array | Sweep | FromLimit | None = None,
+        theta_3: Commanded = None,
         omega_3: float | Array | None = None,
         alpha_3: float | Array = 0.0,
-        theta_4: float | Array | Sweep | FromLimit | None = None,
+        theta_4: Commanded = None,
         omega_4: float | Array | None = None,
         alpha_4: float | Array = 0.0,
         stroke: float | Array | Sweep | None = None,
@@ -497,20 +503,9 @@ class Motion:
         stroke_acceleration: float = 0.0,
         side: str | None = None,
     ) -> None:
+        given = locals()
         expect("motion.law", law, Law, Rise, Sine, type(None))
-        of_bars = (
-            theta_2,
-            omega_2,
-            alpha_2,
-            theta_3,
-            omega_3,
-            alpha_3,
-            theta_4,
-            omega_4,
-            alpha_4,
-        )
-        numbers = dict(zip(_NAMES_OF_BARS, of_bars, strict=True))
-        stated = _find_bar("motion", numbers)
+        stated = _find_bar("motion", {name: given[name] for name in _NAMES_OF_BARS})
         bar = (stated or 2) if law is None else law.bar
         names = COMMAND_NAMES[bar]
         if stroke is not None or side is not None or stroke_speed is not None:
@@ -521,8 +516,7 @@ class Motion:
                 allowed = "is commanded alone: no angle, law or release besides"
                 raise InputError("motion.stroke", stroke, allowed)
             names = STROKE_COMMAND
-            of_stroke = _require_strokes(stroke), stroke_speed, stroke_acceleration
-            numbers = dict(zip(names, of_stroke, strict=True))
+            given["stroke"] = _require_strokes(stroke)
             if not isinstance(side, str) or side not in SIDES:
                 allowed = 'must be "left" or "right", as a stroke has two angles'
                 raise InputError("motion.side", side, allowed)
@@ -531,7 +525,7 @@ class Motion:
             raise InputError("motion.law", "a law", allowed)
         if isinstance(branch, str):
             branch = BRANCH_OF_NAME.get(branch, branch)
-        checked = _require_command(names, *(numbers[name] for name in names))
+        checked = _require_command(names, *(given[name] for name in names))
         expect("motion.branch", branch, int, np.integer, str)
         expect("motion.free", free, Free, type(None))
         if branch not in (OPEN, CROSSED):
@@ -550,9 +544,7 @@ class Motion:
             raise AttributeError(f"a motion has no {name!r}")
         if name in self.names:
             return getattr(self, _FIELDS_OF_NUMBERS[self.names.index(name)])
-        return (
-            0.0 if name.startswith("alpha") or name.endswith("acceleration") else None
-        )
+        return 0.0 if name.startswith("alpha") or "acceleration" in name else None
 
     def replace(self, **changes: Any) -> "Motion":
         """Return a copy with other values of fields.
@@ -567,10 +559,12 @@ class Motion:
             raise TypeError(
                 f"a motion has no field {min(foreign)!r} to replace; {allowed}"
             )
-        values = {}
-        for name, keyword in keywords.items():
-            values[keyword] = changes.get(name, getattr(self, name))
-        return Motion(**values)
+        return Motion(
+            **{
+                keyword: changes.get(name, getattr(self, name))
+                for name, keyword in keywords.items()
+            }
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
@@ -646,12 +640,11 @@ def is_length(*values: object) -> bool:
 
 def _require_strokes(stroke: Any) -> Any:
     """Return the strokes, checked; InputError for what is no length above zero."""
-    if not isinstance(stroke, Sweep):
-        stroke = require_numbers("motion.stroke", stroke, "must be finite lengths", "m")
     if isinstance(stroke, Sweep):
         ends = np.array([stroke.start, stroke.stop])
     else:
-        ends = np.asarray(stroke)
+        stroke = require_numbers("motion.stroke", stroke, "must be finite lengths", "m")
+        ends = stroke
     least = float(ends.min(initial=math.inf))
     if not least > 0.0:
         raise InputError("motion.stroke", least, "must be above 0", unit="m")
@@ -665,31 +658,26 @@ def _require_command(
     acceleration: Any,
 ) -> tuple[Any, Any, Any]:
     """Return angle, speed and acceleration of the command of these names, checked."""
-    (theta, unit), (omega, per_second), (alpha, growth) = (
-        (name, Motion.numbers[name].unit) for name in names
-    )
-    if isinstance(angle, Sweep) and angle.unit not in (None, unit):
-        stated = f"from {angle.start:g} to {angle.stop:g} {angle.unit}"
-        raise InputError(f"motion.{theta}", stated, f"must be in {unit}")
-    if angle is not None and not isinstance(angle, (Sweep, FromLimit)):
-        angles = require_numbers(
-            f"motion.{theta}",
-            angle,
-            "must be finite angles",
-            unit,
-        )
+    unit, per_second, growth = (Motion.numbers[name].unit for name in names)
+    theta, omega, alpha = (f"motion.{name}" for name in names)
+    if isinstance(angle, Sweep):
+        if angle.unit not in (None, unit):
+            stated = f"from {angle.start:g} to {angle.stop:g} {angle.unit}"
+            raise InputError(theta, stated, f"must be in {unit}")
+    elif angle is not None and not isinstance(angle, FromLimit):
+        angles = require_numbers(theta, angle, "must be finite angles", unit)
         if angles.size == 0:
-            raise InputError(f"motion.{theta}", angle, "must be one angle or more")
+            raise InputError(theta, angle, "must be one angle or more")
         angles.flags.writeable = False
         angle = float(angles) if angles.ndim == 0 else angles
     if speed is not None:
-        speed = _require_rates(f"motion.{omega}", speed, per_second, angle)
+        speed = _require_rates(omega, speed, per_second, angle)
         highest = float(np.max(np.abs(speed)))
         if not math.isfinite(highest * highest):
             fastest = write_in_units(per_second, LARGEST_SPEED)
             allowed = f"must be below {fastest}: every acceleration has its square"
-            raise InputError(f"motion.{omega}", highest, allowed, unit=per_second)
-    return angle, speed, _require_rates(f"motion.{alpha}", acceleration, growth, angle)
+            raise InputError(omega, highest, allowed, unit=per_second)
+    return angle, speed, _require_rates(alpha, acceleration, growth, angle)
 
 
 def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array:
@@ -697,11 +685,12 @@ def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array
     if not isinstance(rates, (list, tuple)) and np.ndim(rates) == 0:
         return require(key, rates, unit)
     array = require_numbers(key, rates, unit=unit)
+    allowed = ""
     if unit.startswith("m") or not isinstance(angle, np.ndarray):
         allowed = "must be one number, unless angles are stated one by one"
-        raise InputError(key, f"{len(array)} numbers", allowed)
-    if len(array) != len(angle):
+    elif len(array) != len(angle):
         allowed = f"must be one number, or {len(angle)}: one for each angle"
+    if allowed:
         raise InputError(key, f"{len(array)} numbers", allowed)
     array.flags.writeable = False
     return array
@@ -712,15 +701,13 @@ def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
 
     Every step of a sweep, a law or a release is a position in the memory.
     """
-    for name, stated in (
-        (motion.commanded, motion.angle),
-        ("law", motion.law),
-        ("free", motion.free),
-    ):
-        if isinstance(stated, (Sweep, _OverTime, Free)) and stated.steps >= most:
+    stated = {motion.commanded: motion.angle, "law": motion.law, "free": motion.free}
+    for name, part in stated.items():
+        steps = getattr(part, "steps", 0)
+        if steps >= most:
             raise InputError(
                 f"motion.{name}.steps",
-                stated.steps,
+                steps,
                 f"must be below {most} {place}",
                 file,
             )

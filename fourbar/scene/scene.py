@@ -4,8 +4,7 @@
 """
 
 import math
-from collections.abc import Callable
-from copy import copy
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,7 +33,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.path import NO_DIGIT_LEFT, count_turns, prepare_path
-from fourbar.linkage import BAR_NAMES, FourBar, copy_with, require_bar
+from fourbar.linkage import BAR_NAMES, Entries, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
@@ -115,29 +114,11 @@ class Scene:
     )
 
     def __post_init__(self) -> None:
-        kinds: dict[str, tuple[type, ...]] = {
-            "linkage": (FourBar,),
-            "motion": (Motion,),
-            "title": (str,),
-            "source": (str,),
-            "drawing": (DrawnPins, type(None)),
-            "picture": (TracedPicture, type(None)),
-        }
-        for name, types in kinds.items():
-            expect(name, getattr(self, name), *types)
-        many = {
-            "loads": Effect,
-            "effects": Effect,
-            "pictures": Picture,
-            "points": Point,
-            "tolerances": Tolerance,
-        }
-        for name, kind in many.items():
-            entries = getattr(self, name)
-            expect(name, entries, tuple, list)
-            object.__setattr__(self, name, tuple(entries))
-            for entry in entries:
-                expect(name, entry, kind)
+        for name, kinds in _PARTS.items():
+            expect(name, getattr(self, name), *kinds)
+        for name, kind in _ENTRIES.items():
+            entries = Entries(kind).check(name, getattr(self, name))
+            object.__setattr__(self, name, entries)
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
@@ -158,9 +139,8 @@ class Scene:
         if drive is not None:
             drive.require_motion(self.linkage)
         if self.motion.stroke is not None:
-            object.__setattr__(self, "motion", copy(self.motion))
             bar = _find_triangle(self.linkage, drive).bar
-            object.__setattr__(self.motion, "bar", bar)
+            object.__setattr__(self, "motion", copy_with(self.motion, bar=bar))
         bars = [picture.bar for picture in self.pictures]
         if len(set(bars)) < len(bars):
             raise InputError("pictures", bars, "a bar has one picture")
@@ -263,6 +243,24 @@ class Scene:
         return any(effect.counts_turns for effect in self.effects)
 
 
+_PARTS: dict[str, tuple[type, ...]] = {
+    "linkage": (FourBar,),
+    "motion": (Motion,),
+    "title": (str,),
+    "source": (str,),
+    "drawing": (DrawnPins, type(None)),
+    "picture": (TracedPicture, type(None)),
+}
+_ENTRIES = {
+    "loads": Effect,
+    "effects": Effect,
+    "pictures": Picture,
+    "points": Point,
+    "tolerances": Tolerance,
+}
+"""Classes of a scene's fields, and of the entries of those that hold many."""
+
+
 class LimitOrigin(NamedTuple):
     """Limit position, plus an offset, that a commanded angle is."""
 
@@ -309,24 +307,18 @@ class ReleaseOrigin(NamedTuple):
     +-1: the linkage moves on; otherwise 0.
     """
 
-    def commands(self) -> "list[tuple[NDArray[np.intp], Command, Array]]":
+    def commands(self) -> "Iterator[tuple[NDArray[np.intp], Command, Array]]":
         """List the commands of bars 2 and 4 that the motion is made of.
 
         An entry has the indices of its instants, the command and their side.
         """
-        commands: list[tuple[NDArray[np.intp], Command, Array]] = []
         for bar in (2, 4):
             index = np.flatnonzero(self.bar == bar)
             if index.size:
-                released = Command(
-                    self.angle[index],
-                    self.sign[index].astype(np.int8),
-                    self.speed[index],
-                    self.acceleration[index],
-                    bar=bar,
-                )
-                commands.append((index, released, self.side[index]))
-        return commands
+                sign = self.sign[index].astype(np.int8)
+                stated = self.speed[index], self.acceleration[index]
+                at = Command(self.angle[index], sign, *stated, bar)
+                yield index, at, self.side[index]
 
 
 class Command(NamedTuple):
@@ -498,11 +490,8 @@ class _Triangle(NamedTuple):
         """Return the strokes at two values of beta between 0 and pi, m."""
         fold = abs(self.length - self.reach)
         twice_mean = 2.0 * math.sqrt(self.length * self.reach)
-        least, most = (
-            math.hypot(fold, twice_mean * math.sin(0.5 * beta))
-            for beta in (first, last)
-        )
-        return least, most
+        least = math.hypot(fold, twice_mean * math.sin(0.5 * first))
+        return least, math.hypot(fold, twice_mean * math.sin(0.5 * last))
 
     def turn_bar(
         self,
@@ -567,11 +556,7 @@ def require_cylinder(drive: "ForceDrive | None") -> "LinearDrive":
 def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:
     """Return the triangle of a cylinder, as `require_cylinder` has it."""
     drive = require_cylinder(drive)
-    moving = drive.start
-    fixed = drive.end
-    if drive.start.bar == 1:
-        moving = drive.end
-        fixed = drive.start
+    fixed, moving = sorted((drive.start, drive.end), key=lambda end: end.bar)
     if moving.bar == 2:  # points of the ground are polar about O2
         reach = abs(fixed.distance)
         towards = fixed.angle + linkage.ground_angle + _reverse(fixed)
@@ -702,16 +687,15 @@ def write_stroke_ranges(scene: Scene) -> str:
 def command_at(scene: Scene, places: Array) -> Command:
     """Return the command of the scene's motion at other angles, strokes or times."""
     motion = scene.motion
-    bar = scene.motion.bar
+    bar = motion.bar
     if motion.commanded == "stroke":
         triangle = _triangle_of(scene)
         least = abs(triangle.length - triangle.reach)
         most = triangle.length + triangle.reach
-        inside = (places >= least) & (places <= most)
-        if not inside.all():
-            refused = float(places[np.argmin(inside)])
+        outside = places[~((places >= least) & (places <= most))]
+        if outside.size:
             allowed = f"this cylinder can have {write_stroke_ranges(scene)}"
-            raise InputError("motion.stroke", refused, allowed, unit="m")
+            raise InputError("motion.stroke", float(outside[0]), allowed, unit="m")
         return command_stroke(scene, places, motion.speed, motion.acceleration)
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:
@@ -749,10 +733,10 @@ def command(scene: Scene) -> Command:
     """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
     motion = scene.motion
-    linkage = scene.linkage
-    bar = scene.motion.bar
+    bar = motion.bar
     stated = motion.angle
-    origin = None
+    if isinstance(stated, FromLimit):
+        return _command_from_limit(scene, stated)
     if motion.law is not None:
         places = motion.law.times()
     elif stated is None:
@@ -760,21 +744,24 @@ def command(scene: Scene) -> Command:
         places = default_places(scene, drawn)
     elif isinstance(stated, Sweep):
         places = np.linspace(stated.start, stated.stop, stated.steps + 1)
-    elif isinstance(stated, FromLimit):
-        limits = find_limit_angles(linkage, bar)
-        if stated.limit > len(limits):
-            allowed = f"must be from 1 to {len(limits)}"
-            if not limits:
-                allowed = f"the {BAR_NAMES[bar]} of this linkage has no limit positions"
-            raise InputError(f"motion.theta_{bar}.limit", stated.limit, allowed)
-        from fourbar.formulas.many_digits import limit_remainder
-
-        limit = limits[stated.limit - 1]
-        places = np.array([limit + stated.offset])
-        angle = float(places[0])
-        remainder = limit_remainder(linkage, limit, angle, stated.offset, bar)
-        origin = LimitOrigin(remainder)
     else:
         places = np.array(stated, dtype=float, ndmin=1)
-    at = command_at(scene, places)
-    return at if origin is None else at._replace(origin=origin)
+    return command_at(scene, places)
+
+
+def _command_from_limit(scene: Scene, stated: FromLimit) -> Command:
+    """Command the one position that a motion states from a limit of its bar."""
+    bar = scene.motion.bar
+    limits = find_limit_angles(scene.linkage, bar)
+    if stated.limit > len(limits):
+        allowed = f"must be from 1 to {len(limits)}"
+        if not limits:
+            allowed = f"the {BAR_NAMES[bar]} of this linkage has no limit positions"
+        raise InputError(f"motion.theta_{bar}.limit", stated.limit, allowed)
+    from fourbar.formulas.many_digits import limit_remainder
+
+    limit = limits[stated.limit - 1]
+    angle = float(limit + stated.offset)
+    remainder = limit_remainder(scene.linkage, limit, angle, stated.offset, bar)
+    at = command_at(scene, np.array([angle]))
+    return at._replace(origin=LimitOrigin(remainder))
