@@ -5,6 +5,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -141,13 +142,14 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         The name may be that of a point of the scene (`P`, `v_P`, `a_P`). InputError for
         another name, and for a quantity that was not evaluated.
         """
-        names = _list_quantities(self)
-        if not isinstance(name, str) or name not in names:
-            raise InputError("solution", name, f"must be among {', '.join(names)}")
-        values: Array | None = _find_si(self, name)
-        if values is None:
-            raise InputError("solution", name, "was not evaluated: solve as far as it")
-        return values
+        quantities = _list_quantities(self)
+        allowed = f"must be among {', '.join(quantities)}"
+        if isinstance(name, str) and name in quantities:
+            values = quantities[name]
+            if values is not None:
+                return values
+            allowed = "was not evaluated: solve as far as it"
+        raise InputError("solution", name, allowed)
 
     __iter__: ClassVar[None] = None  # neither positions nor names
 
@@ -270,11 +272,10 @@ def _is_equal(one: Any, another: Any) -> bool:
     if isinstance(one, dict) and isinstance(another, dict):
         if one.keys() != another.keys():
             return False
-        return all(_is_equal(one[name], another[name]) for name in one)
+        another = tuple(another[name] for name in one)
+        one = tuple(one.values())
     if isinstance(one, tuple) and isinstance(another, tuple):
-        if len(one) != len(another):
-            return False
-        return all(map(_is_equal, one, another))
+        return len(one) == len(another) and all(map(_is_equal, one, another))
     return bool(one == another)
 
 
@@ -308,11 +309,9 @@ def list_parts(
     parts: dict[str, Array] = {}
     for name in (*scalars, *PIN_FORCES):
         if (quantity := values.get(name)) is not None:
-            parts |= {
-                part: array
-                for part, array in split_parts(name, quantity).items()
-                if part[-2:] not in ("_x", "_y")
-            }
+            for part, array in split_parts(name, quantity).items():
+                if part[-2:] not in ("_x", "_y"):
+                    parts[part] = array
     return parts
 
 
@@ -322,7 +321,9 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     Vectors are [x, y]; null stands for no value. Entries of other names follow as they
     are given.
     """
-    names = _list_quantities(solution)
+    quantities = {
+        name: find_values(solution, name, units) for name in _list_quantities(solution)
+    }
     passed: dict[str, Any] = {}
     if solution.change_points is not None:
         passed["change_points"] = solution.change_points
@@ -331,11 +332,12 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
         title=solution.title,
         angle_unit=find_unit_in("rad", units)[0],
         units={
-            name: find_unit_in(find_unit_of_quantity(name), units)[0] for name in names
+            name: find_unit_in(find_unit_of_quantity(name), units)[0]
+            for name in quantities
         },
         status=solution.status,
         branch=solution.branch,
-        **{name: find_values(solution, name, units) for name in names},
+        **quantities,
         **passed,
         drive_bar=solution.drive_bar,
         assembled=solution.assembled,
@@ -385,16 +387,15 @@ def _list_leading(solution: Solution) -> dict[str, list[Any]]:
     The table of a study begins with the number of the member.
     """
     size = solution.theta_2.size
-    first = {
+    members = {}
+    if solution.theta_2.ndim > 1:
+        count = len(solution)
+        members["member"] = np.repeat(np.arange(count), size // count).tolist()
+    return {
+        **members,
         "status": np.array(STATUS_NAMES)[solution.status_code.ravel()].tolist(),
         "branch": np.ravel(solution.branch).tolist(),
         "drive_bar": [solution.drive_bar] * size,
-    }
-    if solution.theta_2.ndim == 1:
-        return first
-    return {
-        "member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(),
-        **first,
     }
 
 
@@ -492,8 +493,8 @@ def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
     return units.get(unit, (unit, 1.0))
 
 
-def _list_quantities(solution: "Solution") -> list[str]:
-    """List every quantity of a solution, evaluated or not.
+def _list_quantities(solution: Solution) -> dict[str, Array | None]:
+    """List every quantity of a solution in SI units, from O2; None: not evaluated.
 
     Time and those of a force drive are listed only if there is one.
     """
@@ -503,10 +504,16 @@ def _list_quantities(solution: "Solution") -> list[str]:
     if solution.time is None:
         left_out = (*left_out, "time")
     names = [name for name in UNITS if name not in left_out]
-    points = dict.fromkeys(
-        (*solution.points, *solution.velocity, *solution.acceleration)
-    )
-    return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
+    quantities = {name: getattr(solution, name) for name in names}
+    of_points = {
+        "": solution.points,
+        "v_": solution.velocity,
+        "a_": solution.acceleration,
+    }
+    for name in dict.fromkeys(chain(*of_points.values())):
+        for start, arrays in of_points.items():
+            quantities[start + name] = arrays.get(name)
+    return quantities
 
 
 def find_unit_of_quantity(name: str) -> str:
@@ -526,28 +533,13 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
 
     Places are in the coordinates of the scene's drawing.
     """
-    values = _find_si(solution, name)
+    values = _list_quantities(solution).get(name)
     unit = find_unit_of_quantity(name)
-    if values is not None and unit == "m" and not is_scalar(name):
+    if values is None:
+        return None
+    if unit == "m" and not is_scalar(name):
         values = shift_to_drawing(solution, values)
-    if values is None or unit not in units:
-        return values
-    _, factor = units[unit]
-    return values * factor
-
-
-def _find_si(solution: Solution, name: str) -> Array | None:
-    """Return a quantity, or a point's, in SI units and from O2; None if absent."""
-    values: Array | None
-    if name in UNITS:
-        values = getattr(solution, name)
-        return values
-    start = name[:2]
-    if start == "v_":
-        return solution.velocity.get(name[2:])
-    if start == "a_":
-        return solution.acceleration.get(name[2:])
-    return solution.points.get(name)
+    return values * units[unit][1] if unit in units else values
 
 
 def shift_to_drawing(solution: Solution, places: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import STATED_PAIR, Place, PointName
+from fourbar.effects.place import Place, PointName, StatedPair
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -173,10 +173,10 @@ class Load(Effect):
     bar: Annotated[int, OfBar()]
     force: Annotated[tuple[float, float] | None, Declared("N", pair="rad")] = None
     _: KW_ONLY
-    from_pin: Annotated[tuple[float, float] | None, STATED_PAIR] = None
-    from_centre: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    from_pin: StatedPair = None
+    from_centre: StatedPair = None
     point: Annotated[str | None, PointName()] = None
-    arm: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    arm: StatedPair = None
     moment: Annotated[float, Declared("N m")] = 0.0
     frame: Annotated[str, OneOf(FRAMES)] = "world"
     table: Annotated[Table | None, Part(Table)] = None

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from operator import is_
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from fourbar.linkage import (
 )
 
 STATED_PAIR = Declared("m", left_out=None, pair="rad")
+StatedPair = Annotated[tuple[float, float] | None, STATED_PAIR]
 STATED_PLACES = {"from_pin": STATED_PAIR, "from_centre": STATED_PAIR}
 """Forms in which numbers state a place that turns with its bar; `point` is a name."""
 AT_FIRST_PIN = (0.0, 0.0)

@@ -289,7 +289,7 @@ class Reader:
     ) -> dict[str, Any]:
         """Read each of some numbers, by name."""
         return {
-            name: self.declared(f"{key}.{name}".rstrip("."), given.get(name), by)
+            name: self.declared(f"{key}.{name}".strip("."), given.get(name), by)
             for name, by in numbers.items()
         }
 

@@ -128,26 +128,27 @@ def write_mjcf(
         model.cylinder = scene.drive
     for term in (*scene.effects, *scene.loads):
         term.add_to_mjcf(model)
-    root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
+    root = model.root
+    root.set("model", clean_line(scene.title) or "four-bar")
     for line in _write_comments(scene, drive, reader, passive=passive and model.exerts):
         root.append(ET.Comment(f" {line} "))
     add_element(root, "compiler", angle="radian", autolimits="true")
-    model.add_option(root)
+    model.add_option()
     add_appearance(root, scene.linkage)
     if start is not None:
         start = start._replace(qpos=unwind(scene, start.qpos))
         model.rest = start.qpos
     armature = size_flywheel(scene, settings)
-    model.add_bodies(root, armature)
-    model.add_load_sites(root)
-    model.add_closure(root)
-    model.add_tendons(root)
+    model.add_bodies(armature)
+    model.add_load_sites()
+    model.add_closure()
+    model.add_tendons()
     if drive == "motor":
         actuator = make_motor(scene.drive_bar, _size_control(scene))
     else:
         speed = None if start is None else start.qvel[0]
         actuator = _keep_speed(scene, armature, model.timestep, speed)
-    model.add_actuators(root, actuator, driven=drive == "flywheel")
+    model.add_actuators(actuator, driven=drive == "flywheel")
     if start is not None:
         frame = add_element(root, "keyframe")
         add_element(frame, "key", name="start", qpos=start.qpos, qvel=start.qvel)

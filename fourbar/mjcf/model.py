@@ -183,12 +183,6 @@ def add_element(parent: ET.Element, tag: str, **stated: Any) -> ET.Element:
     return ET.SubElement(parent, tag, attributes)
 
 
-def _find_bar_element(root: ET.Element, bar: int) -> ET.Element:
-    body = root.find(f".//body[@name='{BAR_NAMES[bar]}']")
-    assert body is not None
-    return body
-
-
 _UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
@@ -281,6 +275,9 @@ class Model:
     ) -> None:
         self.passive = passive
         """True if loads and springs have no controls."""
+        self.root = ET.Element("mujoco")
+        self.bodies: dict[int, ET.Element] = {}
+        """Bodies of the bars by number, that of the ground among them."""
         self.linkage = linkage
         self.settings = settings
         self.option: dict[str, Iterable[float]] = {"gravity": (0.0, 0.0, 0.0)}
@@ -332,14 +329,14 @@ class Model:
         """Return True if any pin carries the attribute."""
         return any(attribute in attributes for attributes in self.pin.values())
 
-    def add_option(self, root: ET.Element) -> None:
+    def add_option(self) -> None:
         """Add the timestep, integrator, solver and what effects state, as gravity.
 
         Flags switch off what a closed loop and this model do not need.
         """
         settings = self.settings
         option = add_element(
-            root,
+            self.root,
             "option",
             timestep=self.timestep,
             integrator=settings.integrator,
@@ -357,27 +354,22 @@ class Model:
             unneeded.append("damper")
         add_element(option, "flag", **dict.fromkeys(unneeded, "disable"))
 
-    def add_bodies(self, root: ET.Element, flywheel: float) -> None:
+    def add_bodies(self, flywheel: float) -> None:
         """Add ground > (input > coupler), output; light and camera face the plane."""
-        world = add_element(root, "worldbody")
+        world = add_element(self.root, "worldbody")
         _add_camera(world, self.linkage)
         ground = add_element(world, "body", name="ground")
+        self.bodies[1] = ground
         add_element(ground, "inertial", pos="0 0 0", mass=1, diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
         O4 = self.linkage.ground * self.along_ground
         self._add_site(ground, "O2", 0.0)
         self._add_site(ground, "O4", O4)
-        crank = self._add_bar(ground, 2, 0.0, armature=flywheel)
-        self._add_bar(crank, 3, self.linkage.input.length)
-        self._add_bar(ground, 4, O4)
+        self._add_bar(1, 2, 0.0, armature=flywheel)
+        self._add_bar(2, 3, self.linkage.input.length)
+        self._add_bar(1, 4, O4)
 
-    def _add_bar(
-        self,
-        parent: ET.Element,
-        number: int,
-        at: complex,
-        **drive: float,
-    ) -> ET.Element:
+    def _add_bar(self, parent: int, number: int, at: complex, **drive: float) -> None:
         """Add a bar that turns about its first pin.
 
         Bars 3 and 4 end in the sites that the loop's closure joins.
@@ -385,7 +377,9 @@ class Model:
         bar = self.linkage.bar(number)
         pin = FIRST_PIN[number]
         pos = at.real, at.imag, 0.0
-        body = add_element(parent, "body", name=BAR_NAMES[number], pos=pos)
+        name = BAR_NAMES[number]
+        body = add_element(self.bodies[parent], "body", name=name, pos=pos)
+        self.bodies[number] = body
         if self.rest is not None:
             angle = self.rest[number - 2]
             body.set("axisangle", write_exactly(0.0, 0.0, 1.0, angle))
@@ -406,17 +400,16 @@ class Model:
         self._add_capsule(body, number, bar.length, z)
         if number == 2:
             self._add_site(body, "A", bar.length)
-            return body
+            return
         end = body
         if self.settings.pad is not None:
             assert not isinstance(self.settings.pad, str)  # the document has fitted it
             # massless and welded: it only moves the point at which MuJoCo measures how
             # soft the closure may be
-            end = add_element(body, "body", name=f"{BAR_NAMES[number]}_pad")
+            end = add_element(body, "body", name=f"{name}_pad")
             place = self.settings.pad * bar.length, 0.0, 0.0
             add_element(end, "inertial", pos=place, mass=0, diaginertia="0 0 0")
         self._add_site(end, f"B{number}", bar.length)
-        return body
 
     def _add_site(self, body: ET.Element, name: str, at: complex) -> None:
         pos = at.real, at.imag, 0.0
@@ -447,11 +440,11 @@ class Model:
             conaffinity=0,
         )
 
-    def add_closure(self, root: ET.Element) -> None:
+    def add_closure(self) -> None:
         """Close the loop at B."""
         s = self.settings
         add_element(
-            add_element(root, "equality"),
+            add_element(self.root, "equality"),
             "connect",
             name="B",
             site1="B3",
@@ -460,7 +453,7 @@ class Model:
             solimp=(s.impedance, s.impedance, 0.001, 0.5, 2.0),
         )
 
-    def add_tendons(self, root: ET.Element) -> None:
+    def add_tendons(self) -> None:
         """Add a tendon theta_4 - theta_3 for what acts at the cut pin B.
 
         Springs have a tendon each, between two sites.
@@ -471,7 +464,7 @@ class Model:
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 add_element(fixed, "joint", joint=joint, coef=coefficient)
         for index, spring in enumerate(self.springs, 1):
-            tendon = self._add_line(root, tendons, f"spring_{index}", spring)
+            tendon = self._add_line(tendons, f"spring_{index}", spring)
             length = "0"
             if _is_slack_somewhere(spring):
                 free = write_exactly(-spring.slack / spring.stiffness)
@@ -483,16 +476,12 @@ class Model:
             tendon.set("stiffness", write_exactly(spring.stiffness))
             tendon.set("springlength", length)
         if self.cylinder is not None:
-            self._add_line(root, tendons, CYLINDER, self.cylinder)
+            self._add_line(tendons, CYLINDER, self.cylinder)
         if len(tendons):
-            root.append(tendons)
+            self.root.append(tendons)
 
     def _add_line(
-        self,
-        root: ET.Element,
-        tendons: ET.Element,
-        name: str,
-        line: "Spring | LinearDrive",
+        self, tendons: ET.Element, name: str, line: "Spring | LinearDrive"
     ) -> ET.Element:
         """Add a tendon between two points of bars, with a site at each."""
         tendon = add_element(tendons, "spatial", name=name)
@@ -501,19 +490,16 @@ class Model:
             at = point.vector()
             if point.bar == 1:
                 at = at * self.along_ground
-            self._add_site(_find_bar_element(root, point.bar), f"{name}_{which}", at)
+            self._add_site(self.bodies[point.bar], f"{name}_{which}", at)
         return tendon
 
-    def add_load_sites(self, root: ET.Element) -> None:
+    def add_load_sites(self) -> None:
         """Add the point at which each load acts; an arm becomes a couple at G."""
         for index, load in enumerate(self.loads, 1):
             z = load.foot(self.linkage.bar(load.bar).to_centre)
-            body = _find_bar_element(root, load.bar)
-            self._add_site(body, f"load_{index}", z)
+            self._add_site(self.bodies[load.bar], f"load_{index}", z)
 
-    def add_actuators(
-        self, root: ET.Element, drive: dict[str, Any], *, driven: bool
-    ) -> None:
+    def add_actuators(self, drive: dict[str, Any], *, driven: bool) -> None:
         """Add actuators: the drive, if it has attributes; loads; and some springs.
 
         Actuators of loads and springs ignore their controls.
@@ -544,7 +530,7 @@ class Model:
             placed["gear"] = write_exactly(force.real, force.imag, 0, 0, 0, couple)
             self._add_force(actuators, placed, 1.0)
         if len(actuators):
-            root.append(actuators)
+            self.root.append(actuators)
 
     def _add_force(
         self,

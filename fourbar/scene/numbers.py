@@ -9,11 +9,11 @@ from typing import Annotated, Any, ClassVar
 
 from fourbar import effects
 from fourbar.effects.place import (
-    STATED_PAIR,
     STATED_PLACES,
     At,
     Place,
     Placed,
+    StatedPair,
     require_place,
 )
 from fourbar.errors import InputError, expect
@@ -53,8 +53,8 @@ class Point(Placed):
 
     name: str
     bar: Annotated[int, OfBar((1, *MOVING_BARS))]
-    from_pin: Annotated[tuple[float, float] | None, STATED_PAIR] = None
-    from_centre: Annotated[tuple[float, float] | None, STATED_PAIR] = None
+    from_pin: StatedPair = None
+    from_centre: StatedPair = None
     stated_at: ClassVar[str] = "points.{0.name}"
 
     def __post_init__(self) -> None:
