@@ -85,7 +85,7 @@ def signature(thing: Any) -> str:
         return f"({', '.join(fields)})"
     if isinstance(node, ast.ClassDef):
         arguments = [
-            ast.unparse(_without_declaration(statement)).replace(
+            ast.unparse(_without_declaration(statement, thing)).replace(
                 "field(default_factory=", "("
             )
             for statement in node.body
@@ -99,8 +99,11 @@ def signature(thing: Any) -> str:
     return f"({ast.unparse(node.args)}){returned}"
 
 
-def _without_declaration(statement: ast.stmt) -> ast.stmt:
-    """Return a field without its declaration: of Annotated[int, ...] the int."""
+def _without_declaration(statement: ast.stmt, kind: type) -> ast.stmt:
+    """Return a field of a class without its declaration: int of Annotated[int, ...].
+
+    The module of the class may have a name for an annotation of several fields.
+    """
     match statement:
         case ast.AnnAssign(
             annotation=ast.Subscript(
@@ -108,6 +111,11 @@ def _without_declaration(statement: ast.stmt) -> ast.stmt:
             )
         ):
             statement.annotation = hint
+        case ast.AnnAssign(annotation=ast.Name(id=name)):
+            named = getattr(inspect.getmodule(kind), name, None)
+            if hasattr(named, "__metadata__"):
+                hint = inspect.formatannotation(named.__origin__)
+                statement.annotation = ast.parse(hint, mode="eval").body
     return statement
 
 

@@ -426,9 +426,6 @@ def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> tuple[Any
     return pieces, pieces.derivative(1), pieces.derivative(2)
 
 
-Commanded = float | Array | Sweep | FromLimit | None
-
-
 @dataclass(frozen=True, slots=True, init=False, eq=False)
 class Motion:
     """The command to one moving bar, the input unless numbers of bar 3 or 4 are stated.
@@ -466,7 +463,7 @@ class Motion:
     """Number of the commanded bar, 2, 3 or 4. If a stroke is commanded, the scene's
     drive determines it.
     """
-    angle: Commanded
+    angle: float | Array | Sweep | FromLimit | None
     """Commanded angle, rad, or stroke, m, as it is stated."""
     speed: float | Array | None
     """Commanded speed, rad/s, or m/s of a stroke; (n,) if each angle has its own."""
@@ -486,16 +483,16 @@ class Motion:
 
     def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,
-        theta_2: Commanded = None,
+        theta_2: float | Array | Sweep | FromLimit | None = None,
         omega_2: float | Array | None = None,
         alpha_2: float | Array = 0.0,
         branch: int = OPEN,
         free: Free | None = None,
         law: Law | Rise | Sine | None = None,
-        theta_3: Commanded = None,
+        theta_3: float | Array | Sweep | FromLimit | None = None,
         omega_3: float | Array | None = None,
         alpha_3: float | Array = 0.0,
-        theta_4: Commanded = None,
+        theta_4: float | Array | Sweep | FromLimit | None = None,
         omega_4: float | Array | None = None,
         alpha_4: float | Array = 0.0,
         stroke: float | Array | Sweep | None = None,
