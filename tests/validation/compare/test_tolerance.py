@@ -16,7 +16,7 @@ from fourbar_validation.compare.tolerance import (
     SIMULATED,
     compute_difference,
     divide,
-    find_conditions,
+    find_condition,
     find_error,
     find_lever,
     find_used,
@@ -85,7 +85,7 @@ def test_conditions_of_several_quantities_are_those_of_their_units():
         "torque": lever * s.condition**2 * s.drive_condition,
         "F12": lever * s.condition**2 * s.drive_condition,
     }
-    found = find_conditions([*wanted], scene.linkage, s)
+    found = [find_condition(name, scene.linkage, s) for name in wanted]
     assert np.ptp(s.drive_condition) > 0.0 and np.ptp(s.condition) > 0.0
     np.testing.assert_allclose(found, [*wanted.values()], rtol=1e-15)
 

@@ -174,7 +174,7 @@ class Column:
     @cached_property
     def scale(self) -> Scale:
         """Size of the quantity and how far its terms cancel, (n,)."""
-        return self.judge.sizes.scales([self._made_of], [self.ours]).select(0)
+        return self.judge.sizes.scale(self._made_of, self.ours)
 
     @property
     def size(self) -> Array:

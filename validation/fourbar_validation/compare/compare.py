@@ -4,8 +4,8 @@ The row states the position where the quantity is worst.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -45,9 +45,8 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.compare.scales import (
     Scale,
     TermSizes,
-    find_scale_of_answer,
     make_reference,
-    take_strictest_conditions,
+    size_answer,
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -56,9 +55,9 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
     K,
     Mask,
-    compute_differences,
     count_half_turns,
     divide,
+    find_condition,
     find_error,
     find_gap,
     find_used,
@@ -75,8 +74,8 @@ AnswerNearby = Callable[[Mask], dict[str, Array]]
 """Function that evaluates every quantity again at the positions of a mask. theta_2 is
 varied within its rounding; elsewhere it is NaN.
 """
-Scales = dict[tuple[str, ...], tuple[Scale, Array]]
-"""Scale by the formulas and conditions, (q, n), by the quantities that have them."""
+Scales = dict[str, tuple[Scale, Array]]
+"""Scale by the formulas and condition, (n,), by the quantity that has them."""
 
 _OF_THE_FORMULAS = (
     *DRY_FRICTION_QUANTITIES,
@@ -138,35 +137,14 @@ class Demands(NamedTuple):
     """Method for which the errors are predicted, as the end of a reason."""
 
 
-@dataclass
-class _Judged:
-    """Rows of quantities that were compared, and the numbers that they speak for."""
+class _Judged(NamedTuple):
+    """The row of a quantity, and the numbers that it speaks for."""
 
-    rows: dict[str, Row] = field(default_factory=dict)
-    """Rows by quantity."""
+    row: Row
     numbers: int = 0
-    """Numbers of all quantities at positions where both close the loop."""
+    """Numbers at positions where both close the loop."""
     decided: int = 0
     """Those with a verdict, or at a reversal, where either side is right."""
-
-
-class _Pair(NamedTuple):
-    """A quantity that both sides have."""
-
-    quantity: str
-    ours: Array
-    theirs: Array
-
-
-class _Due(NamedTuple):
-    """A quantity that both sides have, and the positions at which it is compared."""
-
-    quantity: str
-    ours: Array
-    theirs: Array
-    mask: Mask
-    note: str
-    """Positions that are not judged, as the end of a reason."""
 
 
 @dataclass
@@ -211,13 +189,17 @@ class Comparison:
                 for line, quantity in _OF_THE_LINE.items()
                 if quantity in names or line in answer.quantities
             }
-        judged = self._compare([name for name in STAGE_OF if name in names])
-        alarms = [self._unmeasured("watch", FAILS, alarm) for alarm in answer.alarms]
-        of_quantities = [judged.rows[name] for name in STAGE_OF if name in judged.rows]
-        rows = [self._compare_assembled(), *of_quantities, *alarms]
-        numbers = judged.numbers
+        rows = [self._compare_assembled()]
+        numbers = 0
+        undecided = 0
+        for name in filter(names.__contains__, STAGE_OF):
+            judged = self._compare(name)
+            if judged is not None:
+                rows.append(judged.row)
+                numbers += judged.numbers
+                undecided += judged.numbers - judged.decided
+        rows += [self._unmeasured("watch", FAILS, alarm) for alarm in answer.alarms]
         if numbers:  # a scene of which most numbers are undecided does not hold
-            undecided = numbers - judged.decided
             reason = f"{undecided} of {numbers} numbers are undecided"
             share = undecided / numbers
             rows.append(
@@ -335,188 +317,145 @@ class Comparison:
             self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
         )
 
-    def _compare(self, quantities: Sequence[str]) -> _Judged:
-        """Compare all quantities of the answer at once.
-
-        A quantity that neither side has is left out.
-        """
-        judged = _Judged()
-        pairs: list[_Pair] = []
-        for quantity in quantities:
-            if quantity == "drive_condition" and not self._tells_of_jams:
-                continue
-            ours = getattr(self.formulas, quantity, None)
-            theirs = self.answer.quantities.get(quantity)
-            if theirs is None and self._solution is not None:
-                theirs = getattr(self._solution, quantity)
-            if ours is None and theirs is None:  # the scene states positions only
-                continue
-            if theirs is None:
-                missing = "no answer"
-            elif ours is None:
-                missing = "the formulas have no answer"
-            else:
-                pairs.append(_Pair(quantity, ours, theirs))
-                continue
-            judged.rows[quantity] = self._unmeasured(quantity, FAILS, missing)
-        if pairs:
-            due = self._prepare(pairs, judged)
-            if due:
-                self._judge(due, judged)
-        return judged
-
-    def _prepare(self, pairs: Sequence[_Pair], judged: _Judged) -> list[_Due]:
-        """Find where both close the loop and the formulas state a value.
-
-        What cannot be compared anywhere has its row.
-        """
+    def _compare(self, quantity: str) -> _Judged | None:
+        """Compare a quantity of the answer; None if neither side has it."""
+        if quantity == "drive_condition" and not self._tells_of_jams:
+            return None
         formulas = self.formulas
-        code = formulas.status_code
-        stated = _mark_stated(pairs, formulas)
-        masks: Mask = self._closed & stated
+        ours = getattr(formulas, quantity, None)
+        theirs = self.answer.quantities.get(quantity)
+        if theirs is None and self._solution is not None:
+            theirs = getattr(self._solution, quantity)
+        if ours is None and theirs is None:  # the scene states positions only
+            return None
+        if ours is None or theirs is None:
+            missing = "the formulas have no answer" if ours is None else "no answer"
+            return _Judged(self._unmeasured(quantity, FAILS, missing))
         closed = int(np.count_nonzero(self._closed))
-        counts = masks.sum(axis=1).tolist()
-        if self.demands.tolerance.in_time:
-            forces = [pair.quantity in FORCE_NAMES for pair in pairs]
-            masks[forces] &= mark_moving_drive(self.scene, formulas)
-        # at a reversal the forces of either side are right
-        at_reversals = np.zeros(masks.shape, dtype=bool)
-        reversible = self._reversible
-        may_reverse = [pair.quantity in reversible for pair in pairs]
-        if any(may_reverse):
-            at_reversals[may_reverse] = masks[may_reverse] & self._reversing
-        masks &= ~at_reversals
-        reversals = at_reversals.sum(axis=1).tolist()
-        compared = masks.sum(axis=1).tolist()
-        judged.numbers += closed * len(pairs)
-        judged.decided += sum(reversals)
-        due = []
-        for i, (quantity, ours, theirs) in enumerate(pairs):
-            note = ""
-            if counts[i] < closed:
-                unstated = _count(code[self._closed & ~stated[i]])
-                if not counts[i]:
-                    reason = f"{NO_VALUE}: {unstated}"
-                    judged.rows[quantity] = self._unmeasured(quantity, REFUSES, reason)
-                    continue
-                note += f"; not judged: {unstated}"
-            if reversals[i]:
-                count = write_count(reversals[i], "position")
-                note += f"; {count} at which dry friction reverses not judged"
-            if compared[i]:
-                due.append(_Due(quantity, ours, theirs, masks[i], note))
-            else:
-                nowhere = f"{NO_POSITION} this quantity can be compared{note}"
-                judged.rows[quantity] = self._unmeasured(quantity, UNDECIDED, nowhere)
-        return due
+        mask = self._closed & _mark_stated(quantity, formulas.status_code, ours)
+        note = ""
+        if np.count_nonzero(mask) < closed:
+            unstated = _count(formulas.status_code[self._closed & ~mask])
+            if not mask.any():
+                reason = f"{NO_VALUE}: {unstated}"
+                return _Judged(self._unmeasured(quantity, REFUSES, reason), closed)
+            note = f"; not judged: {unstated}"
+        if self.demands.tolerance.in_time and quantity in FORCE_NAMES:
+            mask &= mark_moving_drive(self.scene, formulas)
+        reversals = 0
+        if quantity in self._reversible:
+            # at a reversal the forces of either side are right
+            reversals = int(np.count_nonzero(mask & self._reversing))
+            mask &= ~self._reversing
+        if reversals:
+            count = write_count(reversals, "position")
+            note += f"; {count} at which dry friction reverses not judged"
+        if not mask.any():
+            nowhere = f"{NO_POSITION} this quantity can be compared{note}"
+            row = self._unmeasured(quantity, UNDECIDED, nowhere)
+            return _Judged(row, closed, reversals)
+        errors = self._measure(quantity, ours, theirs, mask)
+        worst = judge_errors(
+            errors, self._predict(quantity, errors), self.demands.method
+        )
+        row = Row(
+            *self._who,
+            quantity,
+            worst.error,
+            worst.allowed,
+            worst.verdict,
+            escape_controls(worst.reason + note),
+            float(formulas.theta_2[worst.position]),
+            worst.condition,
+        )
+        return _Judged(row, closed, reversals + worst.decided)
 
-    def _judge(self, due: Sequence[_Due], judged: _Judged) -> None:
-        """Judge the errors of quantities at their positions."""
-        errors = self._take_again(due, self._measure(due))
-        verdicts = judge_errors(errors, self._predict(due, errors), self.demands.method)
-        theta_2 = self.formulas.theta_2
-        for one, worst in zip(due, verdicts, strict=True):
-            judged.decided += worst.decided
-            judged.rows[one.quantity] = Row(
-                *self._who,
-                one.quantity,
-                worst.error,
-                worst.allowed,
-                worst.verdict,
-                escape_controls(worst.reason + one.note),
-                float(theta_2[worst.position]),
-                worst.condition,
-            )
-
-    def _measure(self, due: Sequence[_Due]) -> "Errors":
-        """Measure the errors of quantities, and what is allowed at each position.
+    def _measure(
+        self, quantity: str, ours: Array, theirs: Array, mask: Mask
+    ) -> "Errors":
+        """Measure the errors of a quantity, and what is allowed at each position.
 
         A quantity whose size is 0 vanishes with all its terms. Nothing is relative to
-        it: its error is in its own unit, and none is allowed.
+        it: its error is in its own unit, and none is allowed. Errors that are too large
+        are asked for again within the rounding of theta_2.
         """
-        names, ours, theirs, masks, _ = zip(*due, strict=True)
-        scale, condition = self._scale(names)
+        scale, condition = self._scale(quantity, ours)
         vanishes = scale.size == 0.0
         unit = replace_zero_size(scale.size)
         tolerance = self.demands.tolerance
         allowed = np.where(vanishes, 0.0, tolerance.allowed(condition) * scale.factor)
+        error = find_error(quantity, ours, theirs, unit)
+        beyond = mask & (error > allowed)
+        again = np.full(error.shape, np.nan)
+        if self.demands.answer_nearby is not None and beyond.any():
+            again = find_error(quantity, ours, self._answered_nearby[quantity], unit)
         return Errors(
-            error=divide(compute_differences(names, ours, theirs), unit),
+            error=np.where(beyond, np.fmin(error, again), error),
             allowed=allowed,
-            scale=Scale(unit, *scale[1:]),
+            scale=scale._replace(size=unit),
             relative=~vanishes,
             condition=condition,
-            mask=np.array(masks),
+            mask=mask,
             tolerance=tolerance,
-            again=np.full(condition.shape, np.nan),
-            settled=np.zeros(len(due), dtype=np.intp),
-        )
-
-    def _take_again(self, due: Sequence[_Due], errors: "Errors") -> "Errors":
-        """Ask again within the rounding of theta_2 for errors that are too large."""
-        beyond = errors.mask & (errors.error > errors.allowed)
-        if self.demands.answer_nearby is None or not beyond.any():
-            return errors
-        again = np.full_like(errors.error, np.nan)
-        for i in np.flatnonzero(beyond.any(axis=1)).tolist():
-            quantity = due[i].quantity
-            theirs = self._answered_nearby[quantity]
-            size = errors.scale.size[i]
-            again[i] = find_error(quantity, due[i].ours, theirs, size)
-        return replace(
-            errors,
-            error=np.where(beyond, np.fmin(errors.error, again), errors.error),
             again=again,
-            settled=np.count_nonzero(beyond & (again <= errors.allowed), axis=1),
+            settled=int(np.count_nonzero(beyond & (again <= allowed))),
         )
 
-    def _predict(self, due: Sequence[_Due], errors: "Errors") -> Array | None:
-        """Predict the errors beyond the allowed ones, (q, n), in the errors' units.
+    def _predict(self, quantity: str, errors: "Errors") -> Array | None:
+        """Predict the errors beyond the allowed ones, (n,), in the errors' unit.
 
-        None where nothing predicts them. A position that was asked again needs no more
-        than what is allowed there: the prediction knows nothing of theta_2's rounding.
-        N multiplies none: sensitivities hold the terms that cancel.
+        None where nothing predicts them, or none is beyond. A position that was asked
+        again needs no more than what is allowed there: the prediction knows nothing of
+        theta_2's rounding. N multiplies none: sensitivities hold the terms that cancel.
         """
         predicted = self.demands.predicted
-        if predicted is None:
+        if predicted is None or not errors.beyond.any():
             return None
-        shares = np.zeros_like(errors.error)
-        for i in np.flatnonzero(errors.beyond.any(axis=1)).tolist():
-            share = divide(
-                predicted(due[i].quantity, errors.beyond[i]), errors.scale.size[i]
-            )
-            was_asked = np.isfinite(errors.again[i])
-            share = np.where(was_asked, np.fmin(share, errors.allowed[i]), share)
-            shares[i] = np.nan_to_num(share, nan=0.0, posinf=np.inf)
-        return shares
+        share = divide(predicted(quantity, errors.beyond), errors.scale.size)
+        was_asked = np.isfinite(errors.again)
+        share = np.where(was_asked, np.fmin(share, errors.allowed), share)
+        return np.nan_to_num(share, nan=0.0, posinf=np.inf)
 
-    def _scale(self, quantities: tuple[str, ...]) -> tuple[Scale, Array]:
-        """Return scale and condition of quantities at each position, (q, n).
+    @cached_property
+    def _sizes(self) -> TermSizes:
+        """Return the sizes of the formulas' quantities."""
+        return TermSizes(self.scene, self.formulas)
 
-        Of formulas and another derivation the stricter one counts.
+    @cached_property
+    def _answered_sizes(self) -> TermSizes | None:
+        """Return the sizes of the answer's quantities, or else of the reference's."""
+        for solution in (self._solution, self.reference):
+            sizes = None if solution is None else size_answer(self.scene, solution)
+            if sizes is not None:
+                return sizes
+        return None
+
+    def _scale(self, quantity: str, ours: Array) -> tuple[Scale, Array]:
+        """Return scale and condition of a quantity at each position, (n,).
+
+        Of formulas and another derivation the stricter one counts: the larger
+        condition, and the pair of size and N that allows less.
         """
-        formulas = self.formulas
-        answered = self._solution
-        if quantities not in self.scales:
-            reference = answered if self.reference is None else self.reference
-            conditions = take_strictest_conditions(
-                quantities, self.scene.linkage, formulas, reference
-            )
-            values = [getattr(formulas, name) for name in quantities]
-            scale = TermSizes(self.scene, formulas).scales(quantities, values)
-            self.scales[quantities] = scale, conditions
-        scale, conditions = self.scales[quantities]
-        for solution in (answered, self.reference):
-            if solution is not None:
-                theirs = find_scale_of_answer(quantities, self.scene, solution)
-                if theirs is not None:
-                    return scale.take_strictest(theirs), conditions
-        return scale, conditions
+        if quantity not in self.scales:
+            link = self.scene.linkage
+            condition = find_condition(quantity, link, self.formulas)
+            reference = self._solution if self.reference is None else self.reference
+            if reference is not None:
+                theirs = find_condition(quantity, link, reference)
+                condition = np.fmin(np.fmax(condition, theirs), 1.0)
+            self.scales[quantity] = self._sizes.scale(quantity, ours), condition
+        scale, condition = self.scales[quantity]
+        answered = self._answered_sizes
+        if answered is not None:
+            values = getattr(answered.solution, quantity)
+            if values is not None:
+                scale = scale.take_strictest(answered.scale(quantity, values))
+        return scale, condition
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of several quantities, (q, n), each in one unit."""
+    """Errors of a quantity, (n,), in one unit."""
 
     error: Array
     allowed: Array
@@ -532,8 +471,8 @@ class Errors:
     """Tolerance that the errors are held to."""
     again: Array
     """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
-    settled: NDArray[np.intp]
-    """Number of positions at which that answer agrees, (q,)."""
+    settled: int = 0
+    """Number of positions at which that answer agrees."""
 
     @cached_property
     def decidable(self) -> Mask:
@@ -551,8 +490,8 @@ class Errors:
         """Positions at which the error is beyond the allowed one, or is no number."""
         return self.judged & ~(self.error <= self.allowed)
 
-    def explain(self, at: tuple[int, int]) -> str:
-        """Say in a sentence what a quantity is allowed at a position, and why."""
+    def explain(self, at: int) -> str:
+        """Say in a sentence what is allowed at a position, and why."""
         why = self.tolerance.explain(float(self.condition[at]))
         cancellation = float(self.scale.cancellation[at])
         if cancellation > K:
@@ -561,8 +500,8 @@ class Errors:
             why += ", of the sum of its terms, which cancel"
         return why
 
-    def explain_undecided(self, at: tuple[int, int]) -> str:
-        """Say why a quantity has too few digits to decide by at a position."""
+    def explain_undecided(self, at: int) -> str:
+        """Say why there are too few digits to decide by at a position."""
         why = f"eps/condition = {EPS / self.condition[at]:.1e}"
         cancellation = float(self.scale.cancellation[at])
         if cancellation > K:
@@ -587,88 +526,72 @@ def judge_errors(
     errors: Errors,
     predicted: Array | None,
     method: str = "",
-) -> Iterator[_WorstPosition]:
-    """Judge the errors of each quantity by the allowed error.
+) -> _WorstPosition:
+    """Judge the errors of a quantity by the allowed error.
 
     Larger ones are judged by TIMES_PREDICTED times the predicted one, which the row
     then states as `allowed`. An error that is no number fails. The position is that
     where an error uses most of what is allowed.
 
-    `predicted`: (q, n), None where nothing predicts the errors. `method`: for which
-    they are predicted, as the end of a reason.
+    `predicted`: (n,), None where nothing predicts the errors. `method`: for which they
+    are predicted, as the end of a reason.
     """
-    judged = errors.judged
     beyond = errors.beyond
     bound = errors.allowed
     no_digit: Mask = np.zeros_like(beyond)
-    if predicted is not None and beyond.any():
+    if predicted is not None:
         bound = np.where(beyond, np.maximum(bound, TIMES_PREDICTED * predicted), bound)
         # where a first-order prediction reaches the value itself, no digit is left
         reaches = np.where(errors.relative, predicted >= 1.0, predicted == np.inf)
         no_digit = np.asarray(beyond & np.isfinite(errors.error) & reaches)
     used = find_used(errors.error, bound)
-    used[no_digit] = np.minimum(used[no_digit], 1.0)
-    candidates = np.where(judged.any(axis=1, keepdims=True), judged, errors.mask)
-    candidates = np.where(beyond.any(axis=1, keepdims=True), beyond, candidates)
-    worst = np.where(candidates, used, -1.0).argmax(axis=1).tolist()
-    decided = np.count_nonzero(errors.decidable & ~no_digit, axis=1).tolist()
-    undecided = np.count_nonzero(errors.mask & ~errors.decidable, axis=1).tolist()
-    for i, position in enumerate(worst):
-        at = i, position
-        error = float(errors.error[at])
-        if math.isnan(error):
-            verdict = FAILS
-            why = "NaN"
-        elif not judged[at]:
-            verdict = UNDECIDED
-            why = errors.explain_undecided(at)
-        elif not beyond[at]:
-            verdict = AGREES
-            why = errors.explain(at)
-        elif predicted is None:
-            verdict = FAILS
-            why = errors.explain(at)
-        elif no_digit[at]:
-            verdict = UNDECIDED
-            why = f"an error of {predicted[at]:.1e} of the value is predicted"
-        elif used[at] <= 1.0:
-            verdict = DEGRADED
-            expected = f"{predicted[at]:.1e} predicted for this position"
-            why = f"{error:.1e} of {expected}{method}"
-        else:
-            verdict = FAILS
-            why = f"{error:.1e} where {predicted[at]:.1e} was predicted{method}"
-        if judged[i].any():
-            if undecided[i]:
-                limit = f"more than {MOST_ALLOWED:g} allowed"
-                count = write_count(undecided[i], "position")
-                why += f"; {count} with {limit} not judged"
-            if again := errors.settled[i]:
-                count = write_count(again, "position")
-                why += f"; {count} within the rounding of theta_2"
-        yield _WorstPosition(
-            position,
-            verdict,
-            why,
-            error,
-            float(bound[at]),
-            float(errors.condition[at]),
-            decided[i],
-        )
-
-
-def _mark_stated(pairs: Sequence[_Pair], formulas: Solution) -> Mask:
-    """Mark where the formulas have a single value of several quantities, (q, n)."""
-    code = formulas.status_code
-    if np.all(code == OK):
-        return np.ones((len(pairs), len(code)), dtype=bool)
-    return np.array(
-        [_mark_one_stated(pair.quantity, code, pair.ours) for pair in pairs]
+    used = np.where(no_digit, np.minimum(used, 1.0), used)
+    candidates = next(
+        (mask for mask in (beyond, errors.judged) if mask.any()), errors.mask
+    )
+    at = int(np.where(candidates, used, -1.0).argmax())
+    error = float(errors.error[at])
+    if math.isnan(error):
+        verdict = FAILS
+        why = "NaN"
+    elif not errors.judged[at]:
+        verdict = UNDECIDED
+        why = errors.explain_undecided(at)
+    elif predicted is None or not beyond[at]:
+        verdict = FAILS if beyond[at] else AGREES
+        why = errors.explain(at)
+    elif no_digit[at]:
+        verdict = UNDECIDED
+        why = f"an error of {predicted[at]:.1e} of the value is predicted"
+    elif used[at] <= 1.0:
+        verdict = DEGRADED
+        expected = f"{predicted[at]:.1e} predicted for this position"
+        why = f"{error:.1e} of {expected}{method}"
+    else:
+        verdict = FAILS
+        why = f"{error:.1e} where {predicted[at]:.1e} was predicted{method}"
+    if errors.judged.any():
+        undecided = np.count_nonzero(errors.mask & ~errors.decidable)
+        if undecided:
+            limit = f"more than {MOST_ALLOWED:g} allowed"
+            count = write_count(int(undecided), "position")
+            why += f"; {count} with {limit} not judged"
+        if errors.settled:
+            count = write_count(errors.settled, "position")
+            why += f"; {count} within the rounding of theta_2"
+    return _WorstPosition(
+        at,
+        verdict,
+        why,
+        error,
+        float(bound[at]),
+        float(errors.condition[at]),
+        int(np.count_nonzero(errors.decidable & ~no_digit)),
     )
 
 
-def _mark_one_stated(quantity: str, code: NDArray[np.uint8], ours: Array) -> Mask:
-    """Mark where they have a single value of one quantity, (n,).
+def _mark_stated(quantity: str, code: NDArray[np.uint8], ours: Array) -> Mask:
+    """Mark where the formulas have a single value of a quantity, (n,).
 
     After an overflow these are the quantities computed before it.
     """

@@ -11,7 +11,7 @@ too small, an acceleration that is too large. So both are taken of the engine's 
 too, and the stricter pair of error and allowance counts.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -37,10 +37,8 @@ from fourbar_validation.compare.tolerance import (
     WELL_CONDITIONED,
     K,
     Mask,
-    find_conditions,
     join_components,
     magnitude,
-    magnitudes,
     sum_lengths,
 )
 
@@ -51,7 +49,7 @@ VANISHING = 2.0**-40
 
 
 class Scale(NamedTuple):
-    """Size of quantities at each position, and how far their terms cancel, (q, n)."""
+    """Size of a quantity at each position, and how far its terms cancel, (n,)."""
 
     size: Array
     """Divisor of the errors, in the unit of the quantity: its largest magnitude, or the
@@ -74,12 +72,8 @@ class Scale(NamedTuple):
         """Divisor of an identity: the sum of the terms where they cancel K-fold."""
         return np.where(self.cancellation > K, self.cancellation * self.size, self.size)
 
-    def select(self, i: int) -> "Scale":
-        """Select one quantity of several."""
-        return Scale(*(part[i] for part in self))
-
     def take_strictest(self, other: "Scale") -> "Scale":
-        """Take the size and N that allow less of an absolute error, (q, n)."""
+        """Take the size and N that allow less of an absolute error."""
         ours = self.size * self.factor
         theirs = other.size * other.factor
         stricter = (theirs < ours) | np.isnan(ours)
@@ -95,42 +89,28 @@ class TermSizes:
         self.solution = solution
         self._sums: dict[str, Array] = {}
 
-    def scales(self, quantities: Sequence[str], values: Sequence[Array]) -> Scale:
-        """Compute sizes of quantities and how far their terms cancel, (q, n)."""
+    def scale(self, quantity: str, values: Array) -> Scale:
+        """Compute the size of a quantity and how far its terms cancel, (n,)."""
         solution = self.solution
-        units = [UNITS[quantity] for quantity in quantities]
-        ones = np.ones((len(units), len(solution)))
-        scale = Scale(ones, ones.copy(), np.zeros(ones.shape, dtype=bool))
-        sized = [i for i, unit in enumerate(units) if unit not in ("rad", "1")]
-        if not sized:
-            return scale
-        size = magnitudes([values[i] for i in sized])
-        terms = self.sum_terms_of([quantities[i] for i in sized])
+        n = len(solution)
+        unit = UNITS[quantity]
+        if unit in ("rad", "1"):
+            return Scale(np.ones(n), np.ones(n), np.zeros(n, dtype=bool))
+        size = magnitude(values)
+        terms = self.sum_terms(quantity)
         well = (solution.condition >= WELL_CONDITIONED) & np.isfinite(size)
         # the poles of what the drive does are not where sin_mu vanishes
-        driven = [
-            row
-            for row, i in enumerate(sized)
-            if units[i] in ("N m", "W") or quantities[i] == LINE.value
-        ]
-        if driven:
-            well[driven] &= solution.drive_condition >= WELL_CONDITIONED
-        largest = np.where(well, size, 0.0).max(axis=1, keepdims=True)
-        most = np.where(well, terms, 0.0).max(axis=1, keepdims=True)
-        size = np.where(well, largest, size)
-        terms = np.where(well, most, terms)
+        if unit in ("N m", "W") or quantity == LINE.value:
+            well &= solution.drive_condition >= WELL_CONDITIONED
+        size, terms = (
+            np.where(well, np.max(each, initial=0.0, where=well), each)
+            for each in (size, terms)
+        )
         vanishes = size < VANISHING * terms
         size = np.where(vanishes, terms, size)
-        scale.size[sized] = size
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            scale.cancellation[sized] = np.where(size == 0.0, 1.0, terms / size)
-        scale.vanishes[sized] = vanishes
-        return scale
-
-    def sum_terms_of(self, quantities: Sequence[str]) -> Array:
-        """Sum the absolute terms of several equations, (q, n), in their units."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.array([self.sum_terms(quantity) for quantity in quantities])
+            cancellation = np.where(size == 0.0, 1.0, terms / size)
+        return Scale(size, cancellation, vanishes)
 
     def sum_terms(self, quantity: str) -> Array:
         """Sum the absolute terms of the equation of a quantity, (n,), in its unit.
@@ -144,14 +124,15 @@ class TermSizes:
         else:
             key = f"{unit} {_choose_bars(quantity)}"
         if key not in self._sums:
-            terms = TERMS_OF_UNIT[unit](quantity, self)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                terms = TERMS_OF_UNIT[unit](quantity, self)
             self._sums[key] = np.asarray(terms, dtype=float)
         return self._sums[key]
 
 
 def scale_of(quantity: str, scene: Scene, solution: Solution, values: Array) -> Scale:
     """Compute size and N of one quantity at each position, (n,)."""
-    return TermSizes(scene, solution).scales([quantity], [values]).select(0)
+    return TermSizes(scene, solution).scale(quantity, values)
 
 
 _OF_EACH_BAR = ("rad/s", "rad/s^2")
@@ -428,47 +409,12 @@ def _find_accelerations(linkage: FourBar, answered: Solution) -> dict[str, Any]:
     return accelerations
 
 
-def take_strictest_conditions(
-    quantities: Sequence[str],
-    linkage: FourBar,
-    formulas: Solution,
-    reference: Solution | None,
-) -> Array:
-    """Return the stricter of two conditions of each quantity at each position, (q, n).
-
-    The larger condition is the stricter one: the allowed error is smaller.
-    """
-    ours = find_conditions(quantities, linkage, formulas)
-    if reference is None:
-        return ours
-    theirs = find_conditions(quantities, linkage, reference)
-    return np.fmin(np.fmax(ours, theirs), 1.0)
-
-
-def find_scale_of_answer(
-    quantities: Sequence[str],
-    scene: Scene,
-    answered: Solution,
-) -> Scale | None:
-    """Compute size and N of quantities by an answer, (q, n).
-
-    NaN for a quantity that it does not have; None without the motion that the sums of
-    terms need.
-    """
+def size_answer(scene: Scene, answered: Solution) -> TermSizes | None:
+    """Return the sizes of an answer; None without the motion that the sums need."""
     if answered.at.speed is not None:
         if any(getattr(answered, name) is None for name in RATES):
             return None
-        if answered.a_G2 is None or answered.a_G3 is None or answered.a_G4 is None:
+        if any(getattr(answered, f"a_G{bar}") is None for bar in MOVING_BARS):
             accelerations = _find_accelerations(scene.linkage, answered)
             answered = replace(answered, **accelerations)
-    values = [getattr(answered, quantity) for quantity in quantities]
-    rows = [i for i, numbers in enumerate(values) if numbers is not None]
-    shape = len(values), len(answered)
-    found = Scale(np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, bool))
-    if rows:
-        of_rows = TermSizes(scene, answered).scales(
-            [quantities[i] for i in rows], [values[i] for i in rows]
-        )
-        for all_rows, part in zip(found, of_rows, strict=True):
-            all_rows[rows] = part
-    return found
+    return TermSizes(scene, answered)

@@ -9,7 +9,6 @@ longest bar.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -175,12 +174,8 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
     return min(others) / max(lengths)
 
 
-def find_conditions(
-    quantities: Sequence[str],
-    linkage: FourBar,
-    formulas: Solution,
-) -> Array:
-    """Return the conditions of several quantities at each position, (q, n).
+def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
+    """Return the condition of a quantity at each position, (n,).
 
     Angles, places and pure numbers have s times the lever, all that follows from them
     s^2 times the lever; forces, torques and power have the drive condition as a further
@@ -188,39 +183,21 @@ def find_conditions(
     or follows from a commanded input alone, has the condition of the command.
     """
     bar = formulas.at.bar
-    units = [UNITS[quantity] for quantity in quantities]
-    powers = np.array([[POWER[unit]] for unit in units])
-    conditions = find_lever(linkage, bar) * _raise_to(powers, formulas.condition)
-    of_forces = [unit in _UNITS_OF_FORCES for unit in units]
-    if formulas.stroke is not None:
-        directed = [
-            of_force or quantity in _OF_DIRECTION
-            for quantity, of_force in zip(quantities, of_forces, strict=True)
-        ]
-        longest = max(linkage.lengths)
-        conditions[directed] *= np.minimum(formulas.stroke / longest, 1.0)
-    if any(of_forces):
-        conditions[of_forces] *= formulas.drive_condition
+    unit = UNITS[quantity]
     if bar == 2:
         decided = OF_THE_INPUT
     else:
         decided = frozenset((f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}"))
-    of_input = [quantity in decided for quantity in quantities]
-    # a stroke commands the bar as far as its cylinder has a lever
-    conditions[of_input] = _raise_to(
-        powers[of_input], np.asarray(formulas.at.condition)
-    )
-    return conditions
-
-
-def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """Compute a quantity's condition at each position, (n,)."""
-    return np.asarray(find_conditions([quantity], linkage, formulas)[0])
-
-
-def _raise_to(powers: NDArray[np.intp], numbers: Array) -> Array:
-    """Raise numbers to the first or second power, (q, n)."""
-    return np.where(powers == 1, numbers, numbers * numbers)
+    if quantity in decided:
+        # a stroke commands the bar as far as its cylinder has a lever
+        return np.full(len(formulas), np.asarray(formulas.at.condition) ** POWER[unit])
+    condition = find_lever(linkage, bar) * formulas.condition ** POWER[unit]
+    of_force = unit in _UNITS_OF_FORCES
+    if formulas.stroke is not None and (of_force or quantity in _OF_DIRECTION):
+        condition *= np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
+    if of_force:
+        condition *= formulas.drive_condition
+    return condition
 
 
 def wrap_difference(angle: Angle) -> Angle:
@@ -283,13 +260,8 @@ def mark_touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
 def magnitude(values: Array) -> Array:
     """Return the absolute value of a scalar, the Euclidean norm of a vector, (n,)."""
     if values.ndim == 2:
-        return _measure_vectors(values)
+        return np.asarray(np.hypot(values[:, 0], values[:, 1]))
     return np.abs(values)
-
-
-def _measure_vectors(vectors: Array) -> Array:
-    """Return the Euclidean norm of vectors, (..., 2)."""
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
 def join_components(x: Array, y: Array) -> Array:
@@ -300,44 +272,11 @@ def join_components(x: Array, y: Array) -> Array:
     return vectors
 
 
-def magnitudes(values: Sequence[Array] | Array) -> Array:
-    """Return the magnitudes of several quantities, (q, n)."""
-    sizes = np.empty((len(values), len(values[0])))
-    for axes in (1, 2):
-        if rows := [i for i in range(len(values)) if values[i].ndim == axes]:
-            alike = np.array([values[i] for i in rows])
-            if axes == 2:
-                sizes[rows] = _measure_vectors(alike)
-            else:
-                sizes[rows] = np.abs(alike)
-    return sizes
-
-
-def compute_differences(
-    quantities: Sequence[str],
-    ours: Sequence[Array],
-    theirs: Sequence[Array],
-) -> Array:
-    """Return the differences of several quantities, (q, n).
+def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
+    """Compute the differences of a quantity, (n,).
 
     Angles differ modulo 2 pi, vectors by Euclidean norm; NaN where the shapes differ.
     """
-    apart = np.full((len(quantities), len(ours[0])), np.nan)
-    alike = [i for i in range(len(ours)) if theirs[i].shape == ours[i].shape]
-    for axes in (1, 2):
-        if rows := [i for i in alike if ours[i].ndim == axes]:
-            difference = np.array([ours[i] - theirs[i] for i in rows])
-            if axes == 2:
-                apart[rows] = _measure_vectors(difference)
-                continue
-            turned = [quantities[i].startswith("theta") for i in rows]
-            difference[turned] = wrap_difference(difference[turned])
-            apart[rows] = np.abs(difference)
-    return apart
-
-
-def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
-    """Compute the differences of one quantity, (n,)."""
     if ours.shape != theirs.shape:
         return np.full(len(ours), np.nan)
     difference = ours - theirs

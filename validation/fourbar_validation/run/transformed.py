@@ -54,14 +54,12 @@ from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     WELL_CONDITIONED,
     Mask,
-    compute_differences,
     count_half_turns,
-    divide,
-    find_conditions,
+    find_condition,
+    find_error,
     find_worst,
     join_components,
     magnitude,
-    magnitudes,
     mark_touching,
     sum_lengths,
 )
@@ -182,17 +180,18 @@ class _Few:
 
         `parts`: sizes of the numbers that were summed to these, (q, n).
         """
-        names = list(theirs)
-        ours = [self.numbers[name] for name in names]
         terms = TermSizes(self.scene, self.solution)
-        sizes = terms.scales(names, ours).of_terms
-        if parts is not None:
-            # what cancels within a part is among the terms of the whole
-            sizes = np.maximum(sizes, np.maximum(parts, terms.sum_terms_of(names)))
-        conditions = find_conditions(names, self.scene.linkage, self.solution)
-        apart = compute_differences(names, ours, list(theirs.values()))
-        errors = divide(apart, sizes) * np.minimum(conditions, 1.0)
-        return dict(zip(names, errors, strict=True))
+        errors = {}
+        for i, (name, values) in enumerate(theirs.items()):
+            ours = self.numbers[name]
+            size = terms.scale(name, ours).of_terms
+            if parts is not None:
+                # what cancels within a part is among the terms of the whole
+                size = np.maximum(size, np.maximum(parts[i], terms.sum_terms(name)))
+            condition = find_condition(name, self.scene.linkage, self.solution)
+            error = find_error(name, ours, values, size)
+            errors[name] = error * np.minimum(condition, 1.0)
+        return errors
 
     def row(self, name: str, transformation: "_Transformation") -> Row:
         """Make the row of a transformation, of the quantity that is worst."""
@@ -497,7 +496,7 @@ def _measure_sum(few: _Few, parts: list[tuple[int, Scene]]) -> dict[str, Array]:
     for name in filter(_FORCES.__contains__, few.numbers):
         of_parts = [times * getattr(part, name) for times, part in solved]
         totals[name] = np.sum(of_parts, axis=0)
-        sizes.append(magnitudes(of_parts).sum(axis=0))
+        sizes.append(sum(map(magnitude, of_parts)))
     return few.compare(totals, sizes)
 
 

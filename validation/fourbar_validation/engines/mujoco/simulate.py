@@ -20,7 +20,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
-from fourbar_validation.compare.scales import find_scale_of_answer, make_reference
+from fourbar_validation.compare.scales import make_reference, size_answer
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import (
     list_speeds,
@@ -257,10 +257,12 @@ class _Simulation:
         if solution is None or answer.at is None or answer.at.speed is None:
             return 1.0
         drive = name_driving(self.scene)
-        scale = find_scale_of_answer([drive], self.scene, solution)
-        if scale is None or not np.isfinite(scale.factor).any():
+        sizes = size_answer(self.scene, solution)
+        effort = getattr(solution, drive)
+        if sizes is None or effort is None:
             return 1.0
-        return float(np.nanmin(scale.factor))
+        factor = sizes.scale(drive, effort).factor
+        return float(np.nanmin(factor)) if np.isfinite(factor).any() else 1.0
 
     def _compile_loop(
         self, supplied: Container[str] = (), **changed: Any
