@@ -7,7 +7,7 @@ generated file.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from itertools import chain, count
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -22,7 +22,9 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
     list_actuators,
     list_lifted_masses,
+    list_wraps,
 )
+from fourbar_validation.engines.mujoco.robots.closures import describe_equality
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 Described = dict[str, ModelEntry]
@@ -198,11 +200,7 @@ class _Description:
         self.put("closure.pin", seen.loop.cut or "within a bar")
         self.put("closure.by", seen.closed_by)
         self.put("closure.out of plane", seen.measure_offset())
-        names = [
-            model.equality(i).name or f"(unnamed {i})"
-            for i in range(model.neq)
-            if i not in seen.loop.closures and model.eq_active0[i]
-        ]
+        names = (describe_equality(model, one) for one in seen.loop.other_equalities)
         self.put("other equalities", ", ".join(names) or NONE_IN_WORDS)
         if not model.eq_active0[number]:
             return
@@ -270,7 +268,7 @@ class _Description:
     def name_tendon(self, number: int) -> str:
         """Return a tendon's name: its pins, or else the bars that it runs between."""
         parts = []
-        for kind, index, _ in _list_wraps(self.model, number):
+        for kind, index, _ in list_wraps(self.model, number):
             if kind == mujoco.mjtWrap.mjWRAP_JOINT:
                 parts.append(self.pins.get(index, "another joint"))
             elif kind == mujoco.mjtWrap.mjWRAP_SITE:
@@ -291,7 +289,7 @@ class _Description:
         rest: dict[int, float] = {}
         for i in filter(seen.touches_tendon, range(model.ntendon)):
             path: list[tuple[Any, ...]] = []
-            for kind, index, by_turn in _list_wraps(model, i):
+            for kind, index, by_turn in list_wraps(model, i):
                 if kind == mujoco.mjtWrap.mjWRAP_JOINT and index in self.pins:
                     pin = self.pins[index]
                     coefficient = seen.sense[pin] * by_turn
@@ -369,16 +367,6 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
         if not periods:
             return np.array([amplitude * math.sin(phase), 0.0, 0.0])
     return np.zeros(3)
-
-
-def _list_wraps(
-    model: mujoco.MjModel, tendon: int
-) -> Iterator[tuple[mujoco.mjtWrap, int, float]]:
-    """List kind, index and coefficient of each thing that a tendon runs over."""
-    first = model.tendon_adr[tendon]
-    for wrap in range(first, first + model.tendon_num[tendon]):
-        kind = mujoco.mjtWrap(model.wrap_type[wrap])
-        yield kind, int(model.wrap_objid[wrap]), float(model.wrap_prm[wrap])
 
 
 def set_entry(

@@ -310,7 +310,48 @@ def test_an_equality_of_joints_or_of_a_fixed_tendon_is_a_mimic(tendon, mimic, wo
     )
     assert other.loop is None
     assert words in other.reason
-    assert one.loop.other_equalities == ((1,) if not tendon else ())
+    assert one.loop.other_equalities == (1,)
+
+
+ON_COUPLER = '<site name="c1" pos=".1 0 0"/><site name="c2" pos=".2 0 0"/>'
+ON_GROUND = (
+    '<site name="g1"/><site name="g2" pos="0 .2 0"/>'
+    '<geom name="drum" type="sphere" size=".01" pos="0 .1 0" mass="0"/>'
+)
+
+
+@pytest.mark.parametrize(
+    ("path", "acts"),
+    [
+        ('<site site="c1"/><site site="g1"/>', True),
+        ('<site site="g1"/><geom geom="drum"/><site site="c1"/>', True),
+        ('<site site="c1"/><site site="c2"/>', False),
+        ('<site site="g1"/><geom geom="drum"/><site site="g2"/>', False),
+        (
+            '<site site="c1"/><site site="c2"/><pulley divisor="2"/><site site="g1"/>'
+            '<site site="g2"/>',
+            False,
+        ),
+    ],
+)
+def test_an_equality_of_a_spatial_tendon_acts_if_its_length_follows_the_bars(
+    path, acts
+):
+    """MuJoCo's own derivative of the length tells, in a pose without symmetries."""
+    tied = (
+        '<equality><tendon tendon1="rope"/></equality>'
+        f'<tendon><spatial name="rope">{path}</spatial></tendon>'
+    )
+    planar = Planar(on_coupler=ON_COUPLER, ground=ON_GROUND, more=tied)
+    model = mujoco.MjModel.from_xml_string(planar.text())
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    moved = np.zeros((1, model.nv))
+    mujoco.mju_sparse2dense(
+        moved, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind
+    )
+    assert bool(np.abs(moved).max() > 1e-3) == acts
+    assert loop_of(planar.text()).other_equalities == (1,) * acts
 
 
 def test_another_hinge_of_the_ground_can_be_the_driven_one():

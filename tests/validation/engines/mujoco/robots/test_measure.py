@@ -343,6 +343,21 @@ def test_what_the_scene_leaves_out_is_no_error_of_mujoco():
         assert part < 0.1 * errors[RIGID].part
 
 
+def test_a_tie_between_bars_is_switched_off_whatever_makes_it():
+    """The errors are those without it: it holds another linkage than the closure."""
+    tendon = (
+        '<tendon><fixed name="tie"><joint joint="j2" coef="1"/>'
+        '<joint joint="j4" coef="-.5"/></fixed></tendon>'
+    )
+    free = SINGLE.replace("</mujoco>", f"{tendon}</mujoco>")
+    tied = '<tendon tendon1="tie"/></equality>'
+    loops = [measure(free), measure(free.replace("</equality>", tied))]
+    assert [loop.switched_off for loop in loops] == [(), ("tie",)]
+    one, other = (loop.states.errors() for loop in loops)
+    for name in FORCE_QUANTITIES:
+        np.testing.assert_array_equal(one[name], other[name])
+
+
 def test_a_couple_is_found_where_nothing_accelerates():
     """At rest without weights no acceleration tells how large a trial is to be."""
     loop = measure(make_parallelogram(0.5, 0.4, "0 0 0"), speed=0.0)

@@ -1,5 +1,7 @@
 """Bodies of a model, the joints between them, and what acts on them."""
 
+from collections.abc import Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
@@ -66,7 +68,7 @@ def list_joints_between(
 
 
 def find_tied_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
-    """Return the two bodies of a connect or a weld."""
+    """Return the two bodies of a connect or a weld, or what else is tied."""
     objects = (int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]))
     if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE:
         first, second = (int(model.site_bodyid[site]) for site in objects)
@@ -134,6 +136,16 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
     return followers if len(ends) == len(leaders) == 1 else []
 
 
+def list_wraps(
+    model: mujoco.MjModel, tendon: int
+) -> Iterator[tuple[mujoco.mjtWrap, int, float]]:
+    """List kind, index and coefficient of each thing that a tendon runs over."""
+    first = model.tendon_adr[tendon]
+    for wrap in range(first, first + model.tendon_num[tendon]):
+        kind = mujoco.mjtWrap(model.wrap_type[wrap])
+        yield kind, int(model.wrap_objid[wrap]), float(model.wrap_prm[wrap])
+
+
 def list_tendon_joints(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
     """Return the coefficient of each joint of a fixed tendon; none of a spatial one.
 
@@ -141,13 +153,41 @@ def list_tendon_joints(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
     """
     if tendon < 0:
         return {}
-    start = int(model.tendon_adr[tendon])
-    wraps = range(start, start + int(model.tendon_num[tendon]))
+    wraps = list_wraps(model, tendon)
     return {
-        int(model.wrap_objid[wrap]): float(model.wrap_prm[wrap])
-        for wrap in wraps
-        if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT
+        joint: factor
+        for kind, joint, factor in wraps
+        if kind == mujoco.mjtWrap.mjWRAP_JOINT
     }
+
+
+def list_joints_of_tendon(model: mujoco.MjModel, tendon: int) -> set[int]:
+    """List the joints on which the length of a tendon depends."""
+    joints = {*list_tendon_joints(model, tendon)}
+    kinds = mujoco.mjtWrap
+    bearers = {
+        kinds.mjWRAP_SITE: model.site_bodyid,
+        kinds.mjWRAP_SPHERE: model.geom_bodyid,
+        kinds.mjWRAP_CYLINDER: model.geom_bodyid,
+    }
+    for wraps in pairwise(list_wraps(model, tendon)):
+        # nothing runs over a pulley, from one branch of the tendon to the next
+        if all(kind in bearers for kind, _, _ in wraps):
+            ends = (int(bearers[kind][index]) for kind, index, _ in wraps)
+            joints.update(list_joints_between(model, *ends))
+    return joints
+
+
+def list_tied_joints(model: mujoco.MjModel, equality: int) -> set[int]:
+    """List the joints on which the residual of an equality depends."""
+    kind = mujoco.mjtEq(int(model.eq_type[equality]))
+    objects = find_tied_bodies(model, equality)
+    if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+        return {*list_joints_between(model, *objects)}
+    tied = {one for one in objects if one >= 0}
+    if kind == mujoco.mjtEq.mjEQ_JOINT:
+        return tied
+    return {joint for one in tied for joint in list_joints_of_tendon(model, one)}
 
 
 def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:

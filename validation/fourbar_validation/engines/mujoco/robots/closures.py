@@ -27,6 +27,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_followers,
     list_joints,
     list_motors,
+    list_tied_joints,
     name_body,
     name_joint,
     name_part,
@@ -799,27 +800,25 @@ class _Finder:
         closures = [loop.equality]
         others: list[int] = []
         for number in np.flatnonzero(model.eq_active0).tolist():
-            tied = find_tied_bodies(model, number)
-            if model.eq_type[number] == mujoco.mjtEq.mjEQ_JOINT:
-                if not {*loop.hinges.values()}.isdisjoint(tied):
-                    others.append(number)
+            tied = list_tied_joints(model, number)
+            if number == loop.equality or tied.isdisjoint(loop.hinges.values()):
                 continue
-            if number == loop.equality or number not in self.chains:
+            if number not in self.chains:
+                others.append(number)
                 continue
-            carrying = [self._find_bar(end, moving) for end in tied]
+            chain = self.chains[number]
+            carrying = [self._find_bar(end, moving) for end in chain.ends]
             numbers = frozenset(bars.get(root, 1) for root in carrying)
             if len(numbers) == 1:
                 continue
-            if not all(self.root[end] in bars for end in tied):
+            if not all(self.root[end] in bars for end in chain.ends):
                 others.append(number)
                 continue
             pin = _PIN_BETWEEN.get(numbers)
             places = find_ends(model, self.data, number)
-            is_pin = self.chains[number].is_pin
-            if not (pin and is_pin and _is_at(frame, pin, places)):
+            if not (pin and chain.is_pin and _is_at(frame, pin, places)):
                 raise _NoFourBarError(
-                    f"{self.names[number]} holds two of its bars as well: no freedom is"
-                    " left"
+                    f"{chain.name} holds two of its bars as well: no freedom is left"
                 )
             # beside a hinge a connect holds the same pin
             (closures if pin == loop.cut else others).append(number)

@@ -142,9 +142,17 @@ def find_loop_of_scene(
     if not fits:
         raise refused[0]
     _, best = min(fits, key=lambda fit: fit[0])
-    if best.file is not file:
-        best.robot.model.eq_active0[best.loop.equality] = 0
-    return best
+    if best.file is file:
+        return best
+    model = best.robot.model
+    model.eq_active0[best.loop.equality] = 0
+    # a tendon holds the pin in its place
+    others = tuple(
+        number
+        for number in best.loop.other_equalities
+        if model.eq_type[number] != mujoco.mjtEq.mjEQ_TENDON
+    )
+    return replace(best, loop=replace(best.loop, other_equalities=others))
 
 
 def _list_variants(

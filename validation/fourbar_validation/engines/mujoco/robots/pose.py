@@ -18,10 +18,9 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
-    find_tied_bodies,
     list_dofs,
-    list_joints_between,
     list_motors,
+    list_tied_joints,
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
@@ -229,15 +228,16 @@ class _Closing:
 
         `held`: joints that are no joints of a loop.
         """
-        active = np.flatnonzero(model.eq_active0)
-        self.model = copy_for_closures(model, active.tolist())
+        active = np.flatnonzero(model.eq_active0).tolist()
+        self.model = copy_for_closures(model, active)
         enabled = mujoco.mjtDisableBit.mjDSBL_EQUALITY
         enabled |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.model.opt.disableflags &= ~int(enabled)
         self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
-        self.tied = _list_tied_joints(model)
+        tied = (list_tied_joints(model, number) for number in active)
+        self.tied = sorted(set[int]().union(*tied))
         """Joints on which an active equality depends."""
 
     def _evaluate(self, qpos: Array) -> tuple[Array, Array]:
@@ -338,17 +338,3 @@ def _put(qpos: Array, place: int, value: float) -> Array:
     moved = qpos.copy()
     moved[place] = value
     return moved
-
-
-def _list_tied_joints(model: mujoco.MjModel) -> list[int]:
-    """List the joints on which an active equality depends."""
-    kinds = mujoco.mjtEq
-    joints = set[int]()
-    for number in np.flatnonzero(model.eq_active0).tolist():
-        kind = kinds(int(model.eq_type[number]))
-        tied = find_tied_bodies(model, number)
-        if kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
-            joints.update(list_joints_between(model, *tied))
-        elif kind == kinds.mjEQ_JOINT:
-            joints.update(joint for joint in tied if joint >= 0)
-    return sorted(joints)

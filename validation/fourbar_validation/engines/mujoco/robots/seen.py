@@ -7,11 +7,12 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.linkage import PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
     list_actuators,
+    list_joints_of_tendon,
 )
 from fourbar_validation.engines.mujoco.robots.closures import EQUALITY_KINDS
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
@@ -98,18 +99,9 @@ class SeenLoop(LoopFrame):
         return not self.loop.held
 
     def touches_tendon(self, tendon: int) -> bool:
-        """Tell whether a tendon runs over a hinge or a moving bar of the loop."""
-        model = self.model
-        start = int(model.tendon_adr[tendon])
-        for wrap in range(start, start + int(model.tendon_num[tendon])):
-            kind = mujoco.mjtWrap(int(model.wrap_type[wrap]))
-            target = int(model.wrap_objid[wrap])
-            if kind == mujoco.mjtWrap.mjWRAP_JOINT and target in self.hinge.values():
-                return True
-            on_site = kind == mujoco.mjtWrap.mjWRAP_SITE
-            if on_site and self.bar(int(model.site_bodyid[target])) in MOVING_BARS:
-                return True
-        return False
+        """Tell whether the length of a tendon depends on a hinge of the loop."""
+        joints = list_joints_of_tendon(self.model, tendon)
+        return not joints.isdisjoint(self.hinge.values())
 
     def bar(self, body: int) -> int | None:
         """Return the bar that a body belongs to, None if it belongs to none."""
