@@ -134,8 +134,18 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
     springs = list_springs(scene)
     if not springs:
         return []
-    command_between: CommandBetween = partial(_command_between, scene, solution.at)
-    if _is_whole_motion(scene, solution):
+    at = solution.at
+
+    def command_between(places: Array) -> Command:
+        if at.moves_stroke:
+            return command_at(scene, places)
+        branch = np.full(places.shape, at.branch[0])
+        return Command(places, branch, None, 0.0, at.bar)
+
+    is_whole = solution.command_at is not None
+    if not is_whole and goes_on_between(scene, solution):
+        is_whole = {*command(scene).places[[0, -1]]} == {*at.places[[0, -1]]}
+    if is_whole:
         course = MotionCourse(scene, "position", solution)
         solution = course.solution
         command_between = course.command
@@ -171,33 +181,27 @@ def list_torsion_notes(
     ground count from its line, where that is not along x: the angle at O2 is not
     theta_2 then.
     """
+    write = partial(write_short, unit="rad", units=units, digits=POSITION_DIGITS)
     effects = scene.settled().effects
     torsions = [effect for effect in effects if isinstance(effect, Torsion)]
     springs = [row for effect in torsions for row in effect.springs]
     theta_1 = math.remainder(scene.linkage.ground_angle, TURN)
     on_ground = [pin for pin, *_ in springs if PINS[pin][0] == 1]
-    if abs(theta_1) < SAME_POSITION or not on_ground:
-        lies = ""
-    else:
-        angle = write_short(theta_1, "rad", units, digits=POSITION_DIGITS)
-        lies = f"the ground's line, which lies at {angle}"
+    turned = on_ground and abs(theta_1) >= SAME_POSITION
+    lies = f"the ground's line, which lies at {write(theta_1)}" if turned else ""
     notes = _list_wound(scene, solution, springs, units)
     if len(solution) > 1 or not solution.assembled[0] or notes:
-        one = f"torsion spring{'s' if len(on_ground) > 1 else ''}"
-        said = f"{one} at {' and '.join(on_ground)}: rest counts from {lies}"
-        return [*notes, *([said] if lies else [])]
+        if lies:
+            one = f"torsion spring{'s' if len(on_ground) > 1 else ''}"
+            notes.append(f"{one} at {' and '.join(on_ground)}: rest counts from {lies}")
+        return notes
     state = compute_shown_state(scene, solution.at)
-    windings = [
-        np.ravel(wound)[0]
-        for effect in torsions
-        for wound in effect.list_windings(state)
-    ]
-    for wound, (pin, _, rest, _) in zip(windings, springs, strict=True):
+    windings = [wound for effect in torsions for wound in effect.list_windings(state)]
+    for winding, (pin, _, rest, _) in zip(windings, springs, strict=True):
+        wound = np.ravel(winding)[0]
         i = PINS[pin][0]
         shown = drop_rounding(np.array([rest + wound, wound]), 1.0).tolist()
-        angle, by = (
-            write_short(one, "rad", units, digits=POSITION_DIGITS) for one in shown
-        )
+        angle, by = map(write, shown)
         line = f"the line of bar {i}" if i > 1 else lies or "the ground's line"
         notes.append(f"torsion spring at {pin}: wound by {by}, at {angle} from {line}")
     return notes
@@ -251,16 +255,6 @@ def _list_ends(spring: Spring) -> list[tuple[float, float, float, str]]:
     ]
 
 
-def _is_whole_motion(scene: Scene, solution: Solution) -> bool:
-    """Return True for the motion of a scene, which goes on between its positions."""
-    if solution.command_at is not None:
-        return True
-    if not goes_on_between(scene, solution):
-        return False
-    ends = command(scene).places[[0, -1]]
-    return set(ends) == set(solution.at.places[[0, -1]])
-
-
 def list_springs(scene: Scene) -> tuple[Spring, ...]:
     """List the springs of a scene in the order of its file."""
     for effect in scene.settled().effects:
@@ -276,13 +270,9 @@ def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
     return np.broadcast_to(np.abs(across), at.places.shape)
 
 
-CommandBetween = Callable[[Array], Command]
-"""Function that returns the command at places between those of a solution."""
-
-
 def _list_stretches(
     scene: Scene,
-    command_between: CommandBetween,
+    command_between: Callable[[Array], Command],
     solution: Solution,
     spring: Spring,
     end: float,
@@ -308,14 +298,6 @@ def _list_stretches(
         low, high = bisect(lambda there: is_longer(there) == before, low, high)
         places[assembled] = 0.5 * (low + high)
     return pair_ends(bool(beyond[0]), places, bool(beyond[-1]))
-
-
-def _command_between(scene: Scene, at: Command, places: Array) -> Command:
-    """Return the command at places between its own."""
-    if at.moves_stroke:
-        return command_at(scene, places)
-    branch = np.full(places.shape, at.branch[0])
-    return Command(places, branch, None, 0.0, at.bar)
 
 
 def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:

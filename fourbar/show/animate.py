@@ -187,9 +187,10 @@ def _collect_sweep(
     name = swept.commanded
     shown = command_at(scene, places)
     branches = {}
+    if solved is not None and not np.array_equal(places, solved.at.places):
+        solved = None
     for sign in signs if name == "theta_2" else (motion.branch,):
-        is_solved = solved is not None and np.array_equal(places, solved.at.places)
-        if solved is None or sign != motion.branch or not is_solved:
+        if solved is None or sign != motion.branch:
             one = set_branch(scene, sign)
             solution = solve(one, stage, at=command_at(one, places))
         else:

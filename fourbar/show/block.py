@@ -455,14 +455,14 @@ class _SceneBlock:
 
     def _write_stretches(self) -> Iterator[str]:
         """Write where the assembly ends."""
-        parts = []
-        for stretch in self.facts.motion.stretches:
-            ends = [
+        parts = [
+            " ".join(
                 f"{word} {self._place(end, named=self.unit != 'm')}"
                 for word, end in zip(("from", "up to"), stretch, strict=True)
                 if end is not None
-            ]
-            parts.append(" ".join(ends))
+            )
+            for stretch in self.facts.motion.stretches
+        ]
         if parts:
             yield f"assembles {', and '.join(parts)}"
 
@@ -520,9 +520,9 @@ class _SceneBlock:
         held = self.facts.held
         parts = []
         for least, most, (first, last), varies in held[:_MOST_HELD]:
-            low, high = map(self._without_rounding, (least, most))
-            size = max(abs(low), abs(high))
-            holds = f"{self._value(low, unit, size)} to {self._value(high, unit, size)}"
+            bounds = [*map(self._without_rounding, (least, most))]
+            size = max(map(abs, bounds))
+            holds = " to ".join(self._value(bound, unit, size) for bound in bounds)
             if len(self.solution) == 1:
                 return f"{holds}: dry friction holds it between them"
             if first == last:
@@ -627,23 +627,22 @@ class _SceneBlock:
     def _write_drive_head(self) -> str:
         scene = self.scene
         motion = self.motion
-        where = describe_drive(scene)
         if scene.drive is None:
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
-        elif scene.drive.has_stroke:
-            head = f"cylinder {where.removeprefix('along a line ')}"
         else:
-            head = f"force {where}"
+            kind = "cylinder" if scene.drive.has_stroke else "force"
+            head = f"{kind} {describe_drive(scene).removeprefix('along a line ')}"
         if motion.speed is None:
             return head if motion.law is None else f"{head}, by a law over time"
         si = "rad/s" if motion.stroke is None else "m/s"
-        moves = np.any(motion.speed)
-        speed = "at rest"
-        if moves:
-            speed = write_ends(motion.speed, lambda x: self._value(x, si))
         drives = scene.drive is None and scene.drive_bar == motion.bar
-        if not drives and motion.stroke is None:
-            speed = f"the {BAR_NAMES[motion.bar]} {'at ' if moves else ''}{speed}"
+        other = not drives and motion.stroke is None
+        speed = "at rest"
+        if np.any(motion.speed):
+            speed = write_ends(motion.speed, lambda x: self._value(x, si))
+            speed = f"at {speed}" if other else speed
+        if other:
+            speed = f"the {BAR_NAMES[motion.bar]} {speed}"
         if np.any(motion.acceleration):
             growth = write_ends(
                 motion.acceleration, lambda x: self._value(x, f"{si}^2")
@@ -713,7 +712,7 @@ class _SceneBlock:
         cells, places = self._write_peaks([*PIN_FORCES], "N")
         rows = [("pins", [*pins]), ("  peak", cells), ("  at", places)]
         means = [load.rms for load in pins.values()]
-        if any(mean is not None for mean in means):
+        if means != [None] * len(means):
             rows.append(("  RMS", self._cells(means, "N")))
         rows += self._list_from_rest([*PIN_FORCES], "N")
         yield from _align(rows, self.width)
@@ -743,25 +742,20 @@ class _SceneBlock:
             return
         moments, places = self._write_peaks(_BENDING, "N m")
         stresses = list[float | None]()
-        for index, (bar, (peak, x, *_)) in enumerate(bending.items()):
-            if peak is not None and peak.value:
+        for index, (number, (peak, x, *_)) in enumerate(bending.items()):
+            if peak and peak.value:
                 along = self._value(x, "m", self.longest)
-                in_motion = (
-                    "" if self.facts.kind == "position" else f", {places[index]}"
-                )
-                places[index] = f"{along}{in_motion}"
+                over = "" if self.facts.kind == "position" else f", {places[index]}"
+                places[index] = along + over
             # a bar without a cross-section has none
-            modulus = self.linkage.bar(bar).section_modulus
-            stress = None
-            if peak is not None and modulus is not None:
-                stress = peak.value / modulus
-            stresses.append(stress)
+            modulus = self.linkage.bar(number).section_modulus
+            stresses.append(peak.value / modulus if peak and modulus else None)
         rows = [
             ("bending", [f"bar {bar}" for bar in bending]),
             ("  moment", moments),
             ("  at x", places),
         ]
-        if any(stress is not None for stress in stresses):
+        if stresses != [None] * len(stresses):
             rows.append(("  stress", self._cells(stresses, "Pa")))
         rows += from_rest
         yield from _align(rows, self.width)

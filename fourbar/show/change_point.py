@@ -1,5 +1,6 @@
 """Pin forces on a change point: the limits to which they tend along the assembly."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -47,10 +48,9 @@ def find_limits(scene: Scene, solution: Solution) -> Solution | None:
         return None
     rising, order = np.unique(MULTIPLES, return_inverse=True)
     beside = solve(scene, "force", at=_list_places(scene, solution, rising))
-    limits: dict[str, Any] = {}
-    for name, limit in _extrapolate_forces(beside, order).items():
-        limits[name] = limit[None]
-    return replace(solution, **limits)
+    limits = _extrapolate_forces(beside, order)
+    forces: Any = {name: limit[None] for name, limit in limits.items()}
+    return replace(solution, **forces)
 
 
 def has_growing_forces(scene: Scene, solution: Solution) -> bool:
@@ -89,8 +89,7 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
     """
     at = solution.at
     law = scene.motion.law
-    free = scene.motion.free
-    if law is None and free is None:
+    if law is None and scene.motion.free is None:
         # a stroke changes by as much as turns its bar by the step; an angle has turn 1
         here = float(at.places[0])
         _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
@@ -99,23 +98,23 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
         except InputError as error:
             raise NoSideError("the cylinder is at an end of its range") from error
 
-    moving = "the law" if free is None else "the release"
+    moving = "the law" if law else "the release"
     speed = abs(float(np.ravel(np.asarray(at.speed, dtype=float))[0]))
     if speed == 0.0:
         raise NoSideError(f"{moving} stands still there")
     assert at.time is not None
     times = float(np.ravel(at.time)[0]) + ANGLE_STEP / speed * multiples
-    one_side = NoSideError(f"{moving} begins or ends there, and has one side alone")
-    if law is not None:
-        if times[0] < law.time[0] or times[-1] > law.time[-1]:
-            raise one_side
-        return command_at(scene, times)
-    if times[0] < 0.0:
-        raise one_side
-    released = release_at(scene, np.array([0.0, *times])).command
-    if len(released.angle) <= len(times):
-        raise one_side
-    return released.part(slice(1, None))
+    begin = 0.0
+    end = math.inf
+    if law:
+        begin, *_, end = law.time
+    if begin <= times[0] and times[-1] <= end:
+        if law:
+            return command_at(scene, times)
+        released = release_at(scene, np.array([0.0, *times])).command
+        if len(released.angle) > len(times):
+            return released.part(slice(1, None))
+    raise NoSideError(f"{moving} begins or ends there, and has one side alone")
 
 
 def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:
@@ -126,14 +125,11 @@ def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, A
     beside : positions on both sides of it.
     rows : those at the `MULTIPLES` of the step.
     """
-    forces = {}
-    sizes = []
-    for name in PIN_FORCES:
-        values = np.reshape(getattr(beside, name)[rows], (2, 2, 3, 2))
-        farthest = values[:, 1, -1]
-        sizes.append(np.abs(farthest).max())
-        forces[name] = values
-    size = max(sizes)
+    forces = {
+        name: np.reshape(getattr(beside, name)[rows], (2, 2, 3, 2))
+        for name in PIN_FORCES
+    }
+    size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
     return {name: _extrapolate_force(values, size) for name, values in forces.items()}
 
 

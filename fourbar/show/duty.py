@@ -4,6 +4,7 @@ Bearings and a motor are chosen by them; the JSON of `analyze` has them.
 """
 
 import warnings
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -258,30 +259,47 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
 
 
 def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
-    """Sum up the duty over the positions of a list, or of each member of a study."""
+    """Sum up the duty over the positions of a list, or of each member of a study.
+
+    A member of a study that is not closed, or has a position without a value, has NaN
+    for what is about the mean.
+    """
     values = getattr(solution, drive.keys.value)
     power = _require_quantity(solution, "power")
     speed = where_assembled(solution, _require_quantity(solution, drive.speed_key))
     closed = is_once_round(solution)
-    peak = _reduce(np.nanmax, np.abs(values))
-    rms = _find_rms(solution, values)
     spans = _compute_spans(solution, power)
-    energy_in, energy_out = _integrate_power(spans, power)
-    mean_power, swing = _find_swing(spans, power, closed)
+
+    def integrate(part: Array) -> Any:
+        steps = 0.5 * spans * (part[..., :-1] + part[..., 1:])
+        moves = np.isfinite(steps).any(axis=-1)
+        return _find_known(np.where(moves, np.nansum(steps, axis=-1), np.nan))
+
+    work = 0.5 * spans * (power[..., :-1] + power[..., 1:])
+    counts = np.asarray(closed) & np.isfinite(work).all(axis=-1)
+    spans = np.broadcast_to(spans, work.shape)
+    duration = spans.sum(axis=-1)
+    mean = np.full(counts.shape, np.nan)
+    np.divide(work.sum(axis=-1), duration, out=mean, where=counts)
+    surplus = np.cumsum(work - mean[..., None] * spans, axis=-1)
+    # the first position counts with an energy of 0
+    most = surplus.max(axis=-1, initial=0.0)
+    least = surplus.min(axis=-1, initial=0.0)
     mean_torque = None
-    if mean_power is not None and solution.drive_bar == solution.at.bar:
-        work = np.asarray(mean_power) * spans.sum(axis=-1)
-        mean_torque = _find_mean_torque(solution, work)
+    if counts.any() and solution.drive_bar == solution.at.bar:
+        mean_torque = _find_mean_torque(solution, mean * duration)
     return MotorDuty(
-        **_name_effort(solution, peak, rms),
+        **_name_effort(
+            solution, _reduce(np.nanmax, np.abs(values)), _find_rms(solution, values)
+        ),
         peak_speed=_reduce(np.nanmax, np.abs(speed)),
         peak_power=_reduce(np.nanmax, np.abs(power)),
         rms_power=_find_rms(solution, power),
-        energy_in=energy_in,
-        energy_out=energy_out,
+        energy_in=integrate(np.maximum(power, 0.0)),
+        energy_out=integrate(np.maximum(-power, 0.0)),
         closed=bool(closed) if np.ndim(closed) == 0 else closed,
         mean_torque=mean_torque,
-        energy_swing=swing,
+        energy_swing=_find_known(np.where(counts, most - least, np.nan)),
     )
 
 
@@ -313,48 +331,6 @@ def _compute_spans(solution: Solution, power: Array) -> Array:
     spans = np.full(speed.shape, np.nan)
     np.divide(np.diff(solution.at.places), speed, out=spans, where=speed != 0.0)
     return np.abs(spans)
-
-
-def _integrate_power(
-    spans: Array,
-    power: Array,
-) -> tuple[float | None, float | None]:
-    """Integrate the positive and the negative part of the power, each over time."""
-
-    def integrate(part: Array) -> Array:
-        return 0.5 * spans * (part[..., :-1] + part[..., 1:])
-
-    steps_in = integrate(np.maximum(power, 0.0))
-    steps_out = integrate(np.maximum(-power, 0.0))
-    moves = np.isfinite(steps_in).any(axis=-1)
-    if not moves.any():
-        return None, None
-    energy_in = np.where(moves, np.nansum(steps_in, axis=-1), np.nan)
-    energy_out = np.where(moves, np.nansum(steps_out, axis=-1), np.nan)
-    return _reduce_to_number(energy_in), _reduce_to_number(energy_out)
-
-
-def _find_swing(
-    spans: Array,
-    power: Array,
-    closed: Any,
-) -> tuple[float | None, float | None]:
-    """Find the mean power, and the range of the energy about it, over closed sweeps.
-
-    NaN for a member of a study that is not closed, or has a position without a value.
-    """
-    work = spans * 0.5 * (power[..., :-1] + power[..., 1:])
-    counts = np.asarray(closed) & np.isfinite(work).all(axis=-1)
-    if not counts.any():
-        return None, None
-    spans = np.broadcast_to(spans, work.shape)
-    mean = np.where(counts, work.sum(axis=-1) / spans.sum(axis=-1), np.nan)
-    surplus = np.cumsum(work - mean[..., None] * spans, axis=-1)
-    # the first position counts with an energy of 0
-    most = np.maximum(surplus.max(axis=-1), 0.0)
-    least = np.minimum(surplus.min(axis=-1), 0.0)
-    swing = np.where(counts, most - least, np.nan)
-    return _reduce_to_number(mean), _reduce_to_number(swing)
 
 
 def _find_mean_torque(solution: Solution, work: Any) -> Any:
@@ -390,6 +366,11 @@ def _reduce(reduce: Any, values: Array) -> Any:
         return _reduce_to_number(reduce(values, axis=-1))
 
 
+def _find_known(values: Array) -> Any:
+    """Return a number, or of a study an array (m,); None where there is none."""
+    return _reduce_to_number(values) if np.isfinite(values).any() else None
+
+
 def _reduce_to_number(value: Any) -> Any:
     """Return a number, or of a study an array (m,)."""
     if np.ndim(value) == 0:
@@ -407,20 +388,19 @@ def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
         return None
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
 
-    def convert(number: float | None, unit: str) -> float | None:
-        return None if number is None else number * find_unit_in(unit, units)[1]
+    def convert(numbers: Iterable[Any], of: dict[str, str]) -> dict[str, Any]:
+        """Name numbers as their units are, and convert them."""
+        return {
+            name: None if number is None else number * find_unit_in(unit, units)[1]
+            for number, (name, unit) in zip(numbers, of.items(), strict=True)
+        }
 
-    loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
+    of_pin = {"peak": "N", "rms": "N", "theta_2": "rad"}
     return {
         "closed": duty.closed,
-        **{name: convert(getattr(duty, name), unit) for name, unit in si.items()},
+        **convert((getattr(duty, name) for name in si), si),
         "pins": {
-            pin: {
-                "peak": convert(load.largest, "N"),
-                "rms": convert(load.rms, "N"),
-                "theta_2": convert(load.where, "rad"),
-            }
-            for pin, load in loads.items()
+            pin: convert(bearing_load(solution, pin), of_pin) for pin in PIN_FORCE
         },
         "units": {name: find_unit_in(unit, units)[0] for name, unit in si.items()},
     }

@@ -15,7 +15,7 @@ from fourbar.linkage import require
 from fourbar.quantities import Array
 from fourbar.quantities.units import NUMBER_TEXT
 from fourbar.scene import Command, Scene
-from fourbar.show.columns import Column, read_column
+from fourbar.show.columns import read_column
 from fourbar.show.shown_units import drop_rounding
 from fourbar.solution import where_assembled
 from fourbar.solving import find_last_stage
@@ -71,17 +71,17 @@ class _LocatedSearch:
     def __init__(self, scene: Scene, name: str) -> None:
         self.scene = scene
         self.name = name
+        stage = "error" if name.endswith("_error") else "force"
         if find_last_stage(scene) == "position":
             stage = "position"
-        elif name.endswith("_error"):
-            stage = "error"
-        else:
-            stage = "force"
         self.course = MotionCourse(scene, stage)
         self.places = self.course.places
         self.commanded = self.course.commanded
         column = read_column(self.course.solution, name)
-        self.unit = _find_column_unit(column)
+        self.unit = column.unit if column.label({}) else "1"
+        """SI unit; that of a pure number is 1."""
+        if "1" not in (self.unit, column.divisor):
+            self.unit = f"({column.unit})/({column.divisor})"
         self.values = where_assembled(self.course.solution, column.values)
 
     def _read(self, places: Array) -> Array:
@@ -140,10 +140,10 @@ class _LocatedSearch:
                 jumped = [write_place(self.commanded, place) for place in places]
                 why = f"it jumps over it at {self.commanded} = {', '.join(jumped)}"
             raise self._refuse(text, why, finite)
-        order = np.argsort(found)
+        found = np.sort(found)
         if self.places[0] > self.places[-1]:
-            order = order[::-1]
-        return self.course.command(self._drop_repeated(found[order]))
+            found = found[::-1]
+        return self.course.command(self._drop_repeated(found))
 
     def _read_value(self, text: str) -> float:
         """Read the value that is sought; InputError where its unit is missing."""
@@ -247,15 +247,6 @@ class _LocatedSearch:
             place = least.x
             value = side * least.f_x
         return float(place), float(value)
-
-
-def _find_column_unit(column: Column) -> str:
-    """Return the SI unit of a column; that of a pure number is 1."""
-    if not column.label({}):
-        return "1"
-    if column.divisor == "1":
-        return column.unit
-    return f"({column.unit})/({column.divisor})"
 
 
 def write_place(name: str, place: float) -> str:

@@ -40,8 +40,8 @@ def show_scene(scene: Scene) -> str:
 def _list_facts(scene: Scene) -> list[tuple[str, str]]:
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
-    bars = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
-    for number, (name, length) in enumerate(bars, 1):
+    bars = zip(BAR_NAMES.items(), scene.linkage.lengths, strict=True)
+    for (number, name), length in bars:
         text = _write_in_si(length, "m")
         if number in MOVING_BARS and (mass := scene.linkage.bar(number).mass):
             text = f"{text}, {_write_in_si(mass, 'kg')}"
@@ -51,9 +51,8 @@ def _list_facts(scene: Scene) -> list[tuple[str, str]]:
         omega = write_ends(motion.speed, lambda x: _write_in_si(x, "rad/s"))
         alpha = write_ends(motion.acceleration, lambda x: _write_in_si(x, "rad/s^2"))
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
-    acting = [f"load on bar {load.bar}" for load in scene.loads] + [
-        effect.key for effect in scene.effects
-    ]
+    acting = [f"load on bar {load.bar}" for load in scene.loads]
+    acting += [effect.key for effect in scene.effects]
     return [
         *facts,
         ("motion", f"{speed}; {BRANCH_NAMES[motion.branch]} branch"),

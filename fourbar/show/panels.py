@@ -400,7 +400,12 @@ def fit_panels(
     stop = edges[1:]
     length = edges[-1] - edges[0]
     fits = _fit_panels(compute, start, stop)
-    usual = {name: _find_usual_size(fit.values) for name, fit in fits.items()}
+    usual = {}
+    for name, fit in fits.items():
+        # a node next to a pole does not change the size of a curve
+        medians = np.median(np.nan_to_num(np.abs(_measure(fit.values))), axis=1)
+        scale = medians.max() or 1.0
+        usual[name] = float(scale * np.sqrt(np.square(medians / scale).mean()))
     kept: dict[str, list[_Fit]] = {name: [] for name in fits}
     ends = []
     for halvings in range(most_halvings + 1):
@@ -439,13 +444,6 @@ def fit_panels(
     stop = stop[order]
     share = (stop - start) / (stop - start).sum()
     return Panels(start, stop, share, curves)
-
-
-def _find_usual_size(values: Array) -> float:
-    """Return the size of a curve, which a node next to a pole does not change."""
-    medians = np.median(np.nan_to_num(np.abs(_measure(values))), axis=1)
-    scale = medians.max() or 1.0
-    return float(scale * np.sqrt(np.square(medians / scale).mean()))
 
 
 def _find_open(

@@ -22,16 +22,16 @@ def write_paths(solution: Solution, units: Conversion) -> list[str]:
     for point, path in measure_paths(solution).items():
         largest = max(path.stroke, *map(abs, (*path.x, *path.y)))
         per_metre, length = choose_unit(largest, "m", units)
-        pairs = np.array([path.x, path.y, (path.straightness, path.stroke)])
-        x, y, (across, along) = (
-            [f"{per_metre * number:#.6g}".rstrip(".") for number in pair]
-            for pair in drop_rounding(pairs, largest).tolist()
+        extents = np.array([*path.x, *path.y, path.straightness, path.stroke])
+        left, right, below, above, across, along = (
+            f"{per_metre * number:#.6g}".rstrip(".")
+            for number in drop_rounding(extents, largest).tolist()
         )
         (direction,) = drop_rounding(np.array([path.direction]), np.pi)
         first, last = (f"{factor * end + 0.0:.6g}" for end in path.ends)
         lines += [
-            f"path of {clean_line(point)}: x from {x[0]} to {x[1]} {length}, y from"
-            f" {y[0]} to {y[1]} {length}",
+            f"path of {clean_line(point)}: x from {left} to {right} {length}, y from"
+            f" {below} to {above} {length}",
             f"{_INDENT}straightness {across} {length}, stroke {along} {length} along"
             f" {angle * direction:.6g} {turned},",
             f"{_INDENT}from {name} = {first} to {last} {place}",

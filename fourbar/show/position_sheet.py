@@ -89,7 +89,8 @@ class PositionSheet:
         kinds = {"theta": "rad"}
         if not self._rests():
             kinds |= {"omega": "rad/s", "alpha": "rad/s^2"}
-        columns: dict[str, list[str]] = {}
+        heads = []
+        columns = []
         squared_speed = 0.0
         for letter, unit in kinds.items():
             numbers = np.array([self._read(f"{letter}_{bar}") for bar in MOVING_BARS])
@@ -100,15 +101,14 @@ class PositionSheet:
                 largest = max(largest, squared_speed)
             else:
                 largest = min(largest, TURN)
-            numbers = drop_rounding(numbers, largest)
             factor, name = choose_unit(0.0, unit, self.units)
             form = ".4f" if letter == "theta" else f".{POSITION_DIGITS}g"
-            columns[f"{letter}, {name}"] = _write_cells_of(factor * numbers, form)
-        rows = [_write_row("", columns)]
-        cells_of_bars = zip(*columns.values(), strict=True)
-        for bar, cells in zip(MOVING_BARS, cells_of_bars, strict=True):
-            rows.append(_write_row(f"bar {bar}", cells))
-        return rows
+            numbers = factor * drop_rounding(numbers, largest)
+            heads.append(f"{letter}, {name}")
+            columns.append(_write_cells_of(numbers, form))
+        cells = zip(MOVING_BARS, *columns, strict=True)
+        rows = [_write_row(f"bar {bar}", of_bar) for bar, *of_bar in cells]
+        return [_write_row("", heads), *rows]
 
     def _rests(self) -> bool:
         """Return True if nothing moves or begins to move: no rate is shown."""
@@ -127,13 +127,13 @@ class PositionSheet:
         if not self._rests():
             scales |= {"v_": "m/s", "a_": "m/s^2"}
         largest = {start: self._find_largest(start, names) for start in scales}
-        for name in names:
-            for start, unit in scales.items():
-                label = f"  {start[0]}" if start else name
-                vector = self._read(start + name)
-                most = largest[start]
-                sized = bool(start)
-                rows.append(self._write_vector(label, vector, unit, most, sized=sized))
+        for name, (start, unit) in product(names, scales.items()):
+            label = f"  {start[0]}" if start else name
+            vector = self._read(start + name)
+            row = self._write_vector(
+                label, vector, unit, largest[start], sized=bool(start)
+            )
+            rows.append(row)
         return rows
 
     def write_pin_forces(self) -> list[str]:

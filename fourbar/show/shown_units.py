@@ -38,15 +38,26 @@ FOLLOWING_UNITS = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", 
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
-_RATE_NAMES = ("omega", "alpha")
 _POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
 """Names of the pound, a mass; a list that names no force may mean pounds-force."""
-_ROTATIONS = ("rpm", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "rad/s²", "deg/s²")
-"""Units of omega and alpha in which rates are shown as they are stated."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
 """Units of a summary if no others are asked for. A unit that is left out is the SI unit
 with a prefix.
 """
+_ROTATIONS: dict[str, Conversion] = {
+    "rpm": {"rad/s": COMMON["rad/s"]},
+    "rad/s": {"rad/s": ("rad/s", 1.0), "rad/s^2": ("rad/s^2", 1.0)},
+    "deg/s": {
+        "rad/s": ("deg/s", DEGREES["rad"][1]),
+        "rad/s^2": ("deg/s^2", DEGREES["rad"][1]),
+    },
+}
+"""Units in which rates are shown, by that of omega or alpha as it is stated."""
+_ROTATIONS |= {
+    f"{rate}{square}": {"rad/s^2": _ROTATIONS[rate]["rad/s^2"]}
+    for rate in ("rad/s", "deg/s")
+    for square in ("^2", "²")
+}
 PREFIXES = (
     (1e9, "G"),
     (1e6, "M"),
@@ -136,7 +147,7 @@ def units_of_length(length: str) -> Conversion:
 
     Inches, feet and yards give imperial units; other lengths keep their unit.
     """
-    return _suit_texts(length, ())
+    return _suit_texts(length)
 
 
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
@@ -150,16 +161,17 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     try:
         length = str(find_length(document))
         motion = document.get("motion", {})
-        rates = tuple(
-            tuple(_first_text(motion.get(f"{rate}_{bar}", "")) for rate in _RATE_NAMES)
+        rates = [
+            _first_text(motion.get(f"{rate}_{bar}", ""))
             for bar in MOVING_BARS
-        )
+            for rate in ("omega", "alpha")
+        ]
         if "free" in motion:
             # what it reaches is read beside its acceleration, unless it states more
-            rates = (("0 rad/s", ""), *rates)
+            rates.insert(0, "0 rad/s")
     except (LookupError, TypeError, AttributeError):
         return COMMON
-    return _suit_texts(length, rates)
+    return _suit_texts(length, *rates)
 
 
 def _first_text(stated: Any) -> str:
@@ -179,7 +191,7 @@ def states_radians(document: Mapping[str, Any]) -> bool:
 
 
 @cache
-def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
+def _suit_texts(length: str, *rates: str) -> Conversion:
     """Return the units that suit a length, speeds and accelerations as written."""
     from fourbar.quantities.units import converts, find_unit
 
@@ -189,25 +201,9 @@ def _suit_texts(length: str, rates: tuple[tuple[str, str], ...]) -> Conversion:
     else:
         named = units(name.replace(" ", ".")) if converts(name, "m") else {}
         shown = {**COMMON, **named}
-    for texts in rates:
-        for text, unit in zip(texts, ("rad/s", "rad/s^2"), strict=True):
-            stated = find_unit(text, "")
-            if stated in _ROTATIONS:
-                shown |= _suit_rotation(stated, unit)
+    for text in rates:
+        shown |= _ROTATIONS.get(find_unit(text, ""), {})
     return shown
-
-
-def _suit_rotation(stated: str, unit: str) -> Conversion:
-    """Return the units of speed and acceleration for a rate like "deg/s"."""
-    turned = stated.removesuffix("^2").removesuffix("²")
-    if turned == "rpm":
-        return {"rad/s": COMMON["rad/s"]}
-    angle = turned.removesuffix("/s")
-    factor = 1.0 if angle == "rad" else DEGREES["rad"][1]
-    rates = {"rad/s": (f"{angle}/s", factor), "rad/s^2": (f"{angle}/s^2", factor)}
-    if unit == "rad/s":
-        return rates
-    return {unit: rates[unit]}
 
 
 def find_length(document: Mapping[str, Any]) -> object:

@@ -5,7 +5,7 @@ Every row of the table is of the place where the spread is largest.
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -52,8 +52,7 @@ TOLERANCE_SCHEMA = "fourbar-tolerance/1"
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
     """List what is drawn, and the angles that follow the command."""
-    parts = list_drawn_parts(spreads)
-    return list(dict.fromkeys([*parts, *_list_angles(spreads)]))
+    return list(dict.fromkeys([*list_drawn_parts(spreads), *_list_angles(spreads)]))
 
 
 def list_drawn_parts(spreads: Tolerances) -> list[str]:
@@ -162,16 +161,13 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
     positions = write_count(len(spreads.theta_2), "position")
     drawn = f"{samples} samples ({spreads.describe_seed()})"
     lines = [f"{tolerance}, {drawn}, {positions}"]
-    for lost, why in (
-        (
-            spreads.invalid,
-            "have an impossible dimension, such as a length below 0",
+    reasons = {
+        "have an impossible dimension, such as a length below 0": spreads.invalid,
+        "do not assemble at some position at which the nominal linkage does": (
+            spreads.apart
         ),
-        (
-            spreads.apart,
-            "do not assemble at some position at which the nominal linkage does",
-        ),
-    ):
+    }
+    for why, lost in reasons.items():
         if lost:
             share = 100.0 * lost / samples
             lines.append(f"{lost} of {samples} samples ({share:.3g} %) {why}")
@@ -252,19 +248,18 @@ def collect_tolerances(
     if not scene.motion.law:
         motion = scene.motion.replace(angle=np.array(places))
         positions = replace(scene, motion=motion)
-    shown: AbstractContextManager[Callable[[float], None] | None]
-    shown = nullcontext(progress)
-    if progress is None and scene.motion.free is None:
-        shown = show_running("the samples of the tolerances are solved")
     try:
-        with shown as report:
-            spreads = tolerances(positions, PAGE_SAMPLES, progress=report)
+        with ExitStack() as stack:
+            if progress is None and scene.motion.free is None:
+                line = show_running("the samples of the tolerances are solved")
+                progress = stack.enter_context(line)
+            spreads = tolerances(positions, PAGE_SAMPLES, progress=progress)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
     # a law is thinned as in `animate`
     rows = np.linspace(0, len(spreads.theta_2) - 1, len(places)).round().astype(int)
 
-    def short(values: Array, digits: int) -> list[float | None]:
+    def short(values: Array, digits: int = 4) -> list[float | None]:
         return [
             float(f"{x:.{digits}g}") if math.isfinite(x) else None
             for x in values[rows].tolist()
@@ -275,14 +270,15 @@ def collect_tolerances(
         spread = spreads.spreads[part]
         with np.errstate(all="ignore"):
             shares = spread.shares / spread.shares.sum(axis=0)
-        entry: dict[str, Any] = {"unit": find_part_unit(part)}
-        entry["nominal"] = short(spread.nominal, 9)
-        for name in ("low", "high", "least", "greatest"):
-            entry[name] = short(getattr(spread, name) - spread.nominal, 4)
-        entry["worst"] = short(spread.worst, 4)
-        entry["deviation"] = short(spread.deviation, 4)
-        entry["shares"] = [short(share, 3) for share in shares]
-        parts[part] = entry
+        ends = ("low", "high", "least", "greatest")
+        parts[part] = {
+            "unit": find_part_unit(part),
+            "nominal": short(spread.nominal, 9),
+            **{name: short(getattr(spread, name) - spread.nominal) for name in ends},
+            "worst": short(spread.worst),
+            "deviation": short(spread.deviation),
+            "shares": [short(share, 3) for share in shares],
+        }
     return {
         "lines": _describe_counts(spreads),
         "keys": [tolerance.key for tolerance in scene.tolerances],

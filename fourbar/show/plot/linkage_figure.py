@@ -128,9 +128,8 @@ def draw_mechanism(
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
         here = factor * complex(*path[index])
-        drawn += _mark_point(axes, here)
         labels.keep_off(axes, here)
-        labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
+        drawn += _mark_point(axes, name, here, middle, labels)
     for carrier, corner in _list_off_bars(view, place):
         first, last = (pins[pin] for pin in ENDS[carrier])
         drawn += draw_plate(axes, carrier, (first, corner, last), labels)
@@ -199,8 +198,11 @@ def draw_plate(
     return [axes.add_patch(plate)]
 
 
-def _mark_point(axes: "Axes", point: complex) -> "list[Line2D]":
-    """Mark a point of the scene by a diamond."""
+def _mark_point(
+    axes: "Axes", name: str, point: complex, shun: complex, labels: Labels
+) -> "list[Line2D]":
+    """Mark a point of the scene by a diamond, and ask for its label."""
+    labels.add(Label(axes, name, point, shun, POINT, 8.5, 2.5))
     look = {**RING_MARK, "mec": POINT}
     return plot_points(axes, point, "D", ms=4.5, mew=1.2, zorder=8, **look)
 
@@ -278,9 +280,7 @@ def choose_drawing_scale(view: View) -> tuple[float, str, float]:
 
 def pin_name(name: str) -> str:
     """Write a pin as it is typeset."""
-    if len(name) == 2:
-        return f"${name[0]}_{name[1]}$"
-    return f"${name}$"
+    return "$" + "_".join(name) + "$"
 
 
 _COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
@@ -409,9 +409,8 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     for name in names:
         here = factor * complex(*view.here.points[name][0])
         plot_points(axes, [A, here, B], lw=0.8, ls=":", **faint)
-        _mark_point(axes, here)
+        _mark_point(axes, name, here, A, labels)
         labels.keep_off(axes, A, here, B)
-        labels.add(Label(axes, name, here, A, POINT, 8.5, 2.5))
     for name, pin in pins.items():
         plot_points(axes, pin, "o", ms=4.5, mew=1.0, zorder=5, **RING_MARK)
         if name in ("O2", "O4"):

@@ -10,7 +10,6 @@ import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ from fourbar.effects import Gravity, LinearDrive, PointDrive
 from fourbar.effects.effect import PinRows
 from fourbar.effects.place import At, Line
 from fourbar.linkage import (
+    ENDS,
     FIRST_PIN,
     MOVING_BARS,
     Entries,
@@ -229,11 +229,10 @@ class Pose(NamedTuple):
 
         At full size the symbol would hide the bar.
         """
-        loop = [*self.pins.items(), *self.pins.items()]
         lengths = [
-            abs(second - first)
-            for (name, first), (next_name, second) in pairwise(loop)
-            if pin in (name, next_name)
+            abs(self.pins[second] - self.pins[first])
+            for first, second in ENDS.values()
+            if pin in (first, second)
         ]
         return min(size, max(SMALLEST * size, _SHARE * min(lengths)))
 
@@ -319,16 +318,10 @@ def draw_symbol(
     `size`: that of a support.
     """
     pen = _Pen(axes, symbol, place, size, labels)
-    if symbol.kind == "gravity":
-        _draw_gravity(pen)
-    elif symbol.end is not None:
+    if symbol.end is not None:
         _draw_between_ends(pen, symbol.end)
-    elif symbol.kind in ("force", "push"):
-        _draw_force(pen)
-    elif symbol.kind in ("moment", "drive"):
-        _draw_couple(pen)
     else:
-        _draw_ring(pen)
+        _DRAW.get(symbol.kind, _draw_ring)(pen)
     return pen.drawn
 
 
@@ -410,13 +403,10 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
     across = 1j * along / abs(along) * width if along else 0.0
-    points = [start, start + 0.15 * along]
-    for tooth in range(COILS):
-        share = 0.15 + 0.7 * (tooth + 0.5) / COILS
-        side = (-1) ** tooth
-        points.append(start + share * along + side * across)
-    points += [start + 0.85 * along, end]
-    return np.array(points)
+    teeth = np.arange(COILS)
+    shares = [0.0, 0.15, *(0.15 + 0.7 * (teeth + 0.5) / COILS), 0.85, 1.0]
+    sides = [0.0, 0.0, *((-1.0) ** teeth), 0.0, 0.0]
+    return start + np.array(shares) * along + np.array(sides) * across
 
 
 def _draw_gravity(pen: _Pen) -> None:
@@ -438,6 +428,16 @@ def _draw_gravity(pen: _Pen) -> None:
             "$g$", xytext=(-x - 8.0, -y), color=pen.colour, size=9.0, **corner
         ),
     ]
+
+
+_DRAW = {
+    "gravity": _draw_gravity,
+    "force": _draw_force,
+    "push": _draw_force,
+    "moment": _draw_couple,
+    "drive": _draw_couple,
+}
+"""Functions that draw what is neither a ring nor between two ends."""
 
 
 def draw_vectors(
