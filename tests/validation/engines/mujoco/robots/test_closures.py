@@ -155,6 +155,10 @@ def test_of_two_motors_one_is_taken_as_driven():
     [
         (Planar(axes={"A": "0 0.0524078 1"}), "A and O2 are 3 deg apart"),
         (Planar(equality='active="false"'), "switched off"),
+        *(
+            (Planar(more=f'<option><flag {of}="disable"/></option>'), "switched off")
+            for of in ("equality", "constraint")
+        ),
         (Planar(by="weld", cut="B", joint='type="slide"'), "slide"),
         (
             Planar(

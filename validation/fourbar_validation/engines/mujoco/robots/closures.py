@@ -367,7 +367,7 @@ class _Finder:
     def _list_reasons(self, chain: _Chain) -> Iterator[str]:
         """Say why a closure closes no four-bar; the first reason counts."""
         if not chain.is_active:
-            yield 'it is switched off in the file (active="false")'
+            yield 'it is switched off in the file (active="false", or a <flag>)'
         if not chain.joints:
             yield "both ends are on one rigid body"
         if self._is_idle(chain):

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 
 _MOST_KEYFRAMES = 100_000
@@ -93,6 +94,8 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             None,
             "MuJoCo breaks down over it; is a size in it too large?",
         ) from None
+    if not is_enabled(model, "equality", "constraint"):
+        model.eq_active0[:] = 0
     if not 0.0 < model.opt.timestep < math.inf:
         raise InputError(
             "MJCF",

@@ -230,9 +230,6 @@ class _Closing:
         """
         active = np.flatnonzero(model.eq_active0).tolist()
         self.model = copy_for_closures(model, active)
-        enabled = mujoco.mjtDisableBit.mjDSBL_EQUALITY
-        enabled |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        self.model.opt.disableflags &= ~int(enabled)
         self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
