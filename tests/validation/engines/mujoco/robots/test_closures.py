@@ -529,3 +529,20 @@ def test_a_slide_is_no_hinge():
     *_, piston = report_of(EXCAVATOR).closures
     assert "stroke" not in piston.hinges
     assert piston.other_joints == ("stroke (slide)",)
+
+
+@pytest.mark.parametrize(("cut", "by"), [("B", "anchor"), ("B", "weld")])
+def test_a_slide_beside_four_pins_is_to_be_held(cut, by):
+    """It lifts the input's bearing; with skew axes or in place of a pin it stays."""
+    hinge = '<joint name="O2"'
+    slide = '<joint name="lift" type="slide" axis="1 0 0"/>'
+    planar = Planar(cut=cut, by=by)
+    text = planar.text().replace(hinge, slide + hinge)
+    assert closure_of(text).reason.endswith("; --hold lift makes it a four-bar")
+    loop = loop_of(text, held=("lift",))
+    assert loop.lengths == pytest.approx(planar.lengths(), rel=1e-12)
+    skew = replace(planar, axes={"A": "0 0.1 1"}).text().replace(hinge, slide + hinge)
+    guided = planar.text().replace('"O4" axis="0 0 1"', '"O4" type="slide"')
+    for other in (skew, guided):
+        reason = closure_of(other).reason
+        assert "is a slide" in reason and "--hold" not in reason

@@ -431,8 +431,17 @@ class _Finder:
         if kind == BALL:
             return f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})"
         text = f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})"
-        if chain.hinges:
-            text += self._describe_inner_four_bar(chain, self._find_coupled(chain))
+        coupled = self._find_coupled(chain)
+        taken = {joint for other in coupled for joint in other.joints}
+        angle, _ = self._measure_axes(chain)
+        is_planar = angle is not None and angle <= PARALLEL
+        is_four = chain.pins - len(chain.others) == len(PINS)
+        holds = is_four and is_planar and taken.isdisjoint(chain.hinges)
+        if holds and {*chain.others.values()} == {SLIDE}:
+            names = ",".join(name_joint(self.model, one) for one in chain.others)
+            text += f"; --hold {names} makes it a four-bar"
+        elif chain.hinges:
+            text += self._describe_inner_four_bar(chain, coupled)
         return text
 
     def _suggest_hinge(self, chain: _Chain) -> str:
