@@ -211,6 +211,13 @@ def units(*names, factor):
     return changed(lambda numbers: {name: factor * numbers[name] for name in names})
 
 
+def in_axes(degrees, of_y=1.0, names=PINS, factor=1.0):
+    """State vectors in axes that are turned, whose y may be reversed."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    axes = factor * np.array([(c, -of_y * s), (s, of_y * c)])
+    return changed(lambda right: {name: right[name] @ axes for name in names})
+
+
 def relative_to(base):
     return changed(lambda numbers: {"theta_4": numbers["theta_4"] - numbers[base]})
 
@@ -495,6 +502,12 @@ IN_CRANK_ROCKER = {
         factor=180 / math.pi,
     ),
     "y reversed": units(*PINS, factor=(1.0, -1.0)),
+    "x reversed": units("F12", "F32", factor=(-1.0, 1.0)),
+    "in axes turned by -90 deg": in_axes(-90.0),
+    "in axes turned by 22.918 deg": in_axes(math.degrees(0.4)),
+    "in axes turned by 33 deg, y reversed, every number is 0.37 times ours": in_axes(
+        33.0, -1.0, ("F12", "F43"), 0.37
+    ),
     "gravity is missing": gravity(),
     "gravity is reversed": gravity(-9.81),
     "gravity is doubled": gravity(2.0 * 9.81),
@@ -576,6 +589,7 @@ MISTAKES = {
                 scene, linkage=replace(scene.linkage, ground_angle=0.0)
             )
         ),
+        "forces are in the frame of bar 1": in_axes(math.degrees(0.3)),
         "alpha_2 is left out": solved(acceleration=0.0),
         "alpha_2 in deg/s^2 taken for": solved(acceleration=math.degrees(30.0)),
         "alpha_2 in rad/s^2 taken for": solved(acceleration=math.radians(30.0)),

@@ -408,11 +408,11 @@ def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
 def test_mistakes_in_several_columns_are_named_together():
     def reverse_both(numbers, at):
         reverse_F43(numbers, at)
-        numbers["F12"] = numbers["F12"] * (1.0, -1.0)
+        numbers["F12"] = numbers["F12"] * (-1.0, 1.0)
 
     of_F43 = "sign reversed, or F_ij given for F_ji: F43"
     causes = find_causes(partial(Altered, reverse_both))
-    assert causes[0] == f"{of_F43}; y reversed: F12"
+    assert causes[0] == f"{of_F43}; x reversed: F12"
 
 
 @pytest.mark.parametrize("spoiled", [["alpha_3"], ["alpha_3", "a_G3"]])

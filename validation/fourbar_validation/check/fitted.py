@@ -3,6 +3,7 @@
 The number is a ratio, a factor, an offset or another order.
 """
 
+import cmath
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -16,7 +17,7 @@ from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Command
-from fourbar_validation.check.calculated import Calculation, Change
+from fourbar_validation.check.calculated import Calculation, Change, join
 from fourbar_validation.check.judge_table import Column, Judge
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
@@ -26,6 +27,7 @@ from fourbar_validation.check.variants import (
     state_all,
 )
 from fourbar_validation.compare.tolerance import compute_difference, wrap_difference
+from fourbar_validation.engines.free_body import stack_components
 from fourbar_validation.scenes.bars import list_moving
 
 _Vary = Callable[[float], Variant]
@@ -53,6 +55,14 @@ _FACTORS = {
 }
 """Factors of a moment of inertia, and the mistake behind each."""
 REVERSED = "sign reversed, or F_ij given for F_ji"
+_AXES = {
+    (False, 0.0): "",
+    (False, 180.0): REVERSED,
+    (True, 0.0): "y reversed",
+    (True, 90.0): "x and y exchanged",
+    (True, 180.0): "x reversed",
+}
+"""Names of axes by whether they are mirrored, and their angle, deg."""
 _INERTIA = "moment of inertia"
 LEAST_FACTOR = 1e-9
 """Least factor. What a smaller one multiplies was left out, which is a mistake of its
@@ -100,50 +110,80 @@ def find_fitted(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
 
 
 def _find_ratios(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
-    """Yield columns that are ours times a number."""
-    by_ratio: dict[str, tuple[float, set[str]]] = {}
+    """Yield columns that are ours times a number, vectors also in other axes."""
+    by_text: dict[str, dict[str, Array]] = {}
     for column in differing:
-        ours = np.where(np.isfinite(column.theirs), column.ours, 0.0)[column.where]
-        if not (squares := float(np.sum(ours * ours))):
-            continue
-        near = float(np.nansum(ours * column.theirs[column.where])) / squares
-        if not column.explained(near * column.ours, NEAR_ENOUGH):
-            continue
-        for text, ratio, times in _list_ratios(column, near, np.count_nonzero(ours)):
-            if column.explained(ratio * column.ours, times):
+        for text, multiple in _list_multiples(column):
+            if column.explained(column.measure(multiple), CARRIED):
                 if text:
-                    by_ratio.setdefault(text, (ratio, set()))[1].add(column.quantity)
+                    by_text.setdefault(text, {})[column.quantity] = multiple
                 break
-    for text, (ratio, quantities) in by_ratio.items():
-        numbers = {name: ratio * judge.right[name] for name in quantities}
-        yield Mistake(text, numbers.get, whole=False, times=CARRIED)
+    for text, multiples in by_text.items():
+        yield Mistake(text, multiples.get, whole=False, times=CARRIED)
+
+
+def _list_multiples(column: Column) -> Iterator[tuple[str, Array]]:
+    """List what a column may be of ours, the simplest first: its name, its numbers.
+
+    As x + i y a vector, or its mirror image, has a complex factor in other axes.
+    """
+    right = column.judge.right[column.quantity]
+    stated = (np.isfinite(column.theirs).T & column.where).T
+    numbers = int(np.count_nonzero(column.ours[stated]))
+    for mirrored in (False, True)[: column.ours.ndim]:
+        units = [1.0, 1.0j][: column.ours.ndim]
+        basis = [_multiply(unit, column.ours, mirrored)[stated] for unit in units]
+        fit = np.linalg.lstsq(np.transpose(basis), column.theirs[stated], rcond=None)
+        near = complex(*fit[0])
+        nearly = _multiply(near, column.ours, mirrored)
+        if not near or not column.explained(nearly, NEAR_ENOUGH):
+            continue
+        for axes, turn in _list_axes(near, mirrored, numbers):
+            for text, ratio in _list_ratios(column, abs(near), numbers):
+                multiple = _multiply(ratio * turn, right, mirrored)
+                yield ", ".join(filter(None, (axes, text))), multiple
+
+
+def _multiply(ratio: complex, values: Array, mirrored: bool) -> Array:
+    """Multiply numbers, (n,), or vectors or their mirror images, (n, 2)."""
+    if values.ndim == 1:
+        return ratio.real * values
+    vectors = join(values)
+    return stack_components(ratio * (np.conj(vectors) if mirrored else vectors))
+
+
+def _list_axes(
+    near: complex, mirrored: bool, numbers: int
+) -> Iterator[tuple[str, complex]]:
+    """List the axes in which ours may be, and the factor of a vector in each."""
+    sense = 1j if mirrored else -1j
+    fitted = (math.degrees(cmath.phase(near)) * sense).imag
+    for degrees in (float(round(fitted)), fitted)[: 1 + (numbers > ENOUGH_NUMBERS)]:
+        turned = f"in axes turned by {degrees:.5g} deg" + ", y reversed" * mirrored
+        name = _AXES.get((mirrored, degrees % 360.0), turned)
+        yield name, cmath.exp(sense * math.radians(degrees))
 
 
 def _list_ratios(
-    column: Column, near: float, numbers: Any
-) -> Iterator[tuple[str, float, float]]:
-    """List what a ratio may be: its name, itself and the factor on what is allowed.
+    column: Column, near: float, numbers: int
+) -> Iterator[tuple[str, float]]:
+    """List what a ratio may be, by its name.
 
-    The number is named as two units if a pair of them has that ratio. A reversed sign
-    is a mistake of its own, and has no name here.
+    The number is named as two units if a pair of them has that ratio.
     """
+    yield "", 1.0
     unit = UNITS[column.quantity]
     announced = column.unit
     for tried in OTHER_UNITS.get(unit, ()):
-        ratio = math.copysign(announced.factor / find_factor(unit, tried), near)
-        if abs(near / ratio - 1.0) < NEAR_A_PLAIN_NUMBER and abs(ratio) != 1.0:
+        ratio = announced.factor / find_factor(unit, tried)
+        if abs(near / ratio - 1.0) < NEAR_A_PLAIN_NUMBER:
             text = f"units: numbers in {tried} where {announced.text} was announced"
-            text += f" ({ratio:.6g} times)" + ", and reversed" * (near < 0.0)
-            yield text, ratio, 1.0
-    if numbers < ENOUGH_NUMBERS or not near:
-        return
-    yield "", -1.0, 1.0
-    power = round(math.log10(abs(near)))
-    ten = math.copysign(10.0**power, near)
-    text = f"every number is {'-' if near < 0.0 else ''}10^{power} times ours"
-    yield REVERSED if ten == -1.0 else text, ten, CARRIED
-    digits = 5 if abs(abs(near) - 1.0) > _NEARLY_ONE else 12
-    yield f"every number is {near:.{digits}g} times ours", near, CARRIED
+            yield f"{text} ({ratio:.6g} times)", ratio
+    if numbers >= ENOUGH_NUMBERS:
+        power = round(math.log10(near))
+        yield f"every number is 10^{power} times ours", 10.0**power
+        digits = 5 if abs(near - 1.0) > _NEARLY_ONE else 12
+        yield f"every number is {near:.{digits}g} times ours", near
 
 
 def _try_exchanged(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:

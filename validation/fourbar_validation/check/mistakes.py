@@ -339,8 +339,6 @@ _COLUMN_MISTAKES: tuple[
         lambda values: np.degrees(np.remainder(values, TURN)),
         _is_angle,
     ),
-    ("x and y exchanged", lambda values: values[:, ::-1], VECTORS.__contains__),
-    ("y reversed", lambda values: values * (1.0, -1.0), VECTORS.__contains__),
     (
         (
             "measured from the other end of the bar (half a turn off): theta_4 or"
