@@ -55,7 +55,6 @@ class PinocchioTree(KeptTree):
                     False,
                 )
         self.data = data = model.createData()
-        self.ends = self.frame["end3"], self.frame["end4"]
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         # the engine's own memory, read and written in place: to look it up again costs
@@ -73,14 +72,6 @@ class PinocchioTree(KeptTree):
             bar: (self.external[joint].linear, self.external[joint].angular)
             for bar, joint in self.joint.items()
         }
-        self.place_of_joint = {
-            bar: model.jointPlacements[joint].translation[:2]
-            for bar, joint in self.joint.items()
-        }
-        self.place_of_frame = {
-            name: model.frames[frame].placement.translation[:2]
-            for name, frame in self.frame.items()
-        }
         self.model_gravity = model.gravity.linear
         self.hold(scene)
 
@@ -88,17 +79,20 @@ class PinocchioTree(KeptTree):
         """Write places, masses and inertias."""
         if reason := find_unknown(scene, has_term, forces=True):
             raise LimitError(reason)
+        model = self.model
         about_g = np.zeros((3, 3))
         for part in list_moving_parts(scene.linkage):
-            self.place_of_joint[part.bar][:] = part.first_pin
+            joint = self.joint[part.bar]
+            model.jointPlacements[joint].translation[:2] = part.first_pin
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
             # inertias has another mass centre
             about_g[2, 2] = part.inertia
-            self.model.inertias[self.joint[part.bar]] = pin.Inertia(
+            model.inertias[joint] = pin.Inertia(
                 part.mass, np.array([*part.centre, 0.0]), about_g
             )
             for name, place in part.points.items():
-                self.place_of_frame[name][:] = place
+                frame = model.frames[self.frame[name]]
+                frame.placement.translation[:2] = place
         self.field = (0.0, 0.0)
         self.ready(scene, list_wrenches(scene, self))
         self.model_gravity[:2] = self.field
@@ -114,16 +108,6 @@ class PinocchioTree(KeptTree):
         jacobian: Array = pin.getFrameJacobian(
             self.model, self.data, self.frame[name], WORLD
         )
-        return jacobian[:2]
-
-    def jacobian(self) -> Array:
-        """Return the difference of the two frames' Jacobians."""
-        model = self.model
-        data = self.data
-        one, two = self.ends
-        jacobian: Array = pin.getFrameJacobian(
-            model, data, one, WORLD
-        ) - pin.getFrameJacobian(model, data, two, WORLD)
         return jacobian[:2]
 
     def turn(self, bar: int) -> Array:

@@ -253,12 +253,6 @@ class KeptTree(Tree, Protocol):
         """Read a bar's axes."""
         return self.turned_to[bar]
 
-    def gap(self) -> tuple[float, float]:
-        """Return B on bar 3 minus B on bar 4; read twice for each assembly and more."""
-        x, y = self.at["end3"].tolist()
-        x_4, y_4 = self.at["end4"].tolist()
-        return x - x_4, y - y_4
-
 
 _KEPT: dict[type[KeptTree], KeptTree] = {}
 """The one tree of its kind in this process, with the scene of the last answer."""

@@ -88,33 +88,19 @@ class MujocoTree(KeptTree):
         self.data = data = mujoco.MjData(model)
         self.body = {bar: model.body(f"bar{bar}").id for bar in PIN_OF_MOVING_BAR}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
-        self.ends = self.site["end3"], self.site["end4"]
         # the engine's own memory, read and written in place: to look it up again takes
         # longer than its work
-        self.place_of_site: dict[str, Array] = {}
-        self.at = {}
-        for name, site in self.site.items():
-            self.place_of_site[name] = model.site_pos[site, :2]
-            self.at[name] = data.site_xpos[site, :2]
-        self.place_of_body: dict[int, Array] = {}
+        self.at = {name: data.site_xpos[site, :2] for name, site in self.site.items()}
         self.turned_to = {}
         self.first_pins: dict[int, Array] = {}
         self.joint_force: dict[int, Array] = {}
         self.applied: dict[int, Array] = {}
         for bar, body in self.body.items():
-            self.place_of_body[bar] = model.body_pos[body, :2]
             self.turned_to[bar] = data.xmat[body].reshape(3, 3)[:2, :2]
             self.first_pins[bar] = data.xpos[body]
             self.joint_force[bar] = data.cfrc_int[body, 3:5]
             self.applied[bar] = data.xfrc_applied[body]
-        self.qpos = data.qpos
-        self.qvel = data.qvel
-        self.qacc = data.qacc
-        self.qfrc_inverse = data.qfrc_inverse
-        self.model_gravity = model.opt.gravity
         self._jac = np.zeros((3, 3))
-        self._jac_3 = np.zeros((3, 3))
-        self._jac_4 = np.zeros((3, 3))
         self._acceleration = np.zeros(6)
         self._force = np.zeros(3)
         self._couple = np.zeros(3)
@@ -134,7 +120,7 @@ class MujocoTree(KeptTree):
         mujoco.mj_resetData(model, self.data)
         for part in parts:
             body = self.body[part.bar]
-            self.place_of_body[part.bar][:] = part.first_pin
+            model.body_pos[body, :2] = part.first_pin
             model.body_ipos[body, :2] = part.centre
             model.body_mass[body] = part.mass
             model.body_subtreemass[body] = part.mass
@@ -142,13 +128,13 @@ class MujocoTree(KeptTree):
             if part.bearer != 1:
                 model.body_subtreemass[self.body[part.bearer]] += part.mass
             for name, place in part.points.items():
-                self.place_of_site[name][:] = place
+                model.site_pos[self.site[name], :2] = place
         self.field = (0.0, 0.0)
         self.ready(scene, list_wrenches(scene, self))
 
     def place(self, q: Sequence[float]) -> None:
         """Place bodies, sites and the axes of the Jacobians at q."""
-        self.qpos[:] = q
+        self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
@@ -157,15 +143,6 @@ class MujocoTree(KeptTree):
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, self.site[name])
         return self._jac[:2].copy()
 
-    def jacobian(self) -> Array:
-        """Return the difference of the two sites' Jacobians."""
-        model = self.model
-        data = self.data
-        one, two = self.ends
-        mujoco.mj_jacSite(model, data, self._jac_3, None, one)
-        mujoco.mj_jacSite(model, data, self._jac_4, None, two)
-        return np.asarray(self._jac_3 - self._jac_4)[:2]
-
     def turn(self, bar: int) -> Array:
         """Return the last row of the body's rotational Jacobian."""
         mujoco.mj_jacBody(self.model, self.data, None, self._jac, self.body[bar])
@@ -173,8 +150,8 @@ class MujocoTree(KeptTree):
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Set the speeds of the bodies."""
-        self.qvel[:] = v
-        self.qacc[:] = a
+        self.data.qvel[:] = v
+        self.data.qacc[:] = a
         mujoco.mj_comVel(self.model, self.data)
 
     def accelerations(self, names: Iterable[str]) -> list[list[float]]:
@@ -182,7 +159,7 @@ class MujocoTree(KeptTree):
         model = self.model
         data = self.data
         # MuJoCo counts gravity as an acceleration of the world
-        self.model_gravity[:2] = 0.0
+        model.opt.gravity[:2] = 0.0
         mujoco.mj_rnePostConstraint(model, data)
         accelerations = []
         for name in names:
@@ -199,7 +176,7 @@ class MujocoTree(KeptTree):
         wrenches: dict[int, list[float]],
     ) -> list[float]:
         """Return the coordinates' forces by mj_inverse, less loads and effects."""
-        self.model_gravity[:2] = field
+        self.model.opt.gravity[:2] = field
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)
         for bar, wrench in wrenches.items():
@@ -214,7 +191,7 @@ class MujocoTree(KeptTree):
                     self.body[bar],
                     applied,
                 )
-        torques: list[float] = (self.qfrc_inverse - applied).tolist()
+        torques: list[float] = (self.data.qfrc_inverse - applied).tolist()
         return torques
 
     def joint_forces(self) -> dict[int, Components]:
