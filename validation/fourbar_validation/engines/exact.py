@@ -43,33 +43,28 @@ class BallArithmetic:
 
         if reason := find_refusal(scene):
             return Answer(BALL_ARITHMETIC, "exact", refusal=reason)
-        n = len(command.theta_2)
         names = [
             q
             for q in COMPARED_QUANTITIES
             if command.omega_2 is not None or q.startswith("theta")
         ]
-        out = make_blank(n, names)
-        assembled = np.zeros(n, dtype=bool)
-        omega, alpha = list_speeds(command)
+        out = make_blank(len(command.theta_2), names)
+        assembled = np.zeros(len(command.theta_2), dtype=bool)
+        rates = list_speeds(command)
         stated = make_balls(scene, 0.0)
         remainder = arb(0 if command.remainder is None else command.remainder)
-        for i in range(n):
-            moved = {
-                "theta_2": arb(float(command.theta_2[i])) + remainder,
-                "omega_2": arb(float(omega[i])),
-                "alpha_2": arb(float(alpha[i])),
-            }
-            values = compute_outputs(scene, int(command.branch[i]), stated | moved)
+        for i, (branch, *motion) in enumerate(
+            zip(command.branch, command.theta_2, *rates, strict=True)
+        ):
+            theta_2, omega, alpha = (arb(float(number)) for number in motion)
+            moved = {"theta_2": theta_2 + remainder, "omega_2": omega, "alpha_2": alpha}
+            values = compute_outputs(scene, int(branch), stated | moved)
             if values is None:
                 continue
             assembled[i] = True
             for name, array in out.items():
-                if name in VECTORS:
-                    array[i, 0] = _to_double(values.get(f"{name}_x"))
-                    array[i, 1] = _to_double(values.get(f"{name}_y"))
-                else:
-                    array[i] = _to_double(values.get(name))
+                axes = ("_x", "_y") if name in VECTORS else ("",)
+                array[i] = np.squeeze([_to_double(values.get(name + x)) for x in axes])
         return Answer(
             BALL_ARITHMETIC,
             "exact",

@@ -275,14 +275,14 @@ class Exact:
         asked = command
         moves = command.speed is not None
         wanted = STAGES if moves else ("position",)
-        solved_motion: tuple[str, ...] = ()
-        if command.bar != 2 or command.moves_stroke:
-            solved_motion = MADE if moves else MADE[:1]
-        names = []
-        for name, stage in STAGE_OF.items():
-            if stage in wanted and name not in NOT_ANSWERED:
-                names.append(name)
-        names += [name for name in solved_motion if name not in names]
+        names = [
+            name
+            for name, stage in STAGE_OF.items()
+            if stage in wanted and name not in NOT_ANSWERED
+        ]
+        input_follows = command.bar != 2 or command.moves_stroke
+        if input_follows:
+            names += MADE if moves else MADE[:1]
         if command.moves_stroke:
             command = find_angle(command, scene.motion, *bars.cylinder(command.bar))
         names = list_unknowns(scene, names)
@@ -294,13 +294,11 @@ class Exact:
             speed: float,
             acceleration: float,
         ) -> BarValues:
-            theta_3 = bars.angle(3)
-            theta_4 = bars.angle(4)
             values: BarValues = dict(bars.positions())
-            values["theta_3"] = theta_3
-            values["theta_4"] = theta_4
+            values["theta_3"] = theta_3 = bars.angle(3)
+            values["theta_4"] = theta_4 = bars.angle(4)
             values["sin_mu"] = math.sin(theta_4 - theta_3)
-            if solved_motion:
+            if input_follows:
                 values["theta_2"] = bars.angle(2)
             if moves:
                 values |= bars.move(command.bar, speed, acceleration)
@@ -310,18 +308,17 @@ class Exact:
         if reason := bars.refusal():
             return Answer(self.name, "exact", refusal=reason)
         _unwrap_angles(out, assembled)
-        answer = Answer(
+        return Answer(
             self.name,
             "exact",
             asked,
             assembled,
             out,
             evidence={"closure_gap": gap},
+            shared=SHARED_BY_EXACT_ENGINES,
+            own=bars.own,
+            seconds=time.perf_counter() - start,
         )
-        answer.shared = SHARED_BY_EXACT_ENGINES
-        answer.own = bars.own
-        answer.seconds = time.perf_counter() - start
-        return answer
 
 
 def _unwrap_angles(values: dict[str, Array], assembled: NDArray[np.bool_]) -> None:
@@ -349,25 +346,24 @@ def read_each(
 
     Return that, where it assembles, and the greatest gap, m.
     """
-    n = len(command.angle)
-    angles = command.angle.tolist()
-    branches = command.branch.tolist()
-    omega, alpha = (rates.tolist() for rates in list_speeds(command))
+    columns = command.angle, command.branch, *list_speeds(command)
     missing: dict[str, Any] = {}
     for name in names:
         missing[name] = (math.nan, math.nan) if name in VECTORS else math.nan
-    rows = [missing] * n
-    assembled = np.zeros(n, dtype=bool)
+    rows = []
+    assembled = []
     gap = 0.0
     position = Assembler(bars, command.bar)
-    for i, (theta, branch) in enumerate(zip(angles, branches, strict=True)):
+    for theta, branch, *rates in zip(*(x.tolist() for x in columns), strict=True):
         q = position.find(theta, branch)
+        values = missing
         if q is not None:
-            assembled[i] = True
             gap = max(gap, math.hypot(*bars.gap()))
-            rows[i] = missing | read(q, omega[i], alpha[i])
+            values = missing | read(q, *rates)
+        rows.append(values)
+        assembled.append(q is not None)
     out = {name: np.array([row[name] for row in rows], float) for name in missing}
-    return out, assembled, gap
+    return out, np.array(assembled, bool), gap
 
 
 MADE = ("theta_2", "omega_2", "alpha_2")

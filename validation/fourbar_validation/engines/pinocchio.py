@@ -286,19 +286,16 @@ class PinocchioReleased:
         if state is None:
             return refuse("the loop does not close at the start")
         q, v = state
+        accelerate = partial(loop.acceleration, tau=none)
+        data = tree.data
         rows = []
         now = 0.0
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
             for _ in range(steps):
-                q, v = make_step(
-                    lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps
-                )
+                q, v = make_step(accelerate, q, v, (t - now) / steps)
             now = float(t)
-            energy = pin.computeMechanicalEnergy(tree.model, tree.data, q, v)
-            data = tree.data
-            rows.append(
-                (q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy))
-            )
-        theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(RELEASED_NAME, setting, theta_2, omega, energy, terms)
+            energy = pin.computeMechanicalEnergy(tree.model, data, q, v)
+            terms = data.kinetic_energy + abs(data.potential_energy)
+            rows.append((q[0], v[0], energy, terms))
+        return ReleasedAnswer(RELEASED_NAME, setting, *np.array(rows).T)

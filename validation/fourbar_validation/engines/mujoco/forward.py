@@ -86,21 +86,13 @@ class MujocoForward:
         rows = []
         stepper = Stepper(loop.model, loop.data, timestep)
         work = _WorkOnBars(loop.model, loop.data, timestep)
-
+        d = loop.data
         for t in times:
-            stepper.to(float(t), lambda _: work.add())
-            mujoco.mj_forward(loop.model, loop.data)
-            terms = np.array([*loop.data.energy, -work.done])
-            rows.append(
-                (
-                    loop.data.qpos[O2],
-                    loop.data.qvel[O2],
-                    terms.sum(),
-                    np.abs(terms).sum(),
-                )
-            )
-        theta_2, omega, energy, terms = np.array(rows).T
-        return ReleasedAnswer(RELEASED, setting, theta_2, omega, energy, terms)
+            stepper.to(float(t), work.add)
+            mujoco.mj_forward(loop.model, d)
+            terms = np.array([*d.energy, -work.done])
+            rows.append((d.qpos[O2], d.qvel[O2], terms.sum(), np.abs(terms).sum()))
+        return ReleasedAnswer(RELEASED, setting, *np.array(rows).T)
 
 
 class _WorkOnBars:
@@ -125,7 +117,7 @@ class _WorkOnBars:
         mujoco.mj_forward(model, data)
         self.before = self._compute_power()
 
-    def add(self) -> None:
+    def add(self, _: float) -> None:
         """Add the step just made.
 
         After a Runge-Kutta step some fields are still of the step before.
@@ -169,14 +161,12 @@ class MujocoOneState:
             rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:
             return Answer(ONE_STATE_NAME, setting, refusal=str(error))
-        values = extrapolate(self.impedances, [rung for rung, _ in rungs])
-        assembled = rungs[0][1]
         return Answer(
             ONE_STATE_NAME,
             setting,
             command,
-            assembled,
-            values,
+            rungs[0][1],
+            extrapolate(self.impedances, [rung for rung, _ in rungs]),
             shared=(
                 "lengths, masses, inertias, centres, loads and effects as MJCF text;"
                 " the command"

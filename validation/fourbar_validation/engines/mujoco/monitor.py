@@ -165,9 +165,10 @@ class ResidualMonitor:
         except np.linalg.LinAlgError:
             # exactly at a limit position nothing closes the loop
             return dict.fromkeys(seen.answer, math.inf)
-        expected = {}
-        for name, value in seen.answer.items():
-            expected[name] = float(np.linalg.norm(value - closed.answer[name]))
+        expected = {
+            name: float(np.linalg.norm(value - closed.answer[name]))
+            for name, value in seen.answer.items()
+        }
         # remainder of the solver: the pin forces differ by as much as F43
         of_pins = float(np.linalg.norm(loop_force - seen.answer["F43"]))
         remaining = dict.fromkeys(PIN_FORCES, of_pins)

@@ -292,21 +292,36 @@ class Stepper:
 class SimulatedRun:
     """One segment of positions at a prescribed motion.
 
-    `light`: the model that a drive elsewhere is read from.
+    Bar 2 is driven by its flywheel. Another drive is read from a second loop, which is
+    closed like the one that is stepped: at a state that a soft closure has reached,
+    another closure asks for other forces. Pads stiffen the closure of a crank with a
+    flywheel alone, so with pads the second loop has a light one; otherwise it is the
+    linkage by itself.
+
+    Parameters
+    ----------
+    start : own joint angles at the first position.
+    settings : with the timestep of the segment.
+    compile_loop : makes a loop by settings.
     """
 
     def __init__(
         self,
-        loop: ClosedLoop,
-        light: ClosedLoop | None,
         motion_segment: SteadySegment,
-        start: tuple[float, float, float],
-        timestep: float,
+        start: Found,
+        settings: Settings,
+        compile_loop: Callable[[Settings], ClosedLoop],
     ) -> None:
-        self.loop = loop
-        self.light = light
+        assert start is not None and settings.timestep is not None
         self.motion_segment = motion_segment
         self.course = course = motion_segment.course
+        self.loop = loop = compile_loop(settings)
+        self.light = None
+        if course.scene.drive_bar != 2:
+            flywheel = 0.0
+            if settings.pad is not None:
+                flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
+            self.light = compile_loop(replace(settings, flywheel=flywheel))
         wound = unwind(course.scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead, rad. Springs at pins count
@@ -314,7 +329,7 @@ class SimulatedRun:
         """
         loop.set_state(wound, motion_segment.omega, course.bar)
         self.begins = self.progress()
-        self.stepper = Stepper(loop.model, loop.data, timestep)
+        self.stepper = Stepper(loop.model, loop.data, settings.timestep)
 
     def progress(self) -> float:
         """Return the angle or stroke of what moves as commanded."""

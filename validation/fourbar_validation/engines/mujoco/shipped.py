@@ -61,21 +61,18 @@ def compare_shipped(
         return None
     d = loop.data
     size = math.fsum(scene.linkage.lengths)
-    departures: list[tuple[float, str]] = []
-    """Parts of what is allowed, and what departs."""
-
-    def require(departure: float, reason: str) -> None:
-        departures.append((departure, reason))
+    departures: dict[str, float] = {}
+    """Parts of what is allowed, by what departs."""
 
     def require_closed(what: str) -> Command:
         mujoco.mj_forward(loop.model, d)
         gap = math.hypot(*loop.gap())
-        require(gap / (LARGEST_GAP * size), f"{what}: the loop is open")
+        departures[f"{what}: the loop is open"] = gap / (LARGEST_GAP * size)
         here = _find_commanded(command, float(d.qpos[O2]), omega)
         # of an assembly the sign changes at a change point
         same = loop.branch() == with_signs(scene.linkage, here).branch[0]
         name_of_branch = BRANCH_NAMES[int(here.branch[0])]
-        require(0.0 if same else math.inf, f"{what}: not {name_of_branch}")
+        departures[f"{what}: not {name_of_branch}"] = 0.0 if same else math.inf
         return here
 
     mujoco.mj_resetData(loop.model, d)
@@ -83,16 +80,16 @@ def compare_shipped(
     mujoco.mj_resetDataKeyframe(loop.model, d, 0)
     first = float(require_closed("keyframe").theta_2[0])
     apart = abs(math.remainder(first - float(d.qpos[O2]), math.tau))
-    require(
-        apart / (K * EPS * max(1.0, abs(first))),
-        "keyframe: theta_2 is none of the scene's",
-    )
-    require(abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2")
     slip = float(np.hypot(*(loop.jacobian() @ d.qvel[:3])))
-    require(
-        slip / (LARGEST_GAP * size * float(np.abs(d.qvel).max())),
-        "keyframe: the bars' speeds open the loop",
-    )
+    fastest = float(np.abs(d.qvel).max())
+    rounding = K * EPS
+    departures |= {
+        "keyframe: theta_2 is none of the scene's": apart
+        / (rounding * max(1.0, abs(first))),
+        "keyframe: omega_2": abs(float(d.qvel[O2]) / omega - 1.0) / rounding,
+        "keyframe: the bars' speeds open the loop": slip
+        / (LARGEST_GAP * size * fastest),
+    }
     driven = SERVO_STEPS * loop.model.opt.timestep
     due = omega
     if scene.motion.alpha_2 == 0.0:  # a servo; from rest as the file opens
@@ -104,13 +101,14 @@ def compare_shipped(
         mujoco.mj_step(loop.model, d, SERVO_STEPS)
         missed = abs(float(d.qvel[O2]) - due)
         lost = d.time < 0.5 * driven
-        require(
-            math.inf if lost else missed / (SPEED_ERROR * max(abs(omega), abs(due))),
+        reason = (
             f"after {SERVO_STEPS} steps the input turns at {d.qvel[O2]:.6g} of"
-            f" {due:.6g} rad/s",
+            f" {due:.6g} rad/s"
         )
-    error, reason = max(
-        departures, key=lambda one: math.inf if math.isnan(one[0]) else one[0]
+        allowed = SPEED_ERROR * max(abs(omega), abs(due))
+        departures[reason] = math.inf if lost else missed / allowed
+    reason, error = max(
+        departures.items(), key=lambda one: math.inf if math.isnan(one[1]) else one[1]
     )
     row = Row.judged(
         (name, SIMULATED_NAME, "shipped"),
@@ -154,6 +152,4 @@ def _find_not_driven(
         return FASTEST.reason
     ahead = np.array([theta_2, theta_2 + omega_2 * seconds])
     least = compute_least_sine(scene.linkage, ahead, np.array([True, True]))
-    if least >= NEAREST_TOGGLE.boundary:
-        return None
-    return NEAREST_TOGGLE.reason
+    return None if least >= NEAREST_TOGGLE.boundary else NEAREST_TOGGLE.reason

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Container
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -37,8 +36,8 @@ from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
 from fourbar_validation.engines.mujoco.runner import (
-    LIGHT_FLYWHEEL,
     Course,
+    Found,
     LawCourse,
     Lead,
     SimulatedRun,
@@ -209,7 +208,8 @@ class _Simulation:
         bar = self.command.bar
         linkage = self.scene.linkage
         # kinematics alone: the timestep plays no part
-        position = Assembler(self._compile_loop(timestep=1e-3), bar)
+        settings = replace(self.settings, timestep=1e-3)
+        position = Assembler(self._compile_loop((), settings), bar)
         assembled = find_assembled(position, self.command, self.order)
         closes = np.array([angles is not None for angles in assembled])
         least = self.course.least_sine(closes)
@@ -223,9 +223,7 @@ class _Simulation:
             self.order,
             partial(self._closes_between, position),
         ):
-            start = assembled[segment[0]]
-            assert start is not None
-            self._run(segment, start)
+            self._run(segment, assembled[segment[0]])
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
         # the command stands for the motion where nothing moved
         commanded = self.command.angle, *list_speeds(self.command)
@@ -264,14 +262,8 @@ class _Simulation:
         factor = sizes.scale(drive, effort).factor
         return float(np.nanmin(factor)) if np.isfinite(factor).any() else 1.0
 
-    def _compile_loop(
-        self, supplied: Container[str] = (), **changed: Any
-    ) -> ClosedLoop:
-        """Compile a model that takes from `supply_forces` what its text cannot say.
-
-        `changed`: settings.
-        """
-        settings = replace(self.settings, timestep_scale=1.0, **changed)
+    def _compile_loop(self, supplied: Container[str], settings: Settings) -> ClosedLoop:
+        """Compile a model that takes from `supply_forces` what its text cannot say."""
         text = write_mjcf(take_full_size(self.scene), settings, keyframe=False)
         return receive_forces(ClosedLoop(text), supplied)
 
@@ -291,7 +283,7 @@ class _Simulation:
             for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
         )
 
-    def _run(self, segment: list[int], start: tuple[float, float, float]) -> None:
+    def _run(self, segment: list[int], start: Found) -> None:
         """Step through one segment and read at the step nearest to each position."""
         motion_segment = self.course.segment(segment)
         timestep = motion_segment.timestep(self.settings)
@@ -301,14 +293,11 @@ class _Simulation:
         supplied = dict(self.supplied)
         if (accelerate := motion_segment.accelerate()) is not None:
             supplied["drive"] = lambda m, d: m.dof_armature[O2] * accelerate(m, d)
+        settings = replace(self.settings, timestep=timestep, timestep_scale=1.0)
         with supply_forces(supplied):
-            build = partial(self._compile_loop, supplied, timestep=timestep)
-            loop = build()
-            light = None
-            if self.scene.drive_bar != 2:
-                light = build(flywheel=LIGHT_FLYWHEEL)
-            monitor = ResidualMonitor(build(), self.scene.drive_bar)
-            run = SimulatedRun(loop, light, motion_segment, start, timestep)
+            compile_loop = partial(self._compile_loop, supplied)
+            run = SimulatedRun(motion_segment, start, settings, compile_loop)
+            monitor = ResidualMonitor(compile_loop(settings), self.scene.drive_bar)
             for index in segment:
                 run.to(index)
                 self._read(run, monitor, index)

@@ -38,7 +38,6 @@ from fourbar_validation.engines.loop import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
-    LIGHT_FLYWHEEL,
     Course,
     SimulatedRun,
     SteadySegment,
@@ -184,35 +183,6 @@ class TrialSetup:
                 " through in time"
             )
 
-    def build_loops(
-        self,
-        settings: Settings,
-        timestep: float,
-        edit: Edit | None,
-    ) -> tuple[ClosedLoop, ClosedLoop | None]:
-        """Build the loop that is stepped, and the loop that the drive is read from.
-
-        The second is None for a drive on bar 2. Both are closed alike: at a state that
-        a soft closure has reached, another closure asks for other forces. Pads stiffen
-        the closure of a crank with a flywheel alone, so with pads the second loop has a
-        light one; otherwise it is the linkage by itself.
-
-        `edit`: change of both texts of MJCF.
-        """
-        settings = replace(settings, timestep=timestep, timestep_scale=1.0)
-
-        def build(built: Settings) -> ClosedLoop:
-            text = write_mjcf(self.scene, built, keyframe=False)
-            return ClosedLoop(text if edit is None else edit(text))
-
-        loop = build(settings)
-        if self.scene.drive_bar == 2:
-            return loop, None
-        flywheel = 0.0
-        if settings.pad is not None:
-            flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
-        return loop, build(replace(settings, flywheel=flywheel))
-
     def _list_runs(self) -> list[WindowMotion]:
         return [SteadySegment(self.course, one).run for one in self.segments]
 
@@ -284,14 +254,10 @@ class TrialSetup:
                 )
                 break
             torque, pins = run.read()
-            motion = {
-                "theta_2": d.qpos[O2] - run.turns,
-                "omega_2": d.qvel[O2],
-                "alpha_2": d.qacc[O2],
-            }
-            for name, value in (
-                motion | pins | {driving: np.nan if torque is None else torque}
-            ).items():
+            motion = d.qpos[O2] - run.turns, d.qvel[O2], d.qacc[O2]
+            values = dict(zip(MADE, motion, strict=True))
+            values[driving] = np.nan if torque is None else torque
+            for name, value in (values | pins).items():
                 out[name][row] = value
         trial.steps += run.stepper.done
         made = 2.0 * np.pi / run.motion_segment.fastest / run.stepper.timestep
@@ -303,10 +269,14 @@ class TrialSetup:
         """Return a run that stands at the first position of a segment."""
         motion_segment = SteadySegment(self.course, segment)
         timestep = motion_segment.run.timestep(settings)
-        loop, light = self.build_loops(settings, timestep, edit)
+        settings = replace(settings, timestep=timestep, timestep_scale=1.0)
+
+        def compile_loop(built: Settings) -> ClosedLoop:
+            text = write_mjcf(self.scene, built, keyframe=False)
+            return ClosedLoop(text if edit is None else edit(text))
+
         start = self.start[segment[0]]
-        assert start is not None
-        return SimulatedRun(loop, light, motion_segment, start, timestep)
+        return SimulatedRun(motion_segment, start, settings, compile_loop)
 
     def make_clocks(
         self,
