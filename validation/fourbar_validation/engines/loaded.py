@@ -74,10 +74,11 @@ class Assembled(Protocol):
         """
 
 
-class EngineBars(Assembled, Protocol):
-    """An engine that holds the bars of a scene and moves.
+class Loaded(Assembled, Protocol):
+    """Bars on which loads and effects act, by their rows of `applied_effects.TERM_OF`.
 
-    The mass centres G2, G3, G4 are among the points.
+    The ground (bar 1) does not move; its line points from O2 to O4. The mass centres
+    G2, G3, G4 are among the points.
     """
 
     own: str
@@ -87,38 +88,6 @@ class EngineBars(Assembled, Protocol):
     without loads and effects.
     """
     ground_angle: float
-
-    def angle(self, bar: int) -> float:
-        """Compute the direction of a bar's line, in (-pi, pi], rad."""
-
-    def cylinder(self, bar: int) -> tuple[complex, complex]:
-        """Measure from the ground pin of a bar to a cylinder's ends, m.
-
-        The end on the bar is at angle 0 of the bar; the other is on the ground.
-        """
-
-    def move(
-        self,
-        bar: int,
-        speed: float,
-        acceleration: float,
-    ) -> BarValues:
-        """Return motion and forces where the bars are placed, by name.
-
-        Empty where a toggle leaves them 0/0.
-        """
-
-    def refusal(self) -> str:
-        """Return why what was answered does not count, or nothing."""
-        return ""
-
-
-class Loaded(EngineBars, Protocol):
-    """Bars on which loads and effects act, by their rows of `applied_effects.TERM_OF`.
-
-    The ground (bar 1) does not move; its line points from O2 to O4.
-    """
-
     drive_bar: int
     force_drive: "ForceDrive | None" = None
     """The drive, where it exerts a force."""
@@ -151,6 +120,21 @@ class Loaded(EngineBars, Protocol):
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
     # methods that the engine defines
+    def move(
+        self,
+        bar: int,
+        speed: float,
+        acceleration: float,
+    ) -> BarValues:
+        """Return motion and forces where the bars are placed, by name.
+
+        Empty where a toggle leaves them 0/0.
+        """
+
+    def refusal(self) -> str:
+        """Return why what was answered does not count, or nothing."""
+        return ""
+
     def point(self, name: str) -> Array:
         """Locate a point that `description.parts` names, world axes, (2,), m.
 
@@ -172,7 +156,10 @@ class Loaded(EngineBars, Protocol):
         return {name: self.point(point) for name, point in PART_POINTS.items()}
 
     def angle(self, bar: int) -> float:
-        """Compute the direction from the bar's axes; the ground's line as described."""
+        """Compute the direction of a bar's line from its axes, in (-pi, pi], rad.
+
+        The ground's is as described.
+        """
         if bar == 1:
             return self.ground_angle
         (cosine, _), (sine, _) = self.rotation(bar).tolist()
@@ -292,10 +279,9 @@ class Loaded(EngineBars, Protocol):
         for _ in range(FRICTION_PASSES):
             loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
             most = max(loads.values())
-            changes = []
-            for pin, load in loads.items():
-                changes.append(abs(load - self.pin_loads.get(pin, 0.0)))
-            change = max(changes)
+            change = max(
+                abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items()
+            )
             if _is_settled(change, before, most):
                 return forces
             if not most < _DIVERGED:

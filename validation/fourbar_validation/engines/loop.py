@@ -38,7 +38,7 @@ from fourbar_validation.engines.free_body_closure import (
     STARTING_ANGLES,
     find_angle,
 )
-from fourbar_validation.engines.loaded import Assembled, BarValues, EngineBars
+from fourbar_validation.engines.loaded import Assembled, BarValues, Loaded
 
 _START_ANGLES = np.radians(STARTING_ANGLES).tolist()
 _SHORTEST_STEP = 2.0**-40
@@ -258,7 +258,7 @@ class Exact:
     """An engine that answers each position by itself."""
 
     name: str
-    build: Callable[[Scene], EngineBars]
+    build: Callable[[Scene], Loaded]
     """Function that builds the engine's bars from the description. LimitError says why
     the engine cannot hold them.
     """

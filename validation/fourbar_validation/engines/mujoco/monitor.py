@@ -143,9 +143,7 @@ class ResidualMonitor:
         The drive's torque and F43 are as read.
         """
         data = loop.data
-        q = np.array(data.qpos)
-        v = np.array(data.qvel)
-        a = np.array(data.qacc)
+        q, v, a = (x.copy() for x in (data.qpos, data.qvel, data.qacc))
         seen = self._motion(q, v, a)
         closing = float(np.hypot(*seen.jerk))
         self._keep("acceleration_gap", closing, float(np.hypot(*seen.a_B)))
@@ -192,11 +190,10 @@ class ResidualMonitor:
 
     def evidence(self) -> dict[str, float]:
         """Return the worst of each residual, relative to its largest term."""
-        relative = {}
-        for name, worst in self.worst.items():
-            most = self._most[name]
-            relative[name] = worst / most if most else worst
-        return relative
+        return {
+            name: worst / (self._most[name] or 1.0)
+            for name, worst in self.worst.items()
+        }
 
     def _motion(
         self,
@@ -264,13 +261,10 @@ class ResidualMonitor:
 
         One Newton step closes each of position, velocity and acceleration.
         """
-        q = q.copy()
-        v = v.copy()
-        a = a.copy()
+        state = q.copy(), v.copy(), a.copy()
         others = [A, O4]
-        q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)
-        motion = self._motion(q, v, a)
-        v[others] -= np.linalg.solve(self.bars.jacobian()[:, others], motion.slip)
-        motion = self._motion(q, v, a)
-        a[others] -= np.linalg.solve(self.bars.jacobian()[:, others], motion.jerk)
-        return self._motion(q, v, a)
+        for values, opening in zip(state, ("gap", "slip", "jerk"), strict=True):
+            jacobian = seen.jacobian[:, others]
+            values[others] -= np.linalg.solve(jacobian, getattr(seen, opening))
+            seen = self._motion(*state)
+        return seen
