@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import FourBarError
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 
@@ -54,6 +55,16 @@ class Answer:
     own: str = ""
     """Results that the engine found alone."""
     seconds: float = 0.0
+
+    @property
+    def theta(self) -> dict[int, Array] | None:
+        """Angles of bars 2, 3 and 4, commanded or answered; None if one is missing."""
+        numbers = dict(self.quantities)
+        if self.at is not None and self.at.commanded == "theta_2":
+            numbers["theta_2"] = self.at.angle
+        theta = {bar: numbers.get(f"theta_{bar}") for bar in MOVING_BARS}
+        known = {bar: angle for bar, angle in theta.items() if angle is not None}
+        return known if self.at is not None and len(known) == len(theta) else None
 
 
 class EngineError(FourBarError):

@@ -211,27 +211,22 @@ class Comparison:
         """Check that the engine's angles close the loop."""
         answer = self.answer
         linkage = self.scene.linkage
-        assert answer.at is not None and answer.assembled is not None
-        if answer.at.commanded == "theta_2":
-            theta_2 = answer.at.angle
-        else:
-            theta_2 = answer.quantities["theta_2"]
-        theta_3 = answer.quantities["theta_3"]
-        theta_4 = answer.quantities["theta_4"]
-        condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
+        theta = answer.theta
+        assert theta is not None and answer.assembled is not None
+        condition = 1.0 / count_half_turns(linkage.ground_angle, theta[2])
         allowed = self.demands.tolerance.factor / condition
         if answer.assembled.any():
             reason = f"identity: {CLOSURE}"
         else:
             reason = NOT_DEMANDED
-        gap = find_gap(linkage, theta_2, theta_3, theta_4)
+        gap = find_gap(linkage, *theta.values())
         return Row.judged(
             self._who,
             "closure",
             gap,
             allowed,
             reason,
-            theta_2,
+            theta[2],
             condition,
             answer.assembled,
         )

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import ForceDrive
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, OK, RATES, UNITS, Array
 from fourbar.scene import Scene, StrokeOrigin
@@ -181,28 +180,28 @@ def _choose_bars(quantity: str) -> tuple[int, ...]:
 
 
 def _sum_velocities(quantity: str, sizes: TermSizes) -> Array:
-    scene = sizes.scene
-    formulas = sizes.solution
-    total = np.zeros(len(formulas))
-    drive = _compute_drive_arms(scene)
+    total = np.zeros(len(sizes.solution))
+    drive = _compute_drive_arms(sizes.scene)
     for number in _choose_bars(quantity):
-        bar = scene.linkage.bar(number)
-        arm = bar.length + _compute_arm(bar) + drive.get(number, 0.0)
-        total += arm * np.abs(getattr(formulas, f"omega_{number}"))
+        arm = _compute_reach(sizes.scene, number) + drive.get(number, 0.0)
+        total += arm * np.abs(getattr(sizes.solution, f"omega_{number}"))
     return total
 
 
 def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
-    scene = sizes.scene
-    formulas = sizes.solution
-    total = np.zeros(len(formulas))
+    total = np.zeros(len(sizes.solution))
     for number in _choose_bars(quantity):
-        bar = scene.linkage.bar(number)
-        omega = getattr(formulas, f"omega_{number}")
-        alpha = getattr(formulas, f"alpha_{number}")
+        omega = getattr(sizes.solution, f"omega_{number}")
+        alpha = getattr(sizes.solution, f"alpha_{number}")
         growth = omega * omega + np.abs(alpha)
-        total += (bar.length + _compute_arm(bar)) * growth
+        total += _compute_reach(sizes.scene, number) * growth
     return total
+
+
+def _compute_reach(scene: Scene, number: int) -> float:
+    """Compute the length of a bar and the distance of its mass centre, m."""
+    bar = scene.linkage.bar(number)
+    return bar.length + _compute_arm(bar)
 
 
 def _sum_forces(_: str, sizes: TermSizes) -> Array:
@@ -276,53 +275,48 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-def has_angles(answer: Answer) -> bool:
-    """Return whether an answer has the angles of all moving bars that are not given."""
-    theta_2 = (
-        () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
-    )
-    return (
-        answer.at is not None
-        and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
-    )
+_SPEEDS = {bar: f"omega_{bar}" for bar in MOVING_BARS}
 
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     """Return an answer as a solution; None if it has no angles.
 
-    Conditions follow from the sines between the answer's own angles.
+    Conditions follow from the sines between the answer's own angles, and stroke,
+    direction, speed and leverage of a force that drives from its angles and speeds.
     """
-    if answer.at is None or not has_angles(answer):
+    at = answer.at
+    theta = answer.theta
+    if at is None or theta is None:
         return None
     answered = answer.quantities
-    if answer.at.commanded == "theta_2":
-        theta_2 = answer.at.angle
-    else:
-        theta_2 = answered["theta_2"]
-    theta = {2: theta_2, 3: answered["theta_3"], 4: answered["theta_4"]}
     known: dict[str, Any] = {name: answered[name] for name in UNITS if name in answered}
-    if answer.at.speed is not None:
-        rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
-        for name, x in (
-            () if answer.at.moves_stroke else rates
-        ):  # the engine finds them if a stroke is commanded
-            known[f"{name}_{answer.at.bar}"] = x + np.zeros(theta_2.shape)
-        if {"omega_3", "omega_4"} <= known.keys():
-            known |= _find_velocities(scene.linkage, theta, known)
-    drive = scene.drive
-    if drive is not None:
-        drive = state_from_pins(scene).drive
-        assert drive is not None
-        known |= _find_line_of_drive(scene.linkage, drive, theta, known)
+    known["theta_2"] = theta[2]
+    n = len(theta[2])
+    if at.speed is not None and not at.moves_stroke:  # else the engine finds them
+        known[f"omega_{at.bar}"] = at.speed + np.zeros(n)
+        known[f"alpha_{at.bar}"] = at.acceleration + np.zeros(n)
+    speeds = {1: np.zeros(n)}
+    speeds |= {bar: known[name] for bar, name in _SPEEDS.items() if name in known}
+    moves = len(speeds) > len(MOVING_BARS)
+    if moves and at.speed is not None:
+        known |= _find_velocities(scene.linkage, theta, speeds)
     known["sin_mu"] = np.sin(theta[4] - theta[3])
-    one, second = (theta[bar] for bar in theta if bar != answer.at.bar)
+    one, second = (theta[bar] for bar in theta if bar != at.bar)
     known["condition"] = np.abs(np.sin(second - one))
-    at = answer.at
-    if isinstance(at.origin, StrokeOrigin) and drive is not None:
-        lever = place_line(scene.linkage, drive, theta).lever
-        at = at._replace(origin=at.origin._replace(condition=lever))
-        known["condition"] = known["condition"] * lever
-    if "drive_condition" not in known:
+    drive = state_from_pins(scene).drive
+    if drive is not None:
+        line = place_line(scene.linkage, drive, theta)
+        known["drive_line"] = join_components(line.unit.real, line.unit.imag)
+        if drive.has_stroke:
+            known["stroke"] = line.stroke
+        if moves:
+            known["stroke_speed"] = line.speed(speeds)
+        known.setdefault("drive_condition", line.condition)
+        if isinstance(at.origin, StrokeOrigin):
+            lever = line.lever
+            at = at._replace(origin=at.origin._replace(condition=lever))
+            known["condition"] = known["condition"] * lever
+    elif "drive_condition" not in known:
         # an engine that knows how near friction is to jamming answers it
         one, second = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits
@@ -333,41 +327,18 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     return Solution(
         scene.title,
         scene.drive_bar,
-        np.full(len(theta_2), OK, dtype=np.uint8),
-        answer.at.branch,
-        **{**known, "theta_2": theta_2},
+        np.full(n, OK, dtype=np.uint8),
+        at.branch,
+        **known,
         drive=drive,
         at=at,
     )
 
 
-def _find_line_of_drive(
-    linkage: FourBar,
-    drive: ForceDrive,
-    theta: dict[int, Array],
-    known: dict[str, Any],
-) -> dict[str, Array]:
-    """Return stroke, direction, speed and leverage of a force that drives.
-
-    All follow from the answer's own angles and speeds.
-    """
-    line = place_line(linkage, drive, theta)
-    quantities = {"drive_line": join_components(line.unit.real, line.unit.imag)}
-    if drive.has_stroke:
-        quantities["stroke"] = line.stroke
-    if all(f"omega_{bar}" in known for bar in MOVING_BARS):
-        omega = {bar: known[f"omega_{bar}"] for bar in MOVING_BARS}
-        omega[1] = np.zeros(len(theta[2]))
-        quantities["stroke_speed"] = line.speed(omega)
-    if "drive_condition" not in known:
-        quantities["drive_condition"] = line.condition
-    return quantities
-
-
 def _find_velocities(
     linkage: FourBar,
     theta: dict[int, Array],
-    known: dict[str, Any],
+    omega: dict[int, Array],
 ) -> dict[str, Array]:
     """Return the velocities of A, B and the mass centres, (n, 2), m/s.
 
@@ -375,7 +346,7 @@ def _find_velocities(
     """
 
     def swung(bar: int, distance: float, angle: float) -> Array:
-        speed = distance * known[f"omega_{bar}"]
+        speed = distance * omega[bar]
         direction = theta[bar] + angle
         return join_components(-speed * np.sin(direction), speed * np.cos(direction))
 

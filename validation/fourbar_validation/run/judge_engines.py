@@ -16,7 +16,7 @@ from fourbar.quantities import COUPLE, FORCE_NAMES, UNITS, Array
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
-from fourbar_validation.compare.scales import has_angles, make_reference
+from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import compute_difference
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.registry import (
@@ -175,7 +175,7 @@ def compare_answer(
     answers = answer.assembled is not None and len(answer.assembled) == len(
         formulas
     )  # otherwise a row has failed
-    if answers and has_angles(answer):
+    if answers and answer.theta is not None:
         rows.append(comparison.closure())
     return rows
 
