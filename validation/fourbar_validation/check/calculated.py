@@ -7,6 +7,7 @@ all changes at once.
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +37,7 @@ from fourbar_validation.engines.free_body import (
     solve_couples,
     solve_unit_couples,
     solve_wrenches,
+    speeds_and_accelerations,
     stack_components,
 )
 from fourbar_validation.engines.free_body_closure import cross_products
@@ -283,11 +285,9 @@ class Calculation:
 
     def _find_couples(self) -> Array:
         """Return the friction couples that follow the pins' loads, (n, p), N m."""
-        pins = list_sliding_pins(self.scene)
-        couples = np.zeros((len(self.right), len(pins)))
-        for i, (pin, arm) in enumerate(pins.items()):
-            couples[:, i] = arm * magnitude(getattr(self.right, FORCE_AT[pin]))
-        return couples
+        pins = list_sliding_pins(self.scene).items()
+        of_pins = [arm * magnitude(self.right[FORCE_AT[pin]]) for pin, arm in pins]
+        return np.reshape(of_pins, (len(pins), len(self.right))).T
 
     def shift_loop_force(self, more: ComplexArray) -> MistakenNumbers:
         """Return the pin forces under another force on bar 3 at B.
@@ -355,39 +355,34 @@ class Calculation:
             yield Mistake(text, torque.get, whole=False, left=SOFT_TORQUE)
 
     def _frames(self) -> Iterator[Mistake]:
-        ways = {
-            "each force is in the frame of the bar on which it acts": 1,
-            "each force is in the frame of the bar that exerts it": 0,
+        frames = {
+            f"each force is in the frame of the bar {words}": {
+                name: bars[side] for name, bars in FORCE_BETWEEN.items()
+            }
+            for words, side in (("on which it acts", 1), ("that exerts it", 0))
         }
-        for text, side in ways.items():
-            frames = {name: bars[side] for name, bars in FORCE_BETWEEN.items()}
-            yield Mistake(f"{text}, not in world axes", self._turn(frames).get)
-        for bar in (1, *MOVING_BARS):
-            text = f"forces are in the frame of bar {bar}, not in world axes"
-            yield Mistake(text, self._turn(dict.fromkeys(FORCE_BETWEEN, bar)).get)
-        for name in FORCE_BETWEEN:
+        of_every = {"forces are": FORCE_BETWEEN.keys()}
+        of_one = {f"{name} is": [name] for name in FORCE_BETWEEN}
+        for words, names in {**of_every, **of_one}.items():
             for bar in (1, *MOVING_BARS):
-                text = f"{name} is in the frame of bar {bar}, not in world axes"
-                yield Mistake(text, self._turn({name: bar}).get, whole=False)
-
-    def _turn(self, frames: dict[str, int]) -> MistakenNumbers:
-        return {
-            name: stack_components(
-                join(getattr(self.right, name)) * np.conj(self.motion.unit[bar])
-            )
-            for name, bar in frames.items()
-        }
+                frames[f"{words} in the frame of bar {bar}"] = dict.fromkeys(names, bar)
+        for text, bars in frames.items():
+            turned = {
+                name: stack_components(
+                    join(self.right[name]) * np.conj(self.motion.unit[bar])
+                )
+                for name, bar in bars.items()
+            }
+            whole = len(turned) > 1
+            yield Mistake(f"{text}, not in world axes", turned.get, whole=whole)
 
     def _equal_forces(self) -> Iterator[Mistake]:
         text = f"the power is given in place of the {self.driving}"
         yield Mistake(text, {self.driving: self.right.power}.get, whole=False)
-        for name in PIN_FORCES:
-            for other in PIN_FORCES:
-                if other == name:
-                    continue
-                values = getattr(self.right, other)
-                yield Mistake(f"{name} = {other}", {name: values}.get, whole=False)
-                yield Mistake(f"{name} = -{other}", {name: -values}.get, whole=False)
+        for name, other in permutations(PIN_FORCES, 2):
+            values = self.right[other]
+            yield Mistake(f"{name} = {other}", {name: values}.get, whole=False)
+            yield Mistake(f"{name} = -{other}", {name: -values}.get, whole=False)
 
     def _scale_inertial(self) -> Iterator[Change]:
         """Scale the inertial forces against the loads."""
@@ -513,27 +508,29 @@ class Calculation:
         """
         motion = self.motion
         right = self.right
-        _, a, b, c = motion.linkage.lengths
-        u = motion.unit
-        speeds = {
-            2: cross_products(u[3], u[4]) / a,
-            3: cross_products(u[4], u[2]) / b,
-            4: -cross_products(u[2], u[3]) / c,
-        }
         bar = right.at.bar
-        with np.errstate(divide="ignore", invalid="ignore"):
-            alone = {k: motion.alpha[bar] * speeds[k] / speeds[bar] for k in speeds}
+        at_rest = speeds_and_accelerations(
+            motion.linkage,
+            motion.theta_2,
+            motion.alpha[bar],
+            np.zeros(len(right)),
+            right.theta_3,
+            right.theta_4,
+            bar,
+        )
+        alone = at_rest.omega
         for factor, done in _VELOCITY_TERM.items():
-            added = {k: factor * (motion.alpha[k] - alone[k]) for k in speeds}
+            added = {k: factor * (motion.alpha[k] - alone[k]) for k in MOVING_BARS}
             added[bar] = np.zeros(len(right))
-            of_A = 1j * added[2] * a * u[2]
-            of_B = 1j * added[4] * c * u[4]
+            of_A, of_B = (
+                1j * added[k] * self.of_bar[k].length * motion.unit[k] for k in (2, 4)
+            )
             moved: MistakenNumbers = {
-                **{f"alpha_{k}": motion.alpha[k] + added[k] for k in speeds},
+                **{f"alpha_{k}": motion.alpha[k] + more for k, more in added.items()},
                 "a_A": right.a_A + stack_components(of_A),
                 "a_B": right.a_B + stack_components(of_B),
             }
-            swing = {k: 1j * added[k] * self.to_centre[k] for k in speeds}
+            swing = {k: 1j * added[k] * self.to_centre[k] for k in added}
             swing[3] = swing[3] + of_A
             more = self.accelerate(swing, added)
             for wheel in self.scene.effects:

@@ -5,7 +5,7 @@ import math
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from fourbar.errors import (
 from fourbar.files import load
 from fourbar.quantities import STAGE_OF, UNITS
 from fourbar.scene import Scene
-from fourbar.writing import require_file, write_text
+from fourbar.writing import null_nan, require_file, write_text
 from fourbar_validation.check.csv_columns import list_names_of_points
 from fourbar_validation.check.judge_table import (
     Allowance,
@@ -42,9 +42,22 @@ class Judgement:
     """All findings, and the known mistakes that would explain them."""
 
     judge: Judge
-    explanations: list[Explanation]
     explained_power: int | None = None
     """Power of ten within which all numbers agree once the mistakes are mended."""
+
+    @cached_property
+    def explanations(self) -> list[Explanation]:
+        """Return the known mistakes that explain what differs."""
+        if self.explained_power is not None:
+            return self.within(self.explained_power).explanations
+        labels = {finding.quantity for finding in self.differing}
+        return _explain(self.judge, labels)
+
+    def within(self, power: int) -> "Judgement":
+        """Judge the same table within a power of ten of each number."""
+        judge = self.judge
+        allowance = Allowance(10.0**power)
+        return Judgement(Judge(judge.scene, judge.table, allowance, judge.rows))
 
     @cached_property
     def table(self) -> TheirTable:
@@ -200,28 +213,24 @@ def judge_table(
     Mistakes are looked for in fewer digits than a table prints if none explains it all
     otherwise: in as many as are right, within what a table in few may be off by.
     """
-    judge = Judge(scene, table, tolerance)
-    judgement = _explain(judge)
-    unexplained = not judgement.is_explained()
-    if tolerance is not None or not unexplained or judgement.agreed_power is not None:
+    judgement = Judgement(Judge(scene, table, tolerance))
+    explained = judgement.is_explained() or judgement.agreed_power is not None
+    if tolerance is not None or explained:
         return judgement
 
-    def explain_within(power: int) -> list[Explanation]:
-        allowance = Allowance(10.0**power)
-        within = _explain(Judge(judge.scene, judge.table, allowance, judge.rows))
-        return within.explanations if within.is_explained() else []
+    def explains(power: int) -> bool:
+        within = judgement.within(power)
+        return bool(within.explanations) and within.is_explained()
 
     powers = range(_LEAST_POWER, round(math.log10(FEWEST_DIGITS)) + 1)
-    if not explain_within(powers[-1]):
+    if not explains(powers[-1]):
         return judgement
-    power = powers[bisect_left(powers, True, key=lambda p: bool(explain_within(p)))]
-    return Judgement(judge, explain_within(power), power)
+    power = powers[bisect_left(powers, True, key=explains)]
+    return Judgement(judgement.judge, power)
 
 
-def _explain(judge: Judge) -> Judgement:
+def _explain(judge: Judge, labels: Collection[str]) -> list[Explanation]:
     """Explain what differs of the quantities of a solution, or else of its motion."""
-    judgement = Judgement(judge, [])
-    labels = {finding.quantity for finding in judgement.differing}
     stages = {
         key: STAGE_OF.get(column.quantity)
         for key, column in judge.columns.items()
@@ -230,12 +239,10 @@ def _explain(judge: Judge) -> Judgement:
     differing = [key for key in sorted(stages) if judge.columns[key].label in labels]
     explanations = _explain_part(judge, differing, stages)
     motion = [key for key, stage in stages.items() if stage != "force"]
-    if not explanations and not set(differing) <= set(motion):
-        explanations = [
-            replace(one, complete=False)
-            for one in _explain_part(judge, differing, motion)
-        ]
-    return replace(judgement, explanations=explanations)
+    if explanations or set(differing) <= set(motion):
+        return explanations
+    of_motion = _explain_part(judge, differing, motion)
+    return [one._replace(complete=False) for one in of_motion]
 
 
 def _explain_part(
@@ -258,7 +265,7 @@ def write_judgement_json(judgement: Judgement) -> str:
 
     A number that differs is stated as theirs and ours, with what explains it.
     """
-    table, tolerance = judgement.table, judgement.tolerance
+    table = judgement.table
     document = {
         "schema": 1,
         "verdict": judgement.sentence(),
@@ -268,21 +275,15 @@ def write_judgement_json(judgement: Judgement) -> str:
         "agree_to_round_off": judgement.exact,
         "not_judged": judgement.not_judged,
         "blank": judgement.blank,
-        "tolerance": None if tolerance is None else asdict(tolerance),
+        "tolerance": judgement.tolerance,
         "found_by": table.found_by,
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
         "without_digits": judgement.not_compared,
-        "differing": [
-            {
-                name: None if isinstance(x, float) and not math.isfinite(x) else x
-                for name, x in asdict(finding).items()
-            }
-            for finding in judgement.differing
-        ],
-        "explanations": [asdict(explanation) for explanation in judgement.explanations],
+        "differing": judgement.differing,
+        "explanations": judgement.explanations,
     }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+    return json.dumps(null_nan(document), indent=1, allow_nan=False) + "\n"
 
 
 def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]:
@@ -383,19 +384,12 @@ def check_command(
     In its place the angle of another bar may stand, if the motion passes it once or the
     rows are the scene's own positions.
     """
+    given = {"--rtol": rtol, "--atol": atol, "--json": json, "--junit": junit}
     if scene.suffix == ".json":
-        for option, value in (
-            ("--rtol", rtol),
-            ("--atol", atol),
-            ("--json", json),
-            ("--junit", junit),
-        ):
+        wrong = "is of a table: a problem has its own levels"
+        for option, value in given.items():
             if value is not None:
-                raise InputError(
-                    option,
-                    str(value),
-                    "is of a table: a problem has its own levels",
-                )
+                raise InputError(option, str(value), wrong)
         from fourbar_validation.check.problem import check_problem
 
         return check_problem(scene, theirs)

@@ -5,8 +5,9 @@ A number gets its error, the allowed error, and what may explain the difference.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +40,7 @@ ONE_DIGIT = 0.1
 """Largest allowed error by which a digit is compared, as a part of the scale."""
 
 
-@dataclass(frozen=True, slots=True)
-class Allowance:
+class Allowance(NamedTuple):
     """Tolerance stated by a user, in NumPy's form: atol + rtol |ours|.
 
     atol is in the SI unit of each quantity.
@@ -50,8 +50,7 @@ class Allowance:
     atol: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Discrepancy:
+class Discrepancy(NamedTuple):
     """One quantity at one position of the user's table, in SI."""
 
     line: int

@@ -4,10 +4,9 @@ The numbers that each would make are held against the table.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, permutations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -359,8 +358,7 @@ mistakes of several columns together.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
+class Explanation(NamedTuple):
     """A mistake that accounts for what differs."""
 
     text: str

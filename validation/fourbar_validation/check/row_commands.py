@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, write_count
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
-from fourbar.scene import Command, Scene, command, find_signs
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import BAR_OF_ANGLE
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -30,8 +30,6 @@ _TIMES_TO_A_SIDE = 32
 """Times to either side of a rounded one at which a law is looked at."""
 _HALVINGS = 60
 """Halvings after which an interval of doubles is none."""
-_SINE_BARS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
-"""Bars whose sine decides the assembly, by the commanded bar."""
 
 
 class RowCommands(NamedTuple):
@@ -314,12 +312,7 @@ def _find_by_another_bar(
     n = len(table.places)
     found = [_command_other_bar(scene, table, table.places, side) for side in (1, -1)]
     angles = np.stack([_turn_into(base.angle, one[base.commanded]) for one in found])
-    fits = np.stack(
-        [
-            _is_in_assembly(scene, one, angle)
-            for one, angle in zip(found, angles, strict=True)
-        ]
-    )
+    fits = np.stack([_fits(scene, table, base, angle) for angle in angles])
     inside = fits & (angles <= base.angle.max() + _ONE_PLACE)
     both_fit = fits.all(axis=0)
     fits = np.where(both_fit & inside.any(axis=0), inside, fits)
@@ -359,16 +352,14 @@ def _turn_into(motion: Array, angle: Array) -> Array:
     return np.asarray(angle + TURN * np.ceil((least - angle) / TURN))
 
 
-def _is_in_assembly(
-    scene: Scene,
-    positions: Solution,
-    angle: Array,
+def _fits(
+    scene: Scene, table: TheirTable, base: Command, angle: Array
 ) -> NDArray[np.bool_]:
-    """Mark the positions that lie in the assembly of the scene's command."""
-    bar = scene.motion.bar
-    first, second = (positions[f"theta_{one}"] for one in _SINE_BARS[bar])
-    sign = find_signs(scene.linkage, angle, scene.motion.branch, bar)
-    return np.asarray(np.isfinite(angle) & (sign * np.sin(second - first) >= -EPS))
+    """Mark the rows whose angle another bar has in the assembly of the scene."""
+    at = _command_each(base, angle, scene)
+    positions = solve(scene, "position", at=at._replace(speed=None))
+    apart = wrap_difference(positions[table.found_by] - table.places)
+    return np.asarray(np.abs(apart) <= _ONE_PLACE)
 
 
 def _refuse_row(

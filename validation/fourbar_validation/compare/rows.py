@@ -326,8 +326,8 @@ class Counts:
     """
 
     def __init__(self, rows: Iterable[Row] = ()) -> None:
-        self._answers = Counter(dict.fromkeys(VERDICTS, 0))
-        self._identities = Counter(dict.fromkeys(VERDICTS, 0))
+        self._answers: Counter[str] = Counter()
+        self._identities: Counter[str] = Counter()
         self.scenes = self.scenes_compared = 0
         self.add(rows)
 
