@@ -196,13 +196,12 @@ class Calculation:
         self, wrenches: BodyWrenches, bars: Collection[int] = MOVING_BARS
     ) -> Array:
         """Return what the wrenches on some bars add to the unknowns, (n, 13)."""
-        more = np.zeros((len(self.right), 13))
+        components = np.zeros((9, len(self.right)))
         for bar in bars:
             force = wrenches.force[bar]
-            components = np.array([force.real, force.imag, wrenches.moment[bar]])
-            response = self.response[..., 3 * bar - 6 : 3 * bar - 3]
-            more += np.einsum("nuk,kn->nu", response, components)
-        return more
+            rows = slice(3 * bar - 6, 3 * bar - 3)
+            components[rows] = force.real, force.imag, wrenches.moment[bar]
+        return np.asarray(np.einsum("nuk,kn->nu", self.response, components))
 
     def push(self, bar: int, force: Any, arm: Any = 0.0, couple: Any = 0.0) -> Array:
         """Return what a force at an arm from a bar's first pin, and a couple, add."""

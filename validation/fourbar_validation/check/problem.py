@@ -62,52 +62,40 @@ class JudgedQuantity(NamedTuple):
 
 def read_problem(path: str | Path) -> dict[str, Any]:
     """Read a problem; InputError names what is wrong."""
-    problem = _read_document(path, PROBLEM_SCHEMA)
-    for name in ("answers", "errors", "scene", "command"):
-        if not isinstance(problem.get(name), dict):
-            raise InputError(name, problem.get(name), "must be an object", str(path))
+    names = "answers", "errors", "scene", "command"
+    objects = dict.fromkeys(names, "must be an object")
+    problem = _read_document(path, PROBLEM_SCHEMA, objects)
     return {**problem, "problem": Path(path).stem}
 
 
 def read_result(path: str | Path, problem: dict[str, Any]) -> dict[str, Any]:
     """Read somebody's answers to a problem; InputError names what is wrong."""
-    answered = _read_document(path, RESULT)
-    if not isinstance(answered.get("answers"), dict):
-        raise InputError(
-            "answers",
-            answered.get("answers"),
-            "must be an object: a list for each quantity",
-            str(path),
-        )
-    if answered.get("problem") != problem["problem"]:
-        raise InputError(
-            "problem",
-            answered.get("problem"),
-            f"must be {problem['problem']!r}",
-            str(path),
-        )
+    objects = {"answers": "must be an object: a list for each quantity"}
+    answered = _read_document(path, RESULT, objects)
+    named = answered.get("problem")
+    if named != problem["problem"]:
+        allowed = f"must be {problem['problem']!r}"
+        raise InputError("problem", named, allowed, str(path))
     return answered
 
 
-def _read_document(path: str | Path, schema: str) -> dict[str, Any]:
+def _read_document(
+    path: str | Path, schema: str, objects: dict[str, str]
+) -> dict[str, Any]:
+    """Read an object of a schema, with what is said of entries that are no objects."""
     text = read_text(path, "JSON file", LARGEST_PROBLEM_FILE)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(
-            "JSON",
-            None,
-            f"cannot be read: {write_one_line(str(error))}",
-            str(path),
-        ) from None
-    if not isinstance(data, dict) or data.get("schema") != schema:
-        raise InputError(
-            "schema",
-            data.get("schema") if isinstance(data, dict) else None,
-            f"must be {schema!r}",
-            str(path),
-        )
-    return data
+        wrong = f"cannot be read: {write_one_line(str(error))}"
+        raise InputError("JSON", None, wrong, str(path)) from None
+    stated = data.get("schema") if isinstance(data, dict) else None
+    if stated != schema:
+        raise InputError("schema", stated, f"must be {schema!r}", str(path))
+    for name, allowed in objects.items():
+        if not isinstance(data.get(name), dict):
+            raise InputError(name, data.get(name), allowed, str(path))
+    return dict(data)
 
 
 def judge_answers(
@@ -184,11 +172,7 @@ def _judge_quantity(
         answered = np.array(theirs, dtype=float)
     except (TypeError, ValueError, OverflowError):
         answered = np.array(np.nan)
-    if (
-        answered.shape != ours.shape
-        or not np.isfinite(answered).all()
-        or theirs is None
-    ):
+    if answered.shape != ours.shape or not np.isfinite(answered).all():
         return JudgedQuantity(name, group, MISSING, math.nan, 0)
     size = 1.0
     if not name.startswith("theta"):
