@@ -1,7 +1,7 @@
 """The commands that evaluate a linkage, what may vary of it, and where it rests."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -128,16 +128,19 @@ def new(
             "file exists; give the new scene another name",
         )
     template = NEW_POSITIONS if positions_only else NEW_SCENE
+    stated: Any
+    write: Any = write_new_scene
     if lengths is not None:
-        texts = [_add_unit("--lengths", text, unit) for text in lengths]
-        with state_messages_in(units_of_length(texts[0])):
-            scene = write_new_scene(texts, template)
-        write_text(file, scene)
-    elif pins is not None:
-        places = _read_pins(pins, unit)
-        with state_messages_in(units_of_length(places["A"][0])):
-            scene = write_drawn_scene(places, template)
-        write_text(file, scene)
+        stated = [_add_unit("--lengths", text, unit) for text in lengths]
+        first = stated[0]
+    else:
+        assert pins is not None
+        write = write_drawn_scene
+        stated = _read_pins(pins, unit)
+        first, _ = stated["A"]
+    with state_messages_in(units_of_length(first)):
+        scene = write(stated, template)
+    write_text(file, scene)
     if file == STANDARD_STREAM:
         return
     # to be copied into any shell

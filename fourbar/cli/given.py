@@ -15,10 +15,8 @@ from fourbar.linkage import ANY_NUMBER, BAR_NAMES, POSITIVE, require
 from fourbar.scene import Command, Scene
 from fourbar.solution import Conversion
 
-_FILE_UNITS = "fourbar.file_units"
-"""Key of the units that suit the scene file in the context of a command."""
-_FILE_RADIANS = "fourbar.file_radians"
-"""Key of whether the scene file commands an angle in rad, in the same context."""
+_FILE_TABLES = "fourbar.file_tables"
+"""Key of the tables of the scene file in the context of a command."""
 MOST_PRINTED = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
 FILE_PATH = click.Path(path_type=Path)
@@ -157,15 +155,12 @@ def open_scene(path: Path) -> Iterator[Scene]:
     """
     from fourbar.files import parse_tables, read_scene_text, read_tables
     from fourbar.scene.motion import require_steps
-    from fourbar.show.shown_units import states_radians, units_of_scene
     from fourbar.writing import require_file
 
     context = click.get_current_context()
     tables = parse_tables(read_scene_text(path), str(path))
-    units = units_of_scene(tables)
-    context.meta[_FILE_UNITS] = units
-    context.meta[_FILE_RADIANS] = states_radians(tables)
-    with state_messages_in(units):
+    context.meta[_FILE_TABLES] = tables
+    with state_messages_in(suit_file_units()):
         scene = read_tables(tables, str(path))
         out = context.params.get("out")
         if out is not None:
@@ -204,14 +199,16 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
 
 def suit_file_units() -> Conversion:
     """Return the units that suit the file of `open_scene`."""
-    units: Conversion = click.get_current_context().meta[_FILE_UNITS]
-    return units
+    from fourbar.show.shown_units import units_of_scene
+
+    return units_of_scene(click.get_current_context().meta[_FILE_TABLES])
 
 
 def commands_radians() -> bool:
     """Return True if the file of `open_scene` commands an angle in rad."""
-    stated: bool = click.get_current_context().meta[_FILE_RADIANS]
-    return stated
+    from fourbar.show.shown_units import states_radians
+
+    return states_radians(click.get_current_context().meta[_FILE_TABLES])
 
 
 def is_bare(text: str) -> bool:

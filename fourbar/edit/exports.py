@@ -71,13 +71,7 @@ def evaluate_scene(
     solution = solve(scene, stage)
     if not solution.assembled.any():
         raise NotAssembledError(say_nowhere(scene))
-    data = collect_live_data(
-        scene,
-        units,
-        stage=stage,
-        midway=True,
-        solved=solution,
-    )
+    data = collect_live_data(scene, units, stage=stage, midway=True, solved=solution)
     data |= {"tolerances": None, "pictures": {}, "toml": None, "traced": None}
     if scene.picture is not None:
         picture = scene.picture
@@ -128,7 +122,7 @@ def pack_frame(about: dict[str, Any]) -> bytes:
             for name, column in table.items():
                 if isinstance(column, np.ndarray):
                     columns.append((sign, name, len(column), column.ndim))
-                    arrays.append(np.ascontiguousarray(column, dtype="<f8").tobytes())
+                    arrays.append(column.astype("<f8").tobytes())
                 else:
                     branches[sign][name] = column
         data = about["data"] | {"branches": branches}
@@ -219,15 +213,9 @@ class HarnessRun:
         lines = list[str]()
 
         def report(**more: Any) -> None:
-            self.tell(
-                {
-                    "check": {
-                        "seconds": time.monotonic() - began,
-                        "lines": lines[:LAST_LINES],
-                        **more,
-                    }
-                }
-            )
+            seconds = time.monotonic() - began
+            about = {"seconds": seconds, "lines": lines[:LAST_LINES], **more}
+            self.tell({"check": about})
 
         try:
             command = find_harness()
@@ -256,12 +244,8 @@ class HarnessRun:
                         lines.append(text)
                 report(running=True)
             status = await self.process.wait()
-            report(
-                running=False,
-                stopped=status < 0,
-                status=status,
-                report=self.report.exists(),
-            )
+            written = self.report.exists()
+            report(running=False, stopped=status < 0, status=status, report=written)
         except (DependencyError, OSError) as error:
             lines[:] = [str(error)]
             report(running=False, report=False)

@@ -122,15 +122,12 @@ def _offer_bars(offers: dict[str, Any]) -> None:
     Pairs are parts, optional numbers are fields.
     """
     fields: dict[str, Any] = offers["fields"].setdefault("bars", {})
-    for bar_number in MOVING_BARS:
-        bar = BAR_NAMES[bar_number]
+    for bar in map(BAR_NAMES.__getitem__, MOVING_BARS):
         for name, declared in Bar.numbers.items():
             example = EXAMPLES[declared.unit]
-            if declared.pair == "rad":
-                part = {"at": ["bars", bar, name], "value": [example, "0 deg"]}
-                offers["parts"].append(part)
-            elif declared.pair:
-                part = {"at": ["bars", bar, name], "value": [*_SECTION]}
+            if declared.pair:
+                pair = [example, "0 deg"] if declared.pair == "rad" else [*_SECTION]
+                part = {"at": ["bars", bar, name], "value": pair}
                 offers["parts"].append(part)
             elif declared.left_out is not REQUIRED_NUMBER:
                 fields.setdefault(bar, {})[name] = example
@@ -138,22 +135,17 @@ def _offer_bars(offers: dict[str, Any]) -> None:
 
 def _offer_commands() -> dict[str, Any]:
     """List the names that can be commanded: label, and the fields that apply to it."""
-    angles = {
-        names: (
-            f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}",
-            {"branch": "open"},
-        )
+    open_ = {"branch": "open"}
+    commands = {
+        names: (f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}", open_)
         for bar, names in COMMAND_NAMES.items()
     }
-    commands = angles | {
-        STROKE_COMMAND: ("stroke of the cylinder", {"side": "left", "branch": "open"})
-    }
+    commands[STROKE_COMMAND] = "stroke of the cylinder", {"side": "left", **open_}
     return {
         names[0]: {
             "label": label,
-            "fields": (
-                {name: _MOVING[Motion.numbers[name].unit] for name in names} | words
-            ),
+            "fields": {name: _MOVING[Motion.numbers[name].unit] for name in names}
+            | words,
         }
         for names, (label, words) in commands.items()
     }
@@ -207,11 +199,9 @@ class SceneDocument:
         *into, last = path
         holder = self._find_holder(into)
         if last == -1:
-            is_of_tables = isinstance(holder, AoT)
-            blank = tomlkit.nl()
-            new = (
-                _make_toml_table(value, blank) if is_of_tables else _write_inline(value)
-            )
+            new = _write_inline(value)
+            if isinstance(holder, AoT):
+                new = _make_toml_table(value, tomlkit.nl())
             holder.append(new)
             return
         old = self.at(path)
@@ -219,11 +209,13 @@ class SceneDocument:
         if isinstance(old, Table):
             del holder[last]
             old = None
-        if len(path) == 1 and isinstance(value, dict):
+        if old is not None:
+            new = _make_item_like(old, value)
+        elif len(path) == 1 and isinstance(value, dict):
             new = _make_toml_table(value)
         else:
             new = _write_inline(value)
-        holder[last] = new if old is None else _make_item_like(old, value)
+        holder[last] = new
 
     def remove(self, path: KeyPath) -> None:
         """Take an entry away, and a table that it leaves empty."""

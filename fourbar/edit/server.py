@@ -13,6 +13,7 @@ import threading
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -87,8 +88,9 @@ class Workbench:
         """Put a request in the queue; `check` and `stop` are done at once."""
         if self.ended.is_set():  # a page may go on sending while the server ends
             return
-        if asked.get("do") in ("check", "stop"):
-            if asked["do"] == "check":
+        do = asked.get("do")
+        if do in ("check", "stop"):
+            if do == "check":
                 self.check.start(self.session.now.text)
             else:
                 self.check.stop()
@@ -105,12 +107,12 @@ class Workbench:
             line, asked = self.waiting.popleft()
             about = await self.loop.run_in_executor(self.one, self.session.do, asked)
             about["for"] = asked.get("id")
-            alone = not {"data", "text"} <= about.keys() or asked.get("do") == "hello"
+            to_all = {"data", "text"} <= about.keys() and asked.get("do") != "hello"
             if about.pop("refer", False):
                 compare = self.session.compared
                 compared = await self.loop.run_in_executor(self.one, compare)
-                self.tell(compared, to=line if alone else None)
-            self.tell(about, to=line if alone or "ask" in about else None)
+                self.tell(compared, to=None if to_all else line)
+            self.tell(about, to=None if to_all and "ask" not in about else line)
         self.following = asyncio.create_task(self._follow_up())
 
     def _write_state_file(self) -> None:
@@ -131,19 +133,14 @@ class Workbench:
         self.one.submit(self._write_state_file)
         session = self.session
         state = session.now
-        units = session.units
-        pressure = session.pressure
-
-        def evaluate() -> dict[str, Any]:
-            data = state.evaluate(units, settled=True, pressure=pressure)
-            return data | {"kept_peaks": session.locate_kept_peaks()}
-
-        def describe(data: dict[str, Any]) -> dict[str, Any]:
-            return session.describe(data, settled=True)
-
+        more = {"settled": True, "pressure": session.pressure}
+        evaluate = partial(state.evaluate, session.units, **more)
+        call = self.loop.run_in_executor
         try:
-            data = await self.loop.run_in_executor(self.aside, evaluate)
-            about = await self.loop.run_in_executor(self.one, describe, data)
+            data = await call(self.aside, evaluate)
+            data["kept_peaks"] = await call(self.aside, session.locate_kept_peaks)
+            describe = partial(session.describe, data, settled=True)
+            about = await call(self.one, describe)
         except FourBarError as error:
             self.tell({"note": str(error)})
             return
@@ -186,11 +183,8 @@ class Workbench:
         try:
             sockets = bind_sockets(port, _LOOPBACK)
         except (OSError, OverflowError) as error:
-            raise InputError(
-                "--port",
-                port,
-                f"the port cannot be opened: {error}",
-            ) from None
+            allowed = f"the port cannot be opened: {error}"
+            raise InputError("--port", port, allowed) from None
         own_port = sockets[0].getsockname()[1]
         server = HTTPServer(
             _make_application(self, own_port),

@@ -22,7 +22,7 @@ from fourbar.edit.headline import list_peaks
 from fourbar.edit.scene_entries import SceneDocument, list_offers, name_entry
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
-from fourbar.files.fields import Reader
+from fourbar.files.fields import Entry, SceneFile
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
 from fourbar.files.scene_text import write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE
@@ -637,7 +637,7 @@ def _suit_entry(value: Any, own: Conversion) -> Any:
 def _read_typed_pressure(text: str) -> str:
     """Return a pressure as it was typed; InputError where it is none."""
     if text.strip():
-        Reader("workbench").quantity("pressure", text, "Pa", POSITIVE)
+        Entry(SceneFile("workbench"), "pressure", text).quantity("Pa", POSITIVE)
     return text.strip()
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.effects import ForceDrive, LinearDrive
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader
+from fourbar.files.fields import Entry
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.mobility import count_equalities, meet_change_points
 from fourbar.linkage import (
@@ -72,28 +72,27 @@ def from_pins(
     return choose_assembly(scene, drawing)
 
 
-def read_drawing(read: Reader, top: dict[str, Any]) -> DrawnPins | None:
+def read_drawing(top: Entry) -> DrawnPins | None:
     """Read the table of the pins; None where a scene states lengths."""
-    if "pins" not in top:
+    pins = top["pins"]
+    if pins.value is None:
         return None
-    if "lengths" in top:
+    if top["lengths"].value is not None:
         allowed = "must be left out: the pins state the lengths and the ground's angle"
-        raise read.refuse("lengths", top["lengths"], allowed)
-    motion = top.get("motion", {})
-    if isinstance(motion, dict) and "branch" in motion:
-        allowed = "must be left out: the pins state the assembly"
-        raise read.refuse("motion.branch", motion["branch"], allowed)
-    pins = read.table("pins", top["pins"], PINS)
-    places = (read_point(read, f"pins.{pin}", pins.get(pin)) for pin in PINS)
-    return DrawnPins(*places)
+        raise top["lengths"].refuse(allowed)
+    motion = top["motion"]
+    if isinstance(motion.value, dict) and "branch" in motion.value:
+        raise motion["branch"].refuse("must be left out: the pins state the assembly")
+    pins.table(PINS)
+    return DrawnPins(*(read_point(pins[pin]) for pin in PINS))
 
 
-def read_point(read: Reader, key: str, value: object) -> tuple[float, float]:
+def read_point(entry: Entry) -> tuple[float, float]:
     """Read a place of the drawing, ["x", "y"], m."""
-    if not isinstance(value, list) or len(value) != 2:
-        raise read.refuse(key, value, 'must be two coordinates like ["10 mm", "25 mm"]')
-    x, y = value
-    return read.quantity(f"{key}[0]", x, "m"), read.quantity(f"{key}[1]", y, "m")
+    if not isinstance(entry.value, list) or len(entry.value) != 2:
+        raise entry.refuse('must be two coordinates like ["10 mm", "25 mm"]')
+    x, y = entry.quantities("m")
+    return x, y
 
 
 class DrawnGround(NamedTuple):
@@ -113,28 +112,24 @@ class DrawnGround(NamedTuple):
         return complex(*place) * cmath.rect(1.0, -self.direction)
 
 
-def read_ground(read: Reader, lengths: Any) -> DrawnGround:
+def read_ground(lengths: Entry) -> DrawnGround:
     """Read the direction of the ground of a scene of lengths.
 
     The file may have x and y of O4 from O2 in the place of length and angle.
     """
-    if not isinstance(lengths, dict):
+    if not isinstance(lengths.value, dict):
         return DrawnGround()
-    key = "lengths.ground"
-    angle = lengths.get("ground_angle")
-    ground = lengths.get("ground")
-    if not isinstance(ground, dict):
-        by = FourBar.numbers["ground_angle"]
-        return DrawnGround(read.declared(f"{key}_angle", angle, by))
-    if angle is not None:
-        allowed = "must be left out: x and y of the ground state its angle"
-        raise read.refuse(f"{key}_angle", angle, allowed)
-    entry = read.table(key, ground, ("x", "y"))
-    x, y = (read.quantity(f"{key}.{axis}", entry.get(axis), "m") for axis in "xy")
+    angle = lengths["ground_angle"]
+    ground = lengths["ground"]
+    if not isinstance(ground.value, dict):
+        return DrawnGround(angle.declared(FourBar.numbers["ground_angle"]))
+    if angle.value is not None:
+        raise angle.refuse("must be left out: x and y of the ground state its angle")
+    ground.table("xy")
+    x, y = (ground[axis].quantity("m") for axis in "xy")
     length = math.hypot(x, y)
     if not 0.0 < length < math.inf:
-        allowed = "must be coordinates of O4 from O2, where it does not lie"
-        raise read.refuse(key, ground, allowed)
+        raise ground.refuse("must be coordinates of O4 from O2, where it does not lie")
     return DrawnGround(math.atan2(y, x), length)
 
 
@@ -159,62 +154,51 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
 
 
 def state_places(
-    read: Reader,
-    key: str,
-    value: Any,
-    drawing: DrawnPins | DrawnGround,
-    bar: int | None = None,
+    entry: Entry, drawing: DrawnPins | DrawnGround, bar: int | None = None
 ) -> Any:
     """State each `{ drawn = [x, y] }` of an entry in the frame of its bar."""
-    if isinstance(value, list):
-        return [
-            state_places(read, f"{key}[{index}]", entry, drawing, bar)
-            for index, entry in enumerate(value)
-        ]
-    if not isinstance(value, dict):
-        return value
-    number = value.get("bar")
+    if isinstance(entry.value, list):
+        return [state_places(one, drawing, bar) for one in entry.entries()]
+    if not isinstance(entry.value, dict):
+        return entry.value
+    stated = dict(entry.value)
+    number = stated.get("bar")
     if isinstance(number, int) and number in BAR_NAMES:
         bar = number
-    if DRAWN_WORD in value:
-        place = _state_place(read, key, value, drawing, bar)
-        if len(value) == 1:
+    if DRAWN_WORD in stated:
+        place = _state_place(entry, drawing, bar)
+        if len(stated) == 1:
             return place
-        if "from_pin" in value:
-            raise read.refuse(f"{key}.from_pin", value["from_pin"], _STANDS_ALONE)
-        value = {**value, "from_pin": place}
-        del value[DRAWN_WORD]
-    named = BAR_NUMBERS if key == "bars" else {}
+        if "from_pin" in stated:
+            raise entry["from_pin"].refuse(_STANDS_ALONE)
+        del stated[DRAWN_WORD]
+        stated["from_pin"] = place
+    named = BAR_NUMBERS if entry.key == "bars" else {}
+    entry = entry.holding(stated)
     return {
-        name: state_places(read, f"{key}.{name}", entry, drawing, named.get(name, bar))
-        for name, entry in value.items()
+        name: state_places(entry[name], drawing, named.get(name, bar))
+        for name in stated
     }
 
 
 def _state_place(
-    read: Reader,
-    key: str,
-    value: dict[str, Any],
-    drawing: DrawnPins | DrawnGround,
-    bar: int | None,
+    entry: Entry, drawing: DrawnPins | DrawnGround, bar: int | None
 ) -> dict[str, str]:
     """State a place of the drawing by its coordinates in the frame of its bar."""
-    drawn = f"{key}.{DRAWN_WORD}"
-    stated = value[DRAWN_WORD]
+    drawn = entry[DRAWN_WORD]
+    key = entry.key
     if bar is None:
-        allowed = (
+        raise drawn.refuse(
             f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
         )
-        raise read.refuse(drawn, stated, allowed)
     if bar != 1 and isinstance(drawing, DrawnGround):
-        allowed = (
+        raise drawn.refuse(
             "is a place of a moving bar: it is drawn where [pins] states the linkage;"
             " here from_pin states it"
         )
-        raise read.refuse(drawn, stated, allowed)
     if key.endswith((".from_centre", ".arm")):
-        raise read.refuse(key, value, "a place of the drawing is written from_pin")
-    z = drawing.into_bar(bar, read_point(read, drawn, stated))
+        raise entry.refuse("a place of the drawing is written from_pin")
+    z = drawing.into_bar(bar, read_point(drawn))
     return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 

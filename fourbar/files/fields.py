@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, Self
 
 from fourbar.effects.effect import PinRows
 from fourbar.effects.load import PLACES_OF_LOADS
@@ -121,20 +121,11 @@ def split_key(key: str) -> list[str | int]:
     return [int(step) if step.isdigit() else step for step in steps]
 
 
-class Reader:
-    """Reads entries of one file; effects are read through it too."""
+class SceneFile:
+    """A file that is read, and what one entry of it tells the reader of another."""
 
-    QUANTITY = 'with a unit, like "1 {}"'
-    """The form of a number of a unit, as errors say it. Likewise of several, and of a
-    polar pair.
-    """
-    QUANTITIES = '["1 {0}", "2 {0}"]'
-    POLAR = '["1 {0}", "0 deg"]'
-    COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
-    """A place or a force by its components; empty where it has to be polar."""
-
-    def __init__(self, file: str, document: Mapping[str, Any] | None = None) -> None:
-        self.file = file
+    def __init__(self, name: str, document: Mapping[str, Any] | None = None) -> None:
+        self.name = name
         self.document: Mapping[str, Any] = document or {}
         """Tables of the file, for suggestions."""
         self.coordinates: dict[str, tuple[float, float]] = {}
@@ -145,102 +136,134 @@ class Reader:
         self.bars: dict[str, int] = {}
         """Bar of each named point, which a place at it need not state again."""
 
-    def refuse(self, key: str, value: object, allowed: str) -> InputError:
-        """Make the error for an entry, or a missing one (None), with the file."""
-        missing = "is missing; " if value is None else ""
-        return InputError(key, _shorten_for_error(value), missing + allowed, self.file)
 
-    def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
-        """Read a table that holds no keys but those allowed.
+class Entry:
+    """Value under a key of a file, with the ways to read it.
 
-        `key`: "" for the top of the file.
-        """
+    Parameters
+    ----------
+    key : dotted, "" for the top of the file.
+    value : as TOML has it; None: the file has no such entry.
+    """
+
+    QUANTITY = 'with a unit, like "1 {}"'
+    """The form of a number of a unit, as errors say it. Likewise of several, and of a
+    polar pair.
+    """
+    QUANTITIES = '["1 {0}", "2 {0}"]'
+    POLAR = '["1 {0}", "0 deg"]'
+    COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
+    """A place or a force by its components; empty where it has to be polar."""
+
+    def __init__(self, file: SceneFile, key: str, value: Any) -> None:
+        self.file = file
+        self.key = key
+        self.value = value
+
+    def holding(self, value: Any) -> Self:
+        """Return an entry of the same key with another value."""
+        return type(self)(self.file, self.key, value)
+
+    def __getitem__(self, name: str) -> Self:
+        """Return the entry of a name in this table."""
+        key = f"{self.key}.{name}".strip(".")
+        return type(self)(self.file, key, self.value.get(name))
+
+    def entries(self) -> list[Self]:
+        """List the entries of a list."""
+        return [
+            type(self)(self.file, f"{self.key}[{index}]", value)
+            for index, value in enumerate(self.value)
+        ]
+
+    def refuse(self, allowed: str) -> InputError:
+        """Make the error for the entry, or a missing one."""
+        missing = "is missing; " if self.value is None else ""
+        value = _shorten_for_error(self.value)
+        return InputError(self.key, value, missing + allowed, self.file.name)
+
+    def table(self, allowed: Iterable[str]) -> dict[str, Any]:
+        """Read a table that holds no keys but those allowed."""
         names = list(allowed)
-        if not isinstance(value, dict):
-            allowed = f"must be a table with the keys {', '.join(names)}"
-            raise self.refuse(key, value, allowed)
-        for name, entry in value.items():
+        if not isinstance(self.value, dict):
+            raise self.refuse(f"must be a table with the keys {', '.join(names)}")
+        for name, entry in self.value.items():
             if name not in names:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
-                if _TABLE_OF.get(name, key) != key:
+                if _TABLE_OF.get(name, self.key) != self.key:
                     known = f"write it under [{_TABLE_OF[name]}]"
                 if "inertia" in names and name in _FORMULAS:
                     known = _FORMULAS[name]
-                if _is_elsewhere(key, value, names):
+                if _is_elsewhere(self.key, self.value, names):
                     known = ELSEWHERE
-                raise self.refuse(_join_key(key, name), entry, f"unknown key; {known}")
-        return value
+                unknown = type(self)(self.file, _join_key(self.key, name), entry)
+                raise unknown.refuse(f"unknown key; {known}")
+        return self.value
 
-    def text(self, key: str, value: object) -> str:
+    def text(self) -> str:
         """Read a string."""
-        if not isinstance(value, str):
-            raise self.refuse(key, value, "must be a text in quotes")
-        return value
+        if not isinstance(self.value, str):
+            raise self.refuse("must be a text in quotes")
+        return self.value
 
-    def choice(self, key: str, value: object, allowed: Iterable[str]) -> Any:
+    def choice(self, allowed: Iterable[str]) -> Any:
         """Read one of a few words."""
         words = list(allowed)
-        if value not in words:
+        if self.value not in words:
             quoted = " or ".join(f'"{word}"' for word in words)
-            meant = _suggest_word(value, words)
-            raise self.refuse(key, value, f"{meant}must be {quoted}")
-        return value
+            raise self.refuse(f"{_suggest_word(self.value, words)}must be {quoted}")
+        return self.value
 
-    def whole(self, key: str, value: Any, least: int, most: int) -> int:
+    def whole(self, least: int, most: int) -> int:
         """Read an integer of a range, both ends included."""
-        if type(value) is not int or not least <= value <= most:
-            allowed = f"must be a whole number from {least} to {most}"
-            raise self.refuse(key, value, allowed)
-        return value
+        if type(self.value) is not int or not least <= self.value <= most:
+            raise self.refuse(f"must be a whole number from {least} to {most}")
+        return self.value
 
-    def bar(self, key: str, value: object, bars: tuple[int, ...] = MOVING_BARS) -> int:
+    def bar(self, bars: tuple[int, ...] = MOVING_BARS) -> int:
         """Read the number of a bar, one of `bars`."""
+        value = self.value
         if type(value) is not int or value not in bars:
             *others, last = (f"{bar} ({BAR_NAMES[bar]})" for bar in bars)
             allowed = f"must be {', '.join(others)} or {last}"
             if isinstance(value, int) and value > len(BAR_NAMES):
                 allowed = f"{allowed}: {ELSEWHERE}"
-            raise self.refuse(key, value, allowed)
+            raise self.refuse(allowed)
         return value
 
-    def number(self, key: str, value: Any) -> float:
+    def number(self) -> float:
         """Read a number without a dimension."""
-        if type(value) not in (int, float) or not math.isfinite(value):
+        if type(self.value) not in (int, float) or not math.isfinite(self.value):
             allowed = "must be a finite number without a unit, and without quotes"
-            raise self.refuse(key, value, allowed)
-        return float(value)
+            raise self.refuse(allowed)
+        return float(self.value)
 
-    def quantity(
-        self,
-        key: str,
-        value: object,
-        unit: str,
-        bound: str = ANY_NUMBER,
-    ) -> float:
+    def quantity(self, unit: str, bound: str = ANY_NUMBER) -> float:
         """Read a number in `unit`; with unit "1" it has none."""
         if unit == "1":
-            return self.number(key, value)
+            return self.number()
         wanted = f"must be {bound} {self.QUANTITY.format(name_unit(unit))}"
-        number = self.in_si(key, value, unit, wanted)
+        number = self.in_si(unit, wanted)
         if not is_within(number, bound):
-            raise self.refuse(key, value, wanted)
+            raise self.refuse(wanted)
         return number
 
-    def in_si(self, key: str, value: Any, unit: str, wanted: str) -> float:
+    def in_si(self, unit: str, wanted: str) -> float:
         """Convert a text with a unit to a number in `unit`."""
+        value = self.value
         if type(value) in (int, float):
-            like = f"{value:.6g} {self._find_likely_unit(key, unit)}"
+            like = f"{value:.6g} {self._find_likely_unit(unit)}"
             missing = f'the unit is missing; did you mean "{like}"? {wanted}'
-            raise self.refuse(key, value, missing)
+            raise self.refuse(missing)
         if value == "drawn":
-            _, _, name = key.partition("motion.")
+            _, _, name = self.key.partition("motion.")
             name = name.partition(".")[0]
-            if name in self.drawn:
-                return self.drawn[name]
+            if name in self.file.drawn:
+                return self.file.drawn[name]
             allowed = "stands for what a drawing has, and the scene has no [pins]; "
-            raise self.refuse(key, value, allowed + wanted)
+            raise self.refuse(allowed + wanted)
         if not isinstance(value, str):
-            raise self.refuse(key, value, wanted)
+            raise self.refuse(wanted)
         try:
             return to_si(value, unit)
         except UnitError as error:
@@ -248,22 +271,22 @@ class Reader:
             if unit == "rad" and value.casefold() in DIRECTION_WORDS:
                 hint = f'did you mean "{DIRECTION_WORDS[value.casefold()]}"? '
             elif str(error) == UNIT_MISSING:
-                likely = self._find_likely_unit(key, unit)
+                likely = self._find_likely_unit(unit)
                 hint = f'did you mean "{value.strip()} {likely}"? '
             elif unit == "kg" and converts(find_unit(value, "m"), "kg/m"):
                 hint = f'did you mean mass_per_length = "{value.strip()}"? '
-            raise self.refuse(key, value, f"{error}; {hint}{wanted}") from None
+            raise self.refuse(f"{error}; {hint}{wanted}") from None
 
-    def _find_likely_unit(self, key: str, unit: str) -> str:
+    def _find_likely_unit(self, unit: str) -> str:
         """Return the unit in which a number without one was probably meant.
 
         The nearest number of its kind decides, first in the entry's own table, then in
         those around it.
         """
-        holder: Any = self.document
+        holder: Any = self.file.document
         around = [holder]
         with suppress(LookupError, TypeError):
-            for step in split_key(key):
+            for step in split_key(self.key):
                 holder = holder[step]
                 around.append(holder)
         for holder in reversed(around):
@@ -273,64 +296,47 @@ class Reader:
                     return stated
         return name_unit(unit, _LIKELY.get(unit))
 
-    def declared(self, key: str, value: object, by: Declared) -> Any:
+    def declared(self, by: Declared) -> Any:
         """Read a number, or a pair of numbers, as it is declared."""
-        if value is None and by.left_out is not REQUIRED_NUMBER:
+        if self.value is None and by.left_out is not REQUIRED_NUMBER:
             return by.left_out
         if by.pair:
-            return self.pair(key, value, by)
-        return self.quantity(key, value, by.unit, by.bound)
+            return self.pair(by)
+        return self.quantity(by.unit, by.bound)
 
-    def numbers(
-        self,
-        key: str,
-        given: Mapping[str, object],
-        numbers: Mapping[str, Declared],
-    ) -> dict[str, Any]:
-        """Read each of some numbers, by name."""
-        return {
-            name: self.declared(f"{key}.{name}".strip("."), given.get(name), by)
-            for name, by in numbers.items()
-        }
+    def numbers(self, numbers: Mapping[str, Declared]) -> dict[str, Any]:
+        """Read some numbers of this table, by name."""
+        return {name: self[name].declared(by) for name, by in numbers.items()}
 
-    def pair(self, key: str, value: object, by: Declared) -> tuple[float, float]:
+    def pair(self, by: Declared) -> tuple[float, float]:
         """Read a declared pair: two numbers, or { x, y } of a magnitude and angle."""
         is_polar = by.pair == "rad"
-        if is_polar and isinstance(value, dict) and self.COORDINATES:
-            entry = self.table(key, value, ("x", "y"))
-            x, y = (
-                self.quantity(f"{key}.{name}", entry.get(name), by.unit)
-                for name in "xy"
-            )
+        if is_polar and isinstance(self.value, dict) and self.COORDINATES:
+            self.table("xy")
+            x, y = (self[name].quantity(by.unit) for name in "xy")
             if not math.isfinite(math.hypot(x, y)):
-                raise self.refuse(key, value, "must have a finite size")
-            self.coordinates[key] = x, y
+                raise self.refuse("must have a finite size")
+            self.file.coordinates[self.key] = x, y
             return convert_to_polar(x, y)
-        if not isinstance(value, list) or len(value) != 2:
+        if not isinstance(self.value, list) or len(self.value) != 2:
             form = f'["1 {by.unit}", "1 {by.pair}"]'
             if is_polar:
                 form = f"{self.POLAR} {self.COORDINATES}".strip()
                 form = form.format(name_unit(by.unit))
-            raise self.refuse(key, value, f"must be a pair like {form}")
-        first, second = (
-            self.quantity(f"{key}[{index}]", value[index], unit, by.bounds[index])
-            for index, unit in enumerate(by.units)
-        )
+            raise self.refuse(f"must be a pair like {form}")
+        first, second = map(type(self).quantity, self.entries(), by.units, by.bounds)
         return first, second
 
-    def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
+    def quantities(self, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
-        if not isinstance(value, list):
+        if not isinstance(self.value, list):
             form = f"like {self.QUANTITIES.format(name_unit(unit))}"
             if unit == "1":
                 form = "of numbers without a unit"
-            raise self.refuse(key, value, f"must be a list {form}")
-        return tuple(
-            self.quantity(f"{key}[{index}]", entry, unit)
-            for index, entry in enumerate(value)
-        )
+            raise self.refuse(f"must be a list {form}")
+        return tuple(entry.quantity(unit) for entry in self.entries())
 
-    def described(self, key: str, value: Any, kind: Any, **stated: Any) -> Any:
+    def described(self, kind: Any, **stated: Any) -> Any:
         """Read a description of a class by the declarations of its fields.
 
         A place is stated by `from_pin`, `from_centre` or `point`, in polar form or by x
@@ -339,36 +345,35 @@ class Reader:
         `stated`: fields that stand elsewhere.
         """
         if issubclass(kind, PinRows):
-            return kind(self._read_rows(key, value, kind))
+            return kind(self._read_rows(kind.numbers))
         fields: Any = list_declared(kind)
         if [field.key for field in fields] == _PAIR:
-            by = Declared(fields[0].by.unit, pair="rad")
-            return kind(*self.pair(key, value, by))
+            return kind(*self.pair(Declared(fields[0].by.unit, pair="rad")))
         if [field.key for field in fields if isinstance(field.by, Entries)] == [""]:
-            return kind(self._read_field(key, {"": value}, fields[0]))
-        entry = self.table(key, value, list_keys(kind))
+            return kind(self.holding({"": self.value})._read_field(fields[0]))
+        self.table(list_keys(kind))
         make = kind
         for form, numbers in getattr(kind, "forms", {}).items():
-            if form in entry:
+            if form in self.value:
                 make = getattr(kind, form)
                 fields = [one for one in fields if not isinstance(one.by, Declared)]
-                self.table(key, entry, (*(field.key for field in fields), form))
-                table = self.table(f"{key}.{form}", entry[form], numbers)
-                stated |= self.numbers(f"{key}.{form}", table, numbers)
+                self.table((*(field.key for field in fields), form))
+                self[form].table(numbers)
+                stated |= self[form].numbers(numbers)
         if states_place(kind):
             by = next(field.by for field in fields if field.name == "bar")
-            place = self._read_place(key, entry, by.bars)._asdict()
+            place = self._read_place(by.bars)._asdict()
             for field in fields:
                 if field.name in place:
                     stated[field.name] = place[field.name]
         for field in fields:
             if field.name not in stated:
-                stated[field.name] = self._read_field(key, entry, field)
-        with self._knowing(key, kind.stated_at):
+                stated[field.name] = self._read_field(field)
+        with self._knowing(kind.stated_at):
             return make(**stated)
 
     @contextmanager
-    def _knowing(self, key: str, section: str) -> Iterator[None]:
+    def _knowing(self, section: str) -> Iterator[None]:
         """Name the file and the key in errors of one description of a section."""
         try:
             yield
@@ -376,82 +381,78 @@ class Reader:
             if error.file or "{" in section:
                 raise
             inner = error.key.removeprefix(section).removeprefix(".")
-            raise error.moved_to(f"{key}.{inner}".strip("."), self.file) from None
+            key = f"{self.key}.{inner}".strip(".")
+            raise error.moved_to(key, self.file.name) from None
 
-    def _read_field(
-        self, key: str, entry: Mapping[str, Any], field: DeclaredField
-    ) -> Any:
-        """Read one field of a description from the entries of its table."""
-        path = f"{key}.{field.key}".rstrip(".")
-        value = entry.get(field.key)
+    def _read_field(self, field: DeclaredField) -> Any:
+        """Read one field of a description from this table."""
+        entry = self[field.key]
         by = field.by
         if isinstance(by, At):
             if by.is_value:
-                return self._read_place(key, entry, by.bars)
-            table = self.table(path, value, _KEYS_OF_PLACE)
-            end = self._read_place(path, table, by.bars)
+                return self._read_place(by.bars)
+            entry.table(_KEYS_OF_PLACE)
+            end = entry._read_place(by.bars)
             return end._replace(from_pin=AT_FIRST_PIN) if end == Place(end.bar) else end
-        if value is None and field.left_out is not REQUIRED_NUMBER:
+        if entry.value is None and field.left_out is not REQUIRED_NUMBER:
             return field.left_out
         if isinstance(by, Entries):
-            if not isinstance(value, list) or not 1 <= len(value) <= by.most:
-                allowed = f"must be a list of 1 to {by.most} {field.name}"
-                raise self.refuse(path, value, allowed)
-            return tuple(
-                self.described(f"{path}[{index}]", one, by.kind)
-                for index, one in enumerate(value)
-            )
+            if (
+                not isinstance(entry.value, list)
+                or not 1 <= len(entry.value) <= by.most
+            ):
+                raise entry.refuse(f"must be a list of 1 to {by.most} {field.name}")
+            return tuple(one.described(by.kind) for one in entry.entries())
         if isinstance(by, Part):
-            return self.described(path, value, by.kind)
+            return entry.described(by.kind)
         if isinstance(by, Listed):
-            return self.quantities(path, value, by.unit)
+            return entry.quantities(by.unit)
         if isinstance(by, Whole):
-            return self.whole(path, value, by.least, by.most)
+            return entry.whole(by.least, by.most)
         if isinstance(by, OneOf):
-            return self.choice(path, value, by.words)
+            return entry.choice(by.words)
         if isinstance(by, OfBar):
-            return self.bar(path, value, by.bars)
-        return self.declared(path, value, by)
+            return entry.bar(by.bars)
+        return entry.declared(by)
 
-    def _read_rows(self, key: str, value: object, kind: Any) -> tuple[Any, ...]:
+    def _read_rows(self, numbers: Mapping[str, Declared]) -> tuple[Any, ...]:
         """Read what each pin has: one number, or a table of several."""
         rows = []
-        for pin, entry in self.table(key, value, PINS).items():
-            path = f"{key}.{pin}"
-            stated = {"": entry}
-            if "" not in kind.numbers:
-                stated = self.table(path, entry, kind.numbers)
-            rows.append((pin, *self.numbers(path, stated, kind.numbers).values()))
+        for pin in self.table(PINS):
+            if "" not in numbers:
+                self[pin].table(numbers)
+                stated = self[pin]
+            else:
+                stated = self[pin].holding({"": self.value[pin]})
+            rows.append((pin, *stated.numbers(numbers).values()))
         return tuple(rows)
 
-    def _read_place(
-        self, key: str, entry: Mapping[str, Any], allowed_bars: tuple[int, ...]
-    ) -> Place:
-        """Read the bar of an entry, one of some, and its place, which one key states.
+    def _read_place(self, allowed_bars: tuple[int, ...]) -> Place:
+        """Read the bar of this table, one of some, and its place, which one key states.
 
-        An entry without such a key is at the bar's first pin.
+        A table without such a key is at the bar's first pin.
         """
-        stated = [name for name in PLACES_OF_LOADS if name in entry]
+        stated = [name for name in PLACES_OF_LOADS if name in self.value]
         if len(stated) > 1:
             allowed = f"{stated[0]} states the place already; state one of them"
-            raise self.refuse(f"{key}.{stated[1]}", entry[stated[1]], allowed)
-        bars = self.bars
-        name: Any = entry.get("point")
+            raise self[stated[1]].refuse(allowed)
+        bars = self.file.bars
+        name = self.value.get("point")
+        of_bar = self["bar"]
         if name is not None:
             if name not in [*bars] and (not bars or name in [*PINS]):
-                allowed = (
+                raise self["point"].refuse(
                     "must be a point of [points]; the first pin of a bar is "
                     'from_pin = ["0 m", "0 deg"], the second has its length in place of'
                     " 0"
                 )
-                raise self.refuse(f"{key}.point", name, allowed)
-            self.choice(f"{key}.point", name, bars)
-        bar = self.bar(f"{key}.bar", entry.get("bar", bars.get(name)), allowed_bars)
+            self["point"].choice(bars)
+            if of_bar.value is None:
+                of_bar.value = bars[name]
+        bar = of_bar.bar(allowed_bars)
         if name is not None and bar != bars[name]:
-            allowed = f"the point {name} is on bar {bars[name]}"
-            raise self.refuse(f"{key}.bar", bar, allowed)
-        pairs = self.numbers(key, entry, STATED_PLACES)
-        return Place(bar, **pairs, point=name)
+            raise of_bar.refuse(f"the point {name} is on bar {bars[name]}")
+        return Place(bar, **self.numbers(STATED_PLACES), point=name)
 
 
 def list_keys(kind: Any) -> tuple[str, ...]:

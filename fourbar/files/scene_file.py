@@ -32,11 +32,18 @@ from fourbar.files.drawn_pins import (
     read_ground,
     state_places,
 )
-from fourbar.files.fields import BARE_KEY, PLACES_OF_ENDS, Reader, list_keys
+from fourbar.files.fields import (
+    BARE_KEY,
+    PLACES_OF_ENDS,
+    Entry,
+    SceneFile,
+    list_keys,
+)
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS, SIGMA
 from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import (
     BAR_NAMES,
+    BAR_NUMBERS,
     MOST_INTERVALS,
     POSITIVE,
     Bar,
@@ -97,6 +104,19 @@ SCENE_TABLES = (
     "tolerances",
     "picture",
 )
+_LEFT_OUT: dict[str, Any] = {
+    "title": "",
+    "source": "",
+    "loads": [],
+    "lengths": {},
+    "bars": {},
+    "motion": {},
+    "drive": {},
+    "points": {},
+    "effects": {},
+    "tolerances": {},
+}
+"""What stands for the tables that a file leaves out."""
 _A_GIVEN_DRIVE = (
     "a drive is what is solved for; a torque or force that is given is a load"
     " ([[loads]]), which moves the linkage with motion.free"
@@ -182,7 +202,8 @@ def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:
     """
     shown = _write_name(name)
     try:
-        return read_scene(Reader(shown, document), document, str(Path(name).parent))
+        file = SceneFile(shown, document)
+        return read_scene(Entry(file, "", document), str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
 
@@ -216,274 +237,263 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     return InputError(key, value, f"cannot be read as TOML: {why}", shown)
 
 
-def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
+def read_scene(document: Entry, folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
-    top = dict(read.table("", document, SCENE_TABLES))
-    drawing = read_drawing(read, top)
-    drawn = drawing or read_ground(read, top.get("lengths"))
-    for key in top.keys() - {"pins", "lengths"}:
-        top[key] = state_places(read, key, top[key], drawn)
-    points = _read_points(read, top.get("points", {}))
-    read.bars = {point.name: point.bar for point in points}
-    drive_bar, drive = _read_drive(read, top.get("drive", {}))
-    entries = top.get("loads", [])
-    if not isinstance(entries, list) or len(entries) > _MOST_LOADS:
-        allowed = f"must be written as [[loads]], at most {_MOST_LOADS}"
-        raise read.refuse("loads", entries, allowed)
-    effects = read.table("effects", top.get("effects", {}), list_kinds())
-    lengths, met = _read_lengths(read, top, drawn)
-    bars = top.get("bars", {})
-    linkage = _read_linkage(read, bars, met, drawn.angle(1))
+    document.table(SCENE_TABLES)
+    drawing = read_drawing(document)
+    drawn = drawing or read_ground(document["lengths"])
+    stated = _LEFT_OUT | document.value
+    for key in document.value.keys() - {"pins", "lengths"}:
+        stated[key] = state_places(document[key], drawn)
+    top = document.holding(stated)
+    points = _read_points(top["points"])
+    top.file.bars = {point.name: point.bar for point in points}
+    drive_bar, drive = _read_drive(top["drive"])
+    loads = top["loads"]
+    if not isinstance(loads.value, list) or len(loads.value) > _MOST_LOADS:
+        raise loads.refuse(f"must be written as [[loads]], at most {_MOST_LOADS}")
+    effects = top["effects"]
+    effects.table(list_kinds())
+    lengths, met = _read_lengths(top, drawn)
+    bars = top["bars"]
+    linkage = _read_linkage(bars, met, drawn.angle(1))
     pictures = []
     for name, bar in MOVING_BAR_NUMBERS.items():
-        if "picture" in bars.get(name, {}):  # its file is read when it is shown
-            text = read.text(f"bars.{name}.picture", bars[name]["picture"])
-            pictures.append(Picture(bar, text, folder))
+        if "picture" in bars.value.get(name, {}):  # its file is read when it is shown
+            pictures.append(Picture(bar, bars[name]["picture"].text(), folder))
     settled = drive and drive.with_places(settler(linkage, points))
     scene = Scene(
         linkage,
-        _read_motion(read, top.get("motion", {}), drawing, settled),
+        _read_motion(top["motion"], drawing, settled),
         drive_bar,  # type: ignore[arg-type]
-        tuple(
-            _read_load(read, f"loads[{index}]", entry)
-            for index, entry in enumerate(entries)
-        ),
-        tuple(_read_effect(read, key, value) for key, value in effects.items()),
-        read.text("title", top.get("title", "")),
-        read.text("source", top.get("source", "")),
+        tuple(map(_read_load, loads.entries())),
+        tuple(_read_effect(effects[key], list_kinds()[key]) for key in effects.value),
+        top["title"].text(),
+        top["source"].text(),
         tuple(pictures),
         points,
         drive=drive,
         drawing=drawing,
-        picture=_read_traced(read, top.get("picture"), folder),
+        picture=_read_traced(top["picture"], folder),
     )
     if drawing is not None:
         scene = choose_assembly(scene, drawing)
     return replace(
         scene,
-        coordinates=tuple(read.coordinates.items()),
+        coordinates=tuple(top.file.coordinates.items()),
         met_lengths=None if met == lengths else (lengths, met),
-        tolerances=_read_tolerances(read, scene, top.get("tolerances", {})),
+        tolerances=_read_tolerances(top["tolerances"], scene),
     )
 
 
-def _read_drive(read: Reader, value: object) -> tuple[int | None, ForceDrive | None]:
+def _read_drive(drive: Entry) -> tuple[int | None, ForceDrive | None]:
     """Read the bar on which a couple acts, or a force along a line or at a place."""
-    if isinstance(value, dict):
+    if isinstance(drive.value, dict):
         for name in ("torque", "moment", "force"):
-            if name in value:
-                raise read.refuse(f"drive.{name}", value[name], _A_GIVEN_DRIVE)
+            if name in drive.value:
+                raise drive[name].refuse(_A_GIVEN_DRIVE)
     on_line = list_keys(LinearDrive)
     allowed = dict.fromkeys(("bar", *on_line, *list_keys(PointDrive)))
-    entry = read.table("drive", value, allowed)
-    stated = entry.keys()
+    stated = drive.table(allowed).keys()
     kind: Any = PointDrive
     if not stated.isdisjoint(on_line):
         kind = LinearDrive
         for name in stated - {*on_line}:
-            raise read.refuse(f"drive.{name}", entry[name], _A_LINE)
-    elif stated <= {"bar"}:
-        return read.bar("drive.bar", entry.get("bar", 2)), None
+            raise drive[name].refuse(_A_LINE)
+    elif not stated:
+        return 2, None
+    elif stated == {"bar"}:
+        return drive["bar"].bar(), None
     elif stated.isdisjoint(PLACES_OF_ENDS):
-        read.bar("drive.bar", entry.get("bar"))
-        raise read.refuse("drive.point", None, _A_POINT)
-    return None, read.described("drive", entry, kind)
+        drive["bar"].bar()
+        raise drive["point"].refuse(_A_POINT)
+    return None, drive.described(kind)
 
 
-def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
-    if not isinstance(value, dict) or len(value) > MOST_POINTS_OF_A_SCENE:
-        allowed = f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}"
-        raise read.refuse("points", value, allowed)
-    points = []
-    for name, point in value.items():
-        key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
-        points.append(read.described(key, point, Point, name=name))
-    return tuple(points)
+def _read_points(points: Entry) -> tuple[Point, ...]:
+    if not isinstance(points.value, dict) or len(points.value) > MOST_POINTS_OF_A_SCENE:
+        raise points.refuse(
+            f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}"
+        )
+    read = []
+    for name, value in points.value.items():
+        entry = points.holding(value)
+        if BARE_KEY.fullmatch(name):
+            entry = points[name]
+        read.append(entry.described(Point, name=name))
+    return tuple(read)
 
 
-def _read_traced(read: Reader, value: object, folder: str) -> TracedPicture | None:
+def _read_traced(picture: Entry, folder: str) -> TracedPicture | None:
     """Read the picture under the drawing; its file is read when it is shown."""
-    if value is None:
+    if picture.value is None:
         return None
-    entry = read.table("picture", value, ("file", "origin", *_PICTURE))
-    origin = entry.get("origin")
+    picture.table(("file", "origin", *_PICTURE))
+    pixel = picture["origin"]
+    origin = pixel.value
     if origin is not None:
         if not isinstance(origin, list) or len(origin) != 2:
-            raise read.refuse("picture.origin", origin, "must be a pixel [x, y]")
-        x, y = (read.number("picture.origin", number) for number in origin)
+            raise pixel.refuse("must be a pixel [x, y]")
+        x, y = (pixel.holding(number).number() for number in origin)
         origin = (x, y)
-    numbers = read.numbers("picture", entry, _PICTURE)
-    name = read.text("picture.file", entry.get("file"))
-    return TracedPicture(name, origin, folder=folder, **numbers)
+    numbers = picture.numbers(_PICTURE)
+    return TracedPicture(picture["file"].text(), origin, folder=folder, **numbers)
 
 
-def _read_lengths(
-    read: Reader, top: dict[str, Any], drawn: DrawnPins | DrawnGround
-) -> tuple[Any, Any]:
+def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]:
     """Read the lengths of ground, input, coupler and output, m.
 
     Return them as they are stated, and with the equalities of change points that their
     last decimals miss.
     """
     if isinstance(drawn, DrawnPins):
-        return tuple(map(drawn.length, BAR_NAMES)), meet_lengths(drawn, top["pins"])
-    names = tuple(BAR_NAMES.values())
-    allowed = (*names, "ground_angle")
-    stated = dict(read.table("lengths", top.get("lengths", {}), allowed))
+        return tuple(map(drawn.length, BAR_NAMES)), meet_lengths(
+            drawn, top["pins"].value
+        )
+    table = top["lengths"]
+    stated = dict(table.table((*BAR_NUMBERS, "ground_angle")))
     if drawn.length is not None:
         # with every digit: lengths are compared within those that are stated
         stated["ground"] = f"{drawn.length:.16e} m"
-    declared = dict.fromkeys(names, Bar.numbers["length"])
-    lengths: Any = tuple(read.numbers("lengths", stated, declared).values())
+    declared = dict.fromkeys(BAR_NUMBERS, Bar.numbers["length"])
+    lengths: Any = tuple(table.holding(stated).numbers(declared).values())
     if not math.isfinite(sum(lengths)):  # refused where they are put together
         return lengths, lengths
-    roundings: Any = tuple(half_unit_of_text(stated[name], "m") for name in names)
+    roundings: Any = tuple(half_unit_of_text(stated[name], "m") for name in declared)
     return lengths, meet_change_points(lengths, roundings)
 
 
-def _read_linkage(
-    read: Reader, value: object, lengths: tuple[float, ...], angle: float
-) -> FourBar:
-    tables = read.table("bars", value, MOVING_BAR_NUMBERS)
+def _read_linkage(bars: Entry, lengths: tuple[float, ...], angle: float) -> FourBar:
+    bars.table(MOVING_BAR_NUMBERS)
     ground, *moving = lengths
     two, three, four = (
-        _read_bar(read, f"bars.{name}", tables.get(name, {}), length)
+        _read_bar(bars[name], length)
         for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
     )
     return FourBar(ground, two, three, four, angle)
 
 
-def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
+def _read_bar(bar: Entry, length: float) -> Bar:
+    if bar.value is None:
+        return Bar(length)
     declared = dict(Bar.numbers)
     del declared["length"]
-    entry = read.table(key, value, (*declared, "picture"))
-    numbers = read.numbers(key, entry, declared)
+    bar.table((*declared, "picture"))
+    numbers = bar.numbers(declared)
     inertia = numbers["mass"] * length * length
     if numbers["inertia"] is None and not math.isfinite(inertia):
-        allowed = "must leave the inertia m L^2/12 a finite number"
-        raise read.refuse(f"{key}.mass", entry.get("mass"), allowed)
+        raise bar["mass"].refuse("must leave the inertia m L^2/12 a finite number")
     try:
         return Bar(length, **numbers)
     except InputError as error:  # which knows of one bar alone
-        value = entry.get(error.key)
-        raise read.refuse(f"{key}.{error.key}", value, error.allowed) from None
+        raise bar[error.key].refuse(error.allowed) from None
 
 
 def _read_motion(
-    read: Reader, value: object, drawing: DrawnPins | None, drive: ForceDrive | None
+    motion: Entry, drawing: DrawnPins | None, drive: ForceDrive | None
 ) -> Motion:
     """Read the motion, in which the word "drawn" stands for the numbers of a drawing.
 
     A side that is left out of a commanded stroke is the drawn one.
     """
-    entry = read.table(
-        "motion", value, (*Motion.numbers, "side", "branch", "free", "law")
-    )
+    entry = motion.table((*Motion.numbers, "side", "branch", "free", "law"))
     if drawing is not None:
-        read.drawn = list_drawn(drawing, drive)
+        motion.file.drawn = list_drawn(drawing, drive)
         by_stroke = not entry.keys().isdisjoint(STROKE_COMMAND)
         if entry.get("side", DRAWN_WORD if by_stroke else None) == DRAWN_WORD:
-            entry = {**entry, "side": find_side_of_cylinder(drawing, drive)}
+            side = find_side_of_cylinder(drawing, drive)
+            motion = motion.holding({**entry, "side": side})
     arguments: dict[str, Any] = {}
     for name, by in Motion.numbers.items():
-        if name in entry:
-            stated = entry[name]
-            key = f"motion.{name}"
-            if name in (*BAR_OF_ANGLE, "stroke"):
-                arguments[name] = _read_commanded(read, key, stated, by.unit)
-            elif isinstance(stated, list):
-                arguments[name] = read.quantities(key, stated, by.unit)
-            else:
-                arguments[name] = read.quantity(key, stated, by.unit)
+        stated = motion[name]
+        if stated.value is None:
+            continue
+        if name in (*BAR_OF_ANGLE, "stroke"):
+            arguments[name] = _read_commanded(stated, by.unit)
+        elif isinstance(stated.value, list):
+            arguments[name] = stated.quantities(by.unit)
+        else:
+            arguments[name] = stated.quantity(by.unit)
     for name, words in (("branch", BRANCH_OF_NAME), ("side", SIDES)):
-        if name in entry:
-            arguments[name] = read.choice(f"motion.{name}", entry[name], words)
+        if name in motion.value:
+            arguments[name] = motion[name].choice(words)
     if "free" in entry:
-        arguments["free"] = read.described("motion.free", entry["free"], Free)
+        arguments["free"] = motion["free"].described(Free)
     if "law" in entry:
-        arguments["law"] = _read_law(read, entry["law"])
+        arguments["law"] = _read_law(motion["law"])
     return Motion(**arguments)
 
 
-def _read_law(read: Reader, value: Any) -> Law | Rise | Sine:
+def _read_law(entry: Entry) -> Law | Rise | Sine:
     """Read a table; a sine; or a rise, a dwell, a fall and a rest by a standard law."""
-    key = "motion.law"
     law: Any = Law
-    if isinstance(value, dict) and "kind" in value:
+    if isinstance(entry.value, dict) and "kind" in entry.value:
         law = Rise
-        if read.choice(f"{key}.kind", value["kind"], LAW_KINDS) == SINE_LAW:
+        if entry["kind"].choice(LAW_KINDS) == SINE_LAW:
             law = Sine
-            value = {name: number for name, number in value.items() if name != "kind"}
-    return read.described(key, value, law)  # type: ignore[no-any-return]
+            numbers = dict(entry.value)
+            del numbers["kind"]
+            entry = entry.holding(numbers)
+    return entry.described(law)  # type: ignore[no-any-return]
 
 
-def _read_commanded(
-    read: Reader,
-    key: str,
-    value: Any,
-    unit: str,
-) -> float | Array | Sweep | FromLimit:
+def _read_commanded(entry: Entry, unit: str) -> float | Array | Sweep | FromLimit:
     """Read angles or strokes: one, a list of them, or a sweep.
 
     An angle may be stated from a limit position.
     """
+    value = entry.value
     if isinstance(value, str) and _LIKE_A_SWEEP.search(value):
         form = '{ from = "0 deg", to = "360 deg", steps = 360 }'
-        raise read.refuse(key, value, f"is no number; a sweep is written {form}")
+        raise entry.refuse(f"is no number; a sweep is written {form}")
     if isinstance(value, str | int | float):
-        return read.quantity(key, value, unit)
+        return entry.quantity(unit)
     if isinstance(value, list) and value:
-        return np.array(read.quantities(key, value, unit))
+        return np.array(entry.quantities(unit))
     is_angle = unit == "rad"
     if not isinstance(value, dict):
         like = '"1.5 m", a list of such, { from, to, steps }'
         if is_angle:
             like = '"135 deg", a list of such, { from, to, steps } or { limit, offset }'
-        raise read.refuse(key, value, f"must be like {like}")
+        raise entry.refuse(f"must be like {like}")
     if is_angle and value.keys() & {"limit", "offset"}:
-        return read.described(key, value, FromLimit)  # type: ignore[no-any-return]
-    sweep = read.table(key, value, ("from", "to", "steps"))
-    start, stop = (
-        read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to")
-    )
-    steps = sweep.get("steps", DEFAULT_STEPS)
-    return Sweep(start, stop, read.whole(f"{key}.steps", steps, 1, MOST_INTERVALS))
+        return entry.described(FromLimit)  # type: ignore[no-any-return]
+    entry.table(("from", "to", "steps"))
+    start, stop = (entry[end].quantity(unit) for end in ("from", "to"))
+    steps = DEFAULT_STEPS
+    if "steps" in value:
+        steps = entry["steps"].whole(1, MOST_INTERVALS)
+    return Sweep(start, stop, steps)
 
 
-def _read_load(read: Reader, key: str, value: Any) -> Load:
-    if isinstance(value, dict):
-        if value.keys().isdisjoint(("force", "moment")):
-            read.table(key, value, list_keys(Load))
-            raise read.refuse(key, value, "must have a force, a moment or both")
-        table = value.get("table")
-        if isinstance(table, dict) and "time" in table:
-            raise read.refuse(f"{key}.table.time", table["time"], _OVER_THETA_2)
-    return read.described(key, value, Load)  # type: ignore[no-any-return]
+def _read_load(load: Entry) -> Load:
+    if isinstance(load.value, dict):
+        if load.value.keys().isdisjoint(("force", "moment")):
+            load.table(list_keys(Load))
+            raise load.refuse("must have a force, a moment or both")
+        table = load["table"]
+        if isinstance(table.value, dict) and "time" in table.value:
+            raise table["time"].refuse(_OVER_THETA_2)
+    return load.described(Load)  # type: ignore[no-any-return]
 
 
-def _read_effect(read: Reader, name: str, value: object) -> Any:
+def _read_effect(effect: Entry, kind: Any) -> Any:
     """Read an effect from the value under its key."""
-    kind: Any = list_kinds()[name]
-    key = f"effects.{name}"
-    if kind.example and not isinstance(value, dict | list):
-        raise read.refuse(key, value, f"must be like {kind.example}")
-    return read.described(key, value, kind)
+    if kind.example and not isinstance(effect.value, dict | list):
+        raise effect.refuse(f"must be like {kind.example}")
+    return effect.described(kind)
 
 
-def _read_tolerances(
-    read: Reader,
-    scene: Scene,
-    value: object,
-) -> tuple[Tolerance, ...]:
+def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
     """Read ``"lengths.input" = "0.05 mm"`` or ``["0.02 mm", "sigma"]``.
 
     The first is plus or minus, the second a standard deviation.
     """
     entries = list_entries(scene)
     tolerances = []
-    flat = _flatten(read, value)
+    flat = _flatten(table, table.value)
     for key, stated in flat.items():
-        name = f'tolerances."{key}"'
+        tolerance = Entry(table.file, f'tolerances."{key}"', stated)
         if key not in entries:
             allowed = (
                 "a commanded value has no tolerance; its speed and acceleration may"
@@ -491,36 +501,37 @@ def _read_tolerances(
             )
             if key not in COMMAND_KEYS:
                 allowed = refuse_key(key, stated, list(entries)).allowed
-            raise read.refuse(name, stated, allowed)
-        entry = entries[key]
+            raise tolerance.refuse(allowed)
+        unit = entries[key].unit
         sigma = isinstance(stated, list)
         if sigma and (len(stated) != 2 or stated[1] != SIGMA):
-            form = f'"0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]'
-            raise read.refuse(name, stated, f"must be like {form}")
-        width = stated[0] if sigma else stated
-        size = read.quantity(name, width, entry.unit, POSITIVE)
+            form = f'"0.05 {unit}" or ["0.02 {unit}", "{SIGMA}"]'
+            raise tolerance.refuse(f"must be like {form}")
+        width = tolerance.holding(stated[0] if sigma else stated)
+        size = width.quantity(unit, POSITIVE)
         if size <= 0.0:
-            raise read.refuse(name, width, "must be > 0")
-        tolerance = Tolerance(key, size, sigma)
-        if (misfit := find_misfit(scene, entry, tolerance)) is not None:
-            raise read.refuse(name, width, misfit)
-        tolerances.append(tolerance)
+            raise width.refuse("must be > 0")
+        read = Tolerance(key, size, sigma)
+        if (misfit := find_misfit(scene, entries[key], read)) is not None:
+            raise width.refuse(misfit)
+        tolerances.append(read)
     if (overlap := find_overlap(flat.keys())) is not None:
         length, pin = overlap
-        allowed = f"follows from {pin}, which has a tolerance too: state one of them"
-        raise read.refuse(f'tolerances."{length}"', flat[length], allowed)
+        twice = Entry(table.file, f'tolerances."{length}"', flat[length])
+        raise twice.refuse(
+            f"follows from {pin}, which has a tolerance too: state one of them"
+        )
     return tuple(tolerances)
 
 
-def _flatten(read: Reader, value: object, before: str = "") -> dict[str, Any]:
+def _flatten(table: Entry, value: object, before: str = "") -> dict[str, Any]:
     """Flatten a table to full keys, whether these are quoted or dotted."""
     if not isinstance(value, dict):
-        allowed = 'must be a table of keys like "lengths.input" = "0.05 mm"'
-        raise read.refuse("tolerances", value, allowed)
+        raise table.refuse('must be a table of keys like "lengths.input" = "0.05 mm"')
     flat: dict[str, Any] = {}
     for key, entry in value.items():
         if isinstance(entry, dict):
-            flat |= _flatten(read, entry, f"{before}{key}.")
+            flat |= _flatten(table, entry, f"{before}{key}.")
         else:
             flat[f"{before}{key}"] = entry
     return flat

@@ -17,7 +17,8 @@ from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
 from fourbar.files.drawn_pins import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
-    Reader,
+    Entry,
+    SceneFile,
     convert_to_polar,
     split_key,
     write_declared,
@@ -309,9 +310,9 @@ def write_new_scene(
     """
     texts = [" ".join(text.split()) for text in lengths]
     stated = dict(zip(BAR_NAMES.values(), texts, strict=True))
-    read = Reader("--lengths", stated)
-    declared = dict.fromkeys(stated, Bar.numbers["length"])
-    d, *moving = read.numbers("", stated, declared).values()
+    read = Entry(SceneFile("--lengths", stated), "", stated)
+    numbers = read.numbers(dict.fromkeys(stated, Bar.numbers["length"]))
+    d, *moving = numbers.values()
     a, b, c = map(Bar, moving)
     FourBar(d, a, b, c)
     rows = ["[lengths]"]
@@ -332,11 +333,11 @@ def write_drawn_scene(
 
     Raises InputError as `DrawnPins` does.
     """
-    read = Reader("--pins")
+    file = SceneFile("--pins")
     rows = ["[pins]  # x and y in the position that is drawn"]
     places = []
     for pin, (x, y) in pins.items():
-        places.append(read_point(read, pin, [x, y]))
+        places.append(read_point(Entry(file, pin, [x, y])))
         rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
     drawing = DrawnPins(*places)
     moving = [drawing.length(bar) for bar in MOVING_BARS]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, Written
+from fourbar.files.fields import Entry, SceneFile, Written
 from fourbar.files.scene_file import read_scene
 from fourbar.files.scene_text import list_scene_tables
 from fourbar.formulas.many_digits import WORKING_DIGITS
@@ -55,25 +55,20 @@ KINDS_OF_COMMAND = (*COMMAND_NAMES.values(), STROKE_COMMAND)
 _OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 
 
-class _NumberReader(Reader):
-    """Reads numbers in SI and radians where a scene file has texts with units."""
+class _NumberEntry(Entry):
+    """An entry with numbers in SI and radians in place of texts with units."""
 
     QUANTITY = "in {}"
     QUANTITIES = "[1.0, 2.0], in {}"
     POLAR = "[1.0, 0.0], in {} and rad"
     COORDINATES = ""
 
-    def in_si(
-        self,
-        key: str,
-        value: object,
-        unit: str,
-        wanted: str,
-    ) -> float:
+    def in_si(self, unit: str, wanted: str) -> float:
+        value = self.value
         if type(value) is int and value.bit_length() < 1024:
             return float(value)
         if type(value) is not float or not math.isfinite(value):
-            raise self.refuse(key, value, wanted)
+            raise self.refuse(wanted)
         return value
 
 
@@ -120,9 +115,10 @@ def scene_from_json(data: Any) -> Scene:
 
     Raises an InputError that names what is wrong.
     """
-    read = _NumberReader("scene")
+    entry = _NumberEntry(SceneFile("scene"), "", data)
     try:
-        return read_scene(read, read.table("", data, DESCRIBED_TABLES), ".")
+        entry.table(DESCRIBED_TABLES)
+        return read_scene(entry, ".")
     except InputError as error:
         raise (error if error.file else error.in_file("scene")) from None
 
