@@ -12,7 +12,7 @@ from fourbar_validation.compare.results_file import CSV_ROWS
 from fourbar_validation.compare.rows import FAILS, Counts
 from fourbar_validation.engines.programs import bound_memory
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import Differences, compare_runs
+from fourbar_validation.regression.changes import Differences, Kind, compare_runs
 from fourbar_validation.regression.history import (
     HISTORY,
     append,
@@ -53,12 +53,12 @@ def add_output_options(junit: str = "") -> Callable[[CommandFunction], CommandFu
 
     `junit`: end of the help of --junit.
     """
+    path = click.Path(path_type=Path, dir_okay=False)
+    ends = {"junit": junit}
 
     def add(command: CommandFunction) -> CommandFunction:
-        for form in reversed(FORMS):
-            path = click.Path(path_type=Path, dir_okay=False)
-            end = junit if form == "junit" else ""
-            text = f"Write the differences as {_FORM_NAMES[form]} too{end}."
+        for form, name in reversed(_FORM_NAMES.items()):
+            text = f"Write the differences as {name} too{ends.get(form, '')}."
             command = click.option(f"--{form}", type=path, help=text)(command)
         return command
 
@@ -99,10 +99,10 @@ def report_differences(
     after = open_run(new, "NEW")
     differences = find_differences(before, after, chosen or {})
     differences.baseline = before.describe()
-    unproven = [str(run.table) for run in (before, after) if not run.verified]
     differences.notes += [
-        f"{table}: not verified, its {ABOUT_FILE} states no SHA-256 or is missing"
-        for table in unproven
+        f"{run.table}: not verified, its {ABOUT_FILE} states no SHA-256 or is missing"
+        for run in (before, after)
+        if not run.verified
     ]
     _add_since(differences, before, draw=forms.get("html") is not None)
     for form, path in forms.items():
@@ -146,15 +146,14 @@ def _read_choice(
     """
     choice = {}
     for option, text in chosen.items():
-        if text is None:
-            continue
-        column = _CHOICES[option]
-        offered = {*tables[0][column], *tables[1][column]}
-        names = {name.strip() for name in text.split(",") if name.strip()}
-        for name in sorted(names - offered) or ([] if names else [text]):
-            allowed = list_allowed(name, sorted(offered))
-            raise InputError(f"--{option}", name, allowed)
-        choice[column] = names
+        if text is not None:
+            column = _CHOICES[option]
+            offered = {*tables[0][column], *tables[1][column]}
+            names = {*filter(None, map(str.strip, text.split(",")))}
+            for name in sorted(names - offered) or [text] * (not names):
+                allowed = list_allowed(name, sorted(offered))
+                raise InputError(f"--{option}", name, allowed)
+            choice[column] = names
     return choice
 
 
@@ -163,14 +162,7 @@ def _read_choice(
 @click.argument("new", type=click.Path(path_type=Path))
 @_add_choosing_options
 @add_output_options()
-def compare_command(
-    old: str,
-    new: Path,
-    only: str | None,
-    engines: str | None,
-    quantity: str | None,
-    **forms: Path | None,
-) -> int:
+def compare_command(old: str, new: Path, **stated: Any) -> int:
     """Say what changed from OLD to NEW.
 
     OLD is a run's folder, its results.csv, or an accepted name. Rows that answer
@@ -179,12 +171,8 @@ def compare_command(
     regression or if nothing was compared, 2 where the runs share fewer than half of
     the rows that both were asked for.
     """
-    return report_differences(
-        find_baseline(old),
-        new,
-        forms,
-        {"only": only, "engines": engines, "quantity": quantity},
-    )
+    chosen = {option: stated.pop(option) for option in _CHOICES}
+    return report_differences(find_baseline(old), new, stated, chosen)
 
 
 def _require_as_strict(run: Recorded, target: Path) -> None:
@@ -192,14 +180,12 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
     if not (target / ABOUT_FILE).is_file() or is_half_accepted(run, target):
         return
     accepted = open_run(target, "--to")
-    differences = compare_runs(
-        (accepted.about, accepted.frame()), (run.about, run.frame())
-    )
+    differences = find_differences(accepted, run, {})
     weakened = [*map(str, differences.weakened)]
-    left_out = [*differences.left_out, *differences.not_run]
+    left_out = differences.name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
     for what, why in (
         (weakened, "is held to weaker rules than"),
-        (left_out, "leaves out what was judged in"),
+        (left_out + differences.not_run, "leaves out what was judged in"),
     ):
         if what:
             more = f", and {len(what) - 1} more" * (len(what) > 1)
@@ -243,45 +229,28 @@ def accept_command(
     folder = results if results.is_dir() else results.parent
     target = folder.absolute().parent / ACCEPTED if to is None else to
     if target.resolve() == folder.resolve():
-        raise InputError(
-            "--to",
-            str(target),
-            "must be another folder than that of the results",
-        )
+        why = "must be another folder than that of the results"
+        raise InputError("--to", str(target), why)
     for name in (*RECORD_FILES, ABOUT_FILE, HISTORY):
         if (target / name).is_dir():
-            raise InputError(
-                "--to",
-                str(target / name),
-                "must name a file, not a folder",
-            )
+            why = "must name a file, not a folder"
+            raise InputError("--to", str(target / name), why)
     bound_memory()
     run = open_run(results)
     counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:
-        if counts[FAILS]:
-            why = f"{counts[FAILS]} comparisons fail"
-        else:
-            why = "nothing was compared"
-        raise InputError(
-            "RESULTS",
-            str(results),
-            f"must hold, or say --even-failing: {why}",
-        )
+        failing = f"{counts[FAILS]} comparisons fail"
+        why = failing if counts[FAILS] else "nothing was compared"
+        why = f"must hold, or say --even-failing: {why}"
+        raise InputError("RESULTS", str(results), why)
     if not run.verified:  # the record does not say whether it lost some of its rows
-        raise InputError(
-            run.key,
-            str(run.table),
-            f"needs a {ABOUT_FILE} with its rows and SHA-256; `run` writes one",
-        )
+        why = f"needs a {ABOUT_FILE} with its rows and SHA-256; `run` writes one"
+        raise InputError(run.key, str(run.table), why)
     if not allow_weaker:
         _require_as_strict(run, target)
-    too_long = counts.total > CSV_ROWS
-    if not too_long:  # first: if the table is damaged nothing is written
+    history = f"too many for {HISTORY}"
+    if counts.total <= CSV_ROWS:  # first: if the table is damaged nothing is written
         append(target / HISTORY, run)
-    accept(run, target)
-    if too_long:
-        history = f"too many for {HISTORY}"
-    else:
         history = f"appended to {target / HISTORY}"
+    accept(run, target)
     click.echo(f"accepted: {target} ({counts.total} rows; {history})")

@@ -28,11 +28,7 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.regression.engines import move_engines, pair_engines
 from fourbar_validation.regression.record import About
-from fourbar_validation.regression.rules import (
-    Weakening,
-    list_grown_rows,
-    list_weakened,
-)
+from fourbar_validation.regression.rules import NOTABLE, Weakening, list_weakened
 from fourbar_validation.regression.scenes import (
     SceneChange,
     find_renamed,
@@ -91,6 +87,12 @@ WHOLE = (Kind.ENGINE_GONE, Kind.SCENE_GONE, Kind.REFUSED)
 """Kinds of what is missing as a whole, which is named once and not row by row."""
 _DISAGREEING = (Kind.VERDICT_WORSE, Kind.NEW_FAILURE, Kind.WORSE)
 REGRESSIONS = (*WHOLE, *_DISAGREEING, Kind.GONE)
+_WITH_A_CAUSE = (
+    Kind.VERDICT_WORSE,
+    Kind.VERDICT_BETTER,
+    Kind.NEW_FAILURE,
+    Kind.STILL_FAILS,
+)
 _OF_ONE_RUN = (
     Kind.ENGINE_GONE,
     Kind.SCENE_GONE,
@@ -100,32 +102,6 @@ _OF_ONE_RUN = (
     Kind.NEW,
     Kind.NEW_FAILURE,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Rows of one engine to which the same happened, for one cause."""
-
-    kind: Kind
-    worst: Any
-    """The line of the table that is worst."""
-    rows: int
-    scenes: int
-    of_scenes: int
-    """Number of scenes in which the engine has rows."""
-    quantities: Counter[str]
-
-    def __str__(self) -> str:
-        names = ", ".join(
-            name if n == 1 else f"{name} {n}"
-            for name, n in self.quantities.most_common(6)
-        )
-        more = ", ..." if len(self.quantities) > 6 else ""
-        cause = f", {self.worst.cause}" if self.worst.cause else ""
-        return (
-            f"{self.worst.engine}, {self.scenes} of {self.of_scenes} scenes,"
-            f" {self.rows} row{'s' * (self.rows > 1)} ({names}{more}){cause}"
-        )
 
 
 @dataclass(slots=True)
@@ -162,16 +138,15 @@ class Differences:
     def failing(self) -> "DataFrame":
         """Return the lines of rows that fail, in the order in which they are shown."""
         lines = self.of(*REGRESSIONS, Kind.STILL_FAILS)
-        order = [*Kind]
-        shown = lines.kind.map(order.index).sort_values(kind="stable").index
-        lines = lines.loc[shown]
-        return lines[lines.fails]
+        lines = lines[lines.fails]
+        return lines.sort_values(
+            "kind", key=lambda kinds: kinds.map([*Kind].index), kind="stable"
+        )
 
     @property
-    def kinds(self) -> Counter[Kind]:
+    def kinds(self) -> "Series[int]":
         """Return how many rows there are of each kind."""
-        counts = self.table.kind.value_counts()
-        return Counter({kind: int(counts.get(kind, 0)) for kind in Kind})
+        return self.table.kind.value_counts().reindex([*Kind], fill_value=0)
 
     @property
     def rows(self) -> int:
@@ -186,27 +161,23 @@ class Differences:
     @property
     def counts(self) -> Counts:
         """Return the rows of the new run by verdict."""
-        return _count_new_rows(self.table[self.table.verdict_new != ""])
+        return _count_new_rows(self.table)
+
+    @property
+    def counterparts(self) -> Counts:
+        """Return those that have a counterpart in the old one."""
+        table = self.table
+        return _count_new_rows(table[(table.verdict_old != "") & (table.why == "")])
 
     @property
     def shared(self) -> int:
         """Return how many rows stand in both runs, whatever question they answer."""
-        return len(self.table[~self.table.kind.isin(_OF_ONE_RUN)])
-
-    @property
-    def _counterparts(self) -> Counts:
-        answered = (self.table.verdict_old != "") & (self.table.verdict_new != "")
-        return _count_new_rows(self.table[answered & (self.table.why == "")])
-
-    @property
-    def compared(self) -> int:
-        """Return how many rows of the new run have a counterpart in the old one."""
-        return self._counterparts.total
+        return self.rows - len(self.of(*_OF_ONE_RUN))
 
     @property
     def nothing(self) -> bool:
         """Return whether no comparison of the new run has a counterpart."""
-        return self._counterparts.nothing
+        return self.counterparts.nothing
 
     @property
     def strange(self) -> bool:
@@ -215,8 +186,8 @@ class Differences:
         Not counted are engines and scenes that the new one does not have. The old one
         is then of another suite.
         """
-        missing = (Kind.NOT_RUN, Kind.ENGINE_GONE, Kind.SCENE_GONE)
-        return 2 * self.shared < self.rows - len(self.of(*missing))
+        missing = self.of(Kind.NOT_RUN, Kind.ENGINE_GONE, Kind.SCENE_GONE)
+        return 2 * self.shared < self.rows - len(missing)
 
     @property
     def status(self) -> int:
@@ -228,31 +199,21 @@ class Differences:
         """Name what is missing as a whole: engines, scenes, and scenes now refused."""
         return self.name_whole(*WHOLE)
 
-    @property
-    def left_out(self) -> list[str]:
-        """Name the engines and scenes that the new run does not have."""
-        return self.name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
-
     def name_whole(self, *kinds: Kind) -> list[str]:
         """Name what is missing as a whole, by the kinds of WHOLE."""
         lines = self.of(*kinds)
-        names = np.select(
-            [lines.kind == Kind.ENGINE_GONE, lines.kind == Kind.SCENE_GONE],
-            [
-                "engine " + lines.engine + " is gone",
-                "scene " + lines.scene + " is gone",
-            ],
-            "scene " + lines.scene + " is newly refused by " + lines.engine,
-        )
-        return _name(lines.assign(name=names)["name"])
+        name = "scene " + lines.scene + " is newly refused by " + lines.engine
+        scenes = "scene " + lines.scene + " is gone"
+        engines = "engine " + lines.engine + " is gone"
+        name = name.mask(lines.kind == Kind.SCENE_GONE, scenes)
+        return _name(name.mask(lines.kind == Kind.ENGINE_GONE, engines))
 
     @property
     def not_run(self) -> list[str]:
         """Name the scenes and engines that the new run was not asked for."""
         lines = self.of(Kind.NOT_RUN)
         run = lines.scene.isin(self.table[self.table.verdict_new != ""].scene)
-        scenes = "scene " + lines.scene[~run]
-        return [*_name(scenes), *_name(lines.engine[run])]
+        return [*_name("scene " + lines.scene[~run]), *_name(lines.engine[run])]
 
     @property
     def not_compared(self) -> list[str]:
@@ -261,44 +222,48 @@ class Differences:
 
     @property
     def grown(self) -> list[str]:
-        """Name the rows whose allowed error grew by a factor above NOTABLE."""
-        return list_grown_rows(self.table)
-
-    def groups(self, kinds: Iterable[Kind]) -> list[Group]:
-        """Return the rows of some kinds by engine and cause, the worst groups first."""
-        lines = self.of(*kinds)
-        in_scenes = (
-            self.table[self.table.kind != Kind.NOT_RUN]
-            .groupby("engine")
-            .scene.nunique()
-        )
-        same = lines.cause.str.replace(NUMBERS_IN_A_REASON, "#", regex=True)
-        groups = [
-            Group(
-                Kind(some.kind.iloc[0]),
-                next(some.itertuples()),
-                len(some),
-                some.scene.nunique(),
-                int(in_scenes.get(engine, 0)),
-                Counter(some.sort_values("quantity").quantity),
-            )
-            for (engine, _, _), some in lines.groupby(
-                [lines.engine, lines.kind, same], sort=False
-            )
+        """Name the rows whose allowed error grew so far that it is printed."""
+        table = self.table
+        both = table[["verdict_old", "verdict_new"]].isin(COMPARED_VERDICTS).all(axis=1)
+        more = table.allowed_new > NOTABLE * table.allowed_old
+        rows = table[both & (table.why == "") & (table.allowed_old > 0.0) & more]
+        return [
+            f"{row.scene} / {row.engine} / {row.quantity}:"
+            f" {row.allowed_old:.1e} -> {row.allowed_new:.1e}"
+            for row in rows.itertuples()
         ]
-        order = list(Kind)
-        return sorted(groups, key=lambda group: order.index(group.kind))
+
+    def list_groups(self, kind: Kind) -> list[str]:
+        """Write the rows of a kind by engine and cause, the worst groups first."""
+        lines = self.of(kind)
+        asked = self.table[self.table.kind != Kind.NOT_RUN]
+        scenes = asked.groupby("engine").scene.nunique()
+        same = lines.cause.str.replace(NUMBERS_IN_A_REASON, "#", regex=True)
+        texts = []
+        for (engine, _), some in lines.groupby(["engine", same], sort=False):
+            counts = Counter(some.quantity.sort_values())
+            names = [
+                f"{name} {n}".removesuffix(" 1") for name, n in counts.most_common(6)
+            ]
+            names += ["..."] * (len(counts) > 6)
+            cause = some.cause.iloc[0]
+            texts.append(
+                f"{engine}, {some.scene.nunique()} of {scenes[engine]} scenes,"
+                f" {write_count(len(some), 'row')} ({', '.join(names)})"
+                + f", {cause}"
+                * bool(cause)
+            )
+        return texts
 
     @property
     def sentences(self) -> list[str]:
         """Say who disagrees, and in how many scenes; the most frequent first."""
         lines = self.table
+        verdicts = lines[["verdict_old", "verdict_new"]]
         exact = (lines.setting == EXACT_SETTING) & (lines.engine != FORMULAS)
-        exact &= lines.verdict_old.isin(COMPARED_VERDICTS) | lines.verdict_new.isin(
-            COMPARED_VERDICTS
-        )
-        worse = lines[lines.kind.isin(_DISAGREEING)].groupby("scene").engine.agg(set)
+        exact &= verdicts.isin(COMPARED_VERDICTS).any(axis=1)
         of_scene = lines[exact].groupby("scene").engine.agg(set)
+        worse = lines[lines.kind.isin(_DISAGREEING)].groupby("scene").engine.agg(set)
         counts = Counter(
             write_fault_sentence(engines, of_scene.get(scene, set()))
             for scene, engines in worse.items()
@@ -310,6 +275,7 @@ class Differences:
 def _count_new_rows(lines: "DataFrame") -> Counts:
     """Count the rows of the new run among lines."""
     counts = Counts()
+    lines = lines[lines.verdict_new != ""]
     counts.add_counted(lines.groupby(["engine", "verdict_new"]).size().to_dict())
     return counts
 
@@ -317,10 +283,8 @@ def _count_new_rows(lines: "DataFrame") -> Counts:
 def _name(names: "Series[str]") -> list[str]:
     """Count rows by name; of more than MOST_ONE_BY_ONE names the others are one."""
     counts = names.value_counts(sort=False)
-    lines = [
-        f"{name} ({write_count(n, 'row')})"
-        for name, n in counts[:MOST_ONE_BY_ONE].items()
-    ]
+    few = counts[:MOST_ONE_BY_ONE].items()
+    lines = [f"{name} ({write_count(n, 'row')})" for name, n in few]
     more = counts[MOST_ONE_BY_ONE:]
     return lines + [f"{len(more)} more ({more.sum()} rows)"] * bool(len(more))
 
@@ -331,17 +295,16 @@ def write_fault_sentence(worse: set[str], exact: set[str]) -> str:
     The rows of `worse` regressed; `exact`: engines held to round-off.
     """
     engines = worse - {FORMULAS}
-    if len(exact) > 1 and engines >= exact:
-        if FORMULAS in worse:
-            return "all engines and the identity disagree: the formulas"
-        return (
-            "all engines disagree, and the identities hold: the formulas, or what all"
-            " engines are given"
-        )
+    identity = FORMULAS in worse
     if not engines:
         return "only the identities: the formulas, or what is stated of them"
-    return f"only {', '.join(sorted(engines))}" + (
-        " and an identity" if FORMULAS in worse else ""
+    if len(exact) < 2 or not engines >= exact:
+        return f"only {', '.join(sorted(engines))}" + " and an identity" * identity
+    if identity:
+        return "all engines and the identity disagree: the formulas"
+    return (
+        "all engines disagree, and the identities hold: the formulas, or what all"
+        " engines are given"
     )
 
 
@@ -357,27 +320,26 @@ def compare_runs(
     `chosen`: names, of either run, by the column that rows are chosen by.
     """
     pairs, notes = pair_engines(old, new)
-    before = move_engines(old[0], pairs)
-    after = new[0]
+    before, after = move_engines(old[0], pairs), new[0]
     names = find_renamed(before.scenes, after.scenes)
     notes += [f"renamed: {first} -> {then}" for first, then in names.items()]
     changed = list_scene_changes(before.scenes, after.scenes)
-    rows = old[1].replace({"engine": pairs, "scene": names}), new[1]
+    runs = [old[1].replace({"engine": pairs, "scene": names}), new[1]]
     for column, wanted in chosen.items():
         now = {pairs.get(name, names.get(name, name)) for name in wanted}
-        rows = rows[0][rows[0][column].isin(now)], rows[1][rows[1][column].isin(now)]
-    table = _join_runs(*map(_keep_worst, rows))
-    table = _classify_rows(table, changed, before, after)
+        runs = [rows[rows[column].isin(now)] for rows in runs]
+    table = _join_runs(*map(_keep_worst, runs))
+    _classify_rows(table, changed, before, after)
     weakened = list_weakened(before.rules, after.rules)
     surroundings = _list_surroundings(before, after)
     differences = Differences(table, surroundings, changed, weakened, notes)
     suites = [
-        about.settings.get("suite", "not recorded")[:12] for about in (old[0], after)
+        about.settings.get("suite", "not recorded")[:12] for about in (before, after)
     ]
     if suites[0] != suites[1] and not (before.scenes or after.scenes):
         notes += [
-            f"{differences.compared} of {differences.rows} rows are compared: the"
-            " others are of one run alone",
+            f"{differences.counterparts.total} of {differences.rows} rows are compared:"
+            " the others are of one run alone",
             f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and neither run"
             " says what they ask: a scene that changed cannot be named, rows are"
             " compared by name alone",
@@ -400,22 +362,17 @@ def _join_runs(old: "DataFrame", new: "DataFrame") -> "DataFrame":
     setting as `setting_new`.
     """
     keys = old[KEY].merge(new[KEY], how="outer", indicator="runs")
-    single = {
-        run: keys.loc[(keys.runs == run) & (keys.setting != "-"), KEY].drop_duplicates(
+    first, then = (
+        keys.loc[(keys.runs == run) & (keys.setting != "-"), KEY].drop_duplicates(
             WITHOUT_SETTING, keep=False
         )
         for run in ("left_only", "right_only")
-    }
-    moved = single["left_only"].merge(
-        single["right_only"], on=WITHOUT_SETTING, suffixes=("_old", "_new")
     )
+    moved = first.merge(then, on=WITHOUT_SETTING, suffixes=("_old", "_new"))
     new = new.merge(moved.assign(setting=moved.setting_new), how="left", on=KEY)
     new["setting"] = new.pop("setting_old").fillna(new.setting)
     table = old.merge(new, how="outer", on=KEY, suffixes=("_old", "_new"))
-    texts = [
-        f"{column}_{run}" for column in ("verdict", "reason") for run in ("old", "new")
-    ]
-    texts.append("setting_new")
+    texts = ["verdict_old", "verdict_new", "reason_old", "reason_new", "setting_new"]
     table[texts] = table[texts].fillna("")
     return table.sort_values(KEY, ignore_index=True)
 
@@ -425,46 +382,32 @@ def _classify_rows(
     changed: list[SceneChange],
     before: About,
     after: About,
-) -> "DataFrame":
+) -> None:
     """Add `why` two rows are not compared, their kind, the cause and the severity."""
     in_old = table.verdict_old != ""
     in_new = table.verdict_new != ""
     fails = table.verdict_new == FAILS
-    failed = table.verdict_old == FAILS
-    why = {
-        "has other positions": {one.scene for one in changed if one.positions_alone},
-        "changed": {one.scene for one in changed if not one.positions_alone},
+    old, new = table.error_old, table.error_new
+    moved = table.scene + " / " + table.engine + ": " + table.setting
+    moved = (moved + " -> " + table.setting_new).where(table.setting_new != "", "")
+    ways = ("changed", "has other positions")
+    whys = {
+        one.scene: f"scene {one.scene} {ways[one.positions_alone]}" for one in changed
     }
-    table["why"] = np.select(
-        [table.scene.isin(scenes) for scenes in why.values()]
-        + [table.setting_new != ""],
-        [("scene " + table.scene + " " + words) for words in why]
-        + [
-            table.scene
-            + " / "
-            + table.engine
-            + ": "
-            + table.setting
-            + " -> "
-            + table.setting_new
-        ],
-        "",
-    )
+    both = zip(table.scene, moved, strict=True)
+    table["why"] = [whys.get(scene, move) for scene, move in both]
     conditions = table[["condition_old", "condition_new"]]
-    table["round_off"] = (
-        FREE_ROUND_OFFS
-        * EPS
-        / conditions.where(conditions > 0.0).min(axis=1).fillna(1.0)
-    ).where(in_old & in_new)
-    missing = _classify_missing(table, before, after)
+    condition = conditions.where(conditions > 0.0).min(axis=1).fillna(1.0)
+    table["round_off"] = (FREE_ROUND_OFFS * EPS / condition).where(in_old & in_new)
     pairs = table.set_index(["scene", "engine"]).index
     refused = (table.quantity == "all") & (table.verdict_new == REFUSES) & ~in_old
     refused = pairs.isin(pairs[refused]) & pairs.isin(pairs[in_old])
+    ranks = dict(zip(("", *VERDICTS), range(-1, len(VERDICTS)), strict=True))
     rank_old, rank_new = (
-        table[column].map({verdict: rank for rank, verdict in enumerate(VERDICTS)})
-        for column in ("verdict_old", "verdict_new")
+        table[verdict].map(ranks).astype(int)
+        for verdict in ("verdict_old", "verdict_new")
     )
-    old, new = table.error_old, table.error_new
+    worse = rank_new - rank_old
     alike = ~table.verdict_new.isin(COMPARED_VERDICTS) | (old == new)
     alike |= (old.isna() & new.isna()) | ((new - old).abs() <= table.round_off)
     larger = (new > _NOTICEABLE * old) | new.isna()
@@ -473,13 +416,13 @@ def _classify_rows(
     same = np.where(fails, Kind.STILL_FAILS, Kind.SAME)
     choices = [
         (refused & (in_old != in_new), Kind.REFUSED),
-        (~in_new, missing),
+        (~in_new, _classify_missing(table, before, after)),
         (~in_old & fails, Kind.NEW_FAILURE),
         (~in_old, Kind.NEW),
-        ((table.why != "") & fails & ~failed, Kind.NEW_FAILURE),
+        ((table.why != "") & fails & (worse > 0), Kind.NEW_FAILURE),
         (table.why != "", Kind.NOT_COMPARED),
-        (rank_new > rank_old, Kind.VERDICT_WORSE),
-        (rank_new < rank_old, Kind.VERDICT_BETTER),
+        (worse > 0, Kind.VERDICT_WORSE),
+        (worse < 0, Kind.VERDICT_BETTER),
         (alike, same),
         (larger & within, Kind.GREW),
         (larger, Kind.WORSE),
@@ -487,33 +430,26 @@ def _classify_rows(
     ]
     conditions_of, kinds = zip(*choices, strict=True)
     table["kind"] = np.select(conditions_of, kinds, same)
-    other = in_old & (table.verdict_old != table.verdict_new)
-    came = (table.verdict_old + " -> ").where(other, "")
-    told = (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE, Kind.STILL_FAILS)
     of_rule = table.reason_new.str.startswith(_HELD_TO)
     table["reason_new"] = table.reason_new.mask(of_rule, "held to " + table.reason_new)
+    came = (table.verdict_old + " -> ").where(in_old & (worse != 0), "")
     table["cause"] = (came + table.verdict_new + ": " + table.reason_new).where(
-        table.kind.isin(told), ""
+        table.kind.isin(_WITH_A_CAUSE), ""
     )
     table["fails"] = fails
     table["since"] = ""
-    floor = np.fmax(old, table.round_off)
-    table["grown"] = (new / floor).where(in_old & in_new, 1.0)
-    return table
+    growth = new / np.fmax(old, table.round_off)
+    table["grown"] = growth.where(in_old & in_new, 1.0)
 
 
-def _classify_missing(
-    table: "DataFrame",
-    before: About,
-    after: About,
-) -> np.ndarray[Any, Any]:
+def _classify_missing(table: "DataFrame", before: About, after: About) -> Any:
     """Return the kind of each line if only the old run has it."""
     of_new = table[table.verdict_new != ""]
     scenes = set(after.scenes or of_new.scene)
     engines = {FORMULAS, *of_new.engine, *after.engines}
     mended = (table.verdict_old == FAILS) & table.quantity.isin(WHOLE_ENGINE)
-    suite = after.settings.get("scenes of", "")
-    same_suite = suite != "" and suite == before.settings.get("scenes of")
+    suite = after.settings.get("scenes of")
+    same_suite = suite and suite == before.settings.get("scenes of")
     left_out = ~table.engine.isin(before.guests_by_option)
     left_out &= after.settings.get("chosen") != ""
     return np.select(
@@ -531,22 +467,18 @@ _NOT_SURROUNDINGS = {"suite", "scenes of", "chosen", "guests"}
 """Settings that say what was asked for, and not with what."""
 
 
-def _list_surroundings(
-    old: About,
-    new: About,
-) -> list[tuple[str, str, str]]:
+def _list_surroundings(old: About, new: About) -> list[tuple[str, str, str]]:
     """List what the runs were made with if it differs: what, old and new."""
-    if old.commit and new.commit:
-        pairs = [("commit", old.commit, new.commit)]
-    else:
-        pairs = []
-    for before, after in (
+    pairs = []
+    both = [({"commit": old.commit}, {"commit": new.commit})]
+    both *= bool(old.commit and new.commit)
+    both += [
         (old.versions, new.versions),
         ({"machine": old.machine}, {"machine": new.machine}),
         (old.settings, new.settings),
-    ):
-        pairs += [
-            (what, before.get(what, "not recorded"), after.get(what, "not recorded"))
-            for what in sorted((before.keys() | after.keys()) - _NOT_SURROUNDINGS)
-        ]
+    ]
+    for before, after in both:
+        for what in sorted((before.keys() | after.keys()) - _NOT_SURROUNDINGS):
+            stated = before.get(what, "not recorded"), after.get(what, "not recorded")
+            pairs.append((what, *stated))
     return [pair for pair in pairs if pair[1] != pair[2]]

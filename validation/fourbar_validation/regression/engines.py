@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fourbar_validation.compare.rows import FORMULAS
 from fourbar_validation.regression.record import About
@@ -22,43 +22,29 @@ def pair_engines(
     their order. The only guest that is gone pairs with the only one that is new if both
     answer the same quantities.
     """
-    gone, added = (
-        [name for name in run if name not in other]
-        for run, other in (
-            (_list_recorded(old), _list_recorded(new)),
-            (_list_recorded(new), _list_recorded(old)),
-        )
-    )
+    names = [_list_recorded(run) for run in (old, new)]
+    gone = [name for name in names[0] if name not in names[1]]
+    added = [name for name in names[1] if name not in names[0]]
     pairs: dict[str, str] = {}
-    for describe in (_name_version, lambda about, name: _name_version(about, name)[0]):
-        for name in gone:
-            alike = [
-                one
-                for one in added
-                if one not in pairs.values()
-                and describe(new[0], one) == describe(old[0], name)
-            ]
-            if alike and name not in pairs:
-                pairs[name] = alike[0]
+    for parts in (2, 1):  # name and version, then the name alone
+        for name in [name for name in gone if name not in pairs]:
+            described = _name_version(old[0], name)[:parts]
+            for other in added:
+                if _name_version(new[0], other)[:parts] == described:
+                    pairs[name] = other
+                    added.remove(other)
+                    break
     notes = [f"versions compared as one: {a} -> {b}" for a, b in pairs.items()]
-    guests = [
-        [name for name in names if name in about.guests]
-        for about, names in (
-            (old[0], [name for name in gone if name not in pairs]),
-            (new[0], [name for name in added if name not in pairs.values()]),
-        )
-    ]
-    if [len(names) for names in guests] == [1, 1]:
-        ((before,), (after,)) = guests
-        answers = [
-            about.rules.get(name, {}).get(ANSWERS_CHECK)
-            for about, name in ((old[0], before), (new[0], after))
-        ]
-        if answers[0] is not None and answers[0] == answers[1]:
-            pairs[before] = after
+    lost = [name for name in old[0].guests if name in gone and name not in pairs]
+    found = [name for name in new[0].guests if name in added]
+    if len(lost) == len(found) == 1:
+        answers = old[0].rules.get(lost[0], {}).get(ANSWERS_CHECK)
+        theirs = new[0].rules.get(found[0], {}).get(ANSWERS_CHECK)
+        if answers is not None and answers == theirs:
+            pairs[lost[0]] = found[0]
             notes.append(
-                f"guests compared as one: {before} is gone, {after} is new, and both"
-                " answer the same quantities"
+                f"guests compared as one: {lost[0]} is gone, {found[0]} is new, and"
+                " both answer the same quantities"
             )
     return pairs, notes
 
@@ -78,10 +64,8 @@ def list_gone(before: About, after: About) -> list[str]:
 def _list_recorded(run: tuple[About, "DataFrame | None"]) -> list[str]:
     """List the engines of a run in the order of its record."""
     about, rows = run
-    of_rows = () if rows is None else rows.engine.unique()
-    return [
-        name for name in dict.fromkeys((*about.engines, *of_rows)) if name != FORMULAS
-    ]
+    names = about.engines if rows is None else [*about.engines, *rows.engine.unique()]
+    return [name for name in dict.fromkeys(names) if name != FORMULAS]
 
 
 def _name_version(about: About, engine: str) -> tuple[str, str]:
@@ -92,10 +76,14 @@ def _name_version(about: About, engine: str) -> tuple[str, str]:
 
 def move_engines(about: About, pairs: Mapping[str, str]) -> About:
     """Return a record whose engines bear the names that they are paired with."""
+
+    def move(entries: Mapping[str, Any]) -> dict[str, Any]:
+        return {pairs.get(name, name): entry for name, entry in entries.items()}
+
+    engines = ", ".join(move(dict.fromkeys(about.engines)))
     return replace(
         about,
-        versions={pairs.get(name, name): text for name, text in about.versions.items()},
-        rules={pairs.get(name, name): rule for name, rule in about.rules.items()},
-        settings=about.settings
-        | {"engines": ", ".join(pairs.get(name, name) for name in about.engines)},
+        versions=move(about.versions),
+        rules=move(about.rules),
+        settings=about.settings | {"engines": engines},
     )

@@ -8,18 +8,16 @@ versions in columns of their own (`version_mujoco`).
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import InputError
 from fourbar.writing import write_bytes
 from fourbar_validation.compare.rows import COMPARED_VERDICTS, FAILS, FORMULAS
 from fourbar_validation.regression.changes import WITHOUT_SETTING
-from fourbar_validation.regression.record import Recorded
+from fourbar_validation.regression.record import Recorded, name_damage
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.report.svg import ALLOWED, choose_style, set_frame, write_svg
 
@@ -28,8 +26,7 @@ if TYPE_CHECKING:
 
 HISTORY = "history.parquet"
 TIME = "time"
-
-
+_NO_HISTORY = "is damaged, or no table written by `accept`"
 MOST_RUNS_DRAWN = 60
 """Latest runs in the picture."""
 
@@ -45,20 +42,12 @@ def append(file: Path, run: Recorded) -> None:
 
     table = _tabulate_run(run)
     if file.exists():
-        try:
-            old = pq.read_table(
-                pa.BufferReader(file.read_bytes()),
-                page_checksum_verification=True,
-            )
+        with name_damage("--to", file, _NO_HISTORY):
+            data = pa.BufferReader(file.read_bytes())
+            old = pq.read_table(data, page_checksum_verification=True)
             if table["run"][0].as_py() in set(old["run"].to_pylist()):
                 return
             table = pa.concat_tables([old, table], promote_options="default")
-        except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
-            raise InputError(
-                "--to",
-                str(file),
-                "is damaged, or no table written by `accept`",
-            ) from None
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -71,50 +60,37 @@ def _tabulate_run(run: Recorded) -> Any:
     import pyarrow as pa
 
     about = run.about
-    rows = run.frame()
-    times = pandas.DataFrame(
-        [
-            (scene, engine, TIME, ratio)
-            for scene, some in run.times()
-            for engine, ratio in some
-        ],
-        columns=["scene", "engine", "quantity", "times_formulas"],
-    )
-    lines = pandas.concat([rows, times], ignore_index=True)
-    digest = hashlib.sha256(f"{about.date}\n{lines.to_csv()}".encode())
-    entries = {
-        scene: hashlib.sha256(json.dumps(stated, sort_keys=True).encode())
-        for scene, stated in about.scenes.items()
+    times = run.times().assign(quantity=TIME)
+    lines = pandas.concat([run.frame(), times], ignore_index=True)
+    digest = _hash(f"{about.date}\n{lines.to_csv()}")
+    hashes = {
+        scene: _hash(json.dumps(entries, sort_keys=True))
+        for scene, entries in about.scenes.items()
     }
-    hashes = {scene: one.hexdigest()[:16] for scene, one in entries.items()}
     stated = {
-        "run": digest.hexdigest()[:16],
+        "run": digest,
         "date": about.date,
         "commit": about.commit,
         "machine": about.machine,
         "settings": json.dumps(about.settings, sort_keys=True),
     }
     stated |= {f"version_{name}": text for name, text in about.versions.items()}
-    lines = pandas.concat(
-        [
-            pandas.DataFrame(stated, index=lines.index),
-            lines.drop(columns="times_formulas").assign(
-                scene_hash=[hashes.get(scene, "") for scene in lines.scene],
-                times_formulas=lines.times_formulas.astype(float),
-            ),
-        ],
-        axis=1,
-    )
+    ratios = lines.pop("times_formulas").astype(float)
+    lines["scene_hash"] = [hashes.get(scene, "") for scene in lines.scene]
+    lines["times_formulas"] = ratios
+    of_run = pandas.DataFrame(stated, index=lines.index)
+    lines = pandas.concat([of_run, lines], axis=1)
     word = pa.dictionary(pa.int32(), pa.string())
-    schema = pa.schema(
-        [
-            (name, pa.float64() if kind.kind == "f" else word)
-            for name, kind in lines.dtypes.items()
-        ]
-    )
-    return pa.Table.from_pandas(
-        lines, schema, preserve_index=False
-    ).replace_schema_metadata()
+    kinds = {
+        name: pa.float64() if kind.kind == "f" else word
+        for name, kind in lines.dtypes.items()
+    }
+    table = pa.Table.from_pandas(lines, pa.schema(kinds), preserve_index=False)
+    return table.replace_schema_metadata()
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 RowKey = tuple[str, str, str]
@@ -134,7 +110,7 @@ def read_history(before: Recorded) -> "DataFrame":
         about = before.about
         lines = before.frame().assign(date=about.date, commit=about.commit)[columns]
     else:
-        with _name_damage(file):
+        with name_damage("--against", file, _NO_HISTORY):
             lines = pandas.read_parquet(file, columns=columns)
         lines = lines[lines.quantity != TIME]
     return lines.astype(dict.fromkeys(columns[:6], str)).sort_values(
@@ -251,16 +227,6 @@ def collect_history(folder: Path) -> list[Section]:
     return [Section("history", "Over the accepted runs", text, figures=[figure])]
 
 
-@contextmanager
-def _name_damage(file: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, ValueError):
-        raise InputError(
-            "--against", str(file), "is damaged, or no table written by `accept`"
-        ) from None
-
-
 def summarise(file: Path) -> "DataFrame":
     """Return a line for each run and engine, by date, with `used` and `time`.
 
@@ -270,7 +236,7 @@ def summarise(file: Path) -> "DataFrame":
     import pandas
 
     columns = ["run", "date", "commit", "engine", "quantity", "verdict", "error"]
-    with _name_damage(file):
+    with name_damage("--against", file, _NO_HISTORY):
         lines = pandas.read_parquet(
             file, columns=[*columns, "allowed", "times_formulas"]
         )

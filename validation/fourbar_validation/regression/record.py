@@ -4,17 +4,15 @@ Recorded are versions, machine, settings and scenes. The record of one scene is 
 `report/scene_record.py`.
 """
 
-import csv
 import hashlib
 import json
 import os
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,15 +110,13 @@ def describe_run(
         "K": repr(K),
         "simulated": repr(simulated),
     }
-    settings |= asked or {}
-    described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
     versions = {guest.name: guest.version for guest in guests if guest.version}
     return About(
         list_versions() | find_kernels() | versions,
         name_machine(),
-        settings,
-        described,
+        settings | dict(asked or {}),
+        {name: dict(entries) for name, entries in (scenes or {}).items()},
         now,
         _find_commit(),
         list_rules(engines),
@@ -156,16 +152,15 @@ def write_about(record: About, folder: Path) -> None:
 
     The file states the rows and SHA-256 of each table, and its own SHA-256.
     """
-    present = [path for name in RECORD_FILES if (path := folder / name).is_file()]
     tables = {
         path.name: {"rows": count_rows(path), "sha256": _hash_file(path)}
-        for path in present
+        for path in map(folder.joinpath, RECORD_FILES)
+        if path.is_file()
     }
     kept = asdict(record) | {"tables": tables}
-    write_text(
-        folder / ABOUT_FILE,
-        json.dumps(kept | {"sha256": _hash_own(kept)}, indent=1, sort_keys=True) + "\n",
-    )
+    kept["sha256"] = _hash_own(kept)
+    text = json.dumps(kept, indent=1, sort_keys=True)
+    write_text(folder / ABOUT_FILE, f"{text}\n")
 
 
 def _hash_file(path: Path) -> str:
@@ -192,22 +187,22 @@ def _require_undamaged(
         path = folder / name
         if name not in tables:
             why = f"is not of this run: its {ABOUT_FILE} does not name it"
-        elif name not in present:
-            why = (
-                f"is missing: {ABOUT_FILE} says that it has {tables[name]['rows']} rows"
-            )
-        elif _hash_file(path) == tables[name]["sha256"]:
-            continue
-        else:
+            raise InputError(key, str(path), why)
+        stated = f"{tables[name]['rows']}"
+        if name not in present:
+            why = f"is missing: {ABOUT_FILE} says that it has {stated} rows"
+            raise InputError(key, str(path), why)
+        if _hash_file(path) != tables[name]["sha256"]:
             try:
                 rows = write_count(count_rows(path), "row")
             except (KeyError, OSError, ValueError):
                 rows = "no rows that can be read"
-            why = (
-                f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256"
-                f" that {ABOUT_FILE} states"
+            raise InputError(
+                key,
+                str(path),
+                f"is damaged: {rows} of {stated}, and not the SHA-256 that"
+                f" {ABOUT_FILE} states",
             )
-        raise InputError(key, str(path), why)
 
 
 NOTHING_KNOWN = About({}, "unknown machine", {})
@@ -256,52 +251,44 @@ class Recorded:
             " scenes, or compare the tables by pandas or DuckDB",
         )
 
-    def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
-        """Yield each scene, and (engine, its time over that of the formulas).
+    def times(self) -> "DataFrame":
+        """Return `scene`, `engine` and its time over that of the formulas.
 
-        Nothing is yielded if no times were kept.
+        The table has no rows if no times were kept.
         """
-        table = self.table.parent / TIMINGS_FILE
-        if not table.is_file():
-            return
-        try:
-            with table.open(newline="", encoding="utf-8") as file:
-                for scene, some in groupby(
-                    csv.DictReader(file),
-                    key=lambda row: row["scene"],
-                ):
-                    yield (
-                        escape_controls(read_cell_text(scene)),
-                        [
-                            (
-                                escape_controls(read_cell_text(row["engine"])),
-                                float(row["times_formulas"]),
-                            )
-                            for row in some
-                        ],
-                    )
-        except (KeyError, TypeError, ValueError, csv.Error):
-            raise InputError(
-                self.key,
-                str(table),
-                "is not a table of times written by `run`",
-            ) from None
+        import pandas
 
-    @contextmanager
-    def _name_damage(self) -> Iterator[None]:
-        try:
-            yield
-        except (
-            KeyError,
-            TypeError,
-            ValueError,
-            OSError,
-        ):  # a column, a cell or a number is missing, or is no text
-            raise InputError(
-                self.key,
-                str(self.table),
-                "is not a table written by `run`",
-            ) from None
+        kinds = {"scene": str, "engine": str, "times_formulas": float}
+        table = self.table.with_name(TIMINGS_FILE)
+        if not table.is_file():
+            return pandas.DataFrame(columns=[*kinds]).astype(kinds)
+        with name_damage(self.key, table, "is not a table of times written by `run`"):
+            times = pandas.read_csv(
+                table, usecols=[*kinds], dtype=str, keep_default_na=False
+            ).astype(kinds)
+        for column in ("scene", "engine"):
+            times[column] = times[column].map(read_cell_text).map(escape_controls)
+        return times
+
+    def _name_damage(self) -> AbstractContextManager[None]:
+        return name_damage(self.key, self.table, "is not a table written by `run`")
+
+
+@contextmanager
+def name_damage(key: str, path: Path, why: str) -> Iterator[None]:
+    """Raise an InputError where a file cannot be read as what it should be."""
+    try:
+        yield
+    except (
+        AttributeError,
+        KeyError,
+        NotImplementedError,
+        OSError,
+        RecursionError,
+        TypeError,
+        ValueError,
+    ):  # a column, a cell or a number is missing, or is no text
+        raise InputError(key, str(path), why) from None
 
 
 def open_run(path: Path, key: str = "RESULTS") -> Recorded:
@@ -317,51 +304,33 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     if not table.is_file() and long.is_file():  # too many rows for a text
         table = long
     if not table.is_file():
-        raise InputError(
-            key,
-            str(path),
-            f"must be a folder with {CSV_FILE} or {PARQUET_FILE}, or such a file",
-        )
-    if (table.parent / UNFINISHED).is_file():
-        raise InputError(
-            key,
-            str(table),
-            "must be of a run that was finished: run it again, and it is resumed",
-        )
-    record = table.parent / ABOUT_FILE
+        why = f"must be a folder with {CSV_FILE} or {PARQUET_FILE}, or such a file"
+        raise InputError(key, str(path), why)
+    if table.with_name(UNFINISHED).is_file():
+        why = "must be of a run that was finished: run it again, and it is resumed"
+        raise InputError(key, str(table), why)
+    record = table.with_name(ABOUT_FILE)
+    run = Recorded(NOTHING_KNOWN, table, key=key)
     if record.is_file():
-        run = _open_described(record, table, key)
-    else:
-        run = Recorded(NOTHING_KNOWN, table, key=key)
+        run = Recorded(_read_about(record, table, key), table, True, key)
     if next(run.rows(), None) is None:
-        raise InputError(
-            key,
-            str(table),
-            "must hold at least one comparison: it has none",
-        )
+        why = "must hold at least one comparison: it has none"
+        raise InputError(key, str(table), why)
     return run
 
 
-def _open_described(
-    record: Path,
-    table: Path,
-    key: str,
-) -> Recorded:
-    """Open a table with what its record says of it.
-
-    Raises InputError if either is damaged.
-    """
-    try:
-        kept = json.loads(record.read_text(encoding="utf-8"))
+def _read_about(record: Path, table: Path, key: str) -> About:
+    """Read what the record of a table says; InputError if either is damaged."""
+    text = record.read_bytes()
+    with name_damage(key, record, "is not a record written by `run`"):
+        kept = json.loads(text)
         if kept.pop("sha256", None) != _hash_own(kept):
             why = "is damaged: it is not what `run` wrote"
             raise InputError(key, str(record), why)
-        tables: Mapping[str, Mapping[str, Any]] = kept.pop("tables")
+        tables = kept.pop("tables")
         about = About(**_escape_texts(kept))
-    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
-        raise InputError(key, str(record), "is not a record written by `run`") from None
     _require_undamaged(tables, table.parent, table.name, key)
-    return Recorded(about, table, True, key)
+    return about
 
 
 def _escape_texts(value: Any) -> Any:
@@ -376,11 +345,9 @@ def find_baseline(name_or_path: str) -> Path:
 
     The accepted state is that of this project's models.
     """
-    if (
-        not Path(name_or_path).exists()
-        and (SHIPPED / name_or_path / ABOUT_FILE).is_file()
-    ):
-        return SHIPPED / name_or_path
+    shipped = SHIPPED / name_or_path
+    if not Path(name_or_path).exists() and (shipped / ABOUT_FILE).is_file():
+        return shipped
     return Path(name_or_path)
 
 

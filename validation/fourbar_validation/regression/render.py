@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from fourbar.errors import write_count
-from fourbar_validation.compare.rows import COMPARED_VERDICTS, FAILS
+from fourbar_validation.compare.rows import HOLDING_VERDICTS
 from fourbar_validation.regression.changes import REGRESSIONS, WHOLE, Differences, Kind
 from fourbar_validation.report.junit import (
     MOST_PASSING_CASES,
     JunitCase,
     count_beyond,
+    make_case,
     write_document,
 )
 from fourbar_validation.report.templating import render, write_error
@@ -53,10 +54,8 @@ def write_verdict(diff: Differences) -> str:
         head = "Nothing was compared"
     elif diff.strange:
         head = f"Runs of two suites: {head[:1].lower()}{head[1:]}"
-    if diff.compared < diff.rows:
-        rows = f"{diff.compared} of {diff.rows}"
-    else:
-        rows = f"{diff.rows}"
+    compared = diff.counterparts.total
+    rows = f"{compared} of " * (compared < diff.rows) + f"{diff.rows}"
     if diff.baseline:
         head += f" against {diff.baseline}"
     moved = f" in {rows} rows: {', '.join(counts)}" if counts else ""
@@ -85,23 +84,23 @@ def write_change_line(row: Any) -> str:
 def write_differences(diff: Differences) -> str:
     """Write for a terminal: what regressed first, the verdict last."""
     lines = []
-    for heading, texts in _list_regressions(diff):
+    for heading, texts in _list_regressions(diff).items():
         lines += [f"{heading}: {text}" for text in texts]
     for kind in KINDS_SHOWN:
         texts = [*_list_groups(diff, kind), *_list_worst(diff, kind)]
         lines += [f"{kind.capitalize()}: {text}" for text in texts]
     lines += [*map(str, diff.scenes), *diff.notes]
     lines += [f"{what}: {old} -> {new}" for what, old, new in diff.surroundings]
-    for heading, texts in _list_other_questions(diff):
+    for heading, texts in _list_other_questions(diff).items():
         lines += [f"{heading}: {text}" for text in texts]
     return "\n".join([*lines, f"{write_verdict(diff)}."]) + "\n"
 
 
 def _list_groups(diff: Differences, kind: Kind) -> list[str]:
     """List the rows of a kind by engine and cause, the worst first."""
-    groups = [*map(str, diff.groups([kind]))]
+    groups = diff.list_groups(kind)
     more = len(groups) - MOST_GROUPS_LISTED
-    beyond = [f"and {more} more engines and causes"] if more > 0 else []
+    beyond = [f"and {more} more engines and causes"] * (more > 0)
     return groups[:MOST_GROUPS_LISTED] + beyond
 
 
@@ -109,30 +108,26 @@ def _list_worst(diff: Differences, kind: Kind) -> list[str]:
     """List the worst rows of a kind; say how many more there are."""
     rows = diff.of(kind)
     more = len(rows) - MOST_ROWS_IN_TEXT
-    return [
-        *map(write_change_line, rows[:MOST_ROWS_IN_TEXT].itertuples()),
-        *([f"and {more} more"] if more > 0 else []),
-    ]
+    lines = [*map(write_change_line, rows[:MOST_ROWS_IN_TEXT].itertuples())]
+    return lines + [f"and {more} more"] * (more > 0)
 
 
-def _list_regressions(diff: Differences) -> list[tuple[str, list[str]]]:
+def _list_regressions(diff: Differences) -> dict[str, list[str]]:
     """List what regressed and is no single row, under its headings."""
-    parts = {
+    return {
         "Gone": diff.gone,
-        "Weaker rule": [str(weakening) for weakening in diff.weakened],
+        "Weaker rule": [*map(str, diff.weakened)],
         "Disagreement": diff.sentences,
     }
-    return [(heading, texts) for heading, texts in parts.items() if texts]
 
 
-def _list_other_questions(diff: Differences) -> list[tuple[str, list[str]]]:
+def _list_other_questions(diff: Differences) -> dict[str, list[str]]:
     """List what was not compared, under its headings."""
-    parts = {
+    return {
         "Not compared": diff.not_compared,
         "Not run": diff.not_run,
         "Allowed more": diff.grown,
     }
-    return [(heading, texts) for heading, texts in parts.items() if texts]
 
 
 def write_pull_request_comment(diff: Differences) -> str:
@@ -143,15 +138,10 @@ def write_pull_request_comment(diff: Differences) -> str:
 
 def write_differences_page(diff: Differences) -> str:
     """Write a page of its own."""
-    rows = {
-        kind: [
-            *map(
-                _write_change_cells,
-                diff.of(kind)[:MOST_ROWS_ON_THE_PAGE].itertuples(),
-            )
-        ]
-        for kind in KINDS_SHOWN
-    }
+    rows = {}
+    for kind in KINDS_SHOWN:
+        few = diff.of(kind)[:MOST_ROWS_ON_THE_PAGE]
+        rows[kind] = [*map(_write_change_cells, few.itertuples())]
     return _render_differences("changes.html.j2", diff, rows)
 
 
@@ -165,21 +155,22 @@ def _write_change_cells(row: Any) -> tuple[str, ...]:
         write_error(row.error_new) if row.verdict_new else "",
         write_error(row.round_off),
         row.verdict_old,
-        f"{row.verdict_new}: {row.reason_new}" if row.fails else row.verdict_new,
+        row.verdict_new + f": {row.reason_new}" * row.fails,
         row.since,
     )
 
 
 def _render_differences(name: str, diff: Differences, rows: dict[Kind, Any]) -> str:
+    regressions = _list_regressions(diff).items()
     return render(
         "fourbar_validation.regression",
         name,
         diff=diff,
         verdict=write_verdict(diff),
-        regressions=_list_regressions(diff),
+        regressions=[(heading, texts) for heading, texts in regressions if texts],
         kinds=[
             (
-                f"{kind.capitalize()}: {diff.kinds[kind]}",
+                f"{kind.capitalize()}: {len(diff.of(kind))}",
                 _list_groups(diff, kind),
                 cells,
             )
@@ -188,7 +179,7 @@ def _render_differences(name: str, diff: Differences, rows: dict[Kind, Any]) -> 
         ],
         questions=[
             ("Scenes", [*map(str, diff.scenes), *diff.notes]),
-            *_list_other_questions(diff),
+            *_list_other_questions(diff).items(),
         ],
         headings=CHANGE_HEADINGS,
     )
@@ -208,31 +199,19 @@ def _list_cases_of_changes(diff: Differences) -> Iterator[JunitCase]:
     failures = diff.of(*bad)[:MOST_PASSING_CASES]
     others = diff.of(*(kind for kind in Kind if kind not in bad))[:MOST_PASSING_CASES]
     for row in failures.itertuples():
-        yield JunitCase(*_name_case(row), "failure", row.kind, write_change_line(row))
+        yield make_case(row, "failure", row.kind, write_change_line(row))
     for row in others.itertuples():
-        if row.verdict_new in COMPARED_VERDICTS and row.verdict_new != FAILS:
-            yield JunitCase(*_name_case(row), "passed")
+        if row.verdict_new in HOLDING_VERDICTS:
+            yield make_case(row)
         elif row.verdict_new:
             why = f"{row.verdict_new}: {row.reason_new}"
-            yield JunitCase(*_name_case(row), "skipped", row.kind, why)
+            yield make_case(row, "skipped", row.kind, why)
         else:
-            why = write_change_line(row)
-            yield JunitCase(*_name_case(row), "skipped", row.kind, why)
-    for weakening in diff.weakened:
-        name = (weakening.name, weakening.name, f"rule: {weakening.what}")
-        yield JunitCase(*name, "failure", "weaker rule", str(weakening))
+            yield make_case(row, "skipped", row.kind, write_change_line(row))
+    for one in diff.weakened:
+        told = ("failure", "weaker rule", str(one))
+        yield JunitCase(one.name, one.name, f"rule: {one.what}", *told)
     yield from count_beyond(diff.rows - len(failures) - len(others))
     if diff.nothing:
-        yield JunitCase(
-            "all scenes",
-            "all scenes",
-            "anything is compared",
-            "failure",
-            "nothing compared",
-            write_verdict(diff),
-        )
-
-
-def _name_case(row: Any) -> tuple[str, str, str]:
-    """Return suite, class and name of the case of a row."""
-    return row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity
+        told = ("failure", "nothing compared", write_verdict(diff))
+        yield JunitCase("all scenes", "all scenes", "anything is compared", *told)

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fourbar_validation.compare.rows import Row
 
@@ -29,44 +29,36 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
 
     What fails is a failure, and what was not compared is skipped.
     """
-    listed = failures = others = 0
+    counts = Counter[bool]()
     for row in rows:
-        name = (row.scene, f"{row.scene}.{row.engine} {row.setting}", row.quantity)
-        if row.failed and failures < MOST_PASSING_CASES:
-            failures += 1
-            yield JunitCase(
-                *name,
-                "failure",
-                row.verdict,
-                f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}",
-            )
-        elif not row.failed and listed < MOST_PASSING_CASES:
-            listed += 1
-            yield (
-                JunitCase(*name, "passed")
-                if row.compared
-                else JunitCase(
-                    *name,
-                    "skipped",
-                    row.verdict,
-                    row.reason,
-                )
-            )
+        counts[row.failed] += 1
+        if counts[row.failed] > MOST_PASSING_CASES:
+            continue
+        if row.compared and not row.failed:
+            yield make_case(row)
+        elif row.failed:
+            why = f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}"
+            yield make_case(row, "failure", row.verdict, why)
         else:
-            others += 1
-    yield from count_beyond(others)
+            yield make_case(row, "skipped", row.verdict, row.reason)
+    others = [count - MOST_PASSING_CASES for count in counts.values()]
+    yield from count_beyond(sum(max(0, count) for count in others))
+
+
+def make_case(row: Any, *told: str) -> JunitCase:
+    """Make the case of a row.
+
+    `told`: its outcome, kind and message; left out: it passed.
+    """
+    name = f"{row.scene}.{row.engine} {row.setting}"
+    return JunitCase(row.scene, name, row.quantity, *(told or ("passed",)))
 
 
 def count_beyond(rows: int) -> Iterator[JunitCase]:
     """Count what is not listed, as one case."""
     if rows > 0:
-        yield JunitCase(
-            "all scenes",
-            "all scenes",
-            f"{rows} rows more: see results.parquet",
-            "skipped",
-            "not listed",
-        )
+        name = f"{rows} rows more: see results.parquet"
+        yield JunitCase("all scenes", "all scenes", name, "skipped", "not listed")
 
 
 def write_document(title: str, cases: Iterable[JunitCase]) -> str:
@@ -91,11 +83,8 @@ def write_document(title: str, cases: Iterable[JunitCase]) -> str:
         for name in (case.suite, ""):
             counts.update(((name, "tests"), (name, case.outcome)))
     for name, element in {**suites, "": report}.items():
-        for attribute, outcome in (
-            ("tests", "tests"),
-            ("failures", "failure"),
-            ("skipped", "skipped"),
-        ):
-            element.set(attribute, str(counts[name, outcome]))
+        element.set("tests", str(counts[name, "tests"]))
+        element.set("failures", str(counts[name, "failure"]))
+        element.set("skipped", str(counts[name, "skipped"]))
         element.set("errors", "0")
     return ET.tostring(report, encoding="unicode", xml_declaration=True) + "\n"
