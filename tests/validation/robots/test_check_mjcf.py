@@ -356,6 +356,7 @@ def test_a_planted_difference_is_named(what, key, word):
 
 
 SPRING = "tendons.ground output.stiffness"
+ARMATURE = "tendons.ground output.armature"
 
 
 @pytest.mark.parametrize(
@@ -364,6 +365,8 @@ SPRING = "tendons.ground output.stiffness"
         ("pins.A.damping", 0.0, 0.1, "a couple at this pin that the scene does not"),
         ("pins.A.friction", 0.2, 0.0, "a couple at this pin that the file does not"),
         ("pins.A.stiffness", 0.2, 0.1, "a spring at this pin, of another size than"),
+        ("pins.A.armature", 0.0, 0.1, "inertia at this pin that the scene does not"),
+        (ARMATURE, None, 0.1, "inertia along this tendon that the scene does not"),
         (SPRING, 150.0, 155.0, "a spring along this tendon, of another size than"),
         (SPRING, None, 155.0, "a spring along this tendon that the scene does not"),
         ("closure.by", "connect of sites", "tendon", "a tendon leaves out"),

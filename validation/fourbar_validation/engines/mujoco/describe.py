@@ -50,6 +50,7 @@ _TENDON = {
     "stiffness": "stiffness",
     "damping": "damping",
     "frictionloss": "frictionloss",
+    "armature": "armature",
     "solref_fri": "solreffriction",
     "solimp_fri": "solimpfriction",
 }

@@ -261,6 +261,38 @@ def test_armature_between_moving_bars_is_named_with_its_size():
     assert any("armature 0.125 kg m^2 of A" in remark for remark in remarks)
 
 
+@pytest.mark.parametrize(
+    ("tendon", "actuator", "named"),
+    [
+        ('armature="0.02"', "", "the tendon T (armature 0.02)"),
+        (
+            'stiffness="3" damping="0 1 2"',
+            "",
+            "the tendon T (stiffness 3, damping 0 1 2)",
+        ),
+        (
+            "",
+            '<general name="pull" tendon="T" biastype="affine" biasprm="5 0 0"'
+            ' gainprm="0"/>',
+            "the actuator pull",
+        ),
+        ("", '<motor name="pull" tendon="T"/>', ""),
+    ],
+)
+def test_what_acts_along_a_tendon_is_named(tendon, actuator, named):
+    over = '<joint joint="O2" coef="1"/><joint joint="O4" coef="-1"/>'
+    acting = (
+        f'<tendon><fixed name="T" {tendon}>{over}</fixed></tendon>'
+        f"<actuator>{actuator}</actuator>"
+    )
+    if "damping" in tendon and not hasattr(mujoco.MjModel, "tendon_dampingpoly"):
+        pytest.skip("this MuJoCo has no polynomials of tendons")
+    remarks = read(Planar(more=acting).text()).remarks
+    expected = [f"not in the scene: {named}"] if named else []
+    left_out = [one for one in remarks if "not in the scene: the" in one]
+    assert left_out == expected
+
+
 def test_forces_across_the_plane_are_named_with_their_sizes():
     made = read(FOOT)
     (remark,) = [r for r in made.remarks if "across the plane" in r]

@@ -23,6 +23,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
@@ -35,6 +36,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_lifted_masses,
     name_body,
     name_joint,
+    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
@@ -553,12 +555,16 @@ class SceneOfLoop:
         The motor of the driven hinge is left out.
         """
         model = self.model
+        none = np.zeros((model.ntendon, 0))
         for number in filter(self.seen.touches_tendon, range(model.ntendon)):
-            sizes = {
-                name: float(np.max(getattr(model, f"tendon_{name}")[number]))
-                for name in ("stiffness", "damping", "frictionloss")
-            }
-            acts = [f"{name} {size:.6g}" for name, size in sizes.items() if size]
+            acts = []
+            for name in ("stiffness", "damping", "frictionloss", "armature"):
+                size = getattr(model, f"tendon_{name}")[number]
+                # since MuJoCo 4.0
+                more = getattr(model, f"tendon_{name}poly", none)[number]
+                sizes = np.trim_zeros(np.append(size, more), "b").tolist()
+                if sizes:
+                    acts.append(f"{name} {write_six_digits(*sizes)}")
             if acts:
                 name = model.tendon(number).name or str(number)
                 self._leave_out(f"the tendon {name} ({', '.join(acts)})")
@@ -568,7 +574,13 @@ class SceneOfLoop:
             target = int(model.actuator_trnid[number, 0])
             on_joint = kind == mujoco.mjtTrn.mjTRN_JOINT and target in joints
             on_site = kind == mujoco.mjtTrn.mjTRN_SITE
-            if on_joint or (on_site and int(model.site_bodyid[target]) in self.bodies):
+            on_tendon = kind == mujoco.mjtTrn.mjTRN_TENDON
+            pulls = on_tendon and not takes_control(model, number)
+            if (
+                on_joint
+                or (on_site and int(model.site_bodyid[target]) in self.bodies)
+                or (pulls and self.seen.touches_tendon(target))
+            ):
                 self._leave_out(describe_actuator(model, number))
 
 
