@@ -358,6 +358,21 @@ def test_a_tie_between_bars_is_switched_off_whatever_makes_it():
         np.testing.assert_array_equal(one[name], other[name])
 
 
+def test_dry_friction_along_a_tendon_is_that_of_its_hinge():
+    """A tendon over one hinge, twice its angle, rubs with twice its couple there."""
+    joint = SINGLE.replace('"j4"', '"j4" frictionloss=".02"')
+    tendon = (
+        '<tendon><fixed frictionloss=".01"><joint joint="j4" coef="2"/></fixed>'
+        "</tendon></mujoco>"
+    )
+    one, other = (
+        measure(text, speed=2.0).states.collect("rigid")
+        for text in (joint, SINGLE.replace("</mujoco>", tendon))
+    )
+    for name in FORCE_QUANTITIES:
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-9)
+
+
 def test_a_couple_is_found_where_nothing_accelerates():
     """At rest without weights no acceleration tells how large a trial is to be."""
     loop = measure(make_parallelogram(0.5, 0.4, "0 0 0"), speed=0.0)

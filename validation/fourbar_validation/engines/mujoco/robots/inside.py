@@ -208,9 +208,6 @@ class LoopInside:
         """Turn of the hinges that follow by that of the commanded bar, at the last
         pose.
         """
-        without_friction = int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS)
-        rubs = not self.model.opt.disableflags & without_friction
-        self._friction = self.model.dof_frictionloss * rubs
         self.bearers = BearerForces(self.model)
         self._bars = list_bars(model, loop)
         self.flywheel = 0.0
@@ -606,7 +603,7 @@ class LoopInside:
         needed = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, needed, accelerations)
         needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
-        needed += self._friction * np.sign(state.qvel)
+        needed += self._rub(state)
         needed -= self.turn * self.flywheel * wanted
         pull = self.turn if self.acting is None else self.acting.find_pull(data)
         # M a + c - J^T f = pull s on the hinges of the loop; the closures bear what
@@ -627,6 +624,20 @@ class LoopInside:
         if self.acting is not None:
             self.acting.exert(data, 0.0)
         return PinsAndTorque(size, forces), accelerations
+
+    def _rub(self, state: _RobotState) -> Array:
+        """Return the joint forces against dry friction in full, (nv,)."""
+        model = self.model
+        data = self.data
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = state.qpos
+        mujoco.mj_fwdPosition(model, data)
+        speeds = np.zeros(data.nefc)
+        mujoco.mj_mulJacVec(model, data, speeds, state.qvel)
+        full = data.efc_frictionloss[: data.nefc] * np.sign(speeds)
+        forces = np.zeros(model.nv)
+        mujoco.mj_mulJacTVec(model, data, forces, full)
+        return forces
 
     def _balance(self, accelerations: Array) -> Array:
         """Return the joint forces that leave the hinges that follow alone, (nv,).
