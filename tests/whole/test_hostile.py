@@ -24,9 +24,9 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.results_file import LONGEST_CELL, read_columns
 from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.environments import choose_engines
 from fourbar_validation.engines.programs import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, write_about
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.plan import Plan, RunOptions

@@ -69,7 +69,6 @@ JUDGED_BY = {
     "validation/engines/test_guests.py": (
         "validation: engine; validation/engines: programs workers"
     ),
-    "validation/engines/test_environments.py": "validation/engines: table",
     "validation/engines/test_free_body.py": (
         "validation/engines: free_body_closure free_body_effects"
     ),

@@ -16,6 +16,7 @@ from fourbar.quantities import (
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FORMULAS, RESULT_COLUMNS, Row
+from fourbar_validation.engines.environments import choose_engines
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.registry import (
     ENGINES,
@@ -23,7 +24,6 @@ from fourbar_validation.engines.registry import (
     WORK,
     load_further,
 )
-from fourbar_validation.engines.table import choose_engines
 from fourbar_validation.regression.changes import WHOLE_ENGINE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.judge import judge

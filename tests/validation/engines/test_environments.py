@@ -17,11 +17,12 @@ from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments
 from fourbar_validation.engines.environments import (
     Entry,
+    choose_engines,
+    fill_table,
     make_environment,
     read_engines,
 )
 from fourbar_validation.engines.programs import Ended
-from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.judge import judge
 from tests.support.guests import end_guests

@@ -1,6 +1,9 @@
-"""Engines in environments of their own.
+"""The one table of engines, by their names, and engines in environments of their own.
 
-engines.toml says what pip installs, and which adapter or command answers.
+Every engine that a run may ask is an entry of the table: those of harness and lab
+(`list_engines`), guests of the command line, and entries of engines.toml, whose
+environments are made when they are chosen. engines.toml says what pip installs, and
+which adapter or command answers.
 """
 
 import hashlib
@@ -10,7 +13,7 @@ import shutil
 import sys
 import sysconfig
 import tomllib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import requires
 from pathlib import Path
@@ -18,11 +21,23 @@ from typing import Any
 
 from filelock import FileLock
 
-from fourbar.errors import DependencyError, InputError
+from fourbar.errors import DependencyError, InputError, list_allowed
 from fourbar.writing import read_text, write_text
-from fourbar_validation.engines.guests import Guest, name_guests, serve_adapter
+from fourbar_validation.engines.guests import (
+    Guest,
+    name_by_versions,
+    name_guests,
+    read_guests,
+    serve_adapter,
+)
 from fourbar_validation.engines.programs import Program, run_to_end
-from fourbar_validation.engines.registry import LAB_FOLDERS, Engine
+from fourbar_validation.engines.registry import (
+    BALLS,
+    LAB_FOLDERS,
+    Engine,
+    list_engines,
+    load_further,
+)
 
 ENGINES_FILE = "engines.toml"
 LARGEST_ENGINES_FILE = 10**6
@@ -82,32 +97,23 @@ def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
 def read_engines_of(file: Path) -> dict[str, Entry]:
     """Read the engines of one file, by name."""
     text = read_text(file, "engines", LARGEST_ENGINES_FILE)
-    try:
-        tables = tomllib.loads(text).get("engine", [])
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            "engine",
-            None,
-            f"is no TOML: {error}",
-            str(file),
-        ) from None
     entries: dict[str, Entry] = {}
-    for table in tables:
-        entry = _read_entry(file, table)
-        entries.setdefault(entry.name, entry)
+    try:
+        for table in tomllib.loads(text).get("engine", []):
+            entry = _read_entry(table)
+            entries.setdefault(entry.name, entry)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError("engine", None, f"is no TOML: {error}", str(file)) from None
+    except InputError as error:
+        raise error.in_file(str(file)) from None
     return entries
 
 
-def _read_entry(file: Path, table: object) -> Entry:
+def _read_entry(table: object) -> Entry:
     texts = ("name", "adapter", "python", "setting")
     lists = ("command", "requires")
     if not isinstance(table, dict) or not table.get("name"):
-        raise InputError(
-            "engine",
-            table,
-            "must be a table [[engine]] with a name",
-            str(file),
-        )
+        raise InputError("engine", table, "must be a table [[engine]] with a name")
     for key, value in table.items():
         if key == "steps" or key in lists:
             kind = int if key == "steps" else str
@@ -119,19 +125,9 @@ def _read_entry(file: Path, table: object) -> Entry:
                 f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of"
                 " texts), steps (whole numbers)"
             )
-            raise InputError(
-                f"engine.{key}",
-                value,
-                allowed,
-                str(file),
-            )
+            raise InputError(f"engine.{key}", value, allowed)
     if bool(table.get("adapter")) == bool(table.get("command")):
-        raise InputError(
-            "engine",
-            table["name"],
-            "must have an adapter or a command",
-            str(file),
-        )
+        raise InputError("engine", table["name"], "must have an adapter or a command")
     stated: dict[str, Any] = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in table.items()
@@ -225,3 +221,65 @@ def start_engine(
     if entry.steps:
         setting["steps_per_turn"] = entry.steps[-1]
     return guest.at_setting(**setting) if setting else guest
+
+
+Table = dict[str, Engine | Entry]
+
+
+def fill_table(
+    folders: Iterable[Path] = (),
+    guests: Sequence[str] = (),
+    seconds: float | None = None,
+    *,
+    balls: bool = False,
+) -> Table:
+    """Fill the table of engines, by name; the first to bear a name keeps it.
+
+    Parameters
+    ----------
+    folders : whose engines.toml is read before those of the package and of the lab.
+    guests : each as `--guest` takes it; they are started, and their hello names them.
+    seconds : time limit for each answer of a guest.
+    balls : offer ball arithmetic too, which is for hard positions.
+    """
+    table: Table = {**list_engines()}
+    if not balls:
+        del table[BALLS.name]
+    table |= {guest.name: guest for guest in read_guests(guests, list(table), seconds)}
+    return table | read_engines(folders) | table
+
+
+def choose_engines(
+    names: str | None,
+    table: Table | None = None,
+    seconds: float | None = None,
+) -> tuple[Engine, ...]:
+    """Choose the engines named in a comma-separated list, and every guest.
+
+    Without a list these are all of the harness, and those of the lab that are
+    installed. `seconds`: time limit for each answer of an engine of engines.toml.
+    """
+    table = fill_table() if table is None else table
+    if names is None:
+        wanted = {name for name, one in table.items() if isinstance(one, Engine)}
+    else:
+        asked = [name.strip() for name in names.split(",") if name.strip()] or [names]
+        for name in asked:
+            if name not in table:
+                raise InputError("--engines", name, list_allowed(name, table))
+        guests = {name for name, one in table.items() if isinstance(one, Guest)}
+        wanted = {*asked, *guests}
+    optional = load_further() if names is None else ()
+    chosen: list[Engine] = []
+    for name in filter(wanted.__contains__, table):
+        engine = table[name]
+        if isinstance(engine, Entry):
+            taken = {*table, *(one.name for one in chosen)} - {name}
+            ours = list_engines().get(engine.adapter)
+            engine = start_engine(engine, taken, seconds, like=ours)
+        if engine in optional and engine.missing():
+            continue
+        if isinstance(engine, Guest):
+            engine = replace(engine, number=len(chosen))
+        chosen.append(engine)
+    return name_by_versions(chosen, table)

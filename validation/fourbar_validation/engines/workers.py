@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 from fourbar.errors import DependencyError
 from fourbar_validation.engines.programs import (
@@ -21,9 +21,6 @@ from fourbar_validation.engines.programs import (
     keep_output,
     open_no_windows,
 )
-
-if TYPE_CHECKING:
-    from pebble import ProcessPool
 
 SCENE_SECONDS = 180.0
 """A scene takes 0.05 to 3 s, one released for 100 s some 50 s of processor time; what
@@ -48,6 +45,8 @@ Task = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
 """Do one item by itself: its result, or the exception that it ended with."""
+_Submitted = tuple["Future[Any]", float]
+"""An item's future, and when the item was handed in by the monotonic clock, s."""
 _Instead = Callable[[Any, BaseException, Attempt], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
 
@@ -71,39 +70,31 @@ def prepare_worker(_: object = None) -> None:
     keep_output()
 
 
-class _Submitted(NamedTuple):
-    """An item's future, and when the item was handed in by the monotonic clock, s."""
-
-    future: "Future[Any]"
-    since: float
-
-
 @dataclass(frozen=True)
 class _PoolOfItems:
     """Items handed to a pool, each with its limit of time."""
 
-    pool: "ProcessPool"
+    pool: Any
     function: Callable[[Any], Any]
     seconds: float | None
+    instead: _Instead
 
-    def submit(self, item: Any) -> "_Submitted":
+    def submit(self, item: Any) -> _Submitted:
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
             with hold_interruption():
-                future: Future[Any] = self.pool.schedule(
-                    self.function,
-                    args=(item,),
-                    timeout=self.seconds,
+                future = self.pool.schedule(
+                    self.function, args=(item,), timeout=self.seconds
                 )
         except RuntimeError:
             raise _lost_workers() from None
-        return _Submitted(future, time.monotonic())
+        return future, time.monotonic()
 
     def attempt(self, item: Any) -> Any:
         """Do one item: its result, or the exception that it ended with."""
-        return self.outcome(item, self.submit(item))
+        return self.outcome(item, *self.submit(item))
 
-    def outcome(self, item: Any, submitted: "_Submitted") -> Any:
+    def outcome(self, item: Any, future: "Future[Any]", since: float) -> Any:
         """Return an item's result, or the exception that it ended with.
 
         A worker may have been killed from outside, for example where memory ran out.
@@ -113,14 +104,11 @@ class _PoolOfItems:
         """
         from pebble import ProcessExpired
 
-        future, since = submitted
+        while self._is_too_soon(future.exception(), since):
+            future, _ = self.submit(item)
+        if isinstance(future.exception(), ProcessExpired):
+            future, _ = self.submit(item)
         error = future.exception()
-        while self._is_too_soon(error, since):
-            future = self.submit(item).future
-            error = future.exception()
-        if isinstance(error, ProcessExpired):
-            future = self.submit(item).future
-            error = future.exception()
         if isinstance(error, BrokenProcessPool):
             raise _lost_workers()
         if isinstance(error, DependencyError):
@@ -135,23 +123,20 @@ class _PoolOfItems:
             and time.monotonic() - since < self.seconds
         )
 
-    def outcomes(
-        self,
-        items: Sequence[Any],
-        submissions: "Sequence[_Submitted]",
-        instead: _Instead,
-    ) -> list[Any]:
-        """Return the results of items in order.
+    def finish(
+        self, number: int, items: Sequence[Any], waiting: Sequence[_Submitted]
+    ) -> tuple[int, list[Any]]:
+        """Return a task's number and the results of its items in order.
 
         An item that failed has its replacement in the result's place.
         """
         results = []
-        for item, submitted in zip(items, submissions, strict=True):
-            outcome = self.outcome(item, submitted)
-            if isinstance(outcome, BaseException):
-                outcome = instead(item, outcome, self.attempt)
-            results.append(outcome)
-        return results
+        for item, submitted in zip(items, waiting, strict=True):
+            result = self.outcome(item, *submitted)
+            if isinstance(result, BaseException):
+                result = self.instead(item, result, self.attempt)
+            results.append(result)
+        return number, results
 
 
 def _lost_workers() -> NoWorkersError:
@@ -207,24 +192,16 @@ def apply_over_processes(
         initializer=prepare_worker,
         initargs=[function],
     ) as pool:
-        pool_of_items = _PoolOfItems(pool, function, seconds)
-
-        def finish(
-            number: int,
-            items: Sequence[Any],
-            waiting: Sequence[_Submitted],
-        ) -> tuple[int, list[Any]]:
-            return number, pool_of_items.outcomes(items, waiting, instead)
-
+        items_of = _PoolOfItems(pool, function, seconds, instead)
         in_flight: deque[tuple[int, Sequence[Any], list[_Submitted]]] = deque()
         try:
             for number, items in tasks:
-                waiting = [pool_of_items.submit(item) for item in items]
+                waiting = [items_of.submit(item) for item in items]
                 in_flight.append((number, items, waiting))
                 if len(in_flight) > _IN_FLIGHT * workers:
-                    yield finish(*in_flight.popleft())
+                    yield items_of.finish(*in_flight.popleft())
             for submitted in in_flight:
-                yield finish(*submitted)
+                yield items_of.finish(*submitted)
         except BaseException:
             pool.stop()  # type: ignore[no-untyped-call]
             raise

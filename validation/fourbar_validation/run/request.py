@@ -10,9 +10,9 @@ from typing import Any
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.writing import require_file, write_text
+from fourbar_validation.engines.environments import choose_engines, fill_table
 from fourbar_validation.engines.guests import adjust_engines
 from fourbar_validation.engines.registry import Engine, hold_fully
-from fourbar_validation.engines.table import choose_engines, fill_table
 from fourbar_validation.regression.accept import FORMS
 from fourbar_validation.regression.record import find_baseline, open_run
 from fourbar_validation.run.plan import (
