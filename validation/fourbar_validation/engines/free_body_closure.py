@@ -125,23 +125,6 @@ def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     return np.clip(angle, NEARLY_IN_LINE, np.pi - 2.0 * NEARLY_IN_LINE)
 
 
-def _look(
-    theta: Array,
-    diagonal: ComplexArray,
-    branch: NDArray[np.int8],
-    b: float,
-    c: float,
-) -> tuple[ComplexArray, ComplexArray, ComplexArray, Array]:
-    """Return e^{i theta_3}, e^{i theta_4}, the gap and its size, infinite off a branch.
-
-    `theta`: (2, n).
-    """
-    u_3, u_4 = np.exp(1j * theta)
-    gap = b * u_3 - c * u_4 - diagonal
-    inside = cross_products(u_3, u_4) * branch > 0.0
-    return u_3, u_4, gap, np.where(inside, np.abs(gap), np.inf)
-
-
 def _solve_newton(
     diagonal: ComplexArray,
     b: float,
@@ -156,20 +139,21 @@ def _solve_newton(
     c sin(theta_4 - theta_3), whose sign is the branch's. A step is halved until the gap
     falls and that sign is kept; so it ends where no smaller gap is to be had.
     """
+
+    def look(theta: Array, at: Any) -> tuple[ComplexArray, ComplexArray, Array, Array]:
+        """Return e^{i theta}, the gap, its size, inf off a branch, and the sine."""
+        unit = np.exp(1j * theta)
+        gap = b * unit[0] - c * unit[1] - diagonal[at]
+        sine = cross_products(*unit)
+        return unit, gap, np.where(sine * branch[at] > 0.0, np.abs(gap), np.inf), sine
+
     theta = theta.copy()
-    size = _look(theta, diagonal, branch, b, c)[3]
+    _, _, size, _ = look(theta, slice(None))
     moving = np.flatnonzero(np.isfinite(size))
     for _ in range(NEWTON_STEPS):
         if not len(moving):
             break
-        u_3, u_4, gap, _ = _look(
-            theta[:, moving],
-            diagonal[moving],
-            branch[moving],
-            b,
-            c,
-        )
-        sine = cross_products(u_3, u_4)
+        (u_3, u_4), gap, _, sine = look(theta[:, moving], moving)
         # b step_3 u_3 - c step_4 u_4 = i gap
         step = np.array(
             [
@@ -177,17 +161,14 @@ def _solve_newton(
                 cross_products(1j * gap, u_3) / (c * sine),
             ]
         )
-        part = np.minimum(
-            1.0,
-            LONGEST_CLOSURE_STEP
-            / np.maximum(np.abs(step).max(axis=0), LONGEST_CLOSURE_STEP),
-        )
+        longest = np.maximum(np.abs(step).max(axis=0), LONGEST_CLOSURE_STEP)
+        part = LONGEST_CLOSURE_STEP / longest
         pending = np.arange(len(moving))
         moved = np.zeros(len(moving), dtype=bool)
         for _ in range(MOST_HALVINGS):
             indices = moving[pending]
             trial = theta[:, indices] + part[pending] * step[:, pending]
-            trial_size = _look(trial, diagonal[indices], branch[indices], b, c)[3]
+            _, _, trial_size, _ = look(trial, indices)
             falls = trial_size < size[indices]
             theta[:, indices[falls]] = trial[:, falls]
             size[indices[falls]] = trial_size[falls]

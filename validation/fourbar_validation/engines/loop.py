@@ -131,24 +131,17 @@ class Assembler:
         for alpha, beta in (triangle, *_START_ANGLES):
             first = phi + branch * alpha
             second = phi + math.pi - branch * beta
-            if bar == 2:
-                theta_2 = theta
-                theta_3 = first
-                theta_4 = second
-            elif bar == 3:
-                theta_2 = first
-                theta_3 = theta
-                theta_4 = second
-            else:
-                theta_2 = second + math.pi
-                theta_3 = first
-                theta_4 = theta
+            theta_2, theta_3, theta_4 = {
+                2: (theta, first, second),
+                3: (first, theta, second),
+                4: (second + math.pi, first, theta),
+            }[bar]
             q = (
                 theta_2,
                 math.remainder(theta_3 - theta_2, math.tau),
                 math.remainder(theta_4, math.tau),
             )
-            assembled = _close_gap(self.tree, q, branch, closed, bar)
+            assembled = self._close_gap(q, branch)
             if assembled is not None:
                 return assembled
         if least_gap < -closed:
@@ -158,99 +151,83 @@ class Assembler:
             )
         return None
 
+    def _close_gap(self, q: JointAngles, branch: int) -> JointAngles | None:
+        """Close the gap with a bar held, never leaving the branch.
 
-def _compute_triangle_angle(
-    e: float,
-    near: float,
-    far: float,
-) -> float:
+        The determinant of the gap's derivative by the angles of the others, for bar 2
+        -b c sin(theta_4 - theta_3), has the branch's sign. A step is halved until the
+        gap falls and the sign is kept. The last step is the one after which a gap below
+        `closed` (m) falls no further. An answer that stops a step earlier has other
+        last digits, and near a change point these decide whether forces can be told.
+        """
+        tree = self.tree
+        closed = self.closed
+        theta_3 = q[0] + q[1]
+        tree.place(q)
+        x, y = tree.gap()
+        size = math.hypot(x, y)
+        a, b, c, d = self._find_slopes()
+        det = a * d - b * c
+        if det * branch >= 0.0:
+            return None
+        for _ in range(NEWTON_STEPS):
+            first = (b * y - d * x) / det
+            second = (c * x - a * y) / det
+            longest = max(abs(first), abs(second), LONGEST_CLOSURE_STEP)
+            part = LONGEST_CLOSURE_STEP / longest
+            while True:
+                trial = self._turn_others(q, theta_3, part * first, part * second)
+                # a step that is lost in the rounding of the angles leaves the gap as it
+                # is
+                if trial != q:
+                    tree.place(trial)
+                    x, y = tree.gap()
+                    trial_size = math.hypot(x, y)
+                    if trial_size < size:
+                        a, b, c, d = self._find_slopes()
+                        det = a * d - b * c
+                        if det * branch < 0.0:
+                            break
+                part /= 2.0
+                if size <= closed or part < _SHORTEST_STEP:
+                    tree.place(q)
+                    return q if size <= closed else None
+            q = trial
+            size = trial_size
+        return q if size <= closed else None
+
+    def _turn_others(
+        self, q: JointAngles, theta_3: float, one: float, other: float
+    ) -> JointAngles:
+        """Turn the two bars that close the loop, the commanded one held.
+
+        `theta_3`: direction of bar 3, held where it is commanded.
+        """
+        if self.bar == 2:
+            return q[0], q[1] + one, q[2] + other
+        if self.bar == 3:
+            return q[0] + one, theta_3 - (q[0] + one), q[2] + other
+        return q[0] + other, q[1] + (one - other), q[2]
+
+    def _find_slopes(self) -> tuple[float, float, float, float]:
+        """Return the derivatives of the gap by the angles of the bars that close it.
+
+        In order: of x by the first and the second angle, then of y.
+        """
+        (e, a, b), (f, c, d) = self.tree.jacobian().tolist()
+        if self.bar == 3:
+            # bar 2 turns alone where its own joint turns and that of bar 3 turns back
+            return e - a, b, f - c, d
+        if self.bar == 4:
+            return a, e - a, c, f - c
+        return a, b, c, d
+
+
+def _compute_triangle_angle(e: float, near: float, far: float) -> float:
     """Compute the angle between the sides e and near, by half-angle tangents."""
     above = (e - near + far) * (far + near - e)
     below = (e + near - far) * (e + near + far)
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
-
-
-def _turn_others(
-    q: JointAngles,
-    bar: int,
-    theta_3: float,
-    one: float,
-    other: float,
-) -> JointAngles:
-    """Turn the two bars that close the loop, the commanded one held.
-
-    `theta_3`: direction of bar 3, held where it is commanded.
-    """
-    if bar == 2:
-        return q[0], q[1] + one, q[2] + other
-    if bar == 3:
-        return q[0] + one, theta_3 - (q[0] + one), q[2] + other
-    return q[0] + other, q[1] + (one - other), q[2]
-
-
-def _close_gap(
-    tree: Assembled,
-    q: JointAngles,
-    branch: int,
-    closed: float,
-    bar: int,
-) -> JointAngles | None:
-    """Close the gap with a bar held, never leaving the branch.
-
-    The determinant of the gap's derivative by the angles of the others, for bar 2 -b c
-    sin(theta_4 - theta_3), has the branch's sign. A step is halved until the gap falls
-    and the sign is kept. The last step is the one after which a gap below `closed` (m)
-    falls no further. An answer that stops a step earlier has other last digits, and
-    near a change point these decide whether forces can be told.
-    """
-    theta_3 = q[0] + q[1]
-    tree.place(q)
-    x, y = tree.gap()
-    size = math.hypot(x, y)
-    a, b, c, d = _find_slopes(tree, bar)
-    det = a * d - b * c
-    if det * branch >= 0.0:
-        return None
-    for _ in range(NEWTON_STEPS):
-        first = (b * y - d * x) / det
-        second = (c * x - a * y) / det
-        part = min(
-            1.0,
-            LONGEST_CLOSURE_STEP / max(abs(first), abs(second), LONGEST_CLOSURE_STEP),
-        )
-        while True:
-            trial = _turn_others(q, bar, theta_3, part * first, part * second)
-            # a step that is lost in the rounding of the angles leaves the gap as it is
-            if trial != q:
-                tree.place(trial)
-                x, y = tree.gap()
-                trial_size = math.hypot(x, y)
-                if trial_size < size:
-                    a, b, c, d = _find_slopes(tree, bar)
-                    det = a * d - b * c
-                    if det * branch < 0.0:
-                        break
-            part /= 2.0
-            if size <= closed or part < _SHORTEST_STEP:
-                tree.place(q)
-                return q if size <= closed else None
-        q = trial
-        size = trial_size
-    return q if size <= closed else None
-
-
-def _find_slopes(tree: Assembled, bar: int) -> tuple[float, float, float, float]:
-    """Return the derivatives of the gap by the angles of the bars that close the loop.
-
-    In order: of x by the first and the second angle, then of y.
-    """
-    (e, a, b), (f, c, d) = tree.jacobian().tolist()
-    if bar == 3:
-        # bar 2 turns alone where its own joint turns and that of bar 3 turns back
-        return e - a, b, f - c, d
-    if bar == 4:
-        return a, e - a, c, f - c
-    return a, b, c, d
 
 
 @dataclass(slots=True)

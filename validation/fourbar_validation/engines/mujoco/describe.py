@@ -136,6 +136,12 @@ class _Description:
             value = tuple(read) if isinstance(read, list) else read
         self.described[key] = ModelEntry(value, element, attribute)
 
+    def name(self, kind: str, number: int, tag: str = "") -> str:
+        """Return an element of a kind by its tag and name, or by its number."""
+        name = getattr(self.model, kind)(number).name
+        tag = tag or kind
+        return f'{tag} "{name}"' if name else f"{tag} {number} (unnamed)"
+
     def add_bar(self, bar: int, flywheel: float) -> None:
         """Describe mass, inertia about the mass centre, and its place.
 
@@ -155,7 +161,7 @@ class _Description:
         if pin in _GROUND_PINS and joint is not None:
             armature = self.model.dof_armature[self.model.jnt_dofadr[joint]] - flywheel
             if armature:
-                hinge = _name_element("joint", self.model.joint(joint).name, joint)
+                hinge = self.name("joint", joint)
                 where = f"{element} inertial and {hinge}"
                 self.put(f"{key}.inertia", inertia + armature, where, "armature")
         lifted = list_lifted_masses(self.model)[seen.list_parts(bar)].sum()
@@ -173,7 +179,7 @@ class _Description:
             self.put(f"{key}.range", UNLIMITED_RANGE)
             return
         dof = int(model.jnt_dofadr[joint])
-        element = _name_element("joint", model.joint(joint).name, joint)
+        element = self.name("joint", joint)
         acting = {}
         for name, (field, attribute, flag) in PIN_PROPERTIES.items():
             if name == "armature" and pin in _GROUND_PINS:
@@ -206,7 +212,7 @@ class _Description:
         if not model.eq_active0[number]:
             return
         kind = seen.closed_by.partition(" ")[0]
-        element = _name_element(kind, model.equality(number).name, number)
+        element = self.name("equality", number, kind)
         self.put("closure.solref", model.eq_solref[number], element, "solref")
         self.put("closure.solimp", model.eq_solimp[number], element, "solimp")
         # MuJoCo's inverse weights of the two bodies that the equality joins, 1/kg
@@ -236,8 +242,7 @@ class _Description:
             number = int(model.actuator_trnid[i, 0])
             exerted = model.actuator_gear[i, 0] * bias
             kind = model.actuator_trntype[i]
-            name = model.actuator(i).name
-            element = _name_element("actuator", name, i)
+            element = self.name("actuator", i)
             bar = None
             if kind == mujoco.mjtTrn.mjTRN_SITE:
                 bar = seen.bar(model.site_bodyid[number])
@@ -249,11 +254,11 @@ class _Description:
                 if seen.touches_tendon(number):
                     self.put(f"{self.name_tendon(number)}.tension", exerted, element)
             elif bar in MOVING_BARS:
-                key, load = _read_load(seen, i, bar, bias[0])
+                key, load = self.read_load(i, bar, bias[0])
                 sums[key] = sums.get(key, np.zeros(5)) + load
             elif seen.is_alone:
                 words = "acts on no pin, bar or tendon"
-                self.put(f"actuators.{name or i}", words, element)
+                self.put(f"actuators.{model.actuator(i).name or i}", words, element)
         for key, total in sums.items():
             fx, fy, couple, turning, along = total.tolist()
             squared = fx * fx + fy * fy
@@ -265,6 +270,31 @@ class _Description:
             self.put(f"{key}.force", (fx, fy))
             self.put(f"{key}.point", (x, y))
             self.put(f"{key}.couple", couple + turning)
+
+    def read_load(
+        self, actuator: int, bar: int, size: float
+    ) -> tuple[str, tuple[float, ...]]:
+        """Return key and sums of what an actuator exerts at a site of a bar.
+
+        The sums are force, couple, r x F and r . F, in N and N m.
+        """
+        seen = self.seen
+        model = self.model
+        site, frame = (int(index) for index in model.actuator_trnid[actuator])
+        axes_of = frame if frame >= 0 else site
+        axes = seen.data.site_xmat[axes_of].reshape(3, 3)
+        gear = model.actuator_gear[actuator].reshape(2, 3)
+        force, couple = (axes @ one * size for one in gear)
+        bearer = seen.bar(model.site_bodyid[axes_of])
+        directions = "world axes"
+        if bearer in MOVING_BARS:
+            fx, fy = seen.resolve(bearer, force)
+            directions = f"axes of the {BAR_NAMES[bearer]}"
+        else:
+            fx, fy = seen.in_plane(force)
+        x, y = seen.along_bar(bar, seen.data.site_xpos[site])
+        moments = float(couple @ seen.normal), x * fy - y * fx, x * fx + y * fy
+        return f"loads.{BAR_NAMES[bar]}, {directions}", (fx, fy, *moments)
 
     def name_tendon(self, number: int) -> str:
         """Return a tendon's name: its pins, or else the bars that it runs between."""
@@ -307,7 +337,7 @@ class _Description:
             counted = (f"{name} ({number})" for number in count(2))
             keys = chain([name], counted)
             key = next(one for one in keys if one not in self.described)
-            element = _name_element("tendon", model.tendon(i).name, i)
+            element = self.name("tendon", i)
             self.put(key, "present", element)
             self.put(f"{key}.path", numbers, element)
             for attribute, written in _TENDON.items():
@@ -318,38 +348,6 @@ class _Description:
                 end = "springlength angle" if i in rest else "springlength"
                 lengths = model.tendon_lengthspring[i] + rest.get(i, 0.0)
                 self.put(f"{key}.{end}", lengths, element, "springlength")
-
-
-def _name_element(tag: str, name: str, number: int) -> str:
-    return f'{tag} "{name}"' if name else f"{tag} {number} (unnamed)"
-
-
-def _read_load(
-    seen: SeenLoop, actuator: int, bar: int, size: float
-) -> tuple[str, tuple[float, ...]]:
-    """Return key and sums of what an actuator exerts at a site of a bar.
-
-    The sums are force, couple, r x F and r . F, in N and N m.
-    """
-    model = seen.model
-    data = seen.data
-    site, frame = (int(index) for index in model.actuator_trnid[actuator])
-    gear = model.actuator_gear[actuator]
-    axes_of = frame if frame >= 0 else site
-    bearer = seen.bar(model.site_bodyid[axes_of]) or 1
-    axes = data.site_xmat[axes_of].reshape(3, 3)
-    force = axes @ gear[:3] * size
-    couple = axes @ gear[3:] * size
-    if bearer in MOVING_BARS:
-        fx, fy = seen.resolve(bearer, force)
-        directions = f"axes of the {BAR_NAMES[bearer]}"
-    else:
-        fx, fy = seen.in_plane(force)
-        directions = "world axes"
-    x, y = seen.along_bar(bar, data.site_xpos[site])
-    key = f"loads.{BAR_NAMES[bar]}, {directions}"
-    turning = x * fy - y * fx
-    return key, (fx, fy, float(couple @ seen.normal), turning, x * fx + y * fy)
 
 
 def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
@@ -382,82 +380,30 @@ def set_entry(
 
     `generated`: its description. `value`: None for what is not there.
     """
-    root = ET.fromstring(text)
     subject, _, rest = key.partition(".")
     if subject == "lift":  # its flags let nothing be lifted
         return None
+    file = _GeneratedFile(text, generated)
+    name, _, part = rest.rpartition(".")
     try:
         if subject == "lengths":
-            _set_length(root, rest, float(value))  # type: ignore[arg-type]
+            file.set_length(rest, float(value))  # type: ignore[arg-type]
         elif subject == "bars":
-            bar, _, name = rest.partition(".")
-            _set_inertial(root, generated, bar, name, float(value))  # type: ignore[arg-type]
+            bar, _, part = rest.partition(".")
+            file.set_inertial(bar, part, float(value))  # type: ignore[arg-type]
         elif subject == "loads":
-            load, _, name = rest.rpartition(".")
-            _set_load(root, generated, load, name, value)
+            file.set_load(name, part, value)
         elif value is None:
-            _find(root, generated[key].element).clear()
+            file.find(generated[key].element).clear()
         else:
-            _set_attribute(root, generated[key], key, value)
+            file.set_attribute(key, value)
     except (
         KeyError,
         TypeError,
         ValueError,
     ):  # an entry of another kind, or of an element that is not there
         return None
-    return ET.tostring(root, encoding="unicode")
-
-
-def _find(root: ET.Element, element: str) -> ET.Element:
-    """Find an element of the generated file by tag and name.
-
-    Raises KeyError if there is none.
-    """
-    tag, _, name = element.partition(" ")
-    tags: tuple[str, ...] = (tag,)
-    if tag == "tendon":
-        tags = ("fixed", "spatial")
-    elif tag == "actuator":
-        tags = ("general",)
-    for each_tag in tags:
-        for candidate in root.iter(each_tag):
-            if not name or candidate.get("name") == name.strip('"'):
-                return candidate
-    raise KeyError(element)
-
-
-def _set_attribute(
-    root: ET.Element,
-    entry: ModelEntry,
-    key: str,
-    value: Value,
-) -> None:
-    """Set the attribute that states an entry.
-
-    A pin's flag is taken off, so that the entry acts.
-    """
-    element = _find(root, entry.element)
-    if not entry.attribute or entry.attribute == "axis":
-        raise KeyError(key)
-    if entry.attribute == "gravity":
-        field = [float(number) for number in element.attrib["gravity"].split()]
-        field["xy".find(key[-1]) if key[-1] in "xy" else 2] = float(value)  # type: ignore[arg-type]
-        value = tuple(field)
-    elif entry.attribute in (
-        "springref",
-        "springlength",
-    ):  # described from the bars' lines
-        stated = float(element.attrib[entry.attribute])
-        described = np.atleast_1d(entry.value)[0]
-        value = stated + float(np.atleast_1d(value)[0]) - float(described)
-    element.set(entry.attribute, _write_setting(value))
-    flags = {"range": "limit"} | {
-        attribute: flag for _, attribute, flag in PIN_PROPERTIES.values()
-    }
-    if (flag := flags.get(entry.attribute)) and (
-        switches := root.find("option/flag")
-    ) is not None:
-        switches.attrib.pop(flag, None)
+    return ET.tostring(file.root, encoding="unicode")
 
 
 def _write_setting(value: Value) -> str:
@@ -470,104 +416,121 @@ def _write_setting(value: Value) -> str:
     )
 
 
-def _set_length(root: ET.Element, bar: str, value: float) -> None:
-    """Move the pin at the end of a bar along its line.
+class _GeneratedFile:
+    """The generated file as elements, with its description."""
 
-    The pin of the ground is that of the output.
-    """
-    if bar == "ground":
-        output = _find(root, 'body "output"')
-        stated = [float(number) for number in output.attrib["pos"].split()]
-        factor = value / math.hypot(*stated)
-        place = tuple(factor * number for number in stated)
-        output.set("pos", _write_setting(place))
-    else:
-        element = {
+    def __init__(self, text: str, generated: Mapping[str, ModelEntry]) -> None:
+        self.root = ET.fromstring(text)
+        self.generated = generated
+
+    def find(self, element: str) -> ET.Element:
+        """Find an element by tag and name; KeyError if there is none."""
+        tag, _, name = element.partition(" ")
+        written = {"tendon": ("fixed", "spatial"), "actuator": ("general",)}
+        for each_tag in written.get(tag, (tag,)):
+            for candidate in self.root.iter(each_tag):
+                if not name or candidate.get("name") == name.strip('"'):
+                    return candidate
+        raise KeyError(element)
+
+    def set_attribute(self, key: str, value: Value) -> None:
+        """Set the attribute that states an entry.
+
+        A pin's flag is taken off, so that the entry acts.
+        """
+        entry = self.generated[key]
+        attribute = entry.attribute
+        element = self.find(entry.element)
+        if attribute in ("", "axis"):
+            raise KeyError(key)
+        if attribute == "gravity":
+            field = [float(number) for number in element.attrib["gravity"].split()]
+            field["xy".find(key[-1]) if key[-1] in "xy" else 2] = float(value)  # type: ignore[arg-type]
+            value = tuple(field)
+        elif attribute in (
+            "springref",
+            "springlength",
+        ):  # described from the bars' lines
+            stated = float(element.attrib[attribute])
+            described = np.atleast_1d(entry.value)[0]
+            value = stated + float(np.atleast_1d(value)[0]) - float(described)
+        element.set(attribute, _write_setting(value))
+        flags = {name: flag for _, name, flag in PIN_PROPERTIES.values()}
+        flag = flags.get(attribute, "limit" if attribute == "range" else "")
+        switches = self.root.find("option/flag")
+        if flag and switches is not None:
+            switches.attrib.pop(flag, None)
+
+    def set_length(self, bar: str, value: float) -> None:
+        """Move the pin at the end of a bar along its line.
+
+        The pin of the ground is that of the output.
+        """
+        place: tuple[float, ...] = (value, 0.0, 0.0)
+        ends = {
+            "ground": 'body "output"',
             "input": 'body "coupler"',
             "coupler": 'site "B3"',
             "output": 'site "B4"',
-        }[bar]
-        _find(root, element).set("pos", _write_setting((value, 0.0, 0.0)))
-
-
-def _set_inertial(
-    root: ET.Element,
-    generated: Mapping[str, ModelEntry],
-    bar: str,
-    name: str,
-    value: float,
-) -> None:
-    """Set mass, inertia or mass centre of a bar, the others kept."""
-    inertial = _find(root, f'body "{bar}"').find("inertial")
-    if inertial is None:
-        raise KeyError(bar)
-    if name == "mass":
-        inertial.set("mass", repr(value))
-    elif name == "inertia":
-        inertial.set("diaginertia", _write_setting((value, value, value)))
-    else:
-        polar = {
-            part: float(generated[f"bars.{bar}.{part}"].value)  # type: ignore[arg-type]
-            for part in ("centre.distance", "centre.angle")
         }
-        distance, angle = (polar | {name: value}).values()
-        inertial.set(
-            "pos",
-            _write_setting(
-                (distance * math.cos(angle), distance * math.sin(angle), 0.0)
-            ),
-        )
+        end = self.find(ends[bar])
+        if bar == "ground":
+            stated = [float(number) for number in end.attrib["pos"].split()]
+            factor = value / math.hypot(*stated)
+            place = tuple(factor * number for number in stated)
+        end.set("pos", _write_setting(place))
 
+    def set_inertial(self, bar: str, name: str, value: float) -> None:
+        """Set mass, inertia or mass centre of a bar, the others kept."""
+        inertial = self.find(f'body "{bar}"').find("inertial")
+        if inertial is None:
+            raise KeyError(bar)
+        if name == "mass":
+            inertial.set("mass", repr(value))
+        elif name == "inertia":
+            inertial.set("diaginertia", _write_setting((value, value, value)))
+        else:
+            polar = {
+                part: float(self.generated[f"bars.{bar}.{part}"].value)  # type: ignore[arg-type]
+                for part in ("centre.distance", "centre.angle")
+            }
+            distance, angle = (polar | {name: value}).values()
+            place = (distance * math.cos(angle), distance * math.sin(angle), 0.0)
+            inertial.set("pos", _write_setting(place))
 
-def _set_load(
-    root: ET.Element,
-    generated: Mapping[str, ModelEntry],
-    key: str,
-    name: str,
-    value: Value | None,
-) -> None:
-    """Add what a load lacks of another.
+    def set_load(self, key: str, name: str, value: Value | None) -> None:
+        """Add what a load lacks of another.
 
-    The sum of the two is the load with this one entry, the others kept.
-    """
-    bar, axes = key.split(", ")
-    if axes not in ("world axes", f"axes of the {bar}"):
-        raise KeyError(axes)
-    load = {
-        part: generated.get(f"loads.{key}.{part}")
-        for part in ("force", "point", "couple")
-    }
-    was = {
-        part: np.atleast_1d((0.0, 0.0, 0.0) if entry is None else entry.value)
-        for part, entry in load.items()
-    }
-    wanted = was | {name: np.atleast_1d(0.0 if value is None else value)}
-    body = _find(root, f'body "{bar}"')
-    actuators = ET.SubElement(root, "actuator")
-    for number, (parts, sign) in enumerate(((was, -1.0), (wanted, 1.0))):
-        (fx, fy), (x, y) = (
-            np.resize(parts[part], 2) * 1.0 for part in ("force", "point")
-        )
-        ET.SubElement(
-            body,
-            "site",
-            name=f"changed_{number}",
-            pos=_write_setting((float(x), float(y), 0.0)),
-        )
-        gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
-        frame = {"refsite": "O2"} if axes == "world axes" else {}
-        ET.SubElement(
-            actuators,
-            "general",
-            frame,
-            site=f"changed_{number}",
-            name=f"changed_{number}",
-            gaintype="fixed",
-            gainprm="0",
-            biastype="affine",
-            biasprm="1 0 0",
-            gear=_write_setting(tuple(gear.tolist())),
-        )
+        The sum of the two is the load with this one entry, the others kept.
+        """
+        bar, axes = key.split(", ")
+        if axes not in ("world axes", f"axes of the {bar}"):
+            raise KeyError(axes)
+        was = {}
+        for part in ("force", "point", "couple"):
+            entry = self.generated.get(f"loads.{key}.{part}")
+            was[part] = np.atleast_1d((0.0, 0.0, 0.0) if entry is None else entry.value)
+        wanted = was | {name: np.atleast_1d(0.0 if value is None else value)}
+        body = self.find(f'body "{bar}"')
+        actuators = ET.SubElement(self.root, "actuator")
+        for number, (parts, sign) in enumerate(((was, -1.0), (wanted, 1.0))):
+            force, point = (np.resize(parts[part], 2) for part in ("force", "point"))
+            site = f"changed_{number}"
+            place = (float(point[0]), float(point[1]), 0.0)
+            ET.SubElement(body, "site", name=site, pos=_write_setting(place))
+            gear = sign * np.array((*force, 0.0, 0.0, 0.0, parts["couple"][0]))
+            ET.SubElement(
+                actuators,
+                "general",
+                {"refsite": "O2"} if axes == "world axes" else {},
+                site=site,
+                name=site,
+                gaintype="fixed",
+                gainprm="0",
+                biastype="affine",
+                biasprm="1 0 0",
+                gear=_write_setting(tuple(gear.tolist())),
+            )
 
 
 def mend_entry(

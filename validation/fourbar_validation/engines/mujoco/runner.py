@@ -383,21 +383,10 @@ class SimulatedRun:
         return light.solve_drive(drive_bar, happened, trials, correction)
 
 
-def find_assembled(
-    position: Assembler,
-    command: Command,
-    order: Iterable[int],
-) -> list[Found]:
-    """Return the joint angles of every commanded position, None where none closes.
-
-    Positions are assembled in the order given, each from the one before.
-    """
-    assembled: list[Found] = [None] * len(command.angle)
-    for index in order:
-        angle = float(command.angle[index])
-        branch = int(command.branch[index])
-        assembled[index] = position.find(angle, branch)
-    return assembled
+def find_assembled(position: Assembler, command: Command) -> list[Found]:
+    """Return the joint angles of every commanded position, None where none closes."""
+    places = zip(command.angle.tolist(), command.branch.tolist(), strict=True)
+    return [position.find(theta, branch) for theta, branch in places]
 
 
 def split_segments(
@@ -449,8 +438,7 @@ class Lead(Course):
         self.values = command.stated[0]
         self.speed = float(np.max(motion.speed or 0.0))
         self.acceleration = float(np.max(motion.acceleration))
-        positions = range(len(self.values))
-        assembled = find_assembled(Assembler(loop, command.bar), command, positions)
+        assembled = find_assembled(Assembler(loop, command.bar), command)
         closes = np.array([q is not None for q in assembled])
         if not closes.any():
             raise LimitError("the loop closes at none of the positions")

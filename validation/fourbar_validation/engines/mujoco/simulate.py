@@ -191,7 +191,6 @@ class _Simulation:
         self.command = course.command
         self.scene = scene = course.scene
         self.supplied = evaluate_loads(scene)
-        self.order = course.order()
         n = len(self.command.angle)
         unknowns = list_unknowns(scene)
         self.out = make_blank(
@@ -210,7 +209,7 @@ class _Simulation:
         # kinematics alone: the timestep plays no part
         settings = replace(self.settings, timestep=1e-3)
         position = Assembler(self._compile_loop((), settings), bar)
-        assembled = find_assembled(position, self.command, self.order)
+        assembled = find_assembled(position, self.command)
         closes = np.array([angles is not None for angles in assembled])
         least = self.course.least_sine(closes)
         if self.bounded and least < NEAREST_TOGGLE.boundary:
@@ -220,7 +219,7 @@ class _Simulation:
             )
         for segment in split_segments(
             assembled,
-            self.order,
+            self.course.order(),
             partial(self._closes_between, position),
         ):
             self._run(segment, assembled[segment[0]])
@@ -274,13 +273,12 @@ class _Simulation:
         second: int,
     ) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
-        start = float(self.command.angle[one])
-        stop = float(self.command.angle[second])
+        start, stop = self.command.angle[[one, second]]
         pieces = int(np.ceil(abs(stop - start) / LONGEST_STEP_OF_A_CHECK))
         branch = int(self.command.branch[one])
         return all(
-            position.find(float(theta_2), branch) is not None
-            for theta_2 in np.linspace(start, stop, pieces + 1)[1:-1]
+            position.find(theta, branch) is not None
+            for theta in np.linspace(start, stop, pieces + 1)[1:-1].tolist()
         )
 
     def _run(self, segment: list[int], start: Found) -> None:

@@ -167,15 +167,16 @@ class TrialSetup:
         self.course = course = Course(scene, command)
         self.scene = course.scene
         self.command = command
-        order = course.order()
         position = Assembler(
             ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False))
         )
         signed = with_signs(scene.linkage, command)
-        self.start = find_assembled(position, signed, order)
+        self.start = find_assembled(position, signed)
         """Joint angles of each position, None where the loop does not close."""
         self.segments = [
-            segment for segment in split_segments(self.start, order) if len(segment) > 1
+            segment
+            for segment in split_segments(self.start, course.order())
+            if len(segment) > 1
         ]
         if not self.segments:
             raise LimitError(
