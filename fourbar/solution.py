@@ -355,11 +355,11 @@ def write_csv(
 
     Vectors are columns `A_x`, `A_y`; a missing value is empty.
 
-    `chosen`: the columns by heading, in these units; left out: all quantities.
+    `chosen`: the columns by heading, in these units; without any: all quantities.
     """
     scalars: Mapping[str, Array | None] = chosen or {}
     columns: dict[str, Iterable[Any]] = {}
-    if chosen is None:
+    if not chosen:
         scalars = {
             column.heading: column.values for column in _list_scalars(solution, units)
         }
@@ -424,20 +424,15 @@ def _list_scalars(solution: Solution, units: Conversion) -> list[_ScalarColumn]:
     for name, values in quantities.items():
         unit, _ = find_unit_in(find_unit_of_quantity(name), units)
         named = f" [{unit}]" if units and unit != "1" else ""
-        for part, column in _split_columns(name, values).items():
-            flat = None if column is None else column.ravel()  # members in turn
+        parts = split_parts(name, np.empty((1, 2)) if values is None else values)
+        for part in sorted(parts, key=lambda part: part[0] == "|"):  # sizes come last
+            # members in turn
+            flat = None if values is None else parts[part].ravel()
             columns.append(_ScalarColumn(f"{part}{named}", unit, flat))
     time = compute_times(solution.scene, solution.at)
     if time is not None:
         columns.append(_ScalarColumn("time [s]" if units else "time", "s", time))
     return columns
-
-
-def _split_columns(name: str, values: Array | None) -> dict[str, Array | None]:
-    """Split a quantity into columns of one number a position, the magnitude last."""
-    parts = split_parts(name, np.empty((1, 2)) if values is None else values)
-    in_order = sorted(parts, key=lambda part: part[0] == "|")
-    return {part: None if values is None else parts[part] for part in in_order}
 
 
 def is_scalar(name: str) -> bool:

@@ -1,7 +1,7 @@
 """The commands that evaluate a linkage, what may vary of it, and where it rests."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,9 +11,6 @@ from fourbar.linkage import POSITIVE
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import DEGREES, SI, Conversion, Solution
-
-if TYPE_CHECKING:
-    from fourbar.show.columns import Column
 
 
 @click.command("classify", cls=given.LengthsCommand)
@@ -449,23 +446,15 @@ def _write_positions(
         paths = collect_paths(solution, units)
         return write_json(solution, units, motor=motor, notes=notes, paths=paths)
     if form == "csv":
-        chosen = _list_chosen(columns, units) if columns else None
+        chosen = dict[str, Array]()
+        for column in columns:
+            # in units other than SI each heading names its unit
+            label = column.label(units)
+            heading = f"{column.name} [{label}]" if units and label else column.name
+            chosen[heading] = column.shown(units)
         return write_csv(solution, units, decimal or ".", chosen)
     width = given.find_width(out)
     return print_positions(solution, width, units, every=every, columns=columns)
-
-
-def _list_chosen(columns: "list[Column]", units: Conversion) -> dict[str, Array]:
-    """List the chosen columns of the CSV by heading.
-
-    In units other than SI each heading names its unit.
-    """
-    chosen = dict[str, Array]()
-    for column in columns:
-        label = column.label(units)
-        heading = f"{column.name} [{label}]" if units and label else column.name
-        chosen[heading] = column.shown(units)
-    return chosen
 
 
 def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:

@@ -172,7 +172,9 @@ def plot(
     from fourbar.show.plot import draw
 
     with given.open_scene(scene) as described, given.show_waiting(described):
-        place = None if at is None else _find_place(described, at)
+        place = None
+        if at is not None:  # of a motion over time it is the angle at that time
+            place = float(given.read_positions(described, at).stated[0][0])
         draw(
             described,
             out,
@@ -187,15 +189,6 @@ def plot(
 def _say_written(out: Path, frames: int = 0) -> None:
     if out != STANDARD_STREAM:
         click.echo(f"wrote {out}" + (f": {frames} frames" if frames else ""))
-
-
-def _find_place(scene: Scene, text: str) -> float:
-    """Return what is commanded at a position, rad or m.
-
-    For a motion over time it is the angle at that time.
-    """
-    positions = given.read_positions(scene, text)
-    return float(positions.stated[0][0])
 
 
 @click.command()

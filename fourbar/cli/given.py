@@ -233,6 +233,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     those that the linkage can have, any other column has its value in the scene's
     motion.
     """
+    from fourbar.files.drawn_pins import list_drawn
     from fourbar.quantities.units import half_unit_of_text
     from fourbar.show.located import EXTREMES, locate
     from fourbar.studies.passing import STATED_POSITIONS, find_positions, meet_limit
@@ -243,7 +244,11 @@ def read_positions(scene: Scene, text: str) -> Command:
     if name == "t":  # as it is printed
         name = "time"
     if value == "drawn":
-        return find_positions(scene, name, _read_drawn(scene, name, text))
+        if scene.drawing is not None:
+            drawn = list_drawn(scene.drawing, scene.settled_drive())
+            if name in drawn:
+                return find_positions(scene, name, drawn[name])
+        raise InputError("--at", text, "needs a scene that states [pins]")
     if name not in STATED_POSITIONS or value in EXTREMES:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
@@ -313,20 +318,6 @@ def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, floa
         raise InputError(key, text, 'must be three numbers, like "0.3 0 1"')
     x, y, z = (read_number(key, part, unit) for part in parts)
     return x, y, z
-
-
-def _read_drawn(scene: Scene, name: str, text: str) -> float:
-    """Return the angle or stroke of the scene's drawing."""
-    from fourbar.files.drawn_pins import list_drawn
-
-    drawing = scene.drawing
-    if drawing is None:
-        drawn = None
-    else:
-        drawn = list_drawn(drawing, scene.settled_drive()).get(name)
-    if drawn is None:
-        raise InputError("--at", text, "needs a scene that states [pins]")
-    return drawn
 
 
 def find_width(out: Path | None = None) -> int | None:

@@ -170,13 +170,7 @@ class SceneDocument:
 
     def at(self, path: KeyPath) -> Any:
         """Return the entry at a path of keys and indices; None where there is none."""
-        entry: Any = self.tree
-        for step in path:
-            try:
-                entry = entry[step]
-            except (KeyError, IndexError, TypeError, TOMLKitError):
-                return None
-        return entry
+        return _find_entry(self.tree, path)
 
     def set(self, path: KeyPath, text: str) -> None:
         """State one entry as it is typed; an empty text removes it.
@@ -190,7 +184,9 @@ class SceneDocument:
         if is_empty and not isinstance(path[-1], int):
             self.remove(path)
             return
-        example = _find_table(list_offers()["fields"], path) if old is None else old
+        example = old
+        if old is None:
+            example = _find_entry(list_offers()["fields"], path)
         is_text = isinstance(example, str) or example is None
         self.put(path, text if is_text else _read_plain_number(text))
 
@@ -247,10 +243,14 @@ def name_entry(path: Iterable[str | int]) -> str:
     return ".".join(map(str, path))
 
 
-def _find_table(table: Any, path: KeyPath) -> Any:
+def _find_entry(entry: Any, path: KeyPath) -> Any:
+    """Return what stands at a path of keys and indices; None where there is none."""
     for step in path:
-        table = table.get(step) if isinstance(table, dict) else None
-    return table
+        try:
+            entry = entry[step]
+        except (KeyError, IndexError, TypeError, TOMLKitError):
+            return None
+    return entry
 
 
 def _read_plain_number(text: str) -> int | float | str:

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
-from fourbar.edit.exports import Exports, evaluate_scene
-from fourbar.edit.headline import list_peaks
+from fourbar.edit.exports import Exports, evaluate_scene, list_peaks
 from fourbar.edit.scene_entries import SceneDocument, list_offers, name_entry
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables

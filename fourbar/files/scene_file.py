@@ -243,8 +243,9 @@ def read_scene(document: Entry, folder: str) -> Scene:
     drawing = read_drawing(document)
     drawn = drawing or read_ground(document["lengths"])
     stated = _LEFT_OUT | document.value
-    for key in document.value.keys() - {"pins", "lengths"}:
-        stated[key] = state_places(document[key], drawn)
+    for key in document.value:
+        if key not in ("pins", "lengths"):
+            stated[key] = state_places(document[key], drawn)
     top = document.holding(stated)
     points = _read_points(top["points"])
     top.file.bars = {point.name: point.bar for point in points}
@@ -262,12 +263,20 @@ def read_scene(document: Entry, folder: str) -> Scene:
         if "picture" in bars.value.get(name, {}):  # its file is read when it is shown
             pictures.append(Picture(bar, bars[name]["picture"].text(), folder))
     settled = drive and drive.with_places(settler(linkage, points))
+    motion = _read_motion(top["motion"], drawing, settled)
+    stated_loads = tuple(map(_read_load, loads.entries()))
+    stated_effects = []
+    for key, value in effects.value.items():
+        effect: Any = list_kinds()[key]
+        if effect.example and not isinstance(value, dict | list):
+            raise effects[key].refuse(f"must be like {effect.example}")
+        stated_effects.append(effects[key].described(effect))
     scene = Scene(
         linkage,
-        _read_motion(top["motion"], drawing, settled),
+        motion,
         drive_bar,  # type: ignore[arg-type]
-        tuple(map(_read_load, loads.entries())),
-        tuple(_read_effect(effects[key], list_kinds()[key]) for key in effects.value),
+        stated_loads,
+        tuple(stated_effects),
         top["title"].text(),
         top["source"].text(),
         tuple(pictures),
@@ -298,8 +307,9 @@ def _read_drive(drive: Entry) -> tuple[int | None, ForceDrive | None]:
     kind: Any = PointDrive
     if not stated.isdisjoint(on_line):
         kind = LinearDrive
-        for name in stated - {*on_line}:
-            raise drive[name].refuse(_A_LINE)
+        for name in stated:
+            if name not in on_line:
+                raise drive[name].refuse(_A_LINE)
     elif not stated:
         return 2, None
     elif stated == {"bar"}:
@@ -475,13 +485,6 @@ def _read_load(load: Entry) -> Load:
         if isinstance(table.value, dict) and "time" in table.value:
             raise table["time"].refuse(_OVER_THETA_2)
     return load.described(Load)  # type: ignore[no-any-return]
-
-
-def _read_effect(effect: Entry, kind: Any) -> Any:
-    """Read an effect from the value under its key."""
-    if kind.example and not isinstance(effect.value, dict | list):
-        raise effect.refuse(f"must be like {kind.example}")
-    return effect.described(kind)
 
 
 def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:

@@ -185,35 +185,29 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
         raise InputError("effects", keys, allowed)
     linkage = scene.linkage
     lengths = zip(BAR_NAMES.values(), linkage.lengths, strict=True)
+    bars = {}
+    for name, number in MOVING_BAR_NUMBERS.items():
+        bar = linkage.bar(number)
+        numbers = write_described(bar)
+        del numbers["length"]
+        if bar.density is not None:  # which states the mass
+            del numbers["mass"]
+        # what a uniform bar has follows from the numbers before it
+        last = {key: numbers.pop(key) for key in OF_A_UNIFORM_BAR if key in numbers}
+        if bar != Bar(bar.length):
+            bars[name] = numbers | last
     drive = {"bar": scene.drive_bar}
     return {
         "lengths": {
             **{name: write_quantity(length, "m") for name, length in lengths},
             "ground_angle": write_quantity(linkage.ground_angle, "rad"),
         },
-        "bars": {
-            name: _write_bar(linkage.bar(bar))
-            for name, bar in MOVING_BAR_NUMBERS.items()
-            if linkage.bar(bar) != Bar(linkage.bar(bar).length)
-        },
+        "bars": bars,
         "drive": drive if scene.drive is None else write_described(scene.drive),
         "points": {point.name: write_described(point) for point in scene.points},
         "loads": [write_described(load) for load in scene.loads],
         "effects": {effect.key: write_described(effect) for effect in scene.effects},
     }
-
-
-def _write_bar(bar: Bar) -> dict[str, Any]:
-    """Write the numbers of a bar; a density states its mass, the pins its length.
-
-    What a uniform bar has follows from the numbers before it.
-    """
-    numbers: dict[str, Any] = write_described(bar)
-    del numbers["length"]
-    if bar.density is not None:
-        del numbers["mass"]
-    last = {name: numbers.pop(name) for name in OF_A_UNIFORM_BAR if name in numbers}
-    return numbers | last
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:

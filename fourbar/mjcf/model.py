@@ -127,23 +127,6 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     )
 
 
-def _add_camera(world: ET.Element, linkage: FourBar) -> None:
-    """Add the camera `plane`, and a light at the same place."""
-    place = write_six_digits(*_find_view(linkage))
-    add_element(
-        world,
-        "light",
-        diffuse=".2 .2 .2",  # with the headlight 1
-        specular=".1 .1 .1",
-        directional="true",
-        castshadow="false",
-        name="light",
-        pos=place,
-        dir="0 0 -1",
-    )
-    add_element(world, "camera", name="plane", pos=place, fovy=_FOVY)
-
-
 CYLINDER = "cylinder"
 """Name of the tendon of a linear drive, and of the actuator on it."""
 _NEVER_REACHED = "1e10"
@@ -357,7 +340,19 @@ class Model:
     def add_bodies(self, flywheel: float) -> None:
         """Add ground > (input > coupler), output; light and camera face the plane."""
         world = add_element(self.root, "worldbody")
-        _add_camera(world, self.linkage)
+        place = write_six_digits(*_find_view(self.linkage))
+        add_element(
+            world,
+            "light",
+            diffuse=".2 .2 .2",  # with the headlight 1
+            specular=".1 .1 .1",
+            directional="true",
+            castshadow="false",
+            name="light",
+            pos=place,
+            dir="0 0 -1",
+        )
+        add_element(world, "camera", name="plane", pos=place, fovy=_FOVY)
         ground = add_element(world, "body", name="ground")
         self.bodies[1] = ground
         add_element(ground, "inertial", pos="0 0 0", mass=1, diaginertia="1 1 1")

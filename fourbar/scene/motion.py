@@ -164,6 +164,11 @@ class _OverTime:
         stated = {name: getattr(self, name, None) for name in _NAMES_OF_BARS}
         return _find_bar("motion.law", stated) or 2
 
+    @property
+    def angle(self: Any) -> Any:
+        """Stated angles of the law's bar, one for each time of a table, rad."""
+        return getattr(self, f"theta_{self.bar}")
+
     def times(self: Any) -> Array:
         """Return the times at which the law is evaluated, (steps + 1,), s."""
         return np.linspace(self.time[0], self.time[-1], self.steps + 1)
@@ -234,11 +239,6 @@ class Law(Described, _OverTime):
             if rates is not None and len(rates) != count:
                 of_bar = f"{key}.{name}_{self.bar}"
                 raise InputError(of_bar, len(rates), f"needs {count}, one for a time")
-
-    @property
-    def angle(self) -> Any:
-        """Angles of the law's bar at its times, rad."""
-        return getattr(self, f"theta_{self.bar}")
 
     @property
     def omega(self) -> Any:
@@ -335,7 +335,7 @@ class Rise(Described, _OverTime):
     def __post_init__(self) -> None:
         Described.__post_init__(self)
         key = self.stated_at
-        if getattr(self, f"theta_{self.bar}") is None:
+        if self.angle is None:
             raise InputError(f"{key}.theta_2", None, "the first angle is missing")
         if not self.rise[1] > 0.0:
             allowed = "must last longer than 0 s"
@@ -359,7 +359,6 @@ class Rise(Described, _OverTime):
         """Compute angle, speed and acceleration of the law's bar, each (n,)."""
         time = require_numbers("time", time)
         angle, duration = self.rise
-        first = getattr(self, f"theta_{self.bar}")
         place, speed, acceleration = _rise(self.kind, time, duration)
         if self.fall is not None:
             start = duration + self.dwell
@@ -370,7 +369,8 @@ class Rise(Described, _OverTime):
             place = place - fallen
             speed = speed - fall_speed
             acceleration = acceleration - fall_acceleration
-        return first + angle * place, angle * speed, angle * acceleration
+        place = self.angle + angle * place
+        return place, angle * speed, angle * acceleration
 
 
 @dataclass(frozen=True, slots=True)

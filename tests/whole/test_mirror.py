@@ -29,7 +29,7 @@ JUDGED_BY = {
     "whole/test_results_format.py": "validation/compare: results_file",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
-    "fourbar/edit/test_session.py": "fourbar/edit: dragging exports scene_entries",
+    "fourbar/edit/test_session.py": "fourbar/edit: dragging scene_entries",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect",
     "fourbar/files/test_files.py": "fourbar/files: scene_text",
     "fourbar/formulas/test_formulas.py": (
