@@ -70,7 +70,8 @@ class Redirect:
                 os.close(handle)  # its server has just ended and taken it away
                 continue
             self.handle = handle
-        if not _is_own_page(self.handle):
+        content = os.read(self.handle, 2 * len(REDIRECT_PAGE))
+        if content and _OWN_PAGE.fullmatch(content) is None:
             os.close(self.handle)
             self.handle = None
             reason = (
@@ -121,13 +122,6 @@ class Redirect:
             if sys.platform != "win32":
                 os.close(self.handle)
             self.handle = None
-
-
-def _is_own_page(handle: int) -> bool:
-    """Return True for an empty file, or a page that this module has written."""
-    longest = 2 * len(REDIRECT_PAGE)
-    content = os.read(handle, longest)
-    return not content or _OWN_PAGE.fullmatch(content) is not None
 
 
 def _lock(handle: int) -> bool:

@@ -206,7 +206,10 @@ class SceneDocument:
             del holder[last]
             old = None
         if old is not None:
-            new = _make_item_like(old, value)
+            new = tomlkit.item(_write_inline(value))
+            if isinstance(old, Item):  # its comment and blanks stay
+                for part in ("comment_ws", "comment", "trail"):
+                    setattr(new.trivia, part, getattr(old.trivia, part))
         elif len(path) == 1 and isinstance(value, dict):
             new = _make_toml_table(value)
         else:
@@ -264,16 +267,6 @@ def _read_plain_number(text: str) -> int | float | str:
         except ValueError:
             continue
     return text
-
-
-def _make_item_like(old: Any, value: Any) -> Any:
-    """Return the value as an item, with the comment and blanks of the old item."""
-    made = tomlkit.item(_write_inline(value))
-    if isinstance(old, Item):
-        made.trivia.comment_ws = old.trivia.comment_ws
-        made.trivia.comment = old.trivia.comment
-        made.trivia.trail = old.trivia.trail
-    return made
 
 
 def _make_toml_table(entries: dict[str, Any], *after: Whitespace) -> Table:

@@ -425,7 +425,12 @@ class Session:
         if values is None:
             reason = "needs a cylinder: add one in place of the bar first"
             raise InputError("command", commanded, reason)
-        first, last = _find_monotone(values, _find_shown(before.theta_2, asked))
+        shown = None
+        if asked.get("theta_2") is not None:
+            turned = np.exp(1j * before.theta_2)
+            distances = np.abs(turned - np.exp(1j * float(asked["theta_2"])))
+            shown = int(np.argmin(np.nan_to_num(distances, nan=np.inf)))
+        first, last = _find_monotone(values, shown)
         if last == first:
             reason = "does not move in this motion: choose another sweep first"
             raise InputError("command", commanded, reason)
@@ -644,15 +649,6 @@ def _read_bar_directions(solution: Solution, index: int) -> Any:
     """Return the directions of the three moving bars at one position."""
     angles = solution.theta_2, solution.theta_3, solution.theta_4
     return np.exp(1j * np.array(angles)[:, index])
-
-
-def _find_shown(theta_2: Any, asked: Asked) -> int | None:
-    """Return the position that the page shows, by its theta_2, or None."""
-    if asked.get("theta_2") is None:
-        return None
-    shown = np.exp(1j * float(asked["theta_2"]))
-    distances = np.abs(np.exp(1j * theta_2) - shown)
-    return int(np.argmin(np.nan_to_num(distances, nan=np.inf)))
 
 
 def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:

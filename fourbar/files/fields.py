@@ -187,7 +187,7 @@ class Entry:
         names = list(allowed)
         if not isinstance(self.value, dict):
             raise self.refuse(f"must be a table with the keys {', '.join(names)}")
-        for name, entry in self.value.items():
+        for name in self.value:
             if name not in names:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
                 if _TABLE_OF.get(name, self.key) != self.key:
@@ -196,7 +196,11 @@ class Entry:
                     known = _FORMULAS[name]
                 if _is_elsewhere(self.key, self.value, names):
                     known = ELSEWHERE
-                unknown = type(self)(self.file, _join_key(self.key, name), entry)
+                unknown = self[name]
+                if not BARE_KEY.fullmatch(name):  # quoted, it stays on one line
+                    end = "..." if len(name) > LONGEST_FIELD else ""
+                    quoted = repr(name[:LONGEST_FIELD] + end)
+                    unknown.key = f"{self.key}.{quoted}".removeprefix(".")
                 raise unknown.refuse(f"unknown key; {known}")
         return self.value
 
@@ -582,17 +586,6 @@ def _suggest_word(word: object, names: list[str]) -> str:
     if _MEANT.get(word) in names:
         close = [_MEANT[word]]
     return f'did you mean "{close[0]}"? ' if close else ""
-
-
-def _join_key(key: str, name: str) -> str:
-    """Join the dotted key.
-
-    A name that is not a plain word is quoted, so that it stays on one line.
-    """
-    if not BARE_KEY.fullmatch(name):
-        end = "..." if len(name) > LONGEST_FIELD else ""
-        name = repr(name[:LONGEST_FIELD] + end)
-    return f"{key}.{name}" if key else name
 
 
 def _shorten_for_error(value: object) -> object:

@@ -257,7 +257,13 @@ def read_scene(document: Entry, folder: str) -> Scene:
     effects.table(list_kinds())
     lengths, met = _read_lengths(top, drawn)
     bars = top["bars"]
-    linkage = _read_linkage(bars, met, drawn.angle(1))
+    bars.table(MOVING_BAR_NUMBERS)
+    ground, *moving = met
+    two, three, four = (
+        _read_bar(bars[name], length)
+        for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
+    )
+    linkage = FourBar(ground, two, three, four, drawn.angle(1))
     pictures = []
     for name, bar in MOVING_BAR_NUMBERS.items():
         if "picture" in bars.value.get(name, {}):  # its file is read when it is shown
@@ -371,16 +377,6 @@ def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]
         return lengths, lengths
     roundings: Any = tuple(half_unit_of_text(stated[name], "m") for name in declared)
     return lengths, meet_change_points(lengths, roundings)
-
-
-def _read_linkage(bars: Entry, lengths: tuple[float, ...], angle: float) -> FourBar:
-    bars.table(MOVING_BAR_NUMBERS)
-    ground, *moving = lengths
-    two, three, four = (
-        _read_bar(bars[name], length)
-        for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
-    )
-    return FourBar(ground, two, three, four, angle)
 
 
 def _read_bar(bar: Entry, length: float) -> Bar:

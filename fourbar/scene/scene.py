@@ -374,24 +374,20 @@ class Command(NamedTuple):
     @property
     def remainder(self) -> Any:
         """Exact angle (mpmath) minus its double, rad; None: the double is exact."""
-        if isinstance(self.origin, LimitOrigin):
-            return self.origin.remainder
-        return None
+        return getattr(self.origin, "remainder", None)
 
     @property
-    def condition(self) -> float | Array:
+    def condition(self) -> Any:
         """How well the command determines the angle, in [0, 1]; 1: it is the angle."""
-        if isinstance(self.origin, StrokeOrigin):
-            return self.origin.condition
-        return 1.0
+        return getattr(self.origin, "condition", 1.0)
 
     @property
     def lost(self) -> Array:
         """Round-off left out of angle, speed and acceleration, (3,) or (n, 3)."""
-        if isinstance(self.origin, StrokeOrigin) and self.origin.lost is not None:
-            return self.origin.lost
-        remainder = 0.0 if self.remainder is None else float(self.remainder)
-        return np.array([remainder, 0.0, 0.0])
+        lost: Array | None = getattr(self.origin, "lost", None)
+        if lost is not None:
+            return lost
+        return np.array([float(self.remainder or 0.0), 0.0, 0.0])
 
     @property
     def margin(self) -> float:
