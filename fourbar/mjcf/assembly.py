@@ -13,7 +13,12 @@ from xml.etree import ElementTree as ET
 from fourbar.errors import LimitError, clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import NOTES, Start, find_start
-from fourbar.mjcf.model import require_carriable, write_exactly, write_six_digits
+from fourbar.mjcf.model import (
+    add_comments,
+    require_carriable,
+    write_exactly,
+    write_six_digits,
+)
 from fourbar.mjcf.plane import LEVEL, Plane
 from fourbar.scene import Scene, require_input
 
@@ -174,8 +179,7 @@ def write_sdf(
         if "B" in dynamics:
             raise LimitError("Drake's ball constraint at pin B has no damping")
     comment = _write_comment(scene, "SDF", reader, assembled, at_B, plane)
-    for line in comment.splitlines():
-        root.append(ET.Comment(f" {line} "))
+    add_comments(root, comment.splitlines())
     world = ET.SubElement(root, "world", name="four_bar")
     _add_numbers(world, "gravity", *plane.turn(*gravity))
     model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")

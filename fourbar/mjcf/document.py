@@ -25,6 +25,7 @@ from fourbar.mjcf.model import (
     Model,
     Settings,
     add_appearance,
+    add_comments,
     add_element,
     make_constant_motor,
     make_motor,
@@ -130,8 +131,8 @@ def write_mjcf(
         term.add_to_mjcf(model)
     root = model.root
     root.set("model", clean_line(scene.title) or "four-bar")
-    for line in _write_comments(scene, drive, reader, passive=passive and model.exerts):
-        root.append(ET.Comment(f" {line} "))
+    exerts = passive and model.exerts
+    add_comments(root, _write_comments(scene, drive, reader, passive=exerts))
     add_element(root, "compiler", angle="radian", autolimits="true")
     model.add_option()
     add_appearance(root, scene.linkage)
@@ -146,8 +147,10 @@ def write_mjcf(
     if drive == "motor":
         actuator = make_motor(scene.drive_bar, _size_control(scene))
     else:
-        speed = None if start is None else start.qvel[0]
-        actuator = _keep_speed(scene, armature, model.timestep, speed)
+        actuator = make_constant_motor(armature * scene.motion.alpha_2)
+        if armature and start is not None and scene.motion.alpha_2 == 0.0:
+            gain = armature / (SETTLING * model.timestep)
+            actuator = make_servo(gain, start.qvel[0])
     model.add_actuators(actuator, driven=drive == "flywheel")
     if start is not None:
         frame = add_element(root, "keyframe")
@@ -158,21 +161,6 @@ def write_mjcf(
         root.insert(0, ET.Comment(f" {NOTES['mjcf']['tilted']} "))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _keep_speed(
-    scene: Scene,
-    armature: float,
-    timestep: float,
-    speed: float | None,
-) -> dict[str, Any]:
-    """Return attributes of the drive beside a flywheel; none has an empty dict.
-
-    `speed`: of the input in the keyframe, rad/s; None: there is no keyframe.
-    """
-    if armature and speed is not None and scene.motion.alpha_2 == 0.0:
-        return make_servo(armature / (SETTLING * timestep), speed)
-    return make_constant_motor(armature * scene.motion.alpha_2)
 
 
 def _require_counterpart(scene: Scene, drive: Drive) -> None:

@@ -157,6 +157,12 @@ def write_exactly(*numbers: float) -> str:
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
 
+def add_comments(root: ET.Element, lines: Iterable[str]) -> None:
+    """Add a comment for each line."""
+    for line in lines:
+        root.append(ET.Comment(f" {line} "))
+
+
 def add_element(parent: ET.Element, tag: str, **stated: Any) -> ET.Element:
     """Add an element; numbers among its attributes are written exactly."""
     attributes = {
