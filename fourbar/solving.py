@@ -130,7 +130,13 @@ def solve(
                 stated = command(scene)
                 case = case.begin_with(stated if stated.bar == at.bar else at)
             alone = _solve_alone(case, at, request)
-            results = alone or _solve_blocks(case, at, request)
+            results = alone or Results(request)
+            blocks = () if alone else split(len(at.angle), request.block)
+            for rows in blocks:
+                block = at.part(rows)
+                # kept until the next block is evaluated: its memory is used again
+                evaluated = evaluate(case, block, request.last_stage, request.wanted)
+                results.store(case, evaluated, (rows,))
     return make_solution(scene, at, results, solved=scene, **of_release)
 
 
@@ -286,18 +292,6 @@ def _solve_alone(case: Case, at: Command, request: SolveRequest) -> Results | No
     results.arrays = {}
     for row, name in enumerate(values):
         results.arrays[name] = scalars[row] if name in SCALARS else vectors[row]
-    return results
-
-
-def _solve_blocks(case: Case, at: Command, request: SolveRequest) -> Results:
-    """Solve the positions of one linkage block by block."""
-    results = Results(request)
-    evaluated = None
-    for rows in split(len(at.angle), request.block):
-        block = at.part(rows)
-        # kept until the next block is evaluated, so that its memory is used again
-        evaluated = evaluate(case, block, request.last_stage, request.wanted)
-        results.store(case, evaluated, (rows,))
     return results
 
 
