@@ -27,7 +27,6 @@ from fourbar.mjcf.model import (
     add_appearance,
     add_comments,
     add_element,
-    make_constant_motor,
     make_motor,
     make_servo,
     require_carriable,
@@ -147,10 +146,12 @@ def write_mjcf(
     if drive == "motor":
         actuator = make_motor(scene.drive_bar, _size_control(scene))
     else:
-        actuator = make_constant_motor(armature * scene.motion.alpha_2)
+        couple = armature * scene.motion.alpha_2
+        gain = 0.0
         if armature and start is not None and scene.motion.alpha_2 == 0.0:
             gain = armature / (SETTLING * model.timestep)
-            actuator = make_servo(gain, start.qvel[0])
+            couple = gain * start.qvel[0]
+        actuator = make_servo(couple, gain)
     model.add_actuators(actuator, driven=drive == "flywheel")
     if start is not None:
         frame = add_element(root, "keyframe")

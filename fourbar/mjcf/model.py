@@ -183,22 +183,15 @@ MuJoCo 3 refuses a motor constant of 0. The back-EMF goes as its square, and tha
 """
 
 
-def make_constant_motor(force: float) -> dict[str, Any]:
-    """Return attributes of a motor on pin O2 that ignores its control.
+def make_servo(couple: float, gain: float) -> dict[str, Any]:
+    """Return the attributes of a drive on pin O2 that exerts couple - gain speed.
 
-    A force of 0 has no motor, and an empty dict.
+    The drive ignores its control. Without couple and gain there is none, and an empty
+    dict.
     """
-    if force:
-        return {**_UNCONTROLLED, "joint": "O2", "biasprm": (force, 0.0, 0.0)}
+    if couple or gain:
+        return {**_UNCONTROLLED, "joint": "O2", "biasprm": (couple, 0.0, 0.0 - gain)}
     return {}
-
-
-def make_servo(gain: float, omega: float) -> dict[str, Any]:
-    """Return the attributes of a drive that exerts the couple gain (omega - speed).
-
-    The drive needs no control.
-    """
-    return {**_UNCONTROLLED, "joint": "O2", "biasprm": (gain * omega, 0.0, -gain)}
 
 
 def make_motor(bar: int | None, most: float) -> dict[str, Any]:
