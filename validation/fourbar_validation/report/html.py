@@ -56,16 +56,15 @@ class _Cell(NamedTuple):
     @property
     def kind(self) -> str:
         """Word for its colour."""
-        return {FAILS: "fails", REFUSES: "refuses", UNDECIDED: "undecided"}.get(
-            self.row.verdict, "holds"
-        )
+        verdict = self.row.verdict
+        return verdict if verdict in (FAILS, REFUSES, UNDECIDED) else "holds"
 
     @property
     def shown(self) -> str:
         """Return the text of its cell."""
-        return {"refuses": "refuses", "undecided": "undecided"}.get(
-            self.kind, write_share(self.used)
-        )
+        if self.kind in (REFUSES, UNDECIDED):
+            return self.kind
+        return write_share(self.used)
 
 
 class SectionFigure(NamedTuple):
@@ -116,16 +115,12 @@ class _SceneView:
     @property
     def drawn(self) -> list[str]:
         """Return the independent engines whose answers the pictures show."""
-        return [
-            engine
-            for engine in self.engines
-            if engine != FORMULAS
-            and any(
-                cell.row.compared
-                for (quantity, name), cell in self.by_place.items()
-                if name == engine and quantity in _DRAWN
-            )
-        ]
+        shown = {
+            name
+            for (quantity, name), cell in self.by_place.items()
+            if quantity in _DRAWN and cell.row.compared and name != FORMULAS
+        }
+        return [engine for engine in self.engines if engine in shown]
 
     @property
     def counts(self) -> Counts:
@@ -151,10 +146,11 @@ def write_html(
         _make_scene_view(scene, first_lines.get(scene.name, 2))
         for scene in summary.shown
     ]
-    csv = write_rows(cell.row for view in views for cell in view.cells)
-    engines = _list_engines(cell.row for view in views for cell in view.cells)
+    cells = [cell for view in views for cell in view.cells]
+    rows = [cell.row for cell in cells]
+    engines = _list_engines(rows)
     failing = sorted(
-        (cell for view in views for cell in view.cells if cell.row.failed),
+        (cell for cell in cells if cell.row.failed),
         key=lambda cell: (-cell.used, cell.line),
     )
     return render(
@@ -194,7 +190,7 @@ def write_html(
             for scene, e in summary.orders
         ],
         statement=STATEMENT,
-        csv=csv,
+        csv=write_rows(rows),
     )
 
 
@@ -224,12 +220,8 @@ def _make_scene_view(
     first_line: int,
 ) -> _SceneView:
     rows = sort_rows(scene.rows)
-    cells = [
-        _Cell(line, *row_and_share)
-        for line, row_and_share in enumerate(
-            zip(rows, compute_shares(rows), strict=True), first_line
-        )
-    ]
+    lines = range(first_line, first_line + len(rows))
+    cells = [*map(_Cell, lines, rows, compute_shares(rows))]
     ranked = sorted(
         reversed(cells),
         key=lambda cell: (cell.row.compared, cell.used),
@@ -242,18 +234,10 @@ def _make_scene_view(
         if cell.row.quantity != "undecided" or cell.row.failed
     }
     names = {cell.row.quantity for cell in cells}
-    quantities = [name for name in QUANTITY_ORDER if name in names] + sorted(
-        names.difference(QUANTITY_ORDER)
-    )
-    engines = _list_engines(cell.row for cell in cells)
-    return _SceneView(
-        scene,
-        cells,
-        engines,
-        quantities,
-        by_place,
-        worst,
-    )
+    quantities = [name for name in QUANTITY_ORDER if name in names]
+    quantities += sorted(names.difference(QUANTITY_ORDER))
+    engines = _list_engines(rows)
+    return _SceneView(scene, cells, engines, quantities, by_place, worst)
 
 
 def _list_engines(rows: Any) -> list[str]:

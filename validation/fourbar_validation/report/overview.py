@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 from fourbar.errors import abbreviate, write_count
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
@@ -81,6 +82,8 @@ class _OverviewCell:
     row: Row | None = None
     used: float = -1.0
     """error/allowed of that row."""
+    scenes: int = 0
+    """Number of scenes, where its rows have a cause in common."""
 
     def add(self, row: Row, used: float) -> None:
         """Take in a row."""
@@ -150,15 +153,6 @@ class Cause:
         return f"{self.engine}: {self.text}: {count}; worst {self.place}"
 
 
-@dataclass(slots=True)
-class _SimilarScenes:
-    """Scenes of an engine that the same mistakes would explain."""
-
-    scenes: int
-    worst: Row
-    used: float
-
-
 def _name_whole(row: Row) -> str:
     """Name the quantity of a row, or that of which it is the inertial part."""
     return row.quantity.removesuffix("_inertia")
@@ -202,7 +196,7 @@ class Overview:
         were compared.
         """
         self._lines: dict[str, OverviewLine] = {}
-        self._kinds: dict[tuple[str, tuple[str, ...]], _SimilarScenes] = {}
+        self._kinds: dict[tuple[str, tuple[str, ...]], _OverviewCell] = {}
 
     def add(self, scene: Record) -> None:
         """Add one more scene."""
@@ -251,15 +245,13 @@ class Overview:
             name = "torque" if row.quantity in DRIVES else row.quantity
             if row.engine != FORMULAS and name in ("torque", *PIN_FORCES):
                 asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
-        whole = len(PIN_FORCES) + 1
         agreeing = [
-            all(of.values())
+            len(of) > len(PIN_FORCES) and all(of.values())
             for engine, of in asked.items()
-            if len(of) == whole and self.declared.get(engine, 0.0) <= INDEPENDENT_ERROR
+            if self.declared.get(engine, 0.0) <= INDEPENDENT_ERROR
         ]
-        if asked:
-            self.with_forces += 1
-            self.checked_twice += sum(agreeing) >= 2
+        self.with_forces += bool(asked)
+        self.checked_twice += sum(agreeing) >= 2
         self.released |= any(row.quantity == "energy" for row in rows)
 
     def _add_causes(self, scene: Record) -> None:
@@ -274,15 +266,13 @@ class Overview:
             telling = _find_telling(scene, engine, rows)
             named = [row for row in rows if _name_whole(row) in scene.against]
             shown = telling or (engine == FORMULAS and named) or rows
-            used = [float(find_used(row.error, row.allowed)) for row in shown]
-            worst = shown[used.index(max(used))]
             key = (engine, tuple(_name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
                 key = (engine, (OTHER_CAUSES,))
-            kind = self._kinds.setdefault(key, _SimilarScenes(0, worst, -1.0))
+            kind = self._kinds.setdefault(key, _OverviewCell())
             kind.scenes += 1
-            if max(used) > kind.used:
-                kind.worst, kind.used = worst, max(used)
+            for row in shown:
+                kind.add(row, float(find_used(row.error, row.allowed)))
 
     @property
     def causes(self) -> list[Cause]:
@@ -290,7 +280,7 @@ class Overview:
 
         The mistake that explains most comes first.
         """
-        causes = []
+        causes: list[Cause] = []
         for engine in dict.fromkeys(engine for engine, _ in self._kinds):
             left = {
                 texts: kind for (of, texts), kind in self._kinds.items() if of == engine
@@ -299,54 +289,37 @@ class Overview:
             while left:
                 counts: Counter[str] = Counter()
                 for texts, kind in left.items():
-                    for text in texts:
-                        counts[text] += kind.scenes
-                text = counts.most_common(1)[0][0]
-                explained = [texts for texts in left if text in texts]
-                kind = max((left[texts] for texts in explained), key=lambda k: k.used)
-                words = text
-                begin = _TOLD_BY.get(kind.worst.quantity)
+                    counts.update(dict.fromkeys(texts, kind.scenes))
+                text, scenes = counts.most_common(1)[0]
+                explained = [left.pop(texts) for texts in [*left] if text in texts]
+                worst = max(explained, key=lambda kind: kind.used).row
+                assert worst is not None
+                begin = _TOLD_BY.get(worst.quantity)
                 if begin is not None and text.startswith(begin):
-                    words = begin + "".join(_take_reason(kind.worst))
-                of_engine.append(
-                    Cause(
-                        engine,
-                        words,
-                        counts[text],
-                        kind.worst,
-                    )
-                )
-                left = {t: kind for t, kind in left.items() if t not in explained}
+                    text = begin + "".join(_take_reason(worst))
+                of_engine.append(Cause(engine, text, scenes, worst))
             causes += sorted(of_engine, key=lambda cause: -cause.scenes)
         return causes
 
     @property
     def named_failure(self) -> Row | None:
         """Return the failing row that the verdict names; None if nothing fails."""
-        causes = self.causes
-        return causes[0].worst if causes else None
+        return next((cause.worst for cause in self.causes), None)
 
     def name_lines(self, versions: Mapping[str, str]) -> list[OverviewLine]:
         """Return the engines that were compared, with their names and versions."""
+        order = list(ENGINE_NAMES)
+        lines = []
         for line in self._lines.values():
             version = versions.get(line.engine, "")
-            pattern = ENGINE_NAMES.get(line.engine)
-            if pattern is None:
-                line.name = f"{line.engine} {version}".strip()
-            else:
-                line.name = pattern.format(version).replace(" ,", ",").strip()
-        order = list(ENGINE_NAMES)
-        return sorted(
-            (
-                line
-                for line in self._lines.values()
-                if line.answered or line.failed or line.reasons
-            ),
-            key=lambda line: (
-                order.index(line.engine) if line.engine in order else len(order),
-                line.name,
-            ),
-        )
+            name = f"{line.engine} {version}"
+            if line.engine in order:
+                name = ENGINE_NAMES[line.engine].format(version).replace(" ,", ",")
+            line.name = name.strip()
+            if line.answered or line.failed or line.reasons:
+                place = [*order, line.engine].index(line.engine)
+                lines.append((place, line.name, line))
+        return [line for *_, line in sorted(lines, key=itemgetter(0, 1))]
 
     @property
     def silent(self) -> list[str]:
@@ -367,15 +340,11 @@ class Overview:
         """Return what is said beneath the table."""
         notes = []
         if self.statements or self.statements_failed:
-            held = "all hold"
-            if self.statements_failed:
-                held = f"{self.statements_failed} FAIL"
-            if self.statements == 1:
-                identities = "1 identity"
-            else:
-                identities = f"{self.statements} identities"
+            failed = self.statements_failed
+            held = f"{failed} FAIL" if failed else "all hold"
+            many = write_count(self.statements, "identity")
             notes.append(
-                f"also checked, without an engine: {identities} of the formulas; {held}"
+                f"also checked, without an engine: {many} of the formulas; {held}"
             )
         if self.with_forces:
             notes.append(

@@ -2,10 +2,10 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import nlargest
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from statistics import median
 from typing import TypeVar
 
@@ -37,6 +37,7 @@ from fourbar_validation.report.words import NUMBERS_IN_A_REASON
 
 T = TypeVar("T")
 _ALLOWANCE = attrgetter("allowed")
+_USED = attrgetter("used")
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,22 +175,14 @@ class Summary:
         compared, loose = _count_compared(scene.rows)
         self.pairs += compared
         self.loose += len(loose)
-        self._loosest = _keep_largest(
-            _LOOSEST_SHOWN,
-            [*self._loosest, *loose],
-            _ALLOWANCE,
-        )
+        _keep_largest(_LOOSEST_SHOWN, self._loosest, loose, _ALLOWANCE)
         for engine, reason in sorted(_list_left_out(scene)):
             kind = (engine, NUMBERS_IN_A_REASON.sub("#", reason))
             self._refusals[kind] += 1
             self._first_reason.setdefault(kind, reason)
         worst = _find_worst_row(scene.rows)
         self.judged += len(worst)
-        self._worst = _keep_largest(
-            _WORST_SHOWN,
-            [*self._worst, *worst],
-            lambda w: w.used,
-        )
+        _keep_largest(_WORST_SHOWN, self._worst, worst, _USED)
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
                 k = row.error * row.condition / EPS
@@ -202,11 +195,7 @@ class Summary:
             self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
         else:
             most = max((w.used for w in worst), default=0.0)
-            self._holding = _keep_largest(
-                SCENES_SHOWN,
-                [*self._holding, (most, scene)],
-                lambda entry: entry[0],
-            )
+            _keep_largest(SCENES_SHOWN, self._holding, [(most, scene)], itemgetter(0))
 
     def picture(self, drawn: Record) -> None:
         """Add what was drawn and measured of a scene that is shown."""
@@ -231,20 +220,18 @@ class Summary:
             for evidence in scene.evidence.values()
             if "observed_order" in evidence
         ]
-        self._orders = _keep_largest(
-            _ORDERS_SHOWN,
-            [*self._orders, *orders],
-            _find_lowest,
-        )
+        _keep_largest(_ORDERS_SHOWN, self._orders, orders, _find_lowest)
+
+    @property
+    def not_run(self) -> str:
+        """Return the end of the verdict that names the engines that are missing."""
+        names = ", ".join(engine for engine, _ in self.missing)
+        return f"; not run: {names}" * bool(names)
 
     @property
     def verdict(self) -> str:
         """Return the verdict of the run as one sentence."""
-        if self.missing:
-            not_run = f"; not run: {', '.join(engine for engine, _ in self.missing)}"
-        else:
-            not_run = ""
-        return self.counts.sentence() + not_run
+        return self.counts.sentence() + self.not_run
 
     @property
     def headline(self) -> str:
@@ -257,26 +244,24 @@ class Summary:
             ("GONE", overview.gone),
         ):
             if lost:
-                more = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
-                words = (
-                    f"{heading}: {lost[0]}{more}, against {overview.baseline}. {words}"
-                )
+                more = f", and {len(lost) - 1} more" * (len(lost) > 1)
+                head = f"{heading}: {lost[0]}{more}, against {overview.baseline}."
+                words = f"{head} {words}"
         return words
 
     def _say_first_cause(self) -> str:
         causes = self.overview.causes
         if not causes:
-            missing = ", ".join(engine for engine, _ in self.missing)
-            return self.counts.headline + (f"; not run: {missing}" if missing else "")
-        more = len(causes) - 1
-        others = f", and {write_count(more, 'more cause')}" if more else ""
+            return self.counts.headline + self.not_run
         first = causes[0]
-        named = first.engine if first.engine != FORMULAS else "fourbar itself"
+        more = len(causes) - 1
+        others = f", and {write_count(more, 'more cause')}" * bool(more)
+        named = "fourbar itself" if first.engine == FORMULAS else first.engine
         scenes = write_count(first.scenes, "scene")
-        what = f"{named} is wrong: {first.text}, in {scenes}; "
-        if not math.isnan(first.worst.error):
-            what += f"worst {first.worst.quantity} of "
-        since = f" {self.overview.since}" if self.overview.since else ""
+        worst = f"worst {first.worst.quantity} of "
+        worst *= not math.isnan(first.worst.error)
+        since = f" {self.overview.since}".rstrip()
+        what = f"{named} is wrong: {first.text}, in {scenes}; {worst}"
         return f"FAILS: {what}{first.place}{others}.{since}"
 
     @property
@@ -343,11 +328,9 @@ class Summary:
         More than _WORST_SHOWN are reduced to those that used most, in that order.
         """
         if self.judged > _WORST_SHOWN:
-            return nlargest(_WORST_SHOWN, self._worst, key=lambda w: w.used)
-        return sorted(
-            self._worst,
-            key=lambda w: (w.row.scene, w.row.engine, w.row.setting),
-        )
+            return nlargest(_WORST_SHOWN, self._worst, key=_USED)
+        by_name = attrgetter("row.scene", "row.engine", "row.setting")
+        return sorted(self._worst, key=by_name)
 
     @property
     def refusals(self) -> list[tuple[str, str, int]]:
@@ -367,8 +350,7 @@ class Summary:
 
         At most _ORDERS_SHOWN are returned, the lowest orders first.
         """
-        few = len(self._orders) <= _ORDERS_SHOWN
-        if few:
+        if len(self._orders) <= _ORDERS_SHOWN:
             return self._orders
         return nlargest(_ORDERS_SHOWN, self._orders, key=_find_lowest)
 
@@ -408,11 +390,8 @@ class Summary:
         return next(iter([*failing, *drawn]), None)
 
     def _find_most_used(self, most: int) -> list[Record]:
-        holding = nlargest(
-            most - len(self._failing),
-            self._holding,
-            key=lambda entry: entry[0],
-        )
+        left = most - len(self._failing)
+        holding = nlargest(left, self._holding, key=itemgetter(0))
         return [*self._failing, *(scene for _, scene in holding)]
 
 
@@ -449,11 +428,11 @@ def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
         if row.compared:
             by_quantity.setdefault(row.quantity, []).append(row)
     loose = [
-        rows_of_one
-        for rows_of_one in by_quantity.values()
-        if all(row.verdict == DEGRADED for row in rows_of_one)
+        min(of_one, key=_ALLOWANCE)
+        for of_one in by_quantity.values()
+        if all(row.verdict == DEGRADED for row in of_one)
     ]
-    return len(by_quantity), [min(rows_of_one, key=_ALLOWANCE) for rows_of_one in loose]
+    return len(by_quantity), loose
 
 
 def _find_worst_row(rows: Sequence[Row]) -> list[Worst]:
@@ -463,27 +442,22 @@ def _find_worst_row(rows: Sequence[Row]) -> list[Worst]:
             groups.setdefault((row.engine, row.setting), []).append((share, row))
     worst = []
     for group in groups.values():
-        share, row = max(group, key=lambda entry: entry[0])
-        worst.append(
-            Worst(
-                row,
-                share,
-                len(group),
-                sum(row_of_group.failed for _, row_of_group in group),
-            )
-        )
+        share, row = max(group, key=itemgetter(0))
+        failed = sum(one.failed for _, one in group)
+        worst.append(Worst(row, share, len(group), failed))
     return worst
 
 
 def _keep_largest(
     most: int,
     entries: list[T],
+    further: Iterable[T],
     key: Callable[[T], float],
-) -> list[T]:
-    """Cut the list to its largest once it is twice too long."""
-    if len(entries) <= 2 * most:
-        return entries
-    return nlargest(most, entries, key=key)
+) -> None:
+    """Add further entries to a list; it is cut to the largest once it is too long."""
+    entries += further
+    if len(entries) > 2 * most:
+        entries[:] = nlargest(most, entries, key=key)
 
 
 def _find_lowest(order: tuple[str, dict[str, float]]) -> float:

@@ -4,6 +4,7 @@ Drawn are the linkage, every engine's answer over the formulas, and the errors b
 """
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -72,29 +73,27 @@ def draw_scene_figure(record: Record) -> str | None:
     The text is None if nothing assembles.
     """
     solution = record.solution
-    if (
-        record.scene is None
-        or solution is None
-        or not np.any(solution.status_code == OK)
-    ):
+    scene = record.scene
+    if scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
-    linkage = _draw_best_position(record.name, record.scene, solution)
+    linkage = _draw_best_position(record.name, scene, solution)
     if np.count_nonzero(solution.status_code == OK) < 2:
         return linkage
-    return linkage + _draw_answers(record, solution)
+    shown = ANGLES
+    if scene.motion.free is not None:
+        shown = _MOTION_AND_FORCE
+    elif solution.F32 is not None:
+        shown = (name_driving(scene), _choose_force(record, solution))
+    curves = [_Curve(name, record, scene, solution) for name in shown]
+    return linkage + "".join(curve.draw() for curve in curves)
 
 
-def _draw_best_position(
-    name: str,
-    scene: Scene,
-    solution: Solution,
-) -> str:
+def _draw_best_position(name: str, scene: Scene, solution: Solution) -> str:
     """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
     from matplotlib.figure import Figure
 
-    best = int(
-        np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0))
-    )
+    condition = np.where(solution.status_code == OK, solution.condition, -1.0)
+    best = int(np.argmax(condition))
     with apply_style():
         figure = Figure(figsize=(3.1, 2.9), layout="constrained")
         labels = Labels()
@@ -113,28 +112,6 @@ def _draw_best_position(
     return svg.replace("<svg", '<svg class="linkage"', 1)
 
 
-def _draw_answers(record: Record, solution: Solution) -> str:
-    """Draw one SVG per quantity: values and errors.
-
-    Errors of the simulation and of the exact engines have axes of their own.
-    """
-    answers = [
-        answer
-        for answer in record.answers
-        if answer.refusal is None and answer.quantities
-    ]
-    assert record.scene is not None
-    drive = name_driving(record.scene)
-    shown = ANGLES
-    if solution.F32 is not None:
-        shown = (drive, _choose_force(record, solution))
-    if record.scene is not None and record.scene.motion.free is not None:
-        shown = _MOTION_AND_FORCE
-    return "".join(
-        _draw_quantity(quantity, record, solution, answers) for quantity in shown
-    )
-
-
 def _choose_force(record: Record, solution: Solution) -> str:
     """Return the name of the pin force to draw.
 
@@ -151,180 +128,175 @@ def _choose_force(record: Record, solution: Solution) -> str:
     )
 
 
-def _draw_quantity(
-    quantity: str,
-    record: Record,
-    solution: Solution,
-    answers: list[Answer],
-) -> str:
-    from matplotlib.figure import Figure
+@dataclass
+class _Curve:
+    """The picture of one quantity of a scene: its values, and their errors beneath.
 
-    shown = [answer for answer in answers if quantity in answer.quantities]
-    simulated = [answer for answer in shown if choose_style(answer.engine).simulated]
-    exact = [answer for answer in shown if not choose_style(answer.engine).simulated]
-    groups = [group for group in (simulated, exact) if group]
-    figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
-    panels = figure.subplots(
-        1 + len(groups),
-        1,
-        sharex=True,
-        height_ratios=[1.9, *[1.0] * len(groups)],
-        squeeze=False,
-    )
-    axes = list(panels[:, 0])
-    _draw_values(axes[0], quantity, solution, [*exact, *simulated], record)
-    for below, group in zip(axes[1:], groups, strict=True):
-        _draw_errors(below, quantity, record, solution, group)
-        below.set_ylabel(
-            "error / scale" if quantity in FORCE_NAMES else "error (rad)",
-            fontsize=8.5,
-        )
-    angle = f"θ{solution.at.bar} (°)".translate(_SUBSCRIPT)
-    axes[-1].set_xlabel("time (s)" if solution.time is not None else angle)
-    figure.align_ylabels(axes)
-    for panel in axes:
-        set_frame(panel)
-    return write_svg(figure, f"{record.name} {quantity}")
-
-
-def _draw_values(
-    axes: "Axes",
-    quantity: str,
-    solution: Solution,
-    answers: list[Answer],
-    record: Record,
-) -> None:
-    """Draw the formulas as a band, and each engine's marks.
-
-    The marks stand at positions of their own.
+    Errors of the simulation and of the exact engines have axes of their own.
     """
-    good = solution.status_code == OK
-    axis = _choose_component(quantity, record, solution, answers)
-    values = _take_plain(quantity, getattr(solution, quantity), axis)
-    ours = np.where(good, values, np.nan)
-    base = _choose_base(solution, None)
-    axes.plot(base, ours, color=BAND, lw=5, solid_capstyle="butt")
-    for turn, answer in enumerate(answers):
-        theirs = _take_plain(quantity, answer.quantities[quantity], axis)
-        phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)
-        places = np.unique(
-            (
-                (np.arange(MARKS_OF_A_CURVE) / MARKS_OF_A_CURVE + phase) * len(theirs)
-            ).astype(int)
+
+    quantity: str
+    record: Record
+    scene: Scene
+    solution: Solution
+
+    def draw(self) -> str:
+        """Draw it as an SVG."""
+        from matplotlib.figure import Figure
+
+        self.good = self.solution.status_code == OK
+        self.base = self.choose_base(self.solution.at)
+        exact: list[Answer] = []
+        simulated: list[Answer] = []
+        for answer in self.record.answers:
+            if answer.refusal is None and self.quantity in answer.quantities:
+                is_simulated = choose_style(answer.engine).simulated
+                (simulated if is_simulated else exact).append(answer)
+        groups = [group for group in (simulated, exact) if group]
+        figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
+        panels = figure.subplots(
+            1 + len(groups),
+            1,
+            sharex=True,
+            height_ratios=[1.9, *[1.0] * len(groups)],
+            squeeze=False,
         )
-        axes.plot(
-            _choose_base(solution, answer.at)[places],
-            theirs[places],
-            **_mark(answer, 5.5),
+        axes = list(panels[:, 0])
+        self.draw_values(axes[0], [*exact, *simulated])
+        unit = "error / scale" if self.quantity in FORCE_NAMES else "error (rad)"
+        for below, group in zip(axes[1:], groups, strict=True):
+            self.draw_errors(below, group)
+            below.set_ylabel(unit, fontsize=8.5)
+        angle = f"θ{self.solution.at.bar} (°)".translate(_SUBSCRIPT)
+        axes[-1].set_xlabel("time (s)" if self.solution.time is not None else angle)
+        figure.align_ylabels(axes)
+        for panel in axes:
+            set_frame(panel)
+        return write_svg(figure, f"{self.record.name} {self.quantity}")
+
+    def choose_base(self, command: Command | None) -> Array:
+        """Return what is drawn over: the commanded angle in degrees, or the time."""
+        base = choose_base(self.solution, command or self.solution.at)
+        return base if base is self.solution.time else np.degrees(base)
+
+    def draw_values(self, axes: "Axes", answers: list[Answer]) -> None:
+        """Draw the formulas as a band, and each engine's marks.
+
+        The marks stand at positions of their own.
+        """
+        quantity = self.quantity
+        axis = self.choose_component(answers)
+        values = _take_plain(quantity, getattr(self.solution, quantity), axis)
+        ours = np.where(self.good, values, np.nan)
+        axes.plot(self.base, ours, color=BAND, lw=5, solid_capstyle="butt")
+        for turn, answer in enumerate(answers):
+            theirs = _take_plain(quantity, answer.quantities[quantity], axis)
+            phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)
+            parts = np.arange(MARKS_OF_A_CURVE) / MARKS_OF_A_CURVE + phase
+            places = np.unique((parts * len(theirs)).astype(int))
+            x = self.choose_base(answer.at)[places]
+            axes.plot(x, theirs[places], **_mark(answer, 5.5))
+        _limit_to_bulk(axes, ours[self.good])
+        axes.set_ylabel(_label(quantity, self.solution, axis))
+
+    def draw_errors(self, axes: "Axes", answers: list[Answer]) -> None:
+        """Draw the largest error of each segment on a logarithmic axis.
+
+        The worst one is ringed; what is allowed is drawn too.
+        """
+        from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+        quantity = self.quantity
+        solution = self.solution
+        rows = [row for row in self.record.rows if row.quantity == quantity]
+        first = answers[0].engine
+        if choose_style(first).simulated:
+            held_to = [row.allowed for row in rows if row.engine == first]
+            limit = held_to[0] if held_to else SIMULATED.factor
+            allowed = np.full(len(solution), limit)
+        else:
+            condition = find_condition(quantity, self.scene.linkage, solution)
+            allowed = EQUIVALENCE.allowed(condition)
+        dashed: dict[str, Any] = {"lw": 1.1, "ls": (0, (5, 2))}
+        shown = np.where(self.good, allowed, np.nan)
+        axes.plot(self.base, shown, color=ALLOWED, **dashed)
+        low = float(np.nanmin(allowed[self.good]))
+        common = high = float(np.nanmax(allowed[self.good]))
+        engines = {answer.engine for answer in answers}
+        for row in rows:  # of an engine that is allowed more than the others
+            limit = row.allowed
+            own = row.engine in engines and row.compared
+            if not own or not limit > 2.0 * common:
+                continue
+            colour = choose_style(row.engine).colour
+            axes.axhline(limit, color=colour, **dashed)
+            axes.annotate(
+                f"allowed to {row.engine}",
+                (0.99, limit),
+                (0, -9),
+                xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points",
+                fontsize=8.5,
+                ha="right",
+                color=colour,
+            )
+            high = max(high, limit)
+        for turn, answer in enumerate(answers):
+            formulas = (
+                solution if answer.at is None else solve(self.scene, at=answer.at)
+            )
+            mine = getattr(formulas, quantity)
+            size = scale_of(quantity, self.scene, formulas, mine).size
+            error = find_error(quantity, mine, answer.quantities[quantity], size)
+            places = find_worst_of_segments(error, turn / len(answers))
+            if not len(places):
+                continue
+            x = self.choose_base(answer.at)[places]
+            heights = np.maximum(error[places], LEAST_DRAWN_ERROR)
+            mark = _mark(answer, 3.2) | {"mew": 0.8}
+            axes.plot(x, heights, **mark)
+            worst = int(np.argmax(heights))
+            ring: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "none", "mew": 0.9}
+            ring |= {"ls": "none", "mec": mark["color"]}
+            axes.plot(x[worst], heights[worst], **ring)
+            low = min(low, float(heights.min()))
+            high = max(high, float(heights.max()))
+        axes.set(yscale="log", ylim=(low / 4.0, 5.0 * high))
+        axes.yaxis.set(
+            major_locator=LogLocator(numticks=5),
+            minor_locator=NullLocator(),
+            major_formatter=FuncFormatter(lambda value, _: f"{value:.0e}"),
         )
-    _limit_to_bulk(axes, ours[good])
-    axes.set_ylabel(_label(quantity, solution, axis))
-
-
-def _draw_errors(
-    axes: "Axes",
-    quantity: str,
-    record: Record,
-    solution: Solution,
-    answers: list[Answer],
-) -> None:
-    """Draw the largest error of each segment on a logarithmic axis.
-
-    The worst one is ringed; what is allowed is drawn too.
-    """
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    good = solution.status_code == OK
-    scene = record.scene
-    assert scene is not None
-    if choose_style(answers[0].engine).simulated:
-        held_to = (
-            r.allowed
-            for r in record.rows
-            if (r.engine, r.quantity) == (answers[0].engine, quantity)
-        )
-        allowed = np.full(len(solution), next(held_to, SIMULATED.factor))
-    else:
-        allowed = EQUIVALENCE.allowed(find_condition(quantity, scene.linkage, solution))
-    axes.plot(
-        _choose_base(solution, None),
-        np.where(good, allowed, np.nan),
-        color=ALLOWED,
-        lw=1.1,
-        ls=(0, (5, 2)),
-    )
-    low = float(np.nanmin(allowed[good]))
-    high = float(np.nanmax(allowed[good]))
-    for engine, limit in _find_own_limits(quantity, record, answers, high):
-        colour = choose_style(engine).colour
-        axes.axhline(limit, color=colour, lw=1.1, ls=(0, (5, 2)))
+        middle = int(np.flatnonzero(self.good)[np.count_nonzero(self.good) // 2])
+        place = (float(self.base[middle]), float(allowed[middle]))
+        is_low = place[1] < math.sqrt(low * high)  # marks stand beneath it
         axes.annotate(
-            f"allowed to {engine}",
-            (0.99, limit),
-            (0, -9),
-            xycoords=axes.get_yaxis_transform(),
+            "allowed",
+            place,
+            (0, 3 if is_low else -9),
             textcoords="offset points",
             fontsize=8.5,
-            ha="right",
-            color=colour,
+            ha="center",
+            color=ALLOWED,
         )
-        high = max(high, limit)
-    for turn, answer in enumerate(answers):
-        formulas = solution if answer.at is None else solve(scene, at=answer.at)
-        mine = getattr(formulas, quantity)
-        size = scale_of(quantity, scene, formulas, mine).size
-        error = find_error(quantity, mine, answer.quantities[quantity], size)
-        places = find_worst_of_segments(error, turn / len(answers))
-        if not len(places):
-            continue
-        x = _choose_base(solution, answer.at)[places]
-        heights = np.maximum(error[places], LEAST_DRAWN_ERROR)
-        axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
-        worst = int(np.argmax(heights))
-        axes.plot(
-            x[worst],
-            heights[worst],
-            "o",
-            ms=9,
-            mfc="none",
-            mec=choose_style(answer.engine).colour,
-            mew=0.9,
-        )
-        low = min(low, float(heights.min()))
-        high = max(high, float(heights.max()))
-    axes.set_yscale("log")
-    axes.set_ylim(low / 4.0, 5.0 * high)
-    axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0e}"))
-    middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
-    place = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
-    is_low = place[1] < math.sqrt(low * high)  # marks stand beneath it
-    axes.annotate(
-        "allowed",
-        place,
-        (0, 3 if is_low else -9),
-        textcoords="offset points",
-        fontsize=8.5,
-        ha="center",
-        color=ALLOWED,
-    )
 
+    def choose_component(self, answers: list[Answer]) -> int | None:
+        """Return the component of a force that is wrong; None if none is.
 
-def _find_own_limits(
-    quantity: str,
-    record: Record,
-    answers: list[Answer],
-    common: float,
-) -> list[tuple[str, float]]:
-    """List the engines that are allowed more than the others, with their limit."""
-    engines = {answer.engine for answer in answers}
-    return [
-        (row.engine, row.allowed)
-        for row in record.rows
-        if row.quantity == quantity and row.engine in engines and row.compared
-        if row.allowed > 2.0 * common
-    ]
+        A force whose sign or direction is wrong lies on the curve of magnitudes.
+        """
+        failed = [row for row in self.record.rows if row.failed]
+        wrong = {row.engine for row in failed if row.quantity == self.quantity}
+        ours = getattr(self.solution, self.quantity)
+        differences = []
+        for answer in answers:
+            theirs = answer.quantities[self.quantity]
+            if answer.engine in wrong and theirs.shape == ours.shape:
+                apart = np.nanmax(np.abs(theirs - ours), axis=0, initial=0.0)
+                differences.append(apart)
+        if ours.ndim == 1 or not differences:
+            return None
+        return int(np.argmax(np.max(differences, axis=0)))
 
 
 def find_worst_of_segments(
@@ -340,11 +312,9 @@ def find_worst_of_segments(
     bounds = np.clip(edges.astype(int), 0, len(error))
     worst = []
     for start, stop in pairwise(bounds):
-        piece = error[start:stop]
-        if np.isfinite(piece).any():
-            worst.append(
-                start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan)))
-            )
+        piece = np.where(np.isfinite(error[start:stop]), error[start:stop], -1.0)
+        if piece.max(initial=-1.0) >= 0.0:
+            worst.append(start + int(piece.argmax()))
     return np.array(worst, dtype=np.intp)
 
 
@@ -358,30 +328,6 @@ def _mark(answer: Answer, size: float) -> dict[str, Any]:
         "mfc": PAPER,
         "mew": 1.2,
     }
-
-
-def _choose_component(
-    quantity: str,
-    record: Record,
-    solution: Solution,
-    answers: list[Answer],
-) -> int | None:
-    """Return the component of a force that is wrong; None if none is.
-
-    A force whose sign or direction is wrong lies on the curve of magnitudes.
-    """
-    wrong = {
-        row.engine for row in record.rows if row.failed and row.quantity == quantity
-    }
-    ours = getattr(solution, quantity)
-    differences = [
-        np.nanmax(np.abs(answer.quantities[quantity] - ours), axis=0, initial=0.0)
-        for answer in answers
-        if answer.engine in wrong and answer.quantities[quantity].shape == ours.shape
-    ]
-    if ours.ndim == 1 or not differences:
-        return None
-    return int(np.argmax(np.max(differences, axis=0)))
 
 
 def _take_plain(quantity: str, values: Array, axis: int | None) -> Array:
@@ -411,12 +357,6 @@ def _label(quantity: str, solution: Solution, axis: int | None) -> str:
     return f"|{quantity}| (N)"
 
 
-def _choose_base(solution: Solution, command: Command | None) -> Array:
-    """Return what a curve is drawn over: theta_2 in degrees, or the time in s."""
-    base = choose_base(solution, solution.at if command is None else command)
-    return base if base is solution.time else np.degrees(base)
-
-
 def _limit_to_bulk(axes: "Axes", values: Array) -> None:
     """Limit the axis to 96 % of the positions.
 
@@ -424,13 +364,11 @@ def _limit_to_bulk(axes: "Axes", values: Array) -> None:
     """
     low, high = np.nanpercentile(values, [2.0, 98.0])
     span = high - low
-    if span > 0.0 and (
-        np.nanmax(values) > high + 3 * span or np.nanmin(values) < low - 3 * span
-    ):
+    beyond = max(np.nanmax(values) - high, low - np.nanmin(values))
+    if span > 0.0 and beyond > 3 * span:
         axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
-        note = "axis ends where the curve leaves towards a pole"
         axes.annotate(
-            note,
+            "axis ends where the curve leaves towards a pole",
             (0.99, 0.97),
             xycoords="axes fraction",
             fontsize=8.5,

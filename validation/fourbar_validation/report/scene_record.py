@@ -4,6 +4,7 @@ The record of a whole run, record.json, is made in `regression/record.py`.
 """
 
 from dataclasses import asdict, dataclass, field, replace
+from operator import attrgetter
 from typing import Any
 
 from fourbar.scene import Scene
@@ -62,18 +63,12 @@ class Record:
 
     def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
+        answers = self.answers
+        shared = {one.engine: (one.shared, one.own) for one in answers if one.own}
         return replace(
             self,
-            independence={
-                answer.engine: (answer.shared, answer.own)
-                for answer in self.answers
-                if answer.own
-            },
-            evidence={
-                answer.engine: answer.evidence
-                for answer in self.answers
-                if answer.evidence
-            },
+            independence=shared,
+            evidence={one.engine: one.evidence for one in answers if one.evidence},
             figure=figure,
             thumbnail=thumbnail,
             scene=None,
@@ -89,43 +84,35 @@ class Record:
         kept = asdict(replace(self, rows=[]))
         for name in ("scene", "solution", "answers"):
             del kept[name]
-        return kept | {
-            "rows": [
-                [getattr(row, name) for name in COLUMN_TYPES]
-                for row in sort_rows(self.rows)
-            ]
-        }
+        cells = attrgetter(*COLUMN_TYPES)
+        return kept | {"rows": [[*cells(row)] for row in sort_rows(self.rows)]}
 
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":
         """Return the record from the data that `kept_all` returned."""
-        rows = [Row(*row) for row in kept["rows"]]
-        timings = [Timing(**timing) for timing in kept["timings"]]
-        independence = {
-            engine: (shared, alone)
-            for engine, (shared, alone) in kept["independence"].items()
+        independence = {name: tuple(two) for name, two in kept["independence"].items()}
+        restored = {
+            "rows": [Row(*row) for row in kept["rows"]],
+            "timings": [Timing(**timing) for timing in kept["timings"]],
+            "independence": independence,
         }
-        return cls(
-            **{**kept, "timings": timings, "independence": independence, "rows": rows}
-        )
+        return cls(**kept | restored)
 
     def joined(self, further: "Record") -> "Record":
         """Add the answers of another set of engines.
 
         The rows of the formulas stand once.
         """
-        rows = set(self.rows)
+        known = set(self.rows)
+        joined: dict[str, Any] = {
+            name: getattr(self, name) | getattr(further, name)
+            for name in ("independence", "evidence", "output", "causes", "against")
+        }
+        timings = [timing for timing in further.timings if timing.engine != FORMULAS]
         return replace(
             self,
-            rows=[*self.rows, *(row for row in further.rows if row not in rows)],
-            timings=[
-                *self.timings,
-                *(timing for timing in further.timings if timing.engine != FORMULAS),
-            ],
-            left_out=[*self.left_out, *further.left_out],
-            independence={**self.independence, **further.independence},
-            evidence={**self.evidence, **further.evidence},
-            output={**self.output, **further.output},
-            causes={**self.causes, **further.causes},
-            against={**self.against, **further.against},
+            **joined,
+            rows=self.rows + [row for row in further.rows if row not in known],
+            timings=self.timings + timings,
+            left_out=self.left_out + further.left_out,
         )

@@ -61,9 +61,7 @@ def find_causes(
     try:
         regular = question.solution.status_code == OK
         table = make_answer_table(answer, regular)
-        slack = SAME_NUMBERS
-        if not tolerance.conditioned:
-            slack = max(tolerance.factor, slack)
+        slack = max(SAME_NUMBERS, tolerance.factor * (not tolerance.conditioned))
         rows = RowCommands(at.part(slice(len(table.places))))
         judge = Judge(scene, table, rows=rows, slack=slack)
         if predicted is not None:
@@ -114,10 +112,8 @@ def _say_causes(found: list[Explanation], differing: list[str]) -> list[str]:
     said = []
     for text, names in causes:
         rest = [name for name in differing if name not in names]
-        if rest:
-            said.append(f"{text}, but {', '.join(rest)} differ{'s' * (len(rest) < 2)}")
-        else:
-            said.append(f"{text}, all else agrees")
+        left = f"but {', '.join(rest)} differ{'s' * (len(rest) < 2)}"
+        said.append(f"{text}, {left if rest else 'all else agrees'}")
     return said
 
 

@@ -6,11 +6,10 @@ the sum of moments about O2.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Actions
 from fourbar.effects.effect import list_bodies
@@ -65,8 +64,6 @@ _LARGE = 1e75
 """Size of numbers beyond which they, or their squares, may overflow. A product of four
 is 1e300.
 """
-_OfSome = Callable[[NDArray[np.intp]], Array]
-"""A number of each of some positions."""
 _IN_ONE_LINE = 32.0 * 2.0**-53
 """|sin(theta_4 - theta_3)| at which bars 3 and 4 may count as collinear. Their
 directions are rounded by that.
@@ -91,11 +88,8 @@ def check_identities(question: Question) -> Iterator[Row]:
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     gap = find_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
     yield _make_equation_row(question, "closure", CLOSURE, gap, closing)
-    if (
-        question.scene.motion.angle is None
-        and question.scene.motion.law is None
-        and command.bar == 2
-    ):
+    motion = question.scene.motion
+    if motion.angle is None and motion.law is None and command.bar == 2:
         yield _check_sweep(question)
     if solution.F12 is not None and (solution.status_code == OK).any():
         yield from _check_sums(question)
@@ -116,11 +110,8 @@ def _check_sweep(question: Question) -> Row:
         missed = np.maximum(-compute_closing_margin(linkage, command.theta_2), 0.0)
     else:
         left_out = min(np.radians(1.0), 0.5 * (stop - start))
-        missed = np.abs(
-            compute_closing_margin(
-                linkage, np.array([start - left_out, stop + left_out])
-            )
-        )
+        ends = np.array([start - left_out, stop + left_out])
+        missed = np.abs(compute_closing_margin(linkage, ends))
     allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, command.theta_2)
     reason = "one degree short of where the loop just closes, or whole turns"
     return question.row("sweep", np.array([missed.max()]), allowed, reason)
@@ -137,18 +128,11 @@ def _make_equation_row(
 
     The error is in parts of its terms.
     """
-    condition = 1.0 / count_half_turns(
-        question.scene.linkage.ground_angle, question.at.angle
-    )
+    ground_angle = question.scene.linkage.ground_angle
+    condition = 1.0 / count_half_turns(ground_angle, question.at.angle)
+    allowed = IDENTITY.factor / condition
     reason = f"identity: {equation}" if judged.any() else NOT_DEMANDED
-    return question.row(
-        quantity,
-        error,
-        IDENTITY.factor / condition,
-        reason,
-        judged,
-        condition,
-    )
+    return question.row(quantity, error, allowed, reason, judged, condition)
 
 
 class _Balance:
@@ -163,24 +147,18 @@ class _Balance:
         self.forces: Any = 0.0
         self.moments: Any = 0.0
 
-    def push(
-        self,
-        force: Array,
-        point: Array,
-        sense: float = 1.0,
-    ) -> None:
+    def push(self, force: Array, point: Array, sense: float = 1.0) -> None:
         """Add a force at a point."""
+        turning = point[..., 0] * force[..., 1] - point[..., 1] * force[..., 0]
         self.force = self.force + sense * force
         self.forces = self.forces + magnitude(force)
-        turning = point[..., 0] * force[..., 1] - point[..., 1] * force[..., 0]
         self.moment = self.moment + sense * turning
         self.carry(force, point)
 
     def carry(self, force: Array, point: Array) -> None:
         """Add the size alone of the moment of a force inside, which cancels."""
-        self.moments = self.moments + np.hypot(
-            point[..., 0], point[..., 1]
-        ) * magnitude(force)
+        arm = np.hypot(point[..., 0], point[..., 1])
+        self.moments = self.moments + arm * magnitude(force)
 
     def couple(self, couple: Array, sense: float = 1.0) -> None:
         """Add a couple."""
@@ -191,9 +169,10 @@ class _Balance:
 def _check_sums(question: Question) -> Iterator[Row]:
     """Check that F12 + F14 + loads = sum of m a_G, the moments about O2, the power."""
     scene = question.scene
+    linkage = scene.linkage
     solution = question.solution
     actions, of_drive, O4 = _sum_actions(question)
-    drive = name_driving(question.scene)
+    drive = name_driving(scene)
     balance = _Balance()
     if solution.torque is not None:
         balance.couple(solution.torque)
@@ -203,65 +182,56 @@ def _check_sums(question: Question) -> Iterator[Row]:
     balance.carry(solution.F43, solution.B)
     acting = actions.wrenches(Wrenches())
     driving = of_drive.wrenches(Wrenches())
-    first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
-    for number in MOVING_BARS:
+    first_pins = (("O2", np.zeros(2)), ("", solution.A), ("O4", O4))
+    for number, (ground_pin, pin) in zip(MOVING_BARS, first_pins, strict=True):
         force_on, couple = acting.on(number)
         # the ground's pull on bars 2 and 4 goes through their pins; between moving bars
         # it cancels
-        resultant = force_on + actions.through.get(
-            {2: "O2", 4: "O4"}.get(number, ""), 0.0
-        )
+        resultant = force_on + actions.through.get(ground_pin, 0.0)
         load = np.broadcast_to(resultant, len(solution))
-        balance.push(join_components(load.real, load.imag), first_pins[number])
+        balance.push(join_components(load.real, load.imag), pin)
         balance.couple(couple)
         # a force that drives and the loads nearly cancel in the couple of their bar,
         # and the force has the rounding of its own moment
         _, couple_of_drive = driving.on(number)
         balance.moments = balance.moments + np.abs(couple_of_drive)
-        accelerated = scene.linkage.bar(number).mass * getattr(solution, f"a_G{number}")
+        accelerated = linkage.bar(number).mass * getattr(solution, f"a_G{number}")
         balance.push(accelerated, getattr(solution, f"G{number}"), -1.0)
-        balance.couple(
-            actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}"), -1.0
-        )
+        turned = actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}")
+        balance.couple(turned, -1.0)
     # the forces of the bars that are not driven are solved apart, and the torque is
     # that of virtual work
     placed = state_from_pins(scene)
     sizes: dict[str, Array | float] = dict.fromkeys(("load", "springs", "torsion"), 0.0)
     for term in (*placed.loads, *placed.effects):
         if term.key in sizes:
-            sizes[term.key] += find_size(term, scene.linkage, solution)
+            sizes[term.key] += find_size(term, linkage, solution)
     # a force at a place far from its bar's pins is balanced by as large a couple
     forces_acting = sizes["load"] + sizes["springs"]
     # and a spring next to its free length has the rounding of that length
-    couples_acting = sum(sizes.values()) * max(scene.linkage.lengths)
+    couples_acting = sum(sizes.values()) * max(linkage.lengths)
+    lever = find_lever(linkage) * solution.drive_condition
+    condition = find_condition(drive, linkage, solution)
     with np.errstate(divide="ignore", invalid="ignore"):
-        force_size = (balance.forces + forces_acting) / (
-            find_lever(scene.linkage) * solution.drive_condition
-        )
-        moment_size = (balance.moments + couples_acting) / find_condition(
-            drive, scene.linkage, solution
-        )
-    judged = solution.status_code == OK
+        force_size = (balance.forces + forces_acting) / lever
+        moment_size = (balance.moments + couples_acting) / condition
     # the sense of dry friction at a pin at rest is decided by rounding: not the same
     # here as in the answer
-    judged &= ~question.reversing(IDENTITY.factor)
-    yield _check_power(question, drive, judged)
-    forces = divide(magnitude(balance.force), force_size)
-    moments = divide(np.abs(balance.moment), moment_size)
-    yield _make_equation_row(
-        question,
-        "force_sum",
-        "F12 + F14 + loads = sum of m a_G",
-        forces,
-        judged,
-    )
-    yield _make_equation_row(
-        question,
-        "moment_sum",
-        "moments about O2, with the torque",
-        moments,
-        judged,
-    )
+    judged = (solution.status_code == OK) & ~question.reversing(IDENTITY.factor)
+    speed = getattr(solution, f"omega_{solution.drive_bar}", solution.stroke_speed)
+    works = getattr(solution, drive) * speed
+    equations = {
+        "power": ("of the drive", solution.power - works, np.abs(works)),
+        "force_sum": ("F12 + F14 + loads = sum of m a_G", balance.force, force_size),
+        "moment_sum": (
+            "moments about O2, with the torque",
+            balance.moment,
+            moment_size,
+        ),
+    }
+    for name, (equation, rest, size) in equations.items():
+        error = divide(magnitude(rest), size)
+        yield _make_equation_row(question, name, equation, error, judged)
 
 
 def _sum_actions(question: Question) -> tuple[Actions, Actions, Array]:
@@ -274,24 +244,18 @@ def _sum_actions(question: Question) -> tuple[Actions, Actions, Array]:
     command = question.at
     solution = question.solution
     state = compute_shown_state(scene, command)
-    speeds = {
-        f"omega_{bar}": getattr(solution, f"omega_{bar}")
-        for bar in MOVING_BARS
-        if bar != command.bar
-    }
+    bars = [bar for bar in MOVING_BARS if bar != command.bar]
+    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in bars}
     state = state._replace(moving=state.moving._replace(**speeds))
     placed = scene.settled()
+    bodies = list_bodies(scene.linkage, scene.effects)
+    forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
     with np.errstate(all="ignore"):
-        actions = Actions(state, list_bodies(scene.linkage, scene.effects)).add(
-            (*placed.loads, *placed.effects)
-        )
+        actions = Actions(state, bodies).add((*placed.loads, *placed.effects))
         for term in scene.effects:
             if term.loaded_pins:
-                term.act_known(
-                    actions,
-                    {name: getattr(solution, name) for name in PIN_FORCE.values()},
-                )
-        of_drive = Actions(state, list_bodies(scene.linkage, scene.effects))
+                term.act_known(actions, forces)
+        of_drive = Actions(state, bodies)
         if solution.drive is not None:
             solution.drive.act(actions, solution.drive_force)
             solution.drive.act(of_drive, solution.drive_force)
@@ -299,171 +263,108 @@ def _sum_actions(question: Question) -> tuple[Actions, Actions, Array]:
     return actions, of_drive, np.array([O4.real, O4.imag])
 
 
-def _check_power(
-    question: Question,
-    drive: str,
-    judged: Mask,
-) -> Row:
-    """Compare the power of the drive with its effort times its speed.
-
-    The effort is a torque or a force.
-    """
-    solution = question.solution
-    works = getattr(solution, drive) * getattr(
-        solution, f"omega_{solution.drive_bar}", solution.stroke_speed
-    )
-    return _make_equation_row(
-        question,
-        "power",
-        "of the drive",
-        divide(np.abs(solution.power - works), np.abs(works)),
-        judged,
-    )
-
-
 def check_status(question: Question) -> Iterator[Row]:
     """Check that the formulas lack a value exactly where another derivation does."""
     reference = question.reference
     free_body = question.free_body
     if reference is not None and question.at.speed is not None:
-        yield compare_status(question, reference, *_solve_exactly(question))
+        yield _compare_status(question, reference)
     elif reference is None and (free_body is None or free_body.refusal is None):
         what = "the free bodies, by which it is judged, broke down"
         yield Row.unmeasured(question.name, FORMULAS, "exact", "status", FAILS, what)
 
 
-def _solve_exactly(question: Question) -> tuple[_OfSome | None, _OfSome | None]:
-    """Give the sine between bars 3 and 4 in many digits, at some positions.
-
-    The number of solutions that friction has is given too.
-    """
-    scene = question.scene
-    command = question.at
-    unknown = (
-        command.remainder is not None
-        or command.commanded != "theta_2"
-        or find_missing("flint")
-    )
-    loaded = any(effect.loaded_pins for effect in scene.effects)
-    return (
-        (
-            None
-            if unknown
-            else lambda indices: compute_exact_sines(
-                scene.linkage, select_positions(command, indices)
-            )
-        ),
-        (
-            (lambda indices: count_solutions(scene, select_positions(command, indices)))
-            if loaded
-            else None
-        ),
-    )
-
-
-def compare_status(
-    question: Question,
-    reference: Solution,
-    sines: _OfSome | None = None,
-    solutions: _OfSome | None = None,
-) -> Row:
+def _compare_status(question: Question, reference: Solution) -> Row:
     """Count where one of the formulas and `reference` alone has a value.
 
     Positions count where digits are left. That a loop does not close is compared by
-    itself where doubles can decide it.
-
-    `sines`: sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop
-    does not close; near 0 it decides whether they are singular. None: nothing is.
-    `solutions`: how many solutions loaded friction has at some positions.
+    itself where doubles can decide it. Near a toggle sin(theta_4 - theta_3) in many
+    digits decides whether positions are singular, and of loaded friction some positions
+    are searched for several solutions.
     """
     scene = question.scene
+    linkage = scene.linkage
+    command = question.at
     formulas = question.solution
+    code = formulas.status_code
     differ = np.zeros(len(formulas), dtype=bool)
     large = _mark_large(scene, reference)
     for quantity in OPTIONAL_QUANTITIES:
         ours = getattr(formulas, quantity)
         theirs = getattr(reference, quantity)
-        if ours is None or theirs is None:
-            continue
-        sound = (
-            find_condition(quantity, scene.linkage, reference) * NOTHING_TO_TELL > EPS
-        )
-        differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
-    differ &= formulas.status_code != NOT_ASSEMBLED
+        if ours is not None and theirs is not None:
+            sound = find_condition(quantity, linkage, reference) * NOTHING_TO_TELL > EPS
+            differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
+    differ &= code != NOT_ASSEMBLED
     if reference.drive_condition is not None:
-        accelerations = [
-            formulas.a_G2,
-            formulas.a_G3,
-            formulas.a_G4,
-            *formulas.acceleration.values(),
-        ]
+        found = [formulas.a_G2, formulas.a_G3, formulas.a_G4]
+        found += formulas.acceleration.values()
+        accelerations = np.hstack([a for a in found if a is not None])
         # if everything that the forces need is finite, a missing number is the forces'
         # own
-        moves = np.isfinite(np.hstack([a for a in accelerations if a is not None])).all(
-            axis=1
-        )
+        moves = np.isfinite(accelerations).all(axis=1)
         in_line = reference.drive_condition < _IN_ONE_LINE
-        differ |= (formulas.status_code == OVERFLOW) & moves & in_line
-        differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (
-            reference.drive_condition > TOO_NEAR_A_TOGGLE
-        )
-    close = (
-        mark_touching(scene.linkage, formulas.theta_2)
-        | (reference.condition < TOO_NEAR_A_TOGGLE)
-        | (formulas.condition < TOO_NEAR_A_TOGGLE)
-    )
-    differ |= np.isin(formulas.status_code, (SINGULAR, CHANGE_POINT)) & ~close & ~large
-    if sines is not None and len(
-        near := np.flatnonzero(close)
-    ):  # exact arithmetic has to decide there
-        sine = np.abs(sines(near))
+        differ |= (code == OVERFLOW) & moves & in_line
+        apart = reference.drive_condition > TOO_NEAR_A_TOGGLE
+        differ |= np.isin(code, (NO_TORQUE, NO_LEVER)) & apart
+    close = mark_touching(linkage, formulas.theta_2)
+    close |= reference.condition < TOO_NEAR_A_TOGGLE
+    close |= formulas.condition < TOO_NEAR_A_TOGGLE
+    singular = np.isin(code, (SINGULAR, CHANGE_POINT))
+    differ |= singular & ~close & ~large
+    near = np.flatnonzero(close)
+    of_theta_2 = command.remainder is None and command.commanded == "theta_2"
+    if of_theta_2 and len(near) and not find_missing("flint"):
+        # exact arithmetic has to decide there
+        sine = np.abs(compute_exact_sines(linkage, select_positions(command, near)))
         closes = np.isfinite(sine)
-        in_line = np.isin(formulas.status_code[near], (SINGULAR, CHANGE_POINT))
-        differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
-        differ[near] |= closes & np.where(
-            in_line,
-            sine > _IN_ONE_LINE,
-            sine < 1.0 / 16.0 * _IN_ONE_LINE,
+        wrong = np.where(
+            singular[near], sine > _IN_ONE_LINE, sine < _IN_ONE_LINE / 16.0
         )
-    if solutions is not None and len(
-        many := np.flatnonzero(formulas.status_code == SEVERAL)[:POSITIONS_OF_FRICTION]
-    ):
-        differ[many] |= solutions(many) < 2
-    if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
-        some = spread_evenly(ok, POSITIONS_OF_FRICTION)
-        differ[some] |= solutions(some) > 1
-    index = find_worst(differ.astype(float))
-    wrong = np.count_nonzero(differ)
+        differ[near] |= (code[near] == NOT_ASSEMBLED) == closes
+        differ[near] |= closes & wrong
+    if any(effect.loaded_pins for effect in scene.effects):
+        differ |= _mark_other_numbers(question)
+    wrong_ones = np.count_nonzero(differ)
     stated = ", ".join(
         f"{count} {name}"
         for name, count in Counter(formulas.status).items()
         if name != "ok"
     )
-    if stated:
-        reason = f"the formulas state: {stated}"
-    else:
+    reason = f"the formulas state: {stated}"
+    if not stated:
         reason = "every position has its values"
-    if differ.any():
-        reason = (
-            f"other at {write_count(int(wrong), 'position')}, the first is"
-            f" {formulas.status[index]}; {reason}"
-        )
-    return question.row(
-        "status",
-        float(wrong) * differ,
-        0.0,
-        reason,
-        theta_2=formulas.theta_2,
-    )
+    if wrong_ones:
+        first = formulas.status[find_worst(differ.astype(float))]
+        positions = write_count(int(wrong_ones), "position")
+        reason = f"other at {positions}, the first is {first}; {reason}"
+    errors = float(wrong_ones) * differ
+    return question.row("status", errors, 0.0, reason, theta_2=formulas.theta_2)
+
+
+def _mark_other_numbers(question: Question) -> Mask:
+    """Mark, of a few positions, those where friction has another number of solutions.
+
+    The formulas state one or several.
+    """
+    code = question.solution.status_code
+    several = np.flatnonzero(code == SEVERAL)[:POSITIONS_OF_FRICTION]
+    alone = np.flatnonzero(code == OK)
+    if len(alone):
+        alone = spread_evenly(alone, POSITIONS_OF_FRICTION)
+    differ = np.zeros(len(code), dtype=bool)
+    for some, many in ((several, True), (alone, False)):
+        if len(some):
+            here = select_positions(question.at, some)
+            differ[some] = (count_solutions(question.scene, here) > 1) != many
+    return differ
 
 
 def _mark_large(scene: Scene, reference: Solution) -> Mask:
     """Mark where numbers are so large that the formulas may have to give up, (n,)."""
-    large = np.full(
-        len(reference),
-        max(scene.linkage.lengths) > _LARGE
-        or min(scene.linkage.lengths) < 1.0 / _LARGE,
-    )
+    lengths = scene.linkage.lengths
+    uneven = max(lengths) > _LARGE or min(lengths) < 1.0 / _LARGE
+    large = np.full(len(reference), uneven)
     for name in ("omega_2", "alpha_2", *OPTIONAL_QUANTITIES, "F12", "F43"):
         values = getattr(reference, name)
         if values is not None:

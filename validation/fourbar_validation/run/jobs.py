@@ -58,13 +58,8 @@ def make_jobs(
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
     scene = job.suite.scene(job.scene)
-    return judge_for_report(
-        job.name,
-        scene,
-        job.engines,
-        draw=job.draw,
-        sketch=job.sketch,
-    )
+    how = {"draw": job.draw, "sketch": job.sketch}
+    return judge_for_report(job.name, scene, job.engines, **how)
 
 
 def _judge_by_engine(

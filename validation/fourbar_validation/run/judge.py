@@ -71,10 +71,7 @@ class Check(NamedTuple):
         """Make its rows; what it raises is a row that fails."""
         make_rows = partial(self.make_rows, question)
         for row in question.attempt(make_rows, FORMULAS, self.make_rows.__name__):
-            if self.compares or row.engine == FORMULAS:
-                yield row
-            else:
-                yield replace(row, engine=FORMULAS)
+            yield row if self.compares else replace(row, engine=FORMULAS)
 
 
 CHECKS = (
@@ -176,15 +173,9 @@ def make_question(
     if scene.motion.free is not None:
         return Question(name, scene, command, engines)
     question = Question(name, scene, command)
-    numbers = (
-        command.angle,
-        command.branch,
-        0.0 if command.speed is None else command.speed,
-        command.acceleration,
-    )
-    if len(command.angle) > 1 and all(
-        np.ptp(values) == 0 for values in numbers
-    ):  # a sweep of equal positions
+    speed = 0.0 if command.speed is None else command.speed
+    numbers = (command.angle, command.branch, speed, command.acceleration)
+    if len(command.angle) > 1 and not any(map(np.ptp, numbers)):
         question.leave_out("positions", "all are the same, one is evaluated")
         question.at = select_positions(command, np.array([0]))._replace(time=None)
     question.engines = list(_select_needed(engines, question))
@@ -197,23 +188,21 @@ def _select_needed(engines: Iterable[Engine], question: Question) -> Iterator[En
     The others are left out before they are imported.
     """
     command = question.at
+    states_speed = command.speed is not None
     for engine in engines:
-        reason = None
-        if command.speed is None:
-            if not engine.positions:
-                reason = (
-                    "the scene states positions only, and this engine computes only"
-                    " forces"
-                )
-        elif engine.through_time and not np.any(command.speed):
-            reason = "the commanded speed is 0: nothing moves through time"
-        elif engine.through_time and len(command.angle) == 1:
-            reason = "a simulation needs more than one position"
-        if reason is None:
-            yield (
-                engine
-                if command.speed is not None
-                else replace(engine, answers=engine.positions)
+        reason = ""
+        if not states_speed and not engine.positions:
+            reason = (
+                "the scene states positions only, and this engine computes only forces"
             )
-        else:
+        elif states_speed and engine.through_time:
+            if not np.any(command.speed):
+                reason = "the commanded speed is 0: nothing moves through time"
+            elif len(command.angle) == 1:
+                reason = "a simulation needs more than one position"
+        if reason:
             question.leave_out(engine.name, reason)
+        elif states_speed:
+            yield engine
+        else:
+            yield replace(engine, answers=engine.positions)

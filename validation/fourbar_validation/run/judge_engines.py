@@ -37,13 +37,10 @@ us: two that miss what they declare by as much do not.
 
 def compare_answers(question: Question) -> Iterator[Row]:
     """Compare every engine's answer with the formulas."""
-    rows = [
-        row
-        for engine in question.engines
-        for row in question.attempt(
-            partial(_answer_of_engine, question, engine), engine.name
-        )
-    ]
+    rows: list[Row] = []
+    for engine in question.engines:
+        answer = partial(_answer_of_engine, question, engine)
+        rows += question.attempt(answer, engine.name)
     question.against = find_agreement(question, rows)
     for row in rows:
         if row.failed:
@@ -84,9 +81,8 @@ def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
     The position is that where the first one is worst, and the two may differ by the
     larger error that either is allowed, and by a tenth of what they differ from us.
     """
-    values, others = (
-        _values_of(question, one.engine, quantity) for one in (row, other)
-    )
+    values = _values_of(question, row.engine, quantity)
+    others = _values_of(question, other.engine, quantity)
     ours = getattr(question.solution, quantity)
     if not math.isfinite(row.error) or ours is None or values is None or others is None:
         return False
@@ -153,29 +149,21 @@ def compare_answer(
     """
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
-    name = question.name
     scene = question.scene
     formulas = question.solution
     held = make_demands(engine, scene, question.at, answer, formulas)
-    comparison = Comparison(
-        name,
-        scene,
-        answer,
-        formulas,
-        held,
-        question.reference,
-        question.scales,
-    )
+    further = (question.reference, question.scales)
+    comparison = Comparison(question.name, scene, answer, formulas, held, *further)
     rows = comparison.rows()
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT_BAR_RATIO:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [
             replace(row, reason=row.reason + why) if row.failed else row for row in rows
         ]
-    answers = answer.assembled is not None and len(answer.assembled) == len(
-        formulas
-    )  # otherwise a row has failed
-    if answers and answer.theta is not None:
+    assembled = answer.assembled
+    # an answer of another length has a row that fails
+    whole = assembled is not None and len(assembled) == len(formulas)
+    if whole and answer.theta is not None:
         rows.append(comparison.closure())
     return rows
 
@@ -188,17 +176,14 @@ def _observe_order_of_engine(question: Question, engine: Engine) -> dict[str, fl
 
     def error(answer: Answer) -> float:
         rows = compare_answer(question, replace(engine, answers=FORCE_NAMES), answer)
-        return max(
-            (row.error for row in rows if row.quantity in FORCE_NAMES),
-            default=math.nan,
-        )  # a refusal has none
+        errors = [row.error for row in rows if row.quantity in FORCE_NAMES]
+        return max(errors, default=math.nan)  # a refusal has none
 
     assert engine.order is not None
     coarse, fine, order = engine.order(question.scene, question.at, error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
-    return (
-        seen if all(map(math.isfinite, seen.values())) else {}
-    )  # a coarse run may leave what the scene covers
+    # a coarse run may leave what the scene covers
+    return seen if all(map(math.isfinite, seen.values())) else {}
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:
@@ -210,34 +195,28 @@ def compare_inertia(question: Question) -> Iterator[Row]:
     scene = question.scene
     if question.at.speed is None or not (scene.loads or scene.effects):
         return
-    bare = Question(
-        question.name,
-        copy_with(scene, loads=(), effects=()),
-        question.at,
-        output=question.output,
-    )
+    drive = name_driving(scene)
+    part = f"{drive}_inertia"
+    unloaded = copy_with(scene, loads=(), effects=())
+    bare = Question(question.name, unloaded, question.at, output=question.output)
     for name, (answer, seconds) in question.answered.items():
-        if f"{name_driving(scene)}_inertia" in answer.quantities:
-            bare.answered[name] = _take_inertia(answer, name_driving(scene)), seconds
+        if part in answer.quantities:
+            quantities = {**answer.quantities, drive: answer.quantities[part]}
+            # it says how near loads and friction are to jamming
+            quantities.pop("drive_condition", None)
+            alone = replace(answer, quantities=quantities, evidence={}, alarms=[])
+            bare.answered[name] = alone, seconds
     for engine in question.engines:
-        if (
-            COUPLE.value in engine.answers and engine.name in question.answered
-        ):  # one that broke down has its row
-            yield from question.attempt(
-                partial(_check_inertia, question, bare, engine),
-                engine.name,
-                "inertia alone",
-            )
+        # one that broke down has its row
+        if COUPLE.value in engine.answers and engine.name in question.answered:
+            rows = partial(_check_inertia, question, bare, engine)
+            yield from question.attempt(rows, engine.name, "inertia alone")
 
 
-def _check_inertia(
-    question: Question,
-    bare: Question,
-    engine: Engine,
-) -> Iterator[Row]:
+def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterator[Row]:
     answer = bare.answer(engine)
-    loaded, _ = question.answered.get(engine.name, (None, 0.0))
-    if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
+    loaded, _ = question.answered[engine.name]
+    if answer.refusal is not None and loaded.refusal is not None:
         return  # the refusal has its row
     drive = name_driving(question.scene)
     rows = compare_answer(bare, replace(engine, answers=(drive,)), answer)
@@ -252,20 +231,10 @@ def _check_inertia(
         _note_causes(question, bare, engine, answer)
     if rows:  # a failure besides the torque, or in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
-        if worst.quantity in (drive, "all"):
-            reason = worst.reason
-        else:
-            reason = f"{worst.quantity}: {worst.reason}"
+        reason = worst.reason
+        if worst.quantity not in (drive, "all"):
+            reason = f"{worst.quantity}: {reason}"
         yield replace(worst, quantity=f"{drive}_inertia", reason=reason)
-
-
-def _take_inertia(answer: Answer, drive: str) -> Answer:
-    """Take the part of an answer that is of the bars' inertia."""
-    alone = {**answer.quantities, drive: answer.quantities[f"{drive}_inertia"]}
-    alone.pop(
-        "drive_condition", None
-    )  # it says how near loads and friction are to jamming
-    return replace(answer, quantities=alone, evidence={}, alarms=[])
 
 
 def compare_shipped_mjcf(question: Question) -> Iterator[Row]:

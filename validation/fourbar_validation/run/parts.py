@@ -89,9 +89,7 @@ class _Gathered:
         numbers = sorted({task % self._parts + 1 for task in missing})
         named = [f"--part {number}/{self._parts}" for number in numbers]
         further = len(named) - _MOST_NAMED
-        words = ", ".join(named[:_MOST_NAMED]) + (
-            f" and {further} more" if further > 0 else ""
-        )
+        words = ", ".join(named[:_MOST_NAMED]) + f" and {further} more" * (further > 0)
         why = f"{len(missing)} of {len(tasks)} tasks are missing: run {words} again"
         raise InputError("DIR", damaged, why)
 
@@ -131,11 +129,8 @@ def collect_parts(
     The folders stay as they are.
     """
     if any((out / "parts").glob("*")):
-        raise InputError(
-            "--out",
-            str(out),
-            "holds parts of a run: name it among the folders and choose another",
-        )
+        why = "holds parts of a run: name it among the folders and choose another"
+        raise InputError("--out", str(out), why)
     gathered = _Gathered(plan, folders, parts)
     with open_store(plan, out) as store:
         summary = write_outcome(plan, gathered.read, out, progress)

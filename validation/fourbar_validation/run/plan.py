@@ -113,10 +113,7 @@ class Plan:
     @property
     def asked(self) -> dict[str, str]:
         """Return what was asked for, as the record of a run keeps it."""
-        return {
-            "chosen": self.chosen,
-            "scenes of": self.suite_name,
-        }
+        return {"chosen": self.chosen, "scenes of": self.suite_name}
 
     @property
     def draw_at_once(self) -> bool:
@@ -193,10 +190,10 @@ class Plan:
         """Say which answers of an interrupted run are kept."""
         names = [escape_controls(self.suite.name(i)) for i in scenes[:MOST_KEPT_NAMED]]
         more = len(scenes) - len(names)
-        further = f" and {more} more" if more else ""
+        listed = ", ".join(names) + f" and {more} more" * bool(more)
         return (
             f"kept from an interrupted run: the answers of all engines on"
-            f" {len(scenes)} of {len(self.suite)} scenes, {', '.join(names)}{further}"
+            f" {len(scenes)} of {len(self.suite)} scenes, {listed}"
         )
 
     def summarise(self) -> Summary:
@@ -230,10 +227,9 @@ class Plan:
 
     def require_engines(self) -> None:
         """Raise DependencyError if an engine could not answer here."""
-        if not self.missing:
-            return
-        names = ",".join(engine.name for engine in self.engines)
-        raise DependencyError(
-            f"{self.missing[0][1]}, or say --engines {names} where those are all that"
-            " is wanted"
-        )
+        if self.missing:
+            names = ",".join(engine.name for engine in self.engines)
+            raise DependencyError(
+                f"{self.missing[0][1]}, or say --engines {names} where those are all"
+                " that is wanted"
+            )

@@ -16,7 +16,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
+from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import (
@@ -85,25 +85,17 @@ class Question:
     """Answer of each engine, by its name, and the seconds that it took."""
     scales: Scales = field(default_factory=dict)
     """Size and condition of each quantity that was compared."""
-    started: dict[str, Adapter] = field(default_factory=dict)
 
-    def solve(self) -> Solution:
-        """Solve the scene as far as anything is compared.
+    @cached_property
+    def solution(self) -> Solution:
+        """Return the answer of the formulas, as far as anything is compared.
 
         Error bars take ten times as long as all the rest.
         """
         if self.scene.motion.free is not None:
             return solve(self.scene)
-        return solve(
-            self.scene,
-            "position" if self.at.speed is None else "force",
-            at=self.at,
-        )
-
-    @cached_property
-    def solution(self) -> Solution:
-        """Return the answer of the formulas."""
-        return self.solve()
+        stage = "position" if self.at.speed is None else "force"
+        return solve(self.scene, stage, at=self.at)
 
     @cached_property
     def free_body(self) -> Answer | None:
@@ -136,17 +128,11 @@ class Question:
         """Note that something was left out, and why."""
         self.left_out.append(f"{what}: {reason}")
 
-    def adapter(self, engine: Engine) -> Adapter:
-        """Start an engine, once."""
-        if engine.name not in self.started:
-            self.started[engine.name] = engine.start()
-        return self.started[engine.name]
-
     def answer(self, engine: Engine) -> Answer:
         """Ask an engine, once."""
         if engine.name not in self.answered:
             with keep_printed(self.output, engine.name):
-                adapter = self.adapter(engine)
+                adapter = engine.start()
                 begin = time.perf_counter()
                 if refusal := explain_refusal(adapter, self.at):
                     answer = Answer(engine.name, "exact", refusal=refusal)
@@ -179,16 +165,8 @@ class Question:
         """
         place = self.at.angle if theta_2 is None else theta_2
         who = (self.name, FORMULAS, "exact")
-        return Row.judged(
-            who,
-            quantity,
-            error,
-            allowed,
-            reason,
-            place,
-            condition,
-            where,
-        )
+        further = (place, condition, where)
+        return Row.judged(who, quantity, error, allowed, reason, *further)
 
     def record(self, rows: list[Row], seconds: float) -> Record:
         """Make the record of the scene; `seconds`: that the formulas took."""
@@ -197,17 +175,9 @@ class Question:
             for engine in self.engines
             if engine.name in self.answered
         ]
-        timings = [
-            Timing(
-                self.name,
-                FORMULAS,
-                "exact",
-                len(self.solution),
-                seconds,
-            ),
-            *self.timings,
-        ]
         n = len(self.at.angle)
+        ours = Timing(self.name, FORMULAS, "exact", len(self.solution), seconds)
+        timings = [ours, *self.timings]
         timings += [
             Timing(self.name, answer.engine, answer.setting, n, took)
             for answer, took in answered
@@ -269,6 +239,6 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
             return value[index]
         return value
 
-    taken = {field.name: take(getattr(study, field.name)) for field in fields(study)}
+    taken = {one.name: take(getattr(study, one.name)) for one in fields(study)}
     taken |= {"at": study.at.part(index), "ground": None, "lengths": None}
     return Solution(**taken)

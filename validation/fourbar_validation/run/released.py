@@ -120,21 +120,12 @@ class _Pendulum(NamedTuple):
 def make_pendulum(scene: Scene) -> _Pendulum | None:
     """Return the pendulum that the scene is, None unless it is one that turns over."""
     d, a, b, c = scene.linkage.lengths
-    effects = scene.effects
-    if not (
-        a == c
-        and b == d
-        and scene.motion.branch == 1
-        and not scene.loads
-        and len(effects) == 1
-    ):
+    motion = scene.motion
+    parallel = a == c and b == d and motion.branch == 1
+    if not parallel or scene.loads or len(scene.effects) != 1 or not motion.omega_2:
         return None
-    down = effects[0]
-    if not (
-        isinstance(down, Gravity)
-        and math.isclose(down.angle, -math.pi / 2)
-        and scene.motion.omega_2
-    ):
+    (down,) = scene.effects
+    if not isinstance(down, Gravity) or not math.isclose(down.angle, -math.pi / 2):
         return None
     J = W = 0.0
     for number in MOVING_BARS:
@@ -145,10 +136,9 @@ def make_pendulum(scene: Scene) -> _Pendulum | None:
             return None
         J += mass * a * a if number == 3 else find_inertia(bar) + mass * r * r
         W += mass * down.magnitude * (a if number == 3 else r)
-    phi_0 = float(np.asarray(scene.motion.theta_2)) - math.pi / 2
-    pendulum = _Pendulum(J, W, phi_0, scene.motion.omega_2)
-    over_the_top = scene.motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))
-    return pendulum if over_the_top else None
+    phi_0 = float(np.asarray(motion.theta_2)) - math.pi / 2
+    over_the_top = motion.omega_2**2 > 2.0 * W / J * (1.0 - math.cos(phi_0))
+    return _Pendulum(J, W, phi_0, motion.omega_2) if over_the_top else None
 
 
 def check_released(question: Question) -> Iterator[Row]:
@@ -157,7 +147,6 @@ def check_released(question: Question) -> Iterator[Row]:
     The forces of each instant are compared too. The motion goes on through limit
     positions and change points.
     """
-    name = question.name
     scene = question.scene
     solution = question.solution
     free = scene.motion.free
@@ -165,44 +154,28 @@ def check_released(question: Question) -> Iterator[Row]:
     times = np.linspace(0.0, free.duration, free.steps + 1)
     yield from _compare_forces(question)
     pendulum = make_pendulum(scene)
-    truth = _Truth(solution.theta_2, solution.omega_2)
+    truth = solution.theta_2, solution.omega_2
     if pendulum is not None:
         phi, rate = pendulum.motion(times)
-        truth = _Truth(phi + math.pi / 2, rate)
         none = np.zeros(len(solution))
-        ours = ReleasedAnswer(
-            "formulas",
-            "exact",
-            solution.theta_2,
-            solution.omega_2,
-            none,
-            none,
-        )
+        ours = ReleasedAnswer("formulas", "exact", *truth, none, none)
+        truth = phi + math.pi / 2, rate
         yield from _make_rows(question, ours, None, truth)
 
     def rows(start: Callable[[float], Any], longest: float) -> list[Row]:
-        pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
-        step = (
-            free.duration / free.steps / (2.0 * pairs)
-        )  # two of them, or more, from one instant to the next
+        interval = free.duration / free.steps
+        # two of them, or more, from one instant to the next
+        step = interval / (2.0 * math.ceil(interval / (2.0 * longest) - 1e-6))
         begin = time.perf_counter()
         fine = start(step).release(scene, times)
         seconds = time.perf_counter() - begin
-        if fine.refusal:
-            coarse = None
-        else:
-            coarse = start(2.0 * step).release(scene, times)
-        question.timings.append(
-            Timing(
-                name,
-                fine.engine,
-                fine.setting,
-                len(times),
-                seconds,
-            )
-        )
+        who = (question.name, fine.engine, fine.setting)
+        question.timings.append(Timing(*who, len(times), seconds))
+        coarse = None
         if fine.refusal is not None:
             question.leave_out(fine.engine, fine.refusal)
+        else:
+            coarse = start(2.0 * step).release(scene, times)
         return _make_rows(question, fine, coarse, truth)
 
     for engine in question.engines:
@@ -229,36 +202,21 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     solution = question.solution
     none = solution.torque if solution.drive is None else solution.drive_force
     what = "a released linkage has no drive"
-    yield Row.judged(
-        (name, FORMULAS, "exact"),
-        "torque",
-        np.abs(none),
-        0.0,
-        what,
-        solution.theta_2,
-    )
+    who = (name, FORMULAS, "exact")
+    yield Row.judged(who, "torque", np.abs(none), 0.0, what, solution.theta_2)
     held = replace(
         scene,
         motion=scene.motion.replace(free=None, acceleration=0.0),
         drive_bar=2,
         drive=None,
     )
-    command = with_signs(
-        scene.linkage,
-        Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2),
-    )
-    driven_ones = [
-        (
-            Question(
-                name,
-                prescribed,
-                select_positions(command, indices),
-                output=question.output,
-            ),
-            take_member(solution, indices),
-        )
-        for prescribed, indices in _prescribe(held, command)
-    ]
+    told = (solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    command = with_signs(scene.linkage, Command(*told))
+    driven_ones = []
+    for prescribed, indices in _prescribe(held, command):
+        at = select_positions(command, indices)
+        driven = Question(name, prescribed, at, output=question.output)
+        driven_ones.append((driven, take_member(solution, indices)))
     for engine in question.engines:
         if (
             engine.tolerance == EQUIVALENCE
@@ -293,16 +251,8 @@ def _compare_forces_by(
     answer = driven.answer(engine)
     scene = driven.scene
     if answer.refusal is not None:
-        return [
-            Row.unmeasured(
-                driven.name,
-                answer.engine,
-                answer.setting,
-                "all",
-                REFUSES,
-                answer.refusal,
-            )
-        ]
+        who = (driven.name, answer.engine, answer.setting)
+        return [Row.unmeasured(*who, "all", REFUSES, answer.refusal)]
     reference = make_reference(scene, answer)
     assert reference is not None
     # the formulas are conditioned by the angle that is independent there, an engine by
@@ -333,21 +283,15 @@ def _prescribe(
     part of its torque, and no more than all of it; one that ends begins to move against
     the whole torque.
     """
-    friction: Friction | None = None
-    others = []
-    for effect in scene.effects:
-        if friction is None and isinstance(effect, Friction):
-            friction = effect
-        else:
-            others.append(effect)
-    resting = np.empty(0, dtype=int)
-    if friction is not None:
-        resting = np.flatnonzero(command.omega_2 == 0.0)
+    frictions = [effect for effect in scene.effects if isinstance(effect, Friction)]
+    resting = np.flatnonzero((command.omega_2 == 0.0) & bool(frictions))
     moving = np.setdiff1d(np.arange(len(command.theta_2)), resting)
     if len(moving):
         yield scene, moving
-    if friction is None:
+    if not frictions:
         return
+    friction = frictions[0]
+    others = [effect for effect in scene.effects if effect is not friction]
     bare = replace(scene, effects=tuple(others))
     numbers = np.stack((command.theta_2, command.alpha_2), axis=1)[resting]
     _, different = np.unique(numbers, axis=0, return_index=True)
@@ -371,87 +315,63 @@ def _hold_by_friction(
     begins = float(np.sign(here.alpha_2)[0])
     at_one = here._replace(speed=np.ones(1))
     turning = ask_at(FreeBody(), bare, at_one).quantities
-    rate = {
-        1: 0.0,
-        2: 1.0,
-        3: turning["omega_3"][0],
-        4: turning["omega_4"][0],
-    }
+    rate = (0.0, 1.0, turning["omega_3"][0], turning["omega_4"][0])
     slips = {}
-    most = 0
-    for pin, torque in friction.torques:
+    for pin, _ in friction.torques:
         i, j = PINS[pin]
-        slips[pin] = rate[j] - rate[i]
-        most += torque * abs(slips[pin])
+        slips[pin] = rate[j - 1] - rate[i - 1]
+    most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)
     part = -begins or float(np.clip(needed / most, -1.0, 1.0))
     loads = []
     for pin, torque in friction.torques:
         couple = part * torque * float(np.sign(slips[pin]))
-        i, j = PINS[pin]
-        for bar, moment in ((i, -couple), (j, couple)):
+        for bar, moment in zip(PINS[pin], (-couple, couple), strict=True):
             if bar != 1:
                 loads.append(Load(bar, moment=moment))
     return loads
-
-
-class _Truth(NamedTuple):
-    """The motion that engines are held against."""
-
-    theta_2: Array
-    omega_2: Array
 
 
 def _make_rows(
     question: Question,
     fine: ReleasedAnswer,
     coarse: ReleasedAnswer | None,
-    truth: _Truth,
+    truth: tuple[Array, Array],
 ) -> list[Row]:
+    """Judge the motion by the truth, its theta_2 and omega_2, and by twice the step."""
     free = question.scene.motion.free
-    n = len(truth.theta_2)
+    theta_2, omega_2 = truth
+    n = len(theta_2)
     assert free is not None
     who = (question.name, fine.engine, fine.setting)
     if fine.refusal is not None:
         return [Row.unmeasured(*who, "all", REFUSES, fine.refusal)]
     if len(fine.theta_2) < n:
-        return [
-            Row.unmeasured(
-                *who,
-                "all",
-                FAILS,
-                f"it stopped after {len(fine.theta_2)} of {n} instants",
-            )
-        ]
-
-    def numbers(answer: ReleasedAnswer) -> dict[str, Array]:
-        series = {"theta_2": answer.theta_2[:n], "omega_2": answer.omega_2[:n]}
-        if coarse is not None:
-            # the formulas integrate the energy equation: their drift is tested too
-            series["energy"] = answer.energy[:n] - answer.energy[0]
-        return series
-
-    right_and_size = {
-        "theta_2": (truth.theta_2, 1.0),
-        "omega_2": (truth.omega_2, float(np.abs(truth.omega_2).max())),
-        "energy": (np.zeros(n), float(fine.terms[:n].max())),
+        why = f"it stopped after {len(fine.theta_2)} of {n} instants"
+        return [Row.unmeasured(*who, "all", FAILS, why)]
+    motions = [fine] if coarse is None else [fine, coarse]
+    compared = {
+        "theta_2": ([one.theta_2[:n] for one in motions], theta_2, 1.0),
+        "omega_2": (
+            [one.omega_2[:n] for one in motions],
+            omega_2,
+            np.abs(omega_2).max(),
+        ),
     }
+    if coarse is not None:
+        # the formulas integrate the energy equation: their drift is tested too
+        energies = [one.energy[:n] - one.energy[0] for one in motions]
+        compared["energy"] = (energies, np.zeros(n), fine.terms[:n].max())
     rows = []
-    for name, values in numbers(fine).items():
-        right = right_and_size[name][0]
-        size = replace_zero_size(np.array(right_and_size[name][1]))
+    for name, (series, right, largest) in compared.items():
+        values, coarser = series[0], series[-1]
+        size = replace_zero_size(np.array(float(largest)))
         error = divide(np.abs(values - right), size)
-        expected = 0.0
-        if coarse is not None:
-            coarser = numbers(coarse)[name]
-            alike = len(coarser) == len(values)
-            if alike:
-                expected = float(divide(np.abs(values - coarser).max(), size))
-            else:
-                expected = math.nan
+        expected = math.nan
+        if len(coarser) == len(values):
+            expected = float(divide(np.abs(values - coarser).max(), size))
         index = find_worst(error)
-        full = RELEASED_ERRORS[name] * max(
-            1.0, free.duration / DURATION_OF_FULL_ACCURACY
-        )
+        longer = max(1.0, free.duration / DURATION_OF_FULL_ACCURACY)
+        full = RELEASED_ERRORS[name] * longer
         allowed = max(full, TIMES_PREDICTED * expected)
         if error[index] <= full:
             verdict = AGREES
@@ -464,20 +384,9 @@ def _make_rows(
             reason = f"an error of {expected:.1e} of the value is predicted"
         else:
             verdict = DEGRADED
-            reason = (
-                f"{error[index]:.1e} of {expected:.1e} predicted from twice the step"
-            )
+            told = f"{error[index]:.1e} of {expected:.1e}"
+            reason = f"{told} predicted from twice the step"
+        worst = float(error[index])
         place = float(fine.theta_2[index])
-        rows.append(
-            Row(
-                *who,
-                name,
-                float(error[index]),
-                allowed,
-                verdict,
-                reason,
-                place,
-                1.0,
-            )
-        )
+        rows.append(Row(*who, name, worst, allowed, verdict, reason, place, 1.0))
     return rows

@@ -41,10 +41,6 @@ _EXCLUDED = (
 """Option, what it cannot be combined with, and why."""
 HARD_SUITE = "hard"
 """Name of the suite of hard cases."""
-_OF_RANDOM = ("seed", "type")
-"""Options that say which random linkages are drawn."""
-_OF_A_REPORT = ("against", *FORMS)
-"""Options of the verdict, which a part has none of."""
 _REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 OPTIONS_OF_A_PART = (
@@ -99,34 +95,26 @@ class Request:
         Files that cannot be written are refused too.
         """
         for option, excluded, why in _EXCLUDED:
-            if getattr(self, option) is not None and getattr(self, excluded) not in (
-                None,
-                (),
-            ):
+            if getattr(self, option) is not None and getattr(self, excluded):
                 raise InputError(f"--{option}", getattr(self, option), why)
-        for option in _OF_RANDOM:
-            if getattr(self, option) is not None and self.random is None:
-                raise InputError(
-                    f"--{option}",
-                    getattr(self, option),
-                    "is of random linkages; say --random N too",
-                )
-        for option in _OF_A_REPORT if self.part is not None else ():
+        for option in ("seed", "type"):
+            value = getattr(self, option)
+            if value is not None and self.random is None:
+                why = "is of random linkages; say --random N too"
+                raise InputError(f"--{option}", value, why)
+        for option in ("against", *FORMS) if self.part is not None else ():
             if (value := getattr(self, option)) is not None:
                 why = "is of a report: leave it out, and collect the parts first"
                 raise InputError(f"--{option}", str(value), why)
         for form, path in self.forms.items():
-            if path is not None:
-                if self.against is None and form != "junit":
-                    raise InputError(
-                        f"--{form}",
-                        str(path),
-                        "tells differences; say --against BASELINE too",
-                    )
-                if (
-                    self.out.exists() or path.parent != self.out
-                ):  # a folder that the run will make
-                    require_file(path, *self.scenes)
+            if path is None:
+                continue
+            if self.against is None and form != "junit":
+                why = "tells differences; say --against BASELINE too"
+                raise InputError(f"--{form}", str(path), why)
+            # the run will make its own folder
+            if self.out.exists() or path.parent != self.out:
+                require_file(path, *self.scenes)
         if self.against is not None:
             open_run(find_baseline(self.against), "--against")
 
@@ -143,11 +131,7 @@ class Request:
     def options(self) -> RunOptions:
         """Return the options of the run itself."""
         against = None if self.against is None else find_baseline(self.against)
-        return RunOptions(
-            self.workers,
-            not self.no_pictures,
-            against=against,
-        )
+        return RunOptions(self.workers, not self.no_pictures, against)
 
 
 def make_plan(request: Request, files: Files | None = None) -> Plan:
@@ -158,16 +142,13 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
     `files`: the scenes as a part kept them.
     """
     suite = _select_scenes(request) if files is None else files
-    engines = select_engines(request)
-    present, missing = _find_askable(engines, by_name=request.engines is not None)
-    return Plan(
-        suite,
-        present,
-        request.options,
-        missing,
-        request.engines or "",
-        request.suite_name,
-    )
+    reasons = {engine: engine.missing() for engine in select_engines(request)}
+    missing = [(one.name, why) for one, why in reasons.items() if why is not None]
+    if missing and request.engines is not None:
+        raise DependencyError("; ".join(f"{name}: {why}" for name, why in missing))
+    present = tuple(engine for engine, why in reasons.items() if why is None)
+    asked = (request.engines or "", request.suite_name)
+    return Plan(suite, present, request.options, missing, *asked)
 
 
 def keep_request(
@@ -195,19 +176,13 @@ def read_request(folder: Path) -> tuple[int, Request, Files | None]:
     try:
         kept = json.loads((folder / _REQUEST).read_text(encoding="utf-8"))
         asked = kept["asked"]
-        asked |= {
-            "scenes": tuple(map(Path, asked["scenes"])),
-            "guest": tuple(asked["guest"]),
-        }
+        asked["scenes"] = tuple(map(Path, asked["scenes"]))
+        asked["guest"] = tuple(asked["guest"])
         request = Request(**asked)
         files = kept.get("files")
         if files is not None:
-            texts = tuple((name, text) for name, text in files["texts"])
-            files = Files(
-                texts,
-                files["positions"],
-                frozenset(files["not_drawn"]),
-            )
+            texts = tuple(map(tuple, files["texts"]))
+            files = Files(texts, files["positions"], frozenset(files["not_drawn"]))
         return int(kept["parts"]), request, files
     except (OSError, KeyError, TypeError, ValueError):
         why = "must be a folder that `run --part` wrote and that was not collected yet"
@@ -253,33 +228,6 @@ def _read_linkage_types(text: str) -> tuple[DrawnType, ...]:
     try:
         return tuple(DrawnType(name.strip()) for name in text.split(","))
     except ValueError:
-        allowed = ALL_TYPES.replace(",", ", ")
-        raise InputError(
-            "--type",
-            text,
-            f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}",
-        ) from None
-
-
-def _find_askable(
-    engines: tuple[Engine, ...],
-    *,
-    by_name: bool,
-) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
-    """Find those that can answer here, and the others with the reason.
-
-    Raises DependencyError if those were named.
-    """
-    present: list[Engine] = []
-    missing: list[tuple[str, str]] = []
-    for engine in engines:
-        reason = engine.missing()
-        if reason is None:
-            present.append(engine)
-        else:
-            missing.append((engine.name, reason))
-    if missing and by_name:
-        raise DependencyError(
-            "; ".join(f"{name}: {reason}" for name, reason in missing)
-        )
-    return tuple(present), missing
+        listed = ALL_TYPES.replace(",", ", ")
+        why = f"must be {UNEVEN_TYPE} or a comma-separated list of {listed}"
+        raise InputError("--type", text, why) from None

@@ -121,15 +121,9 @@ def write_outcome(
     options = plan.options
     summary = plan.summarise()
     first_lines = _collect_tasks(plan, read, out, summary, progress)
-    if options.drawn:
-        pictured = {record.name for record in summary.pictured}
-    else:
-        pictured = set()
-    shown = [
-        index
-        for index in range(len(suite))
-        if escape_controls(suite.name(index)) in pictured
-    ]
+    pictured = {record.name for record in summary.pictured if options.drawn}
+    names = [escape_controls(suite.name(index)) for index in range(len(suite))]
+    shown = [index for index, name in enumerate(names) if name in pictured]
     if shown and not plan.draw_at_once:
         jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
         limit = find_time_limit(suite, engines)
@@ -143,7 +137,7 @@ def write_outcome(
     summary.date = about.date
     summary.commit = about.commit
     if len(suite) == 1:
-        summary.asked = escape_controls(suite.name(0))
+        summary.asked = names[0]
     if options.against is not None:
         before = open_run(options.against, "--against")
         overview = summary.overview
@@ -152,7 +146,7 @@ def write_outcome(
             since = find_since(read_history(before), before, [key])
             overview.since = f"It {since[key]}."
         weakened = list_weakened(before.about.rules, about.rules)
-        overview.weaker = [f"{rule}" for rule in weakened]
+        overview.weaker = [*map(str, weakened)]
         overview.gone = list_gone(before.about, about)
         overview.baseline = before.describe()
         with suppress(InputError):  # raised again where the differences are printed
@@ -163,9 +157,8 @@ def write_outcome(
                 overview.gone += _list_rows(differences, Kind.GONE)
                 overview.worse = _list_rows(differences, Kind.VERDICT_WORSE, Kind.WORSE)
     write_text(out / "report.md", write_summary_page(summary))
-    sections = collect_sections(
-        read_columns(out / PARQUET_FILE) if isinstance(suite, Hard) else None, out
-    )
+    rows = read_columns(out / PARQUET_FILE)
+    sections = collect_sections(rows if isinstance(suite, Hard) else None, out)
     if options.against is not None:
         sections += collect_history(before.table.parent)
     STYLE_NUMBERS.update(number_guests(engines))
@@ -200,16 +193,8 @@ def _collect_tasks(
             records = [Record.restore(kept) for kept in read(number)]
             for scene, record in zip(scenes, records, strict=True):
                 name = escape_controls(plan.suite.name(scene))
-                record.rows = record.rows or [
-                    Row.unmeasured(
-                        name,
-                        FORMULAS,
-                        "",
-                        "all",
-                        FAILS,
-                        "nothing was judged",
-                    )
-                ]
+                told = (FORMULAS, "", "all", FAILS, "nothing was judged")
+                record.rows = record.rows or [Row.unmeasured(name, *told)]
                 summary.add(record)
                 times.write(write_csv_rows((), _list_timings(record)))
                 output.writelines(
@@ -235,13 +220,8 @@ def _redraw(
     name = escape_controls(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
-    (job,) = make_jobs(
-        suite,
-        [scene],
-        [one for one in engines if one.name not in broken],
-        draw=True,
-    )
-    return job
+    sound = [engine for engine in engines if engine.name not in broken]
+    return make_jobs(suite, [scene], sound, draw=True)[0]
 
 
 @contextmanager

@@ -60,18 +60,14 @@ class Store:
         for name in self._written:
             require_file(self.folder / name)
         if self.parts.exists() and not self.parts.is_dir():
-            raise InputError(
-                "--out",
-                str(self.parts),
-                "must be a folder, in which a run keeps its parts",
-            )
+            why = "must be a folder, in which a run keeps its parts"
+            raise InputError("--out", str(self.parts), why)
         lock = FileLock(self.folder / "lock", timeout=0)
         try:
             lock.acquire()
         except Timeout:
-            raise RunningError(
-                f"{self.folder}: another run is writing into this folder"
-            ) from None
+            why = "another run is writing into this folder"
+            raise RunningError(f"{self.folder}: {why}") from None
         try:
             self._begin()
             yield self
@@ -83,9 +79,9 @@ class Store:
         same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
         if not same:
             if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
+                difference = self._name_difference(marker)
                 self.notes.append(
-                    "made again: the parts of another run"
-                    f" ({self._name_difference(marker)})"
+                    f"made again: the parts of another run ({difference})"
                 )
             marker.unlink(missing_ok=True)
             shutil.rmtree(self.parts, ignore_errors=True)
@@ -126,9 +122,7 @@ class Store:
         done = set()
         for path, damage in self.examine():
             if damage:
-                self.notes.append(
-                    f"made again: {path.parent.name}/{path.name}: {damage}"
-                )
+                self.notes.append(f"made again: parts/{path.name}: {damage}")
                 _remove(path)
             else:
                 done.add(int(path.name))
@@ -151,13 +145,9 @@ class Store:
         """Write a finished task, its results as JSON has them."""
         lines = "\n".join(json.dumps(result) for result in results)
         packed = gzip.compress(lines.encode(), 1, mtime=0)
-        head = {
-            "task": task,
-            "run": self._run,
-            "sha256": hashlib.sha256(packed).hexdigest(),
-        }
-        first_line = json.dumps(head).encode() + b"\n"
-        write_bytes(self._find_path(task), first_line + packed)
+        digest = hashlib.sha256(packed).hexdigest()
+        head = json.dumps({"task": task, "run": self._run, "sha256": digest})
+        write_bytes(self._find_path(task), f"{head}\n".encode() + packed)
 
     def _find_path(self, task: int) -> Path:
         return self.parts / f"{task:06d}"
@@ -191,9 +181,8 @@ class Store:
         try:
             lines = gzip.decompress(self._unpack(path)).decode().splitlines()
         except (ValueError, FileNotFoundError) as error:
-            raise DependencyError(
-                f"{path}: {error}; run it again, and this part is made again"
-            ) from None
+            why = f"{error}; run it again, and this part is made again"
+            raise DependencyError(f"{path}: {why}") from None
         return [json.loads(line) for line in lines]
 
     def finish(self) -> None:
