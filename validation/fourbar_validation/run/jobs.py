@@ -97,18 +97,16 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
 
 
 def judge_tasks(
+    suite: Suite,
+    engines: Iterable[Engine],
     tasks: Iterable[tuple[int, list[Job]]],
-    limit: float,
     workers: int,
 ) -> Iterator[tuple[int, list[Record]]]:
-    """Judge numbered tasks, each as it is done.
-
-    A job that takes longer than `limit` (s) hangs.
-    """
+    """Judge numbered tasks, each as it is done; a job that takes too long hangs."""
     return worker_processes.apply_over_processes(
         judge_job,
         tasks,
         workers,
-        seconds=limit,
+        seconds=find_time_limit(suite, engines),
         instead=_judge_by_engine,
     )

@@ -6,7 +6,6 @@ A part has many tasks; `run/store.py` keeps the file of each.
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -42,60 +41,39 @@ def judge_part(
         plan.judge(store, part, progress)
 
 
-class _Gathered:
-    """Finished tasks of one run that lie in several folders."""
+def _gather(plan: Plan, folders: Sequence[Path], parts: int) -> dict[int, Store]:
+    """Find the folder of each finished task of a run.
 
-    def __init__(
-        self,
-        plan: Plan,
-        folders: Sequence[Path],
-        parts: int,
-    ) -> None:
-        self._plan = plan
-        self._parts = parts
-        self._stores: dict[int, Store] = {}
-        """Store of each task."""
-        self._damaged: list[str] = []
-        for folder in folders:
-            self._add(folder)
-        self._require_all()
-
-    def _add(self, folder: Path) -> None:
-        """Add the tasks of a folder; InputError if they are of another run."""
-        store = Store(folder, self._plan.identity)
+    InputError if a folder is of another run, or names the parts with missing or damaged
+    tasks. A damaged task is no copy of the one that another folder holds.
+    """
+    stores: dict[int, Store] = {}
+    spoilt = []
+    for folder in folders:
+        store = Store(folder, plan.identity)
         store.require_same()
         for path, damage in store.examine():
             if damage:
-                self._damaged.append(f"{path} {damage}")
-                continue
-            task = int(path.name)
-            first = self._stores.setdefault(task, store)
-            if first is not store:
-                _require_alike(task, first, store)
-
-    def _require_all(self) -> None:
-        """Raise InputError that names the parts with missing or damaged tasks.
-
-        A damaged task is no copy of the one that another folder holds.
-        """
-        tasks = range(len(self._plan.tasks))
-        missing = [task for task in tasks if task not in self._stores]
-        damaged = "; ".join(self._damaged[:_MOST_NAMED]) or None
-        if damaged and not missing:
-            why = "differs from another folder's: leave it out, or judge its part again"
-            raise InputError("DIR", damaged, why)
-        if not missing:
-            return
-        numbers = sorted({task % self._parts + 1 for task in missing})
-        named = [f"--part {number}/{self._parts}" for number in numbers]
+                spoilt.append(f"{path} {damage}")
+            else:
+                task = int(path.name)
+                first = stores.setdefault(task, store)
+                if first is not store:
+                    _require_alike(task, first, store)
+    tasks = range(len(plan.tasks))
+    missing = [task for task in tasks if task not in stores]
+    damaged = "; ".join(spoilt[:_MOST_NAMED]) or None
+    if missing:
+        numbers = sorted({task % parts + 1 for task in missing})
+        named = [f"--part {number}/{parts}" for number in numbers]
         further = len(named) - _MOST_NAMED
         words = ", ".join(named[:_MOST_NAMED]) + f" and {further} more" * (further > 0)
         why = f"{len(missing)} of {len(tasks)} tasks are missing: run {words} again"
         raise InputError("DIR", damaged, why)
-
-    def read(self, task: int) -> list[Any]:
-        """Read the results of a task."""
-        return self._stores[task].read(task)
+    if damaged:
+        why = "differs from another folder's: leave it out, or judge its part again"
+        raise InputError("DIR", damaged, why)
+    return stores
 
 
 def _require_alike(task: int, first: Store, second: Store) -> None:
@@ -131,9 +109,11 @@ def collect_parts(
     if any((out / "parts").glob("*")):
         why = "holds parts of a run: name it among the folders and choose another"
         raise InputError("--out", str(out), why)
-    gathered = _Gathered(plan, folders, parts)
+    stores = _gather(plan, folders, parts)
     with open_store(plan, out) as store:
-        summary = write_outcome(plan, gathered.read, out, progress)
+        summary = write_outcome(
+            plan, lambda task: stores[task].read(task), out, progress
+        )
         store.finish()
     return summary
 

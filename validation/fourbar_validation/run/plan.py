@@ -17,7 +17,7 @@ from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
-from fourbar_validation.run.jobs import find_time_limit, judge_tasks, make_jobs
+from fourbar_validation.run.jobs import judge_tasks, make_jobs
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Suite
 
@@ -84,10 +84,6 @@ class RunPart(NamedTuple):
         allowed = "must be K/N, part K of N parts: --part 1/8 to --part 8/8"
         raise InputError("--part", text, allowed)
 
-    def holds(self, task: int) -> bool:
-        """Return whether a task, counted from 0, is of this part."""
-        return task % self.of == self.number - 1
-
 
 WHOLE_RUN = RunPart()
 """The only part of a run that one machine judges."""
@@ -133,9 +129,8 @@ class Plan:
         slow = self.draw_at_once or any(one.through_time for one in self.engines)
         least = SCENES_OF_A_SLOW_TASK if slow else SCENES_OF_A_QUICK_TASK
         size = max(least, math.ceil(count / _MOST_TASKS))
-        return [
-            range(start, min(start + size, count)) for start in range(0, count, size)
-        ]
+        scenes = range(count)
+        return [scenes[start : start + size] for start in scenes[::size]]
 
     @cached_property
     def identity(self) -> dict[str, Any]:
@@ -151,9 +146,9 @@ class Plan:
             "sketch": self.sketch,
         }
 
-    def list_tasks(self, part: RunPart) -> list[int]:
+    def list_tasks(self, part: RunPart) -> range:
         """List the numbers of the tasks of a part."""
-        return [task for task in range(len(self.tasks)) if part.holds(task)]
+        return range(len(self.tasks))[part.number - 1 :: part.of]
 
     def count_scenes(self, tasks: Iterable[int]) -> int:
         """Count the scenes of some tasks."""
@@ -181,8 +176,7 @@ class Plan:
             if task not in done
         )
         workers = self.options.workers
-        limit = find_time_limit(self.suite, self.engines)
-        for task, records in judge_tasks(jobs, limit, workers):
+        for task, records in judge_tasks(self.suite, self.engines, jobs, workers):
             store.put(task, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
 

@@ -46,7 +46,7 @@ from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.sections import collect_sections
 from fourbar_validation.report.svg import STYLE_NUMBERS
-from fourbar_validation.run.jobs import Job, find_time_limit, judge_tasks, make_jobs
+from fourbar_validation.run.jobs import Job, judge_tasks, make_jobs
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.plan import (
     COLLECTING,
@@ -126,8 +126,7 @@ def write_outcome(
     shown = [index for index, name in enumerate(names) if name in pictured]
     if shown and not plan.draw_at_once:
         jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
-        limit = find_time_limit(suite, engines)
-        for _, records in judge_tasks(jobs, limit, options.workers):
+        for _, records in judge_tasks(suite, engines, jobs, options.workers):
             summary.picture(*records)
             progress.advance(DRAWING, 1)
     about = describe_run(
