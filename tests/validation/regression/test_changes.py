@@ -11,7 +11,7 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.compare.rows import DEGRADED, FAILS, REFUSES
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import Kind
+from fourbar_validation.regression.changes import Kind, write_fault_sentence
 from fourbar_validation.regression.engines import list_gone
 from fourbar_validation.regression.record import NOTHING_KNOWN
 from fourbar_validation.regression.rules import list_weakened
@@ -60,6 +60,7 @@ KINDS = [
     ([], [replace(OTHER, verdict=FAILS, reason=WHY)], Kind.NEW_FAILURE),
     ([ROW], [changed(setting="h/2", error=1.0)], Kind.NOT_COMPARED),
     ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
+    ([FAILING], [changed(setting="h/2", verdict=FAILS)], Kind.NOT_COMPARED),
 ]
 """Rows of the old and of the new run, and what happened: each line in its own scene."""
 
@@ -130,6 +131,10 @@ def test_of_two_rows_of_one_name_the_worse_counts_in_either_order():
         assert kinds([ROW], twice) == [Kind.VERDICT_WORSE]
         assert kinds(twice, twice) == [Kind.STILL_FAILS]
         assert kinds(twice, [ROW]) == [Kind.VERDICT_BETTER]
+
+
+def test_one_exact_engine_alone_is_not_all_of_them():
+    assert write_fault_sentence({"one"}, {"one"}) == "only one"
 
 
 def test_the_worst_change_comes_first():

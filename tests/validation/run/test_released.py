@@ -202,9 +202,9 @@ def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypa
     scene = falling()
     shown = []
     monkeypatch.setattr(
-        scene_pictures,
-        "_draw_quantity",
-        lambda quantity, *_: shown.append(quantity) or "",
+        scene_pictures._Curve,
+        "draw",
+        lambda curve: shown.append(curve.quantity) or "",
     )
     scene_pictures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
     assert shown == ["theta_4", "F32"]
