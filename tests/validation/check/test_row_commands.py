@@ -16,7 +16,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Rise
 from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.judge_table import Judge
-from fourbar_validation.check.row_commands import find_row_commands
+from fourbar_validation.check.row_commands import find_row_commands, find_steady
 from fourbar_validation.check.theirs import read_table
 from tests.support.scenes import CYLINDER, crank_rocker
 
@@ -308,6 +308,17 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
         with pytest.raises(InputError, match=judged_as) as caught:
             judge_table(SERVO, read(text))
         assert "Servo" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("speed", "start"), [(3.0, 20.0), (-2.0, 80.0)])
+def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
+    theta = np.radians([20.0, 35.0, 50.0, 80.0])
+    scene = crank_rocker(motion=fourbar.Motion(theta.tolist(), speed))
+    time = (theta - math.radians(start)) / speed
+    rows = np.transpose([time, fourbar.solve(scene).torque]).tolist()
+    text = "\n".join(["time,torque", *(f"{t!r},{number!r}" for t, number in rows)])
+    judgement = judge_table(scene, read(text, law=find_steady(scene)))
+    assert judgement.agreeing == 4 and judgement.digits >= "12"
 
 
 @pytest.mark.parametrize("times", [(0.0,), (0.1, 0.8)])

@@ -30,6 +30,7 @@ from fourbar_validation.check.judge_table import (
     Judge,
 )
 from fourbar_validation.check.mistakes import Explanation, explain
+from fourbar_validation.check.row_commands import find_steady
 from fourbar_validation.check.theirs import TheirTable, Unit, read_table
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.tolerance import EPS
@@ -378,7 +379,8 @@ def check_command(
     command prints to how many digits the numbers were compared. If --rtol or --atol is
     given, these decide, and the number of exact agreements is printed too. If the scene
     states no speed, each row is judged at its own, say omega_2 and alpha_2. Along a law
-    each has the law's at its time, a column beside or without the angle, or its own.
+    each has the law's at its time, a column beside or without the angle, or its own; at
+    one speed a row without an angle is found by its time.
 
     A row is found by what the scene commands (theta_2, theta_3, theta_4 or a stroke).
     In its place the angle of another bar may stand, if the motion passes it once or the
@@ -396,7 +398,8 @@ def check_command(
     stated = load(scene)
     points = list_names_of_points(stated)
     motion = stated.motion
-    table = read_table(theirs, motion.commanded, points, motion.law)
+    law = motion.law or find_steady(stated)
+    table = read_table(theirs, motion.commanded, points, law)
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)

@@ -13,9 +13,9 @@ from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import BAR_OF_ANGLE
-from fourbar.solution import Solution
+from fourbar.solution import Solution, compute_times
 from fourbar.solving import solve
-from fourbar_validation.check.theirs import TheirTable, fill_zeros
+from fourbar_validation.check.theirs import Steady, TheirTable, fill_zeros
 from fourbar_validation.compare.tolerance import EPS, wrap_difference
 
 _AS_PRINTED = 4.0 * EPS
@@ -44,6 +44,15 @@ class RowCommands(NamedTuple):
     """True if the rates are those of a law at the times of the rows."""
     notes: tuple[str, ...] = ()
     """Sentences on rows at another time than the printed one."""
+
+
+def find_steady(scene: Scene) -> Steady | None:
+    """Return the motion of a scene whose positions have times at one speed."""
+    at = command(scene)
+    times = compute_times(scene, at)
+    if times is None:
+        return None
+    return Steady(at.places[np.argmin(times)], np.ravel(at.stated[1])[0])
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:

@@ -143,6 +143,24 @@ stand between bars.
 """
 
 
+class Steady(NamedTuple):
+    """A motion at one speed, with the methods of a law that rows need."""
+
+    start: float
+    """What is commanded at time 0."""
+    speed: float
+    time: tuple[float, float] = (-math.inf, math.inf)
+    """It lasts for ever."""
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """Compute what is commanded, its speed and acceleration at times, each (n,)."""
+        zero = np.zeros_like(time)
+        return self.start + self.speed * time, zero + self.speed, zero
+
+
+_OverTime = Law | Rise | Sine | Steady
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """Unit of the numbers of a column."""
@@ -253,13 +271,13 @@ def read_table(
     path: Path,
     commanded: str = "theta_2",
     points: Collection[str] = (),
-    law: Law | Rise | Sine | None = None,
+    law: _OverTime | None = None,
 ) -> TheirTable:
     """Read a CSV table; InputError names the column or line that cannot be read.
 
     `commanded`: name of the angle that the scene commands. Rows are found by it, or by
     another bar's angle where the table does not have it. Without an angle they are
-    found by their time along the scene's law.
+    found by their time, along the scene's law or at its one speed.
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
@@ -276,7 +294,7 @@ def _read_columns(
     rows: list[tuple[int, list[str]]],
     commanded: str,
     points: Collection[str],
-    law: Law | Rise | Sine | None,
+    law: _OverTime | None,
 ) -> TheirTable:
     """Read the columns of the rows of a table, each a line number and its cells."""
     columns, left_out, renamings = _read_headings(
@@ -383,7 +401,7 @@ def _read_times(
     return None
 
 
-def _follow(law: Law | Rise | Sine, times: Array, lines: list[int]) -> TheirColumn:
+def _follow(law: _OverTime, times: Array, lines: list[int]) -> TheirColumn:
     """Return the law's angle at each time, and what the rounding of the time moves it.
 
     Raises InputError for a time that the law does not have.
