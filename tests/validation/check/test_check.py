@@ -1036,6 +1036,14 @@ def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_to
     assert "N mm where N m" in first.text and first.complete
 
 
+def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
+    numbers = bars(scaled(inertia=0.98), "output")(OURS)
+    *_, third, second, _ = sorted(abs(numbers["torque"] / right(OURS)["torque"] - 1.0))
+    tolerance = Allowance(rtol=0.5 * (third + second))
+    judgement = judged(OURS, numbers, ("torque",), tolerance=tolerance)
+    assert len(judgement.differing) == 2 and not judgement.explanations
+
+
 def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(read):
     parallelogram = fourbar.FourBar(
         0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2)
@@ -1177,6 +1185,9 @@ COARSE = [
     ("60,0.1,6.36", FAILED, "1 of 2 numbers agree"),
     ("103.76,,2\n79.18,0.281,3.00", HOLDS, "3 of 3 numbers agree, compared to 2"),
     ("107,,2\n79.18,0.281,3.00", FAILED, "2 of 3 numbers agree"),
+    ("60,0.4,6.36\n100,-0.04,1.603 --rtol 0.2", HOLDS, "4 of 4"),
+    ("60,0.45,6.36\n100,-0.0422,1.6 --rtol 0.02", FAILED, "--atol 2.4e-03 allows it"),
+    ("60,0.45,6.36\n100,-0.06,1.6 --rtol 0.02", FAILED, "no single known mistake"),
     ("60,0,6.36 --rtol 2", HOLDS, "2 of 2 numbers agree within"),
     ("60,0,6.36 --rtol 0.5", FAILED, "no number has a digit to compare"),
 ]

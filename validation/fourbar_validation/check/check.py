@@ -133,6 +133,35 @@ class Judgement:
         )
         return math.ceil(math.log10(worst)) if worst <= FEWEST_DIGITS else None
 
+    @property
+    def needed_atol(self) -> float | None:
+        """Absolute tolerance under which what differs agrees; None if it is not small.
+
+        It is small within the relative tolerance of the largest of its quantity.
+        """
+        if self.tolerance is None:
+            return None
+        rtol, atol = self.tolerance.rtol, self.tolerance.atol
+        largest: dict[str, float] = {}
+        for one in self.findings:
+            size = math.hypot(*one.ours)
+            largest[one.quantity] = max(size, largest.get(one.quantity, 0.0))
+        more = 0.0
+        for one in self.differing:
+            assert one.permitted is not None
+            if one.difference > rtol * largest[one.quantity]:
+                return None
+            more = max(more, one.difference - one.permitted)
+        return _MARGIN * more + atol
+
+    def describe_unexplained(self) -> str:
+        """Say that no mistake explains what differs, or that it is small."""
+        if (atol := self.needed_atol) is not None:
+            small = "what differs is small beside the largest of its quantity"
+            return f"{small}: --atol {atol:.1e} allows it"
+        what = "the rest" if self.explanations else "it"
+        return f"no single known mistake explains {what}"
+
     @cached_property
     def not_compared(self) -> list[str]:
         """Name the lines and quantities of which no number has a digit to compare."""
@@ -320,6 +349,8 @@ def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]
 MOST_SHOWN_OF_EACH = 3
 _LEAST_POWER = -12
 """Least power of ten that is tried as a tolerance: to round-off a table needs none."""
+_MARGIN = 1.06
+"""Factor on a tolerance that two digits are printed of."""
 FEWEST_DIGITS = 1e-4
 """Part of each number by which a table may be off that is right, in fewer digits than
 it prints.
@@ -489,8 +520,7 @@ def show_judgement(judgement: Judgement, name: str) -> None:
     mended = judgement.explained_power
     if differing and mended is None:
         if not judgement.is_explained():
-            what = "the rest" if judgement.explanations else "it"
-            print_sentence(f"no single known mistake explains {what}")
+            print_sentence(judgement.describe_unexplained())
         elif not any(one.complete for one in judgement.explanations):
             print_sentence("these together explain all of it")
     if power is not None:

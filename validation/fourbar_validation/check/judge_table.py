@@ -229,6 +229,14 @@ class Column:
         error, allowed, _ = self.judged_right
         return np.asarray(self.where & ~(error <= allowed))
 
+    @property
+    def excess(self) -> Array:
+        """Error in parts of what is allowed, or of what a tolerance permits, (n,)."""
+        error, allowed, apart = self.judged_right
+        permitted = self.permitted(self.nearest)
+        times = error / allowed
+        return times if permitted is None else np.fmin(times, apart / permitted)
+
     def compare(self, ours: Array) -> tuple[Array, Array, Array]:
         """Return (error, allowed, apart) of the table, each (n,).
 

@@ -447,10 +447,10 @@ def _list_explained(
                 return []
         elif agrees:
             explained.append(column)
-            error, allowed, _ = column.judged_right
-            wrong = (error > allowed) & column.where
+            excess = column.excess
+            wrong = (excess > 1.0) & column.where
             numbers += int(wrong.sum())
-            digits += float(np.log10(error / allowed)[wrong].sum())
+            digits += float(np.log10(excess[wrong]).sum())
         else:
             possible -= 1
             if mistake.whole and possible < least:
