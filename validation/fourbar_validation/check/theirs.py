@@ -33,6 +33,7 @@ from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
 from fourbar_validation.check.csv_columns import GROWING
 from fourbar_validation.compare.tolerance import EPS
+from fourbar_validation.engines.description import FORCE_AT
 
 _DECIMALS = 4
 """Decimals of a position that somebody chose, like 12.5 deg or 0.25 rad. 0.1745 rad is
@@ -93,8 +94,16 @@ _MAY_MEAN = (
     ("alpha", "alpha_2"),
     (r"(?:r|fr|force|kraft|reaction)([1-4])([1-4])[xy]?", r"F\1\2_x or F\1\2_y"),
     (r"[tm](?:_?in)?|.*(?:torque|moment).*", "torque"),
+    *(
+        (
+            r"(?:.*(?:force|kraft|reaction|pin)|fr?|r)?[xy]?(?:at)?"
+            rf"{pin.lower()}[xy]?",
+            f"{force}_x, {force}_y or {force}",
+        )
+        for pin, force in FORCE_AT.items()
+    ),
     (
-        r"f[xy]?(?:at)?(?:a|b|o2|o4)?|.*(?:force|kraft|reaction).*",
+        "f[xy]?|.*(?:force|kraft|reaction).*",
         "F12_x, F32_x, F43_x, F14_x, or their y",
     ),
     (r".*(?:speed|velocity|geschwindigkeit).*", "omega_2, omega_3 or omega_4"),
@@ -673,7 +682,9 @@ def _read_heading(
             break
     vector = _name_vector(name, points)
     quantity = vector or name
-    if match is None or quantity in NOT_JUDGED or not _is_known(name, points):
+    is_at_pin = quantity in FORCE_AT and converts(unit, "N")
+    unread = match is None or quantity in NOT_JUDGED or is_at_pin
+    if unread or not _is_known(name, points):
         parts = re.split("[-/]", re.sub(r"\s*\[.*", "", heading.strip()))
         if len(parts) > 1 and all(part in UNITS or part in points for part in parts):
             return _Heading(name, why="follows from columns that are judged")
