@@ -182,6 +182,12 @@ PROGRAMS = {
         ("force.imag)", "force.imag if theta < 1.2 else 'y')"),
         "answers.F12, entry 2 = 'y': must be a finite number or null",
     ),
+    "broken far inside": (
+        say("text = '{\"a\": [' + 400 * '1, ' + '!' + 400 * ', 1' + ']}'", SAY),
+        f"{NO_JSON} (Expecting value: line 1 column 1208 (char 1207)); it said: ... , "
+        + 41 * "1, "
+        + "!, 1, 1",
+    ),
     "repeated key": (
         say("text = text[:-1] + ', \"id\": 1}'", SAY),
         f"{NO_JSON} (a key",

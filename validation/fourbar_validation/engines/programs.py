@@ -23,7 +23,12 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from fourbar_validation.compare.answer import EngineError
-from fourbar_validation.compare.rows import QUOTED, escape_controls, write_one_line
+from fourbar_validation.compare.rows import (
+    LONGEST_REASON,
+    QUOTED,
+    escape_controls,
+    write_one_line,
+)
 
 WORKER_MEMORY = 8 * 2**30
 """Bytes of data of one process, a guest too; a scene takes a hundredth."""
@@ -420,7 +425,7 @@ class Running:
 
     def _read(self, reply: bytes) -> _Message:
         """Read a line; EngineError where it is not the answer that was asked for."""
-        said = write_one_line(reply[:OUTPUT_KEPT].decode(errors="backslashreplace"))
+        said = _quote(reply)
         try:
             data = json.loads(
                 reply,
@@ -428,6 +433,7 @@ class Running:
                 parse_constant=_refuse_constant,
             )
         except (ValueError, RecursionError) as error:
+            said = _quote(reply, getattr(error, "pos", 0))
             raise EngineError(
                 f"said what is no JSON ({write_one_line(str(error))}){QUOTED}{said}"
             ) from None
@@ -549,6 +555,13 @@ def _signal(process: "subprocess.Popen[bytes]", name: str) -> None:
             os.killpg(process.pid, getattr(signal, name))
     elif process.poll() is None:
         process.terminate()
+
+
+def _quote(reply: bytes, place: int = 0) -> str:
+    """Write a reply in one line, from shortly before a place on."""
+    start = max(0, place - LONGEST_REASON // 4)
+    kept = reply[: OUTPUT_KEPT + start].decode(errors="backslashreplace")[start:]
+    return "... " * bool(start) + write_one_line(kept)
 
 
 def _make_object(pairs: list[tuple[str, Any]]) -> _Message:
