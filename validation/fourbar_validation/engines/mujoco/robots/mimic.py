@@ -1,7 +1,8 @@
 """An equality by whose polynomial one joint of a robot's file follows another."""
 
+import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -104,7 +105,7 @@ def read_joint_equality(
     for number in range(model.neq):
         for tie in list_followers(model, number):
             if tie.joint == joint:
-                return _describe_follower(model, tie, scene, theta_2)
+                return _RestPose(model, tie, scene).describe(theta_2)
     needed = {
         "MJCF": f'<joint joint1="{name}" joint2="..."> and no equality of a fixed'
         " tendon over it and one other joint"
@@ -114,139 +115,196 @@ def read_joint_equality(
     )
 
 
-def _describe_follower(
-    model: mujoco.MjModel,
-    tie: Follower,
-    scene: Scene,
-    stated: float | None,
-) -> JointEquality:
-    follower, leader, coefficients = tie
-    for joint in (follower, leader):
-        if int(model.jnt_type[joint]) != HINGE_JOINT:
-            raise InputError(
-                "--mimic",
-                name_joint(model, joint),
-                "is no hinge: both must be hinges",
-            )
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    along = float(data.xaxis[follower] @ data.xaxis[leader])
-    low, high = model.jnt_range[leader].tolist()
-    equality = JointEquality(
-        name_joint(model, follower),
-        name_joint(model, leader),
-        coefficients,
-        float(model.qpos0[model.jnt_qposadr[leader]]),
-        math.copysign(1.0, along),
-        stated,
-        None,
-        1.0,
-        stated,
-        _find_bars(model, leader, follower),
-        (low, high) if model.jnt_limited[leader] else None,
-    )
-    return _measure_bars(model, data, tie, scene, equality)
+class _RestPose:
+    """Rest pose of a file in which one hinge of a scene's loop follows another."""
 
+    def __init__(self, model: mujoco.MjModel, tie: Follower, scene: Scene) -> None:
+        self.model = model
+        self.tie = tie
+        self.scene = scene
+        for joint in (tie.joint, tie.leader):
+            if int(model.jnt_type[joint]) != HINGE_JOINT:
+                raise InputError(
+                    "--mimic",
+                    name_joint(model, joint),
+                    "is no hinge: both must be hinges",
+                )
+        self.data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, self.data)
+        self.axes = np.zeros((2, 3))
+        """x along the ground and y in the plane, (2, 3), once the ground is found."""
 
-def _find_bars(model: mujoco.MjModel, leader: int, follower: int) -> tuple[int, int]:
-    """Return the bar that a follower turns, and the bar that bears it."""
-    roots = find_roots(model, set())
-    turned, crank = (int(model.jnt_bodyid[joint]) for joint in (follower, leader))
-    ground = roots[find_parent(model, crank)]
-    bearer = roots[find_parent(model, turned)]
-    if bearer == crank:
-        return 3, 2
-    if bearer == ground:
-        return 4, 1
-    if roots[find_parent(model, bearer)] == crank:
-        return 4, 3
-    return 3, 4
+    def describe(self, stated: float | None) -> JointEquality:
+        """Describe the equality, with the angles of the rest pose and the side.
 
+        The ground or the input may not be found: neither is known then.
+        """
+        model = self.model
+        linkage = self.scene.linkage
+        follower, leader, coefficients = self.tie
+        along = float(self.data.xaxis[follower] @ self.data.xaxis[leader])
+        low, high = model.jnt_range[leader].tolist()
+        equality = JointEquality(
+            name_joint(model, follower),
+            name_joint(model, leader),
+            coefficients,
+            float(model.qpos0[model.jnt_qposadr[leader]]),
+            math.copysign(1.0, along),
+            stated,
+            None,
+            1.0,
+            stated,
+            self._find_bars(follower),
+            (low, high) if model.jnt_limited[leader] else None,
+        )
+        rocker = self._find_rocker()
+        input_angle = None
+        if rocker is not None:
+            input_angle = self._find_angle(leader, linkage.input)
+        if rocker is None or input_angle is None:
+            return equality
+        output_angle = self._find_angle(rocker, linkage.output)
+        angles = None
+        if output_angle is not None:
+            # where the equality turns the output while the leader is at its zero
+            turn = coefficients[0] * along if rocker == follower else 0.0
+            angles = (0.0, input_angle, math.nan, output_angle + turn)
+        ground = linkage.ground_angle
+        rests = {side: ground + side * input_angle for side in (1.0, -1.0)}
+        told = self._find_side(rests, angles, equality)
+        side = told or 1.0
+        follower_zero = None
+        if equality.bars == (4, 1) and rocker == follower and output_angle is not None:
+            follower_zero = ground + side * output_angle
+        elif equality.bars == (3, 2):
+            coupler = self._find_angle(follower, linkage.coupler)
+            if coupler is not None:
+                follower_zero = side * (coupler - input_angle)
+        return replace(
+            equality,
+            theta_2=rests[side] if stated is None else stated,
+            follower_zero=follower_zero,
+            side=side,
+            other_side=None if told else rests[-side],
+        )
 
-def _measure_bars(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    tie: Follower,
-    scene: Scene,
-    equality: JointEquality,
-) -> JointEquality:
-    """Return an equality with the angles of the rest pose and the side of the scene.
+    def _find_bars(self, follower: int) -> tuple[int, int]:
+        """Return the bar that a follower turns, and the bar that bears it."""
+        model = self.model
+        roots = find_roots(model, set())
+        crank = int(model.jnt_bodyid[self.tie.leader])
+        ground = roots[find_parent(model, crank)]
+        bearer = roots[find_parent(model, int(model.jnt_bodyid[follower]))]
+        if bearer == crank:
+            return 3, 2
+        if bearer == ground:
+            return 4, 1
+        if roots[find_parent(model, bearer)] == crank:
+            return 4, 3
+        return 3, 4
 
-    An equality stays as it is where the ground or the input is not found.
-    """
-    follower, leader, coefficients = tie
-    linkage = scene.linkage
-    normal = data.xaxis[leader]
-    across = np.eye(3) - np.outer(normal, normal)
-    for rocker in _list_rockers(model, leader, follower):
-        line = across @ (data.xanchor[rocker] - data.xanchor[leader])
-        if _is_same_number(float(np.linalg.norm(line)), linkage.lengths[0]):
-            break
-    else:
-        return equality
-    x = line / np.linalg.norm(line)
-    axes = (x, np.cross(normal, x))
-    input_angle = _find_angle_of_bar(model, data, leader, linkage.input, axes)
-    output_angle = _find_angle_of_bar(model, data, rocker, linkage.output, axes)
-    if input_angle is None:
-        return equality
-    angles = None
-    if output_angle is not None:
-        # where the equality turns the output while the leader is at its zero
-        turn = coefficients[0] * float(data.xaxis[follower] @ normal)
-        turned = output_angle + (turn if rocker == follower else 0.0)
-        angles = (0.0, input_angle, math.nan, turned)
-    rests = {side: linkage.ground_angle + side * input_angle for side in (1.0, -1.0)}
-    told = _find_side(scene, rests, angles, equality)
-    side = told or 1.0
-    follower_zero = None
-    if equality.bars == (4, 1) and rocker == follower and output_angle is not None:
-        follower_zero = linkage.ground_angle + side * output_angle
-    elif equality.bars == (3, 2):
-        coupler = _find_angle_of_bar(model, data, follower, linkage.coupler, axes)
-        if coupler is not None:
-            follower_zero = side * (coupler - input_angle)
-    stated = equality.theta_2
-    return replace(
-        equality,
-        theta_2=rests[side] if stated is None else stated,
-        follower_zero=follower_zero,
-        side=side,
-        other_side=None if told else rests[-side],
-    )
+    def _find_rocker(self) -> int | None:
+        """Find the hinge that bears the output on the ground, and take its axes.
 
+        The follower itself is the first that may be, then all joints that follow the
+        same leader.
+        """
+        model = self.model
+        follower, leader, _ = self.tie
+        ties = chain.from_iterable(list_followers(model, n) for n in range(model.neq))
+        joints = [follower, *(tie.joint for tie in ties if tie.leader == leader)]
+        normal = self.data.xaxis[leader]
+        across = np.eye(3) - np.outer(normal, normal)
+        for joint in joints:
+            line = across @ (self.data.xanchor[joint] - self.data.xanchor[leader])
+            length = float(np.linalg.norm(line))
+            is_ground = _is_same_number(length, self.scene.linkage.lengths[0])
+            if is_ground and self._find_bars(joint) == (4, 1):
+                x = line / length
+                self.axes = np.array([x, np.cross(normal, x)])
+                return joint
+        return None
 
-def _find_side(
-    scene: Scene,
-    rests: Mapping[float, float],
-    angles: Sequence[float] | None,
-    equality: JointEquality,
-) -> float | None:
-    """Return +1 if a scene sees the leader's axis from its tip, -1 from behind.
+    def _find_side(
+        self,
+        rests: Mapping[float, float],
+        angles: Sequence[float] | None,
+        equality: JointEquality,
+    ) -> float | None:
+        """Return +1 if a scene sees the leader's axis from its tip, -1 from behind.
 
-    The stated or the drawn theta_2 decides. Where it does not, the scene's output
-    does, and last the side from which the leader's range meets the scene's. The
-    result is None if none of them tells.
+        The stated or the drawn theta_2 decides. Where it does not, the scene's output
+        does, and last the side from which the leader's range meets the scene's. The
+        result is None if none of them tells.
 
-    Parameters
-    ----------
-    rests : theta_2 in the rest pose by sides, rad.
-    angles : theta_1 to theta_4 in the file, seen from the tip, rad, if it tells them.
-    """
-    shown = equality.theta_2
-    if shown is None and scene.drawing is not None:
-        shown = scene.drawing.angle(2)
-    positions = command(scene).theta_2
-    evidence: list[list[float]] = [[], [], []]
-    for side, rest in rests.items():
-        if shown is not None and is_same_angle(rest, shown):
-            evidence[0].append(side)
-        if angles and is_seen_from_behind(scene, [-side * angle for angle in angles]):
-            evidence[1].append(side)
-        swing = replace(equality, side=side, theta_2=rest).swing
-        if swing is not None and _meet(swing, (positions.min(), positions.max())):
-            evidence[2].append(side)
-    return next((sides[0] for sides in evidence if len(sides) == 1), None)
+        Parameters
+        ----------
+        rests : theta_2 in the rest pose by sides, rad.
+        angles : theta_1 to theta_4 in the file, seen from the tip, rad, if it tells
+            them.
+        """
+        scene = self.scene
+        shown = equality.theta_2
+        if shown is None and scene.drawing is not None:
+            shown = scene.drawing.angle(2)
+        positions = command(scene).theta_2
+        evidence: list[list[float]] = [[], [], []]
+        for side, rest in rests.items():
+            if shown is not None and is_same_angle(rest, shown):
+                evidence[0].append(side)
+            turned = [-side * angle for angle in angles or ()]
+            if turned and is_seen_from_behind(scene, turned):
+                evidence[1].append(side)
+            swing = replace(equality, side=side, theta_2=rest).swing
+            if swing is not None and _meet(swing, (positions.min(), positions.max())):
+                evidence[2].append(side)
+        return next((sides[0] for sides in evidence if len(sides) == 1), None)
+
+    def _find_angle(self, joint: int, bar: Bar) -> float | None:
+        """Return the angle of a bar from its hinge to its other pin, rad.
+
+        The pin is what lies at the length of the bar: a hinge, else a site, else the
+        end of a capsule or cylinder. Else a mass centre as far from the hinge as that
+        of the scene tells the line, if the scene has it on the line. None if there is
+        nothing, or if it lies in several directions.
+        """
+        body = int(self.model.jnt_bodyid[joint])
+
+        def locate(place: Array) -> complex:
+            return complex(*(self.axes @ (place - self.data.xanchor[joint])))
+
+        for places in self._list_places(body):
+            arms = map(locate, places)
+            angles = [
+                cmath.phase(arm)
+                for arm in arms
+                if _is_same_number(abs(arm), bar.length)
+            ]
+            if angles:
+                first = angles[0]
+                spread = [abs(math.remainder(one - first, math.tau)) for one in angles]
+                return first if max(spread) <= _SAME_LENGTH else None
+        distance, turn = bar.centre or (0.5 * bar.length, 0.0)
+        arm = locate(self.data.xipos[body])
+        is_centre = math.isclose(abs(arm), distance, rel_tol=_SAME_CENTRE)
+        return cmath.phase(arm) if is_centre and turn == 0.0 and distance else None
+
+    def _list_places(self, body: int) -> Iterator[Iterable[Array]]:
+        """Yield the hinges of the bodies on a body, its sites, the ends of its rods."""
+        model = self.model
+        data = self.data
+        on_body = model.body_parentid[model.jnt_bodyid] == body
+        yield data.xanchor[on_body & (model.jnt_type == HINGE_JOINT)]
+        yield data.site_xpos[model.site_bodyid == body]
+        ends = []
+        rods = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
+        for number in np.flatnonzero(model.geom_bodyid == body):
+            if mujoco.mjtGeom(int(model.geom_type[number])) in rods:
+                axis = data.geom_xmat[number].reshape(3, 3)[:, 2]
+                reach = model.geom_size[number, 1] * axis
+                middle = data.geom_xpos[number]
+                ends += [middle - reach, middle + reach]
+        yield ends
 
 
 def _meet(one: tuple[float, float], other: tuple[float, float]) -> bool:
@@ -259,73 +317,6 @@ def _meet(one: tuple[float, float], other: tuple[float, float]) -> bool:
 def is_same_angle(one: float, other: float) -> bool:
     """Tell whether two angles are the same but for whole turns and what is rounded."""
     return abs(math.remainder(one - other, math.tau)) <= _SAME_ANGLE
-
-
-def _list_rockers(model: mujoco.MjModel, leader: int, follower: int) -> list[int]:
-    """List the joints that may bear the output on the ground.
-
-    The follower itself is the first, then all joints that follow the same leader.
-    """
-    ties = chain.from_iterable(list_followers(model, n) for n in range(model.neq))
-    joints = [follower, *(tie.joint for tie in ties if tie.leader == leader)]
-    return [joint for joint in joints if _find_bars(model, leader, joint) == (4, 1)]
-
-
-def _find_angle_of_bar(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    joint: int,
-    bar: Bar,
-    axes: tuple[Array, Array],
-) -> float | None:
-    """Return the angle of a bar from its hinge to its other pin, rad.
-
-    The pin is what lies at the length of the bar: a hinge, else a site, else the end of
-    a capsule or cylinder. Else a mass centre as far from the hinge as that of the scene
-    tells the line, if the scene has it on the line. None if there is nothing, or if it
-    lies in several directions.
-    """
-    body = int(model.jnt_bodyid[joint])
-    for places in _list_places(model, data, body):
-        directions = []
-        for place in places:
-            apart = place - data.xanchor[joint]
-            across, up = (float(apart @ axis) for axis in axes)
-            if _is_same_number(math.hypot(across, up), bar.length):
-                directions.append(math.atan2(up, across))
-        if directions:
-            first, *others = directions
-            spread = (abs(math.remainder(one - first, math.tau)) for one in others)
-            if max(spread, default=0.0) <= _SAME_LENGTH:
-                return first
-            return None
-    distance, turn = bar.centre or (0.5 * bar.length, 0.0)
-    apart = data.xipos[body] - data.xanchor[joint]
-    across, up = (float(apart @ axis) for axis in axes)
-    is_centre = math.isclose(math.hypot(across, up), distance, rel_tol=_SAME_CENTRE)
-    return math.atan2(up, across) if is_centre and turn == 0.0 and distance else None
-
-
-def _list_places(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    body: int,
-) -> Iterator[list[Array]]:
-    """Yield the hinges of the bodies on a body, its sites, and the ends of its rods."""
-    on_body = model.body_parentid[model.jnt_bodyid] == body
-    hinges = np.flatnonzero(on_body & (model.jnt_type == HINGE_JOINT))
-    yield [data.xanchor[number] for number in hinges]
-    sites = np.flatnonzero(model.site_bodyid == body)
-    yield [data.site_xpos[number] for number in sites]
-    ends = []
-    rods = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
-    for number in np.flatnonzero(model.geom_bodyid == body):
-        if mujoco.mjtGeom(int(model.geom_type[number])) in rods:
-            axis = data.geom_xmat[number].reshape(3, 3)[:, 2]
-            reach = model.geom_size[number, 1] * axis
-            middle = data.geom_xpos[number]
-            ends += [middle - reach, middle + reach]
-    yield ends
 
 
 def _is_same_number(one: float, other: float) -> bool:
