@@ -177,13 +177,10 @@ class LoopInside:
         self.as_it_is = as_it_is
         self.acting = None if drive is None or drive.couple_bar == bar else drive
         self.model = copy(model)
-        self.flags = int(model.opt.disableflags)
         self.joint = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
         """Hinge between the ground and the commanded bar, if the file has one."""
-        self.taken_off: list[int] = []
+        self.taken_off = [] if self.joint is None else list_actuators(model, self.joint)
         """Actuators on that hinge."""
-        if self.joint is not None:
-            self.taken_off = list_actuators(model, self.joint)
         self._switch_off()
         self.data = mujoco.MjData(self.model)
         # the closure alone, for kinematics: with every row, and a dense derivative
@@ -268,14 +265,17 @@ class LoopInside:
         if armature > _DRIVING * (others + inertia):
             self.flywheel = armature
 
-    def _size_armature(self, heavy: float) -> float:
-        """Return the armature that keeps speeds through time, kg m^2.
+    def _hold_others(self, heavy: float) -> tuple[mujoco.MjModel, float]:
+        """Return a model whose armatures hold the other joints, and their size, kg m^2.
 
-        `heavy`: its size over the robot's largest inertia.
+        `heavy`: the size over the robot's largest inertia.
         """
-        inertias = self.model.dof_M0.copy()
+        model = copy(self.model)
+        inertias = model.dof_M0.copy()
         inertias[self.lead] -= self.flywheel
-        return heavy * float(inertias.max())
+        armature = heavy * float(inertias.max())
+        model.dof_armature[self.held] += armature
+        return model, armature
 
     def angle(self, qpos: Array) -> float:
         """Return the angle of the commanded bar in a pose, rad."""
@@ -343,7 +343,7 @@ class LoopInside:
 
         The assembly is that of the loop's pose; None if the loop is open.
         """
-        qpos = assemble(self.model, self.loop, self.bar, wanted)
+        qpos = self._assemble(wanted, self._pose_sine)
         if qpos is None:
             return None
         self._turn_to(qpos, wanted)
@@ -352,6 +352,55 @@ class LoopInside:
         self._last = qpos.copy()
         self._rates = self._find_rates(qpos)
         return qpos
+
+    @property
+    def _pose_sine(self) -> float:
+        """Sine of the angle between the bars that follow in the loop's pose."""
+        first, second = (self.loop.angles[one - 1] for one in FOLLOWING[self.bar])
+        return math.sin(second - first)
+
+    def _assemble(self, wanted: float, sign: float) -> Array | None:
+        """Return the pose at an angle of the commanded bar in an assembly, (nq,).
+
+        Each hinge but the driven one turns by less than half a turn. None if the loop
+        is open. `sign`: of the sine of the angle from the first bar that follows to the
+        second.
+        """
+        loop = self.loop
+        bar = self.bar
+        ground, crank, coupler, output = loop.lengths
+        moving = (Bar(crank), Bar(coupler), Bar(output))
+        linkage = FourBar(ground, *moving, loop.angles[0])
+        branch = np.array([math.copysign(1.0, sign)]).astype(np.int8)
+        closed = close(linkage, np.array([wanted]), branch, bar)
+        if not closed.assembled[0]:
+            return None
+        turned = {1: 0.0, bar: wanted - loop.angles[bar - 1]}
+        for one, theta in zip(FOLLOWING[bar], closed.theta[:, 0].tolist(), strict=True):
+            turned[one] = math.remainder(theta - loop.angles[one - 1], math.tau)
+        qpos = loop.qpos.copy()
+        for pin, joint in loop.hinges.items():
+            first, second = PINS[pin]
+            turn = turned[second] - turned[first]
+            if pin != "O2":
+                turn = math.remainder(turn, math.tau)
+            qpos[self.model.jnt_qposadr[joint]] += loop.senses[pin] * turn
+        return qpos
+
+    def reflect(self) -> Array | None:
+        """Return the pose of the other assembly at the same commanded angle, (nq,).
+
+        None where it does not close.
+        """
+        qpos = self._assemble(self.loop.angles[self.bar - 1], -self._pose_sine)
+        if qpos is None:
+            return None
+        # put together anew, no spring is wound by more than half a turn
+        for joint in {*self.loop.hinges.values()} - {self.joint}:
+            address = self.model.jnt_qposadr[joint]
+            drawn = self.model.qpos0[address]
+            qpos[address] = drawn + math.remainder(qpos[address] - drawn, math.tau)
+        return qpos if self.close_gap(qpos) else None
 
     def _find_rates(self, qpos: Array) -> Array:
         """Return the turn of the hinges that follow by that of the commanded bar, (k,).
@@ -374,9 +423,7 @@ class LoopInside:
             stride = math.copysign(_STRIDE, math.sin(angle - loop.angles[0] + _STRIDE))
             if self.bar == 4:
                 stride = -stride
-            after = assemble(
-                self.model, loop, self.bar, angle + stride, sign=self.branch
-            )
+            after = self._assemble(angle + stride, self.branch)
             if after is not None:
                 return self._read_turns(after - loop.qpos) / stride
         return self._find_rates(loop.qpos)
@@ -550,16 +597,16 @@ class LoopInside:
         A hinge sticks if its dry friction does not oppose its motion in full: the
         soft constraint may even push it on.
         """
-        model = self.model
         data = self.data
         kinds = data.efc_type[: data.nefc]
         names = []
         for row in np.flatnonzero(kinds == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF):
             dof = int(data.efc_id[row])
-            reached = _REACHED * model.dof_frictionloss[dof]
-            opposes = -data.efc_force[row] * np.sign(data.qvel[dof])
-            if dof in self.moving and data.qvel[dof] and opposes < reached:
-                names.append(name_joint(model, int(model.dof_jntid[dof])))
+            speed = data.qvel[dof]
+            reached = _REACHED * self.model.dof_frictionloss[dof]
+            opposes = -data.efc_force[row] * np.sign(speed)
+            if dof in self.moving and speed and opposes < reached:
+                names.append(name_joint(self.model, int(self.model.dof_jntid[dof])))
         return tuple(names)
 
     def _measure_gap(self, qpos: Array) -> float:
@@ -662,9 +709,8 @@ class LoopInside:
 
         def differ(turns: Array) -> Array:
             # the forces are linear but where dry friction reaches its couple
-            steps = np.eye(len(turns))
-            changes = [leave(turns + step) - leave(turns) for step in steps]
-            return np.column_stack(changes)
+            changes = [leave(turns + step) for step in np.eye(len(turns))]
+            return np.column_stack(changes) - leave(turns)[:, None]
 
         start = np.zeros(len(self.passive))
         return find_forces(root(leave, start, jac=differ, tol=_BALANCED).x)
@@ -674,26 +720,24 @@ class LoopInside:
         frame = LoopFrame(self.loop, data)
         forces = {}
         for pin, name in FORCE_AT.items():
-            joint = self.loop.hinges.get(pin)
-            if joint is None:
-                body = find_tied_bodies(self.model, self.loop.equality)[0]
-                force = self._sum_closures(data, self._bars[body])
-            else:
-                body = int(self.model.jnt_bodyid[joint])
-                force = self.bearers.read(data, body)
             _, acted_on = FORCE_BETWEEN[name]
-            sign = 1.0 if self._bars[body] == acted_on else -1.0
-            forces[name] = sign * frame.in_plane(force)
+            if pin in self.loop.hinges:
+                body = int(self.model.jnt_bodyid[self.loop.hinges[pin]])
+                parts = [(body, self.bearers.read(data, body))]
+            else:
+                parts = [
+                    (
+                        find_tied_bodies(self.model, one)[0],
+                        read_equality_force(data, one),
+                    )
+                    for one in self.loop.closures
+                ]
+            signed = [
+                force if self._bars[body] == acted_on else -force
+                for body, force in parts
+            ]
+            forces[name] = frame.in_plane(np.sum(signed, axis=0))
         return forces
-
-    def _sum_closures(self, data: mujoco.MjData, bar: int | None) -> Array:
-        """Sum the forces of the equalities at the cut pin on one of its bars."""
-        total = np.zeros(3)
-        for equality in self.loop.closures:
-            first = find_tied_bodies(self.model, equality)[0]
-            sign = 1.0 if self._bars[first] == bar else -1.0
-            total += sign * read_equality_force(data, equality)
-        return total
 
     def answer_states(self, motion: LoopMotion) -> InsideAnswer:
         """Answer at closed states, each by itself.
@@ -731,7 +775,14 @@ class LoopInside:
         answer = InsideAnswer()
         _, omega, alpha = next(motion.states())
         angles = sorted(motion.angle, reverse=omega < 0.0)
-        model, armature = self._make_heavy(heavy)
+        model, armature = self._hold_others(heavy)
+        if self.flywheel:
+            armature = self.flywheel
+        elif self.joint is not None:
+            model.dof_armature[self.lead] += armature
+        else:
+            # about its own centre alone, and alike about every axis: it turns no other
+            model.body_inertia[self.loop.bodies[self.bar][0]] += armature
         data = mujoco.MjData(self.model)
         timestep = float(model.opt.timestep)
         state = self.state(angles[0], omega)
@@ -750,7 +801,7 @@ class LoopInside:
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
         stepper = Stepper(model, data, timestep)
-        instants = [_find_instant(angles[0], angle, omega, alpha) for angle in angles]
+        instants = _list_instants(angles, omega, alpha)
         if not 1.0 <= instants[-1] / timestep <= MOST_TIMESTEPS:
             raise LimitError(
                 f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g}"
@@ -786,20 +837,6 @@ class LoopInside:
         if answer.other_assembly is not None and not answer.rows:
             raise LimitError(OTHER_ASSEMBLY)
         return answer
-
-    def _make_heavy(self, heavy: float) -> tuple[mujoco.MjModel, float]:
-        """Return a model whose armatures keep speeds, and that of the commanded bar."""
-        model = copy(self.model)
-        armature = self._size_armature(heavy)
-        model.dof_armature[self.held] += armature
-        if self.flywheel:
-            return model, self.flywheel
-        if self.joint is None:
-            # about its own centre alone, and alike about every axis: it turns no other
-            model.body_inertia[self.loop.bodies[self.bar][0]] += armature
-        else:
-            model.dof_armature[self.lead] += armature
-        return model, armature
 
     def _left_assembly(
         self, answer: InsideAnswer, doubtful: list[InsideRow], qpos: Array
@@ -842,36 +879,33 @@ class LoopInside:
         The other joints are held. A state is the one of the largest gap on the way from
         each angle; of a motion that MuJoCo loses there is none.
         """
-        model = copy(self.model)
-        model.dof_armature[self.held] += self._size_armature(HEAVY)
+        model, _ = self._hold_others(HEAVY)
         # the motor may meet the stops of the file
-        model.opt.disableflags &= ~(LIMITS_OFF & ~self.flags)
+        model.opt.disableflags &= ~(LIMITS_OFF & ~self.given.opt.disableflags)
         steps = max(round(seconds / model.opt.timestep), 1)
-        starts = (self.state(angle, 0.0) for angle in angles)
+
+        def let_go(qpos: Array) -> Iterator[TornState]:
+            """Yield the states of a pose that is let go under the torque."""
+            data = mujoco.MjData(model)
+            data.qpos[:] = qpos
+            for _ in range(steps):
+                data.qfrc_applied[:] = self.turn * torque
+                mujoco.mj_step(model, data)
+                mujoco.mj_forward(model, data)
+                mujoco.mj_rnePostConstraint(model, data)
+                if _has_warned(data):
+                    yield TornState(self._read_position(qpos), math.inf, {})
+                    return
+                joint = self._read_position(data.qpos)
+                gap = self._measure_gap(data.qpos)
+                yield TornState(joint, gap, self._read_forces(data))
+
+        starts = (self.close(angle) for angle in angles)
         return [
-            max(self._let_go(model, start.qpos, torque, steps), key=lambda one: one.gap)
+            max(let_go(start), key=lambda one: one.gap)
             for start in starts
             if start is not None
         ]
-
-    def _let_go(
-        self, model: mujoco.MjModel, qpos: Array, torque: float, steps: int
-    ) -> Iterator[TornState]:
-        """Yield the states of a pose that is let go under a torque, N m."""
-        data = mujoco.MjData(model)
-        data.qpos[:] = qpos
-        for _ in range(steps):
-            data.qfrc_applied[:] = self.turn * torque
-            mujoco.mj_step(model, data)
-            mujoco.mj_forward(model, data)
-            mujoco.mj_rnePostConstraint(model, data)
-            if _has_warned(data):
-                yield TornState(self._read_position(qpos), math.inf, {})
-                return
-            joint = self._read_position(data.qpos)
-            yield TornState(
-                joint, self._measure_gap(data.qpos), self._read_forces(data)
-            )
 
 
 def _solve_least_squares(matrix: Array, right: Array) -> Array:
@@ -896,85 +930,25 @@ def _has_warned(data: mujoco.MjData) -> bool:
     return any(data.warning[kind].number for kind in WARNINGS)
 
 
-def assemble(
-    model: mujoco.MjModel,
-    loop: RobotLoop,
-    bar: int,
-    angle: float,
-    *,
-    sign: float | None = None,
-) -> Array | None:
-    """Return the pose at an angle of a bar in an assembly of a loop, (nq,).
-
-    Each hinge but the driven one turns by less than half a turn. None if the loop is
-    open.
-
-    Parameters
-    ----------
-    angle : of the bar in the plane of the loop, rad.
-    sign : of the sine of the angle from the first bar that follows to the second; None:
-        that of the loop's pose.
-    """
-    if sign is None:
-        sign = _measure_pose_sine(loop, bar)
-    ground, crank, coupler, output = loop.lengths
-    moving = (Bar(crank), Bar(coupler), Bar(output))
-    linkage = FourBar(ground, *moving, loop.angles[0])
-    branch = np.array([math.copysign(1.0, sign)]).astype(np.int8)
-    closed = close(linkage, np.array([angle]), branch, bar)
-    if not closed.assembled[0]:
-        return None
-    turned = {1: 0.0, bar: angle - loop.angles[bar - 1]}
-    for one, theta in zip(FOLLOWING[bar], closed.theta[:, 0].tolist(), strict=True):
-        turned[one] = math.remainder(theta - loop.angles[one - 1], math.tau)
-    qpos = loop.qpos.copy()
-    for pin, joint in loop.hinges.items():
-        first, second = PINS[pin]
-        turn = turned[second] - turned[first]
-        if pin != "O2":
-            turn = math.remainder(turn, math.tau)
-        qpos[model.jnt_qposadr[joint]] += loop.senses[pin] * turn
-    return qpos
-
-
-def _measure_pose_sine(loop: RobotLoop, bar: int) -> float:
-    """Return the sine of the angle between the bars that follow in a loop's pose."""
-    first, second = (loop.angles[other - 1] for other in FOLLOWING[bar])
-    return math.sin(second - first)
-
-
 def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | None:
     """Return the pose of the other assembly at the same angle of a bar, (nq,).
 
     None where it does not close.
     """
-    other = -_measure_pose_sine(loop, bar)
-    qpos = assemble(model, loop, bar, loop.angles[bar - 1], sign=other)
-    if qpos is None:
-        return None
-    # put together anew, no spring is wound by more than half a turn
-    for pin, joint in loop.hinges.items():
-        if pin == DRIVEN_PINS.get(bar):
-            continue
-        address = model.jnt_qposadr[joint]
-        drawn = model.qpos0[address]
-        qpos[address] = drawn + math.remainder(qpos[address] - drawn, math.tau)
-    return qpos if LoopInside(model, loop, bar=bar).close_gap(qpos) else None
+    return LoopInside(model, loop, bar=bar).reflect()
 
 
-def _find_instant(
-    start: float,
-    angle: float,
-    omega: float,
-    alpha: float,
-) -> float:
-    """Return the time at which a motion passes an angle, s.
+def _list_instants(angles: list[float], omega: float, alpha: float) -> list[float]:
+    """List the times at which a motion passes angles, the first at 0, s.
 
     Raises LimitError if it comes to rest before.
     """
-    turned = angle - start
-    squared = omega**2 + 2.0 * alpha * turned
-    if squared <= 0.0:
-        raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
-    speed = math.copysign(math.sqrt(squared), omega)
-    return 2.0 * turned / (omega + speed)
+    instants = []
+    for angle in angles:
+        turned = angle - angles[0]
+        squared = omega**2 + 2.0 * alpha * turned
+        if squared <= 0.0:
+            raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
+        speed = math.copysign(math.sqrt(squared), omega)
+        instants.append(2.0 * turned / (omega + speed))
+    return instants
