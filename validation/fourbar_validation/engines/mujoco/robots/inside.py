@@ -775,14 +775,7 @@ class LoopInside:
         answer = InsideAnswer()
         _, omega, alpha = next(motion.states())
         angles = sorted(motion.angle, reverse=omega < 0.0)
-        model, armature = self._hold_others(heavy)
-        if self.flywheel:
-            armature = self.flywheel
-        elif self.joint is not None:
-            model.dof_armature[self.lead] += armature
-        else:
-            # about its own centre alone, and alike about every axis: it turns no other
-            model.body_inertia[self.loop.bodies[self.bar][0]] += armature
+        model, armature = self._keep_speeds(heavy)
         data = mujoco.MjData(self.model)
         timestep = float(model.opt.timestep)
         state = self.state(angles[0], omega)
@@ -837,6 +830,18 @@ class LoopInside:
         if answer.other_assembly is not None and not answer.rows:
             raise LimitError(OTHER_ASSEMBLY)
         return answer
+
+    def _keep_speeds(self, heavy: float) -> tuple[mujoco.MjModel, float]:
+        """Return a model whose armatures keep speeds, and that of the commanded bar."""
+        model, armature = self._hold_others(heavy)
+        if self.flywheel:
+            return model, self.flywheel
+        if self.joint is not None:
+            model.dof_armature[self.lead] += armature
+        else:
+            # about its own centre alone, and alike about every axis: it turns no other
+            model.body_inertia[self.loop.bodies[self.bar][0]] += armature
+        return model, armature
 
     def _left_assembly(
         self, answer: InsideAnswer, doubtful: list[InsideRow], qpos: Array
