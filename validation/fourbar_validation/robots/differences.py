@@ -13,6 +13,7 @@ import numpy as np
 
 from fourbar.quantities import FORCE_NAMES
 from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.description import ModelEntry, Value
 
 SAME_NUMBER = 1e-12
@@ -72,13 +73,13 @@ class Difference:
 
     def write(self) -> str:
         """Write the entry with both values, where it is written, and what it does."""
-        text = (
-            f"{self.key}: {write_value(self.theirs)}, generated"
-            f" {write_value(self.generated)}"
-        )
+        theirs, generated = map(write_value, (self.theirs, self.generated))
+        parts = [f"{self.key}: {theirs}, generated {generated}"]
         if self.written:
-            text += f"; in the file: {self.written}"
-        return f"{text}; {self.remark}" if self.remark else text
+            parts.append(f"in the file: {self.written}")
+        if self.remark:
+            parts.append(self.remark)
+        return "; ".join(parts)
 
 
 def find_differences(
@@ -92,35 +93,20 @@ def find_differences(
         if _is_length(key)
     )
     differences = []
-    for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours = generated.get(key)
-        yours_entry = theirs.get(key)
-        if (ours is None or yours_entry is None) and not (
-            key.startswith(ENTRIES_THAT_MAY_LACK) or key.endswith(".motor")
-        ):
+    for key in dict.fromkeys((*theirs, *generated)):
+        entries = (generated.get(key), theirs.get(key))
+        may_lack = key.startswith(ENTRIES_THAT_MAY_LACK) or key.endswith(".motor")
+        if None in entries and not may_lack:
             # one of the files has no use for it, like solver parameters of no friction
             continue
-        nothing = next(
-            (value for end, value in MISSING_LOAD.items() if key.endswith(end)), None
-        )
-        mine, yours = (
-            nothing if entry is None else entry.value for entry in (ours, yours_entry)
-        )
+        loads = (value for end, value in MISSING_LOAD.items() if key.endswith(end))
+        nothing = next(loads, None)
+        mine, yours = (nothing if one is None else one.value for one in entries)
         if _is_same_value(key, mine, yours, length) or _is_finer(key, mine, yours):
             continue
-        if yours_entry is not None:
-            written = f"{yours_entry.element} {yours_entry.attribute}".strip()
-        else:
-            written = ""
-        differences.append(
-            Difference(
-                key,
-                mine,
-                yours,
-                _remark(key, mine, yours),
-                written,
-            )
-        )
+        remark = _remark(key, mine, yours)
+        written = "" if entries[1] is None else " ".join(entries[1][1:]).strip()
+        differences.append(Difference(key, mine, yours, remark, written))
     return differences
 
 
@@ -155,11 +141,10 @@ def _keep_worst(before: _Errors, after: _Errors) -> _Errors:
     """Return the worst error before, by method, at the quantity that is worst after."""
     worst = {}
     for engine in {engine for engine, _ in after}:
-        quantities = [name for method, name in after if method == engine]
-        quantity = max(quantities, key=lambda name: after[engine, name])
+        keys = [key for key in after if key[0] == engine]
         errors = [error for key, error in before.items() if key[0] == engine]
         if errors:
-            worst[engine, quantity] = max(errors)
+            worst[max(keys, key=after.__getitem__)] = max(errors)
     return worst
 
 
@@ -228,39 +213,25 @@ def _is_same_value(
     theirs: Value | None,
     length: float,
 ) -> bool:
-    if (
-        isinstance(ours, str)
-        or isinstance(theirs, str)
-        or ours is None
-        or theirs is None
-        or ours == theirs
-    ):
-        return ours == theirs
-    first = np.atleast_1d(ours)
-    second = np.atleast_1d(theirs)
-    if first.shape != second.shape:
+    numbers = (float, tuple)
+    if ours == theirs:
+        return True
+    if not (isinstance(ours, numbers) and isinstance(theirs, numbers)):
         return False
+    if np.shape(ours) != np.shape(theirs):
+        return False
+    both = np.array([ours, theirs])
+    apart = both[0] - both[1]
     if key.endswith("angle"):
-        return bool(
-            np.all(
-                np.abs(np.remainder(first - second + np.pi, math.tau) - np.pi)
-                <= SAME_NUMBER
-            )
-        )
-    placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
-    if placed:
+        return bool(np.all(np.abs(wrap_difference(apart)) <= SAME_NUMBER))
+    floor = 0.0
+    if any(part in key for part in ("centre", "plane", ".point", ".path")):
         floor = length
     elif key.startswith(("gravity", "loads")):
         floor = 1.0
-    else:
-        floor = 0.0
     same = _SAME_SOFTNESS if key == "closure.softness" else SAME_NUMBER
-    return bool(
-        np.all(
-            np.abs(first - second)
-            <= same * max(np.abs(first).max(), np.abs(second).max(), floor)
-        )
-    )
+    limit = same * max(np.abs(both).max(), floor)
+    return bool(np.all(np.abs(apart) <= limit))
 
 
 def _remark(
@@ -275,12 +246,9 @@ def _remark(
         remark = remark.format(**_describe_what_acts(key, ours, theirs))
     if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
         power = math.log10(abs(theirs)) - math.log10(abs(ours))
-        if (
-            not key.startswith("option")
-            and round(power)
-            and abs(power - round(power)) <= _TENFOLD
-        ):
-            return f"10^{round(power)} times: units? {remark}"
+        tens = round(power)
+        if tens and abs(power - tens) <= _TENFOLD and not key.startswith("option"):
+            return f"10^{tens} times: units? {remark}"
     return str(remark)
 
 
@@ -303,6 +271,4 @@ def write_value(value: Value | None) -> str:
     """Write numbers with the digits that set them apart, or the word itself."""
     if value is None or isinstance(value, str):
         return value or "none"
-    return " ".join(
-        f"{number:.12g}" for number in (value if isinstance(value, tuple) else (value,))
-    )
+    return " ".join(f"{number:.12g}" for number in np.atleast_1d(value).tolist())

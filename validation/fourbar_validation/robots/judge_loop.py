@@ -98,17 +98,11 @@ class JudgedError:
         A row without an error says why.
         """
         row = self.row
-        if not math.isnan(row.error):
-            verdict = row.verdict
-        else:
-            verdict = f"{row.verdict}: {row.reason}"
-        return (
-            row.quantity,
-            write_error(row.error),
-            write_error(self.generated),
-            write_error(row.allowed),
-            verdict,
-        )
+        verdict = row.verdict
+        if math.isnan(row.error):
+            verdict += f": {row.reason}"
+        errors = map(write_error, (row.error, self.generated, row.allowed))
+        return row.quantity, *errors, verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,15 +129,14 @@ class LoopJudgement:
             }
             if not errors or any(math.isnan(error) for error in errors.values()):
                 continue
-            driving = {
-                name: errors.pop(name) for name in [*errors] if name not in PIN_FORCES
-            }
+            pins = [name for name in errors if name in PIN_FORCES]
             parts = [
                 f"{name} is off by {write_error(error)}"
-                for name, error in driving.items()
+                for name, error in errors.items()
+                if name not in pins
             ]
-            if errors:
-                worst = max(errors, key=lambda name: errors[name])
+            if pins:
+                worst = max(pins, key=errors.__getitem__)
                 parts.append(
                     f"the worst pin force, {worst}, by {write_error(errors[worst])}"
                 )
@@ -195,8 +188,8 @@ def judge_file(
         theirs = examined(_EXAMINE, scene, file, held)
         plain = MeasureOptions(PoseOptions())
         if options.span is not None:
-            angles = theirs.measured.command(theirs.measured.states).angle
-            plain = replace(plain, span=(float(angles.min()), float(angles.max())))
+            angles = theirs.measured.command(theirs.measured.states).angle.tolist()
+            plain = replace(plain, span=(min(angles), max(angles)))
         generated = examined(_EXAMINE, scene, None, plain)
         ours = {
             (row.engine, row.quantity): row.error
@@ -330,9 +323,8 @@ def _judge_vanishing(
 
 def list_answers(measured: LoopMeasurement) -> list[Answer]:
     """Return the answers at single states and through time, in the scene's axes."""
-    answers = [
-        _make_answer(measured, measured.states, FILE_AT_ONE_STATE, "as compiled")
-    ]
+    states = measured.states
+    answers = [_make_answer(measured, states, FILE_AT_ONE_STATE, "as compiled")]
     settings = measured.settings
     setting = f"{settings.integrator} {settings.timestep:g} s"
     through = measured.through_time
@@ -349,7 +341,6 @@ def _make_answer(
 ) -> Answer:
     rows = inside.rows
     at = measured.command(inside)
-    count = len(at.angle)
     quantities = measured.collect(inside, "soft")
     for name in BarMotion._fields:
         if name.endswith(f"_{at.bar}"):
@@ -361,4 +352,4 @@ def _make_answer(
     for name, values in quantities.items():
         missing = np.full((len(inside.open), *values.shape[1:]), np.nan)
         quantities[name] = np.concatenate([values, missing])
-    return Answer(engine, setting, at, np.arange(count) < len(rows), quantities)
+    return Answer(engine, setting, at, np.arange(len(at.angle)) < len(rows), quantities)

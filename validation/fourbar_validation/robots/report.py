@@ -263,9 +263,9 @@ def _describe_loop(
 
 def _write_left_out(left_out: float, *, lengths_are_read: bool) -> str:
     """Write how far rigid pins differ from the formulas, and why."""
-    size = f"less than {SCENE_ROUND_OFF:g}"
-    if left_out > SCENE_ROUND_OFF:
-        size = f"{left_out:.1e}"
+    size = f"{left_out:.1e}"
+    if left_out <= SCENE_ROUND_OFF:
+        size = f"less than {SCENE_ROUND_OFF:g}"
     reasons = "what the scene leaves out"
     if lengths_are_read:
         reasons += " and the lengths that it reads as equal"
@@ -279,19 +279,15 @@ def _write_left_out(left_out: float, *, lengths_are_read: bool) -> str:
 
 def _write_held(loop: LoopMeasurement) -> str:
     """Write what holds the other joints, what keeps the speed, and what is off."""
+    text = "no other degree of freedom is held"
+    keeps = "; through time (once the loop has settled) armature keeps the speed of"
+    through = f"{keeps} {loop.joint}"
     if loop.held:
         are = "degree of freedom is" if loop.held == 1 else "degrees of freedom are"
         text = f"{loop.held} other {are} held: at single states by generalized forces"
-    else:
-        text = "no other degree of freedom is held"
+        through = ", through time (once the loop has settled) by armature"
     if loop.influence is not None:
-        if loop.held:
-            text += ", through time (once the loop has settled) by armature"
-        else:
-            text += (
-                "; through time (once the loop has settled) armature keeps the speed of"
-                f" {loop.joint}"
-            )
+        text += through
         text += (
             f", a tenth of which changes the errors by {loop.influence.worst:.1g} of"
             f" the largest, {loop.influence.median:.1g} in the median"
@@ -302,17 +298,14 @@ def _write_held(loop: LoopMeasurement) -> str:
 
 
 def _describe_worst_near_limits(
-    loop: LoopMeasurement,
-    errors: Sequence[InsideError],
+    loop: LoopMeasurement, errors: Sequence[InsideError]
 ) -> Iterator[ReportBlock]:
     """Say that errors are worst near a limit position or a change point."""
-    joints = {error.joint: error.angle for error in errors}
-    for joint, angle in joints.items():
-        near = _describe_limit(loop, angle)
-        if near:
+    for error in errors:
+        if near := _describe_limit(loop, error.angle):
             yield (
-                f"{write_degrees(joint)} deg is {near}: the median tells of the rest of"
-                " the motion"
+                f"{write_degrees(error.joint)} deg is {near}: the median tells of the"
+                " rest of the motion"
             )
             return
 
