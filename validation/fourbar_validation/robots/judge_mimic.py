@@ -5,6 +5,7 @@ A joint equality's polynomial is held against the four-bar that it stands for.
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -122,7 +123,7 @@ def measure_mimic(
         equality: JointEquality = examined(
             READ, file, joint, scene, theta.get("theta_2")
         )
-    equality, stated = _state_angles(equality, theta)
+    equality = _state_angles(equality, theta)
     positions = _place_leader(scene, equality)
     low = float(positions[0])
     high = float(positions[-1])
@@ -137,8 +138,10 @@ def measure_mimic(
         middle = 0.5 * (low + high)
         rest = middle + math.remainder(equality.theta_2 - middle, math.tau)
         x = equality.side * (theta_2 - rest)
-        if not stated:
-            zeros += _find_in_loop(scene, rest, branch, equality)
+        if theta.keys() <= {"theta_2"}:
+            with suppress(InputError):  # the loop is open there
+                in_loop, _ = _follow(scene, np.array([rest]), branch, equality)
+                zeros += in_loop.tolist()
         drawn = equality.follower_zero
         if drawn is not None and not any(is_same_angle(one, drawn) for one in zeros):
             zeros.append(drawn)
@@ -212,17 +215,16 @@ def _place_leader(scene: Scene, equality: JointEquality) -> Array:
 
 
 def _state_angles(
-    equality: JointEquality,
-    angles: Mapping[str, float],
-) -> tuple[JointEquality, bool]:
-    """Return an equality with its follower where angles state it, and whether they do.
+    equality: JointEquality, angles: Mapping[str, float]
+) -> JointEquality:
+    """Return an equality with its follower where angles state it, if they do.
 
     Raises
     ------
     InputError : an angle of a bar that the equality does not turn, or only one of two
         that tell where the follower is.
     """
-    of_follower = [f"theta_{bar}" for bar in sorted(equality.bars) if bar > 2]
+    of_follower = (f"theta_{bar}" for bar in sorted(equality.bars) if bar > 2)
     allowed = ["theta_2", *of_follower]
     theta = {1: 0.0}
     if equality.theta_2 is not None:
@@ -236,32 +238,18 @@ def _state_angles(
                 " the rest pose of the file",
             )
         theta[int(name[-1])] = angle
-    if not any(name in angles for name in of_follower):
-        return equality, False
+    if angles.keys() <= {"theta_2"}:
+        return equality
     for name in allowed:
         if int(name[-1]) not in theta:
             raise InputError(f"--pose {name}", None, "is needed beside the other angle")
     turned, bearer = (theta[bar] for bar in equality.bars)
-    return replace(equality, follower_zero=turned - bearer), True
+    return replace(equality, follower_zero=turned - bearer)
 
 
 def _drop_turns(angles: Array) -> Array:
     """Return angles without the whole turns of their mean."""
     return np.asarray(angles - math.tau * np.round(angles.mean() / math.tau))
-
-
-def _find_in_loop(
-    scene: Scene,
-    theta_2: float,
-    branch: int,
-    equality: JointEquality,
-) -> list[float]:
-    """Return the angle of a bar against another, rad; none where the loop is open."""
-    try:
-        angle, _ = _follow(scene, np.array([theta_2]), branch, equality)
-    except InputError:
-        return []
-    return [float(angle[0])]
 
 
 def _follow(
@@ -350,22 +338,10 @@ def fit_minimax(
     middle = 0.5 * float(y.max() + y.min())
     wanted = (y - middle) / size
     ones = np.ones((len(x), 1))
-    above = np.block(
-        [
-            [basis, -ones],
-            [-basis, -ones],
-        ]
-    )
-    bounds = np.concatenate([wanted, -wanted])
-    cost = np.zeros(degree + 2)
-    cost[-1] = 1.0
-    best = linprog(
-        cost,
-        A_ub=above,
-        b_ub=bounds,
-        bounds=(None, None),
-        method="highs",
-    )
+    above = np.block([[basis, -ones], [-basis, -ones]])
+    limits = np.concatenate([wanted, -wanted])
+    cost = np.eye(degree + 2)[-1]
+    best = linprog(cost, A_ub=above, b_ub=limits, bounds=(None, None))
     fitted = np.polynomial.Chebyshev(size * best.x[:-1], domain=(low, high))
     return _list_powers(fitted.convert(kind=np.polynomial.Polynomial) + middle)
 
@@ -397,16 +373,12 @@ def show_mimic(report: _MimicReport) -> None:
             " theta_2^2 + ..., in rad"
         )
     click.echo(ROW.format(*FIT_HEADINGS))
-    for degree, *errors in zip(
-        POLYNOMIAL_DEGREES,
-        report.squares,
-        report.fitted,
-        strict=True,
-    ):
+    fits = zip(POLYNOMIAL_DEGREES, report.squares, report.fitted, strict=True)
+    for degree, *errors in fits:
         for fit, error in zip(_FITS, errors, strict=True):
-            polycoef = _write_coefficients(error.coefficients)
             ratio = f"{error.ratio:.4g}"
             click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio))
+            polycoef = _write_coefficients(error.coefficients)
             click.echo(f"{'':8}{label} {polycoef}")
 
 

@@ -13,12 +13,11 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.quantities import COUPLE, OK, STATUS_NAMES, UNITS, Array
+from fourbar.quantities import OK, STATUS_NAMES, UNITS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
     FORCE_QUANTITIES,
     InsideAnswer,
@@ -78,11 +77,10 @@ class InsideError:
 
     def cells(self) -> tuple[str, ...]:
         """Return method, quantity, error, relative size, place and median, as text."""
-        unit = UNITS[self.quantity]
         return (
             self.method,
             self.quantity,
-            f"{self.error:.3g} {unit}",
+            f"{self.error:.3g} {UNITS[self.quantity]}",
             write_percent(self.part),
             f"{write_degrees(self.joint)} deg",
             write_percent(self.median),
@@ -154,19 +152,19 @@ def _compare(
     commanded, formulas = _solve_formulas(loop, answer)
     judged = ~mark_reversing(loop.scene, formulas, _SLIP)
     errors = answer.errors()
+    rigid = loop.collect(answer, "rigid").items()
     if method == RIGID:
-        errors = _subtract_formulas(answer, formulas, loop)
         judged &= formulas.status_code == OK
-    for name in FORCE_QUANTITIES:
-        quantity = name_driving(loop.scene) if name == COUPLE.value else name
-        sizes = np.where(np.isfinite(errors[name]), errors[name], math.inf)
+    for name, (quantity, force) in zip(FORCE_QUANTITIES, rigid, strict=True):
+        sizes = errors[name]
+        if method == RIGID:
+            sizes = measure_sizes(force - np.asarray(getattr(formulas, quantity)))
+        sizes = np.where(np.isfinite(sizes), sizes, math.inf)
         worst = int(np.argmax(np.where(judged, sizes, -1.0)))
-        error = float(sizes[worst])
         scale = loop.scales[name]
-        if answer.lost or not judged.any():
-            error = math.inf
-            median = math.inf
-        else:
+        error = median = math.inf
+        if judged.any() and not answer.lost:
+            error = float(sizes[worst])
             median = divide(float(np.median(sizes[judged])), scale)
         yield InsideError(
             method,
@@ -187,22 +185,6 @@ def _solve_formulas(
     """Return the command of an answer's states, and what the formulas have there."""
     commanded = loop.command(replace(answer, open=[]))
     return commanded, solve(loop.scene, "force", at=commanded)
-
-
-def _subtract_formulas(
-    answer: InsideAnswer,
-    formulas: Solution,
-    loop: LoopMeasurement,
-) -> dict[str, Array]:
-    """Return how far torque and pin forces of rigid pins are from the formulas, (n,).
-
-    Differences are sizes at each state, N m and N.
-    """
-    rigid = loop.collect(answer, "rigid").items()
-    return {
-        name: measure_sizes(force - np.asarray(getattr(formulas, quantity)))
-        for name, (quantity, force) in zip(FORCE_QUANTITIES, rigid, strict=True)
-    }
 
 
 def list_without_value(loop: LoopMeasurement) -> dict[str, list[float]]:
