@@ -9,6 +9,9 @@ import numpy as np
 
 from fourbar.quantities import Array
 
+_CLOSING = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
+_ON_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
 
 def find_parent(model: mujoco.MjModel, body: int) -> int:
     """Return the body that carries another."""
@@ -67,11 +70,17 @@ def list_joints_between(
     return joints
 
 
+def list_closing(model: mujoco.MjModel) -> list[int]:
+    """List the connects and welds of a model, also those that are switched off."""
+    closing: list[int] = np.flatnonzero(np.isin(model.eq_type, _CLOSING)).tolist()
+    return closing
+
+
 def find_tied_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
     """Return the two bodies of a connect or a weld, or what else is tied."""
     objects = (int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]))
     if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE:
-        first, second = (int(model.site_bodyid[site]) for site in objects)
+        first, second = model.site_bodyid[[*objects]].tolist()
         return first, second
     return objects
 
@@ -106,8 +115,8 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
     A tendon over two joints that is kept at a length, c1 q1 + c2 q2 = a0, lets each of
     them follow the other. Of two tendons over a joint each the first one follows.
     """
-    kind = mujoco.mjtEq(int(model.eq_type[equality]))
-    tied = (int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]))
+    kind = model.eq_type[equality]
+    tied = find_tied_bodies(model, equality)
     powers = model.eq_data[equality, :5].tolist()
     if kind == mujoco.mjtEq.mjEQ_JOINT:
         ends, leaders = ({joint: 1.0} if joint >= 0 else {} for joint in tied)
@@ -180,9 +189,9 @@ def list_joints_of_tendon(model: mujoco.MjModel, tendon: int) -> set[int]:
 
 def list_tied_joints(model: mujoco.MjModel, equality: int) -> set[int]:
     """List the joints on which the residual of an equality depends."""
-    kind = mujoco.mjtEq(int(model.eq_type[equality]))
+    kind = model.eq_type[equality]
     objects = find_tied_bodies(model, equality)
-    if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+    if kind in _CLOSING:
         return {*list_joints_between(model, *objects)}
     tied = {one for one in objects if one >= 0}
     if kind == mujoco.mjtEq.mjEQ_JOINT:
@@ -213,25 +222,22 @@ def list_dofs(model: mujoco.MjModel, joint: int) -> list[int]:
 
 def list_motors(model: mujoco.MjModel) -> list[tuple[int, int]]:
     """List (joint, actuator) of what takes a control and acts on joints."""
-    transmission = mujoco.mjtTrn
     motors = []
     for number in range(model.nu):
-        kind = transmission(int(model.actuator_trntype[number]))
+        kind = model.actuator_trntype[number]
         target = int(model.actuator_trnid[number, 0])
         if not takes_control(model, number):
             continue
-        if kind in (transmission.mjTRN_JOINT, transmission.mjTRN_JOINTINPARENT):
+        if kind in _ON_JOINTS:
             motors.append((target, number))
-        elif kind == transmission.mjTRN_TENDON:
+        elif kind == mujoco.mjtTrn.mjTRN_TENDON:
             motors += [(joint, number) for joint in list_tendon_joints(model, target)]
     return motors
 
 
 def list_actuators(model: mujoco.MjModel, joint: int) -> list[int]:
     """List the actuators on a joint."""
-    kinds = mujoco.mjtTrn
-    on_joints = (kinds.mjTRN_JOINT, kinds.mjTRN_JOINTINPARENT)
-    of_joints = np.isin(model.actuator_trntype, [int(kind) for kind in on_joints])
+    of_joints = np.isin(model.actuator_trntype, _ON_JOINTS)
     on_this = model.actuator_trnid[:, 0] == joint
     actuators: list[int] = np.flatnonzero(of_joints & on_this).tolist()
     return actuators
@@ -242,10 +248,15 @@ def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
     return bool(model.actuator_gainprm[actuator].any())
 
 
+def find_bits(*flags: str) -> int:
+    """Return the bits that switch features off, by the names of <flag>."""
+    bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{one.upper()}") for one in flags)
+    return sum(map(int, bits))
+
+
 def is_enabled(model: mujoco.MjModel, *flags: str) -> bool:
     """Tell whether no flag switches a feature off."""
-    bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{one.upper()}") for one in flags)
-    return not any(model.opt.disableflags & int(bit) for bit in bits)
+    return not model.opt.disableflags & find_bits(*flags)
 
 
 def list_lifted_masses(model: mujoco.MjModel) -> Array:

@@ -43,9 +43,7 @@ class LoopMotion(NamedTuple):
 
     def states(self) -> Iterator[tuple[float, float, float]]:
         """Iterate over angle, speed and acceleration of each position."""
-        for state in zip(*np.broadcast_arrays(*self), strict=True):
-            angle, speed, acceleration = map(float, state)
-            yield angle, speed, acceleration
+        yield from np.column_stack(np.broadcast_arrays(*self)).tolist()
 
     def thin_out(self, most: int) -> "LoopMotion":
         """Return the motion with at most so many positions, spread evenly.
@@ -54,12 +52,11 @@ class LoopMotion(NamedTuple):
         """
         count = min(len(self.angle), most)
         keep = np.linspace(0, len(self.angle) - 1, count).round().astype(int)
-
-        def pick(part: tuple[float, ...]) -> tuple[float, ...]:
-            return tuple(np.array(part)[keep].tolist())
-
-        rates = (pick(part) if isinstance(part, tuple) else part for part in self[1:])
-        return LoopMotion(pick(self.angle), *rates)
+        parts: list[Any] = [
+            tuple(np.array(part)[keep].tolist()) if isinstance(part, tuple) else part
+            for part in self
+        ]
+        return LoopMotion(*parts)
 
 
 @dataclass(frozen=True, slots=True)

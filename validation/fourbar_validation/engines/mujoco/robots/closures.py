@@ -24,6 +24,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_roots,
     find_tied_bodies,
     list_actuators,
+    list_closing,
     list_followers,
     list_joints,
     list_motors,
@@ -69,7 +70,6 @@ EQUALITY_KINDS = {
     int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
     for name in ("connect", "weld", "joint", "tendon")
 }
-_CLOSING = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 _TIED = {"connect": "body", "weld": "body"}
 """What an equality ties, where its kind does not say it."""
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
@@ -259,9 +259,7 @@ class _Finder:
         A closure of two hinges that lies on the axis of one leaves this one free. The
         other hinge stands.
         """
-        closing = np.isin(model.eq_type, [*_CLOSING])
-        numbers: list[int] = np.flatnonzero(closing).tolist()
-        for number in numbers:
+        for number in list_closing(model):
             chain = _Chain(self, number)
             away = self._list_away(chain)
             is_of_two = chain.is_pin and len(chain.joints) == 2
@@ -269,7 +267,7 @@ class _Finder:
                 (self.standing[number],) = away
                 self.held.update(away)
         self.root = find_roots(model, self.held)
-        self.chains = {number: _Chain(self, number) for number in numbers}
+        self.chains = {one: _Chain(self, one) for one in list_closing(model)}
         self.normals = find_normals(model, self.data, self.held)
         self.before = mujoco.MjData(model)
         self.before.qpos[:] = posed.stated

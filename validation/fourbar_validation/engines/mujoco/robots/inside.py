@@ -40,6 +40,7 @@ from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
 from fourbar_validation.engines.mujoco.couple import find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_bits,
     find_tied_bodies,
     is_enabled,
     list_actuators,
@@ -107,8 +108,7 @@ HEAVY = 1e4
 the robot. It lets the joints move by about its inverse; beyond 1e5 MuJoCo's solver
 loses the light bars beside it: at 1e6 the gap was three times too large.
 """
-LIMITS_OFF = int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
-CONTACTS_OFF = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+LIMITS_OFF = find_bits("limit")
 SETTLING_TIME = 5.0
 """Time constants after which the loop has yielded but for 1 %, at most half of the
 motion.
@@ -229,7 +229,7 @@ class LoopInside:
             # a sweep ends at the limits of a joint, to round-off on either side
             model.jnt_margin[:] -= _TOUCHED
         else:
-            model.opt.disableflags |= LIMITS_OFF | CONTACTS_OFF
+            model.opt.disableflags |= LIMITS_OFF | find_bits("contact")
             off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
         model.actuator_gainprm[off] = 0.0
         model.actuator_biasprm[off] = 0.0

@@ -486,15 +486,15 @@ class SceneOfLoop:
         """
         _, _, theta_3, theta_4 = self.loop.angles
         angles = (linkage.ground_angle, theta_2, theta_3, theta_4)
-        apart = {}
-        for branch in (OPEN, CROSSED):
-            scene = Scene(linkage, Motion(theta_2, branch=branch))
-            apart[branch] = miss_output(scene, angles)
-        if not abs(apart[OPEN] - apart[CROSSED]) > FLAT:
+        missed, missed_crossed = (
+            miss_output(Scene(linkage, Motion(theta_2, branch=branch)), angles)
+            for branch in (OPEN, CROSSED)
+        )
+        if not abs(missed - missed_crossed) > FLAT:
             text = "coupler and output are in line in this pose: open is taken"
             self._remark(f"{text}; --pose states another")
             return OPEN
-        branch = OPEN if apart[OPEN] < apart[CROSSED] else CROSSED
+        branch = OPEN if missed < missed_crossed else CROSSED
         if self.loop.is_flat(2):
             text = (
                 "coupler and output are in line in the pose before closing, which does"
@@ -517,12 +517,12 @@ class SceneOfLoop:
         model = self.model
         loop = self.loop
         across = float(self.gravity @ self.seen.normal)
-        weights = {bar: abs(lump.mass * across) for bar, lump in lumps.items()}
         if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
-            texts = ", ".join(
-                f"{BAR_NAMES[bar]} {weight:.4g} N" for bar, weight in weights.items()
+            weights = (
+                f"{BAR_NAMES[bar]} {abs(lump.mass * across):.4g} N"
+                for bar, lump in lumps.items()
             )
-            self._leave_out(f"weights across the plane: {texts}")
+            self._leave_out(f"weights across the plane: {', '.join(weights)}")
         if loop.misaligned > _SKEW:
             angle = math.degrees(loop.misaligned)
             self._leave_out(f"the {angle:.2g} deg between its axes")
@@ -569,9 +569,8 @@ class SceneOfLoop:
                 name = model.tendon(number).name or str(number)
                 self._leave_out(f"the tendon {name} ({', '.join(acts)})")
         joints = {*self.loop.hinges.values()} - {self.loop.joint}
-        for number in range(model.nu):
-            kind = mujoco.mjtTrn(int(model.actuator_trntype[number]))
-            target = int(model.actuator_trnid[number, 0])
+        for number, kind in enumerate(model.actuator_trntype):
+            target = model.actuator_trnid[number, 0]
             on_joint = kind == mujoco.mjtTrn.mjTRN_JOINT and target in joints
             on_site = kind == mujoco.mjtTrn.mjTRN_SITE
             on_tendon = kind == mujoco.mjtTrn.mjTRN_TENDON

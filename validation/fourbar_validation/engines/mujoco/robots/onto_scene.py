@@ -23,6 +23,7 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
+    list_closing,
     name_body,
     name_joint,
 )
@@ -159,8 +160,7 @@ def _list_variants(
     file: RobotFile, model: mujoco.MjModel, names: Mapping[str, str]
 ) -> Iterator[RobotFile]:
     """Yield the file, or one for each pair of sites that may close a loop in it."""
-    closing = {int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)}
-    if closing & {*model.eq_type.tolist()}:
+    if list_closing(model):
         yield file
         return
     sites = [model.site(number).name for number in range(model.nsite)]

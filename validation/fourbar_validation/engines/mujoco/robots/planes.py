@@ -13,8 +13,10 @@ import numpy as np
 
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_bits,
     find_ends,
     find_tied_bodies,
+    list_closing,
     list_joints_between,
 )
 from fourbar_validation.engines.mujoco.robots.forces import read_equality_force
@@ -23,7 +25,6 @@ PARALLEL = math.radians(0.5)
 """Largest angle between the axes of a planar linkage, rad. Beyond it forces across the
 plane reach a hundredth.
 """
-_CLOSURES = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
 
 
 def find_mean_axis(data: mujoco.MjData, hinges: Iterable[int]) -> Array:
@@ -44,9 +45,7 @@ def find_normals(
     `held`: joints that stay where they are.
     """
     normals = {}
-    for number in range(model.neq):
-        if mujoco.mjtEq(int(model.eq_type[number])) not in _CLOSURES:
-            continue
+    for number in list_closing(model):
         ends = find_tied_bodies(model, number)
         joints = [j for j in list_joints_between(model, *ends) if j not in held]
         hinges = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE
@@ -106,9 +105,7 @@ def copy_for_closures(
     """
     alone = copy(model)
     alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ISLAND"):
-        flag = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
-        alone.opt.disableflags |= flag
+    alone.opt.disableflags |= find_bits("contact", "limit", "frictionloss", "island")
     alone.eq_active0[:] = 0
     alone.eq_active0[[*closures]] = 1
     return alone
