@@ -114,7 +114,7 @@ class _RobotReading:
     path: Path
     assets: Path | None
     size: int = 0
-    included: list[Path] = field(default_factory=list)
+    included: int = 0
     contents: dict[str, bytes] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -153,14 +153,8 @@ class _RobotReading:
         for element in root.iter():
             self._screen(element)
         text = ET.tostring(root, encoding="unicode")
-        return RobotFile(
-            self.path,
-            text,
-            self.kind,
-            self.contents,
-            self.missing,
-            tuple(self.notes),
-        )
+        notes = tuple(self.notes)
+        return RobotFile(self.path, text, self.kind, self.contents, self.missing, notes)
 
     def _convert_sdf(self, root: ET.Element) -> ET.Element:
         """Return an SDF as MJCF; its includes lie in its folder or beside it."""
@@ -196,13 +190,9 @@ class _RobotReading:
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
             )
         closing = [one.get("name", "") for one in root.findall("gazebo/joint")]
-        for child in list(root):
-            if child.tag not in ("link", "joint"):
-                root.remove(child)
+        root[:] = [child for child in root if child.tag in ("link", "joint")]
         for link in root.iter("link"):
-            for child in list(link):
-                if child.tag != "inertial":
-                    link.remove(child)
+            link[:] = link.findall("inertial")
         bounds = {"boundmass": "1e-6", "boundinertia": "1e-9", "balanceinertia": "true"}
         ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", bounds)
         if left_out:
@@ -284,8 +274,8 @@ class _RobotReading:
 
     def _include(self, path: Path, name: str) -> ET.Element:
         """Parse an included file."""
-        self.included.append(path)
-        if len(self.included) > MOST_INCLUDES:
+        self.included += 1
+        if self.included > MOST_INCLUDES:
             raise self._refuse(name, f"more than {MOST_INCLUDES} files are included")
         return self._parse(path)
 
@@ -316,19 +306,18 @@ class _RobotReading:
         beside = home.parent
         if beside != beside.parent and resolved.is_relative_to(beside):
             return resolved.parent != beside
-        return self.assets is not None and resolved.is_relative_to(
-            self.assets.resolve()
-        )
+        assets = self.assets
+        return assets is not None and resolved.is_relative_to(assets.resolve())
 
     def _take_meshes(self, root: ET.Element) -> None:
         """Read each mesh, and give its file a plain name in the text."""
         folder = ""
-        strip = False
+        strip = ""
         for compiler in root.iter("compiler"):
             for name in FOLDER_ATTRIBUTES[:2]:
                 folder = compiler.attrib.pop(name, folder)
             compiler.attrib.pop("texturedir", None)
-            strip = compiler.attrib.pop("strippath", str(strip)).lower() == "true"
+            strip = compiler.attrib.pop("strippath", strip)
         total = 0
         for number, mesh in enumerate(root.iter("mesh")):
             file = mesh.attrib.pop("file", None)
@@ -337,13 +326,12 @@ class _RobotReading:
             if file is None:
                 continue
             mesh.attrib.pop("content_type", None)
-            stem = Path(file).stem
-            mesh.set("name", mesh.get("name", stem))
-            name = Path(file).name if strip else file
+            mesh.set("name", mesh.get("name", Path(file).stem))
+            name = Path(file).name if strip.lower() == "true" else file
+            plain = f"mesh_{number}"
             suffix = Path(file).suffix.lower()
-            plain = (
-                f"mesh_{number}{suffix if re.fullmatch('[.][a-z]+', suffix) else ''}"
-            )
+            if re.fullmatch("[.][a-z]+", suffix):
+                plain += suffix
             mesh.set("file", plain)
             path = self._find(name, (self.path.parent / folder, self.path.parent))
             if path is None:

@@ -327,19 +327,13 @@ def _describe_limit(loop: LoopMeasurement, angle: float) -> str:
         places += [(limit, f"a limit position, {open_beyond}") for limit in limits]
     places = [(at, _say_growth(scene, angle, at, kind)) for at, kind in places]
     mu = transmission_extremes(linkage)
-    smallest = (
+    for at, smallest in (
         (mu.theta_2_least, mu.least),
         (mu.theta_2_greatest, math.pi - mu.greatest),
-    )
-    places += [
-        (
-            at,
-            f"a transmission angle of {math.degrees(smallest_angle):.2g} deg, whose"
-            " sine divides the forces",
-        )
-        for at, smallest_angle in smallest
-        if bar == 2 and 0.0 < smallest_angle < NEAR_A_LIMIT
-    ]
+    ):
+        if bar == 2 and 0.0 < smallest < NEAR_A_LIMIT:
+            kind = f"a transmission angle of {math.degrees(smallest):.2g} deg, whose"
+            places.append((at, f"{kind} sine divides the forces"))
     near = [(abs(math.remainder(angle - at, math.tau)), kind) for at, kind in places]
     distance, kind = min(near, default=(math.inf, ""))
     if distance > NEAR_A_LIMIT:
@@ -507,13 +501,12 @@ def write_markdown(title: str, blocks: Sequence[ReportBlock]) -> str:
     parts = [f"# {escape_cell(title)}"]
     for block in blocks:
         if isinstance(block, TextTable):
-            rule = ("---",) * len(block.headings)
-            rows = (block.headings, rule, *block.rows)
-            written = (
-                " | ".join(cell if row is rule else escape_cell(cell) for cell in row)
-                for row in rows
+            headings, *rows = (
+                f"| {' | '.join(map(escape_cell, row))} |"
+                for row in (block.headings, *block.rows)
             )
-            parts.append("\n".join(f"| {row} |" for row in written))
+            rule = f"|{' --- |' * len(block.headings)}"
+            parts.append("\n".join([headings, rule, *rows]))
         elif isinstance(block, Typed):
             parts.append(f"```xml\n{escape_controls(block.text)}\n```")
         else:
@@ -535,10 +528,11 @@ def _list_states(
             (MEASURED_THROUGH_TIME, loop.through_time),
         ):
             for row in () if answer is None else answer.rows:
+                both = (row.soft, row.rigid)
                 numbers = [math.degrees(row.joint), row.speed, row.acceleration]
-                numbers += [row.soft.torque, row.rigid.torque]
-                for pins in (row.soft, row.rigid):
-                    numbers += [math.hypot(*pins.forces[name]) for name in PIN_FORCES]
+                numbers += [one.torque for one in both]
+                for one in both:
+                    numbers += [math.hypot(*one.forces[name]) for name in PIN_FORCES]
                 numbers.append(1e3 * row.gap)
                 yield escape_controls(loop.name), method, *map(float, numbers)
 
