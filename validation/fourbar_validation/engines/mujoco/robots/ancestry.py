@@ -204,7 +204,7 @@ def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:
     name = model.actuator(actuator).name
     if name:
         return f"the actuator {name}"
-    kind = mujoco.mjtTrn(int(model.actuator_trntype[actuator]))
+    kind = model.actuator_trntype[actuator]
     target = int(model.actuator_trnid[actuator, 0])
     where = f"number {actuator} of the file"
     if kind == mujoco.mjtTrn.mjTRN_JOINT:

@@ -183,7 +183,7 @@ def describe_equality(model: mujoco.MjModel, number: int) -> str:
     """Return an equality's name, or the names of what it ties."""
     if model.equality(number).name:
         return str(model.equality(number).name)
-    kind = EQUALITY_KINDS.get(int(model.eq_type[number]))
+    kind = EQUALITY_KINDS.get(model.eq_type[number])
     if kind is None:
         return f"equality {number}"
     tied = [one for one in find_tied_bodies(model, number) if one >= 0]
@@ -305,7 +305,7 @@ class _Finder:
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""
         model = self.model
-        kind = EQUALITY_KINDS.get(int(model.eq_type[number]), "flex")
+        kind = EQUALITY_KINDS.get(model.eq_type[number], "flex")
         closure = RobotClosure(
             self.names[number],
             kind,
@@ -588,7 +588,7 @@ class _Finder:
             across = np.cross(*self.data.xaxis[[joint, chain.hinges[0]]])
             if float(np.linalg.norm(across)) > math.sin(PARALLEL):
                 continue
-            parent = self.root[find_parent(model, int(model.jnt_bodyid[joint]))]
+            parent = self.root[find_parent(model, model.jnt_bodyid[joint])]
             pair = frozenset((self._find_root(joint), parent))
             pins[pair] = self.data.xanchor[joint], ""
         for one in (*coupled, chain):

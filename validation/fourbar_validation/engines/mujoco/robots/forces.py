@@ -44,7 +44,7 @@ class BearerForces:
         loads = []
         for load in self.loads:
             site = model.actuator_trnid[load, 0]
-            if body in climb(model, int(model.site_bodyid[site])):
+            if body in climb(model, model.site_bodyid[site]):
                 loads.append(load)
         lifted = np.flatnonzero(self.lifted)
         borne = [number for number in lifted if body in climb(model, int(number))]

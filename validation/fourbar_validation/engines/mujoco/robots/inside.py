@@ -722,7 +722,7 @@ class LoopInside:
         for pin, name in FORCE_AT.items():
             _, acted_on = FORCE_BETWEEN[name]
             if pin in self.loop.hinges:
-                body = int(self.model.jnt_bodyid[self.loop.hinges[pin]])
+                body = self.model.jnt_bodyid[self.loop.hinges[pin]]
                 parts = [(body, self.bearers.read(data, body))]
             else:
                 parts = [

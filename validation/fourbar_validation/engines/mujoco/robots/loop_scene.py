@@ -577,7 +577,7 @@ class SceneOfLoop:
             pulls = on_tendon and not takes_control(model, number)
             if (
                 on_joint
-                or (on_site and int(model.site_bodyid[target]) in self.bodies)
+                or (on_site and model.site_bodyid[target] in self.bodies)
                 or (pulls and self.seen.touches_tendon(target))
             ):
                 self._leave_out(describe_actuator(model, number))

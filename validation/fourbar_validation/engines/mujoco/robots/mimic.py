@@ -123,7 +123,7 @@ class _RestPose:
         self.tie = tie
         self.scene = scene
         for joint in (tie.joint, tie.leader):
-            if int(model.jnt_type[joint]) != HINGE_JOINT:
+            if model.jnt_type[joint] != HINGE_JOINT:
                 raise InputError(
                     "--mimic",
                     name_joint(model, joint),
@@ -192,9 +192,9 @@ class _RestPose:
         """Return the bar that a follower turns, and the bar that bears it."""
         model = self.model
         roots = find_roots(model, set())
-        crank = int(model.jnt_bodyid[self.tie.leader])
+        crank = model.jnt_bodyid[self.tie.leader]
         ground = roots[find_parent(model, crank)]
-        bearer = roots[find_parent(model, int(model.jnt_bodyid[follower]))]
+        bearer = roots[find_parent(model, model.jnt_bodyid[follower])]
         if bearer == crank:
             return 3, 2
         if bearer == ground:
@@ -268,7 +268,7 @@ class _RestPose:
         of the scene tells the line, if the scene has it on the line. None if there is
         nothing, or if it lies in several directions.
         """
-        body = int(self.model.jnt_bodyid[joint])
+        body = self.model.jnt_bodyid[joint]
 
         def locate(place: Array) -> complex:
             return complex(*(self.axes @ (place - self.data.xanchor[joint])))
@@ -299,7 +299,7 @@ class _RestPose:
         ends = []
         rods = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
         for number in np.flatnonzero(model.geom_bodyid == body):
-            if mujoco.mjtGeom(int(model.geom_type[number])) in rods:
+            if model.geom_type[number] in rods:
                 axis = data.geom_xmat[number].reshape(3, 3)[:, 2]
                 reach = model.geom_size[number, 1] * axis
                 middle = data.geom_xpos[number]

@@ -86,7 +86,7 @@ def evaluate_closures(
         if len(rows) == len(normal):
             continue
         # MuJoCo states the turn of a weld in the axes of its second body or site
-        second = int(model.eq_obj2id[number])
+        second = model.eq_obj2id[number]
         by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
         axes = data.site_xmat[second] if by_sites else data.xmat[second]
         turned = axes.reshape(3, 3).T @ normal

@@ -77,7 +77,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     fixed = {*held}
     for name, text in options.joints.items():
         joint = find_joint(model, name, "--pose")
-        unit = JOINT_UNITS.get(int(model.jnt_type[joint]))
+        unit = JOINT_UNITS.get(model.jnt_type[joint])
         if unit is None:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
         stated[model.jnt_qposadr[joint]] = _read_joint_position(name, text, unit)
@@ -119,7 +119,7 @@ def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str
     moved = []
     for joint in range(model.njnt):
         amounts = change[list_dofs(model, joint)]
-        shifts = {SLIDE: 1, FREE_JOINT: 3}.get(int(model.jnt_type[joint]), 0)
+        shifts = {SLIDE: 1, FREE_JOINT: 3}.get(model.jnt_type[joint], 0)
         parts = []
         for part, factor, unit in (
             (amounts[:shifts], 1e3, "mm"),

@@ -86,7 +86,7 @@ class SeenLoop(LoopFrame):
         if not model.eq_active0[self.closure]:
             tied = (kinds == mujoco.mjtEq.mjEQ_TENDON).any()
             return "tendon" if tied else "nothing"
-        kind = EQUALITY_KINDS[int(model.eq_type[self.closure])]
+        kind = EQUALITY_KINDS[model.eq_type[self.closure]]
         by_sites = model.eq_objtype[self.closure] == mujoco.mjtObj.mjOBJ_SITE
         return f"{kind} of {'sites' if by_sites else 'body anchors'}"
 
