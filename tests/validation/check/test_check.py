@@ -550,6 +550,9 @@ IN_CRANK_ROCKER = {
     "from another zero: theta_2 +37 deg": shifted(
         lambda theta: theta + math.radians(37.0)
     ),
+    "from another zero: theta_2 -118 deg": shifted(
+        lambda theta: theta - math.radians(118.0)
+    ),
     "read as degrees": shifted(np.radians),
     "in radians where degrees": units("theta_2", factor=math.pi / 180),
     "relative to bar 2": relative_to("theta_2"),

@@ -233,7 +233,11 @@ class Calculation:
 
     def solve(self, changes: list[Change]) -> Iterator[Mistake]:
         """Yield the numbers that each change leads to."""
-        wanted = [change for change in changes if self._is_wanted(change)]
+        wanted = [
+            change
+            for change in changes
+            if any(self.wanted(change.text + words) for words in ("", *change.where))
+        ]
         if not wanted:
             return
         unknowns = np.stack([change.more for change in wanted], axis=-1)
@@ -246,10 +250,6 @@ class Calculation:
             for words, names in change.where.items():
                 shown = {name: numbers[name] for name in names if name in numbers}
                 yield Mistake(f"{change.text}{words}", shown.get)
-
-    def _is_wanted(self, change: Change) -> bool:
-        texts = [f"{change.text}{words}" for words in ("", *change.where)]
-        return any(map(self.wanted, texts))
 
     def _read(self, more: Array) -> MistakenNumbers:
         """Return forces, drive and power under unknowns that are added, (n, 13)."""

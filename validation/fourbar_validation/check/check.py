@@ -66,11 +66,6 @@ class Judgement:
         table = self.judge.table
         return replace(table, notes=(*table.notes, *self.judge.describe_held()))
 
-    @property
-    def tolerance(self) -> Allowance | None:
-        """Return the tolerance that a user stated."""
-        return self.judge.tolerance
-
     @cached_property
     def findings(self) -> list[Discrepancy]:
         """Return every number that the table states where the formulas have one."""
@@ -122,7 +117,7 @@ class Judgement:
         The power is None if a tolerance was stated, or if one of them is off by more
         than any table that is right in the digits it has.
         """
-        if self.tolerance is not None or not self.differing or self.not_assembled:
+        if self.judge.tolerance is not None or not self.differing or self.not_assembled:
             return None
         sizes = [math.hypot(*finding.ours) for finding in self.differing]
         if not all(sizes):
@@ -181,17 +176,18 @@ class Judgement:
 
     def sentence(self) -> str:
         """Write how many numbers agree, exactly and within the stated tolerance."""
+        tolerance = self.judge.tolerance
         if not self.compared:
             agreed = "Nothing was compared"
-        elif self.tolerance is None:
+        elif tolerance is None:
             agreed = f"{self.agreeing} of {self.compared} numbers agree"
         else:
-            within = f"rtol {self.tolerance.rtol:g}, atol {self.tolerance.atol:g}"
+            within = f"rtol {tolerance.rtol:g}, atol {tolerance.atol:g}"
             agreed = (
                 f"{self.agreeing} of {self.compared} numbers agree within {within};"
                 f" {self.exact} to round-off"
             )
-        if self.digits and self.tolerance is None:
+        if self.digits and tolerance is None:
             agreed += f", compared to {self.digits}"
         if self.not_judged:
             agreed += f"; no digit left to judge {self.not_judged} more by"
@@ -305,7 +301,7 @@ def write_judgement_json(judgement: Judgement) -> str:
         "agree_to_round_off": judgement.exact,
         "not_judged": judgement.not_judged,
         "blank": judgement.blank,
-        "tolerance": judgement.tolerance,
+        "tolerance": judgement.judge.tolerance,
         "found_by": table.found_by,
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
@@ -355,13 +351,6 @@ FEWEST_DIGITS = 1e-4
 """Part of each number by which a table may be off that is right, in fewer digits than
 it prints.
 """
-
-
-def _write_extent(explanation: Explanation) -> str:
-    """Write how far a mistake explains what differs."""
-    if explanation.complete:
-        return "explains everything that differs: " + ", ".join(explanation.quantities)
-    return "explains " + ", ".join(explanation.quantities)
 
 
 @click.command("check")
@@ -515,7 +504,9 @@ def show_judgement(judgement: Judgement, name: str) -> None:
         text = f"no number has a digit to compare, print more digits: {names}"
         print_sentence(abbreviate(text, LONGEST_MESSAGE))
     for explanation in judgement.explanations:
-        print_sentence(f"looks like: {explanation.text} ({_write_extent(explanation)})")
+        extent = "everything that differs: " if explanation.complete else ""
+        extent += ", ".join(explanation.quantities)
+        print_sentence(f"looks like: {explanation.text} (explains {extent})")
     power = judgement.agreed_power
     mended = judgement.explained_power
     if differing and mended is None:

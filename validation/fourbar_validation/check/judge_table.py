@@ -92,11 +92,6 @@ class Discrepancy(NamedTuple):
         return self.exact or (self.judged and self.difference <= self.permitted)
 
 
-def _is_finite(values: Array) -> Mask:
-    """Mark the rows in which every number is finite, (n,)."""
-    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-
-
 class Column:
     """One quantity of a table, row by row against the formulas."""
 
@@ -114,7 +109,8 @@ class Column:
         axes = np.flatnonzero(each.any(axis=0))
         if self.theirs.ndim == 2 and len(axes) == 1:
             self.label = f"{key}_{'xy'[axes[0]]}"
-        self.answered = _is_finite(self.ours)
+        finite = np.isfinite(self.ours.reshape(len(self.ours), -1))
+        self.answered = np.asarray(finite.all(axis=1))
         """Rows in which the formulas have a number, (n,)."""
         self.is_shared = self.quantity in (*PIN_FORCES, "guide_force")
         """True for a force that depends on how pins at rest share the friction."""

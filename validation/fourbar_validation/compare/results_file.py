@@ -55,7 +55,6 @@ class ResultsWriter:
         """Arrow tables that wait to be a row group. Rows themselves would take five
         times the memory.
         """
-        self._rows_waiting = 0
         self._files = ExitStack()
 
     def __enter__(self) -> "ResultsWriter":
@@ -85,30 +84,25 @@ class ResultsWriter:
         return self
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Add the rows that come next."""
+        """Add the rows that come next, and keep them until they fill a row group."""
+        import pyarrow as pa
+
         for row in rows:
             if self._line <= CSV_ROWS:
                 self.first_lines.setdefault(row.scene, self._line)
             self._line += 1
         if rows:
-            self._wait(rows)
+            # NaN is no number: as null no greatest error is NaN by it
+            columns = [
+                pa.array([getattr(row, name) for row in rows], kind, from_pandas=True)
+                for name, kind in zip(RESULT_COLUMNS, self._schema.types, strict=True)
+            ]
+            self._waiting.append(pa.table(columns, schema=self._schema))
         if self._line <= CSV_ROWS:
             with name_file(self.out / "results.csv"):
                 self._csv.write(write_rows(rows).partition("\n")[2])
-        if self._rows_waiting >= GROUP_ROWS:
+        if sum(map(len, self._waiting)) >= GROUP_ROWS:
             self._write_group()
-
-    def _wait(self, rows: Sequence[Row]) -> None:
-        """Keep rows until there are enough for a row group."""
-        import pyarrow as pa
-
-        # NaN is no number: as null no greatest error is NaN by it
-        columns = [
-            pa.array([getattr(row, name) for row in rows], kind, from_pandas=True)
-            for name, kind in zip(RESULT_COLUMNS, self._schema.types, strict=True)
-        ]
-        self._waiting.append(pa.table(columns, schema=self._schema))
-        self._rows_waiting += len(rows)
 
     def _write_group(self) -> None:
         import pyarrow as pa
@@ -117,7 +111,6 @@ class ResultsWriter:
         with name_file(self.out / "results.parquet"):
             self._parquet.write_table(group)
         self._waiting.clear()
-        self._rows_waiting = 0
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Put both in place, the text only where it is not too long."""
