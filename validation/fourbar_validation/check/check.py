@@ -134,9 +134,9 @@ class Judgement:
 
         It is small within the relative tolerance of the largest of its quantity.
         """
-        if self.tolerance is None:
+        if self.judge.tolerance is None:
             return None
-        rtol, atol = self.tolerance.rtol, self.tolerance.atol
+        rtol, atol = self.judge.tolerance
         largest: dict[str, float] = {}
         for one in self.findings:
             size = math.hypot(*one.ours)
