@@ -33,7 +33,7 @@ from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
-from fourbar.show.block import write_facts
+from fourbar.show.block import SceneBlock
 from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
 from fourbar.show.shown_units import COMMON, write_short
 from fourbar.show.studies import write_type
@@ -94,10 +94,9 @@ def evaluate_scene(
     shown_units = {**COMMON, **units}
     facts = None
     if settled:  # what `analyze` and `classify` print
-        facts = Facts(solution)
-        block = write_facts(facts, shown_units, pressure=pressure)
+        facts = SceneBlock(solution, shown_units, pressure)
         limits = write_type(scene.linkage, shown_units, everything=True)
-        data["summary"] = [*block, "", *limits]
+        data["summary"] = [*facts.write(), "", *limits]
         if len(solution) > 1:  # the curves are those of a sweep
             data["peaks"] = list_peaks(solution, facts)
     data["headline"] = write_headline(solution, shown_units, facts)

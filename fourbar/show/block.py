@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -102,62 +101,51 @@ BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 
 
 def write_block(
-    solution: Solution, units: Conversion = COMMON, **options: Any
-) -> list[str]:
-    """Write the summary of a solved scene line by line; of one position, everything.
-
-    The options are those of `write_facts`.
-    """
-    return write_facts(Facts(solution), units, **options)
-
-
-def write_facts(
-    facts: Facts,
+    solution: Solution,
     units: Conversion = COMMON,
     *,
     pressure: float | None = None,
     headed: bool = True,
     width: int | None = None,
 ) -> list[str]:
-    """Write facts that are collected already.
+    """Write the summary of a solved scene line by line; of one position, everything.
+
+    The parameters are those of `SceneBlock` and its `write`.
+    """
+    return SceneBlock(solution, units, pressure, width).write(headed=headed)
+
+
+class SceneBlock(Facts):
+    """Facts of a solved scene with the units that they are written in.
 
     Parameters
     ----------
+    solution : as of `Facts`.
     units : units of the numbers; one that is left out is the SI unit with a prefix.
     pressure : pressure of a cylinder, Pa; adds the bore that it needs.
-    headed : begin with the linkage.
     width : that of a terminal.
     """
-    return _SceneBlock(facts, units, pressure, width).write(headed=headed)
-
-
-class _SceneBlock:
-    """The facts of a scene and the units that they are written in."""
 
     def __init__(
         self,
-        facts: Facts,
+        solution: Solution,
         units: Conversion,
-        pressure: float | None,
-        width: int | None,
+        pressure: float | None = None,
+        width: int | None = None,
     ) -> None:
-        self.facts = facts
-        self.scene = facts.scene
-        self.motion = facts.scene.motion
-        self.linkage = facts.scene.linkage
-        self.solution = facts.solution
-        self.drive = facts.drive
+        super().__init__(solution)
+        self.linkage = self.scene.linkage
         self.pressure = pressure
         self.width = find_block_width(width)
         self.units = units
-        self.digits = POSITION_DIGITS if facts.kind == "position" else SHOWN_DIGITS
+        self.digits = POSITION_DIGITS if self.kind == "position" else SHOWN_DIGITS
         self.longest = max(self.linkage.lengths)
-        self.symbol, self.unit = name_places(self.solution)
+        self.symbol, self.unit = name_places(solution)
 
     def write(self, *, headed: bool = True) -> list[str]:
         """Write all paragraphs; a blank line parts them. `headed`: with the linkage."""
         paragraphs = [self._write_motion(), self._write_loads()]
-        if self.facts.kind == "position":
+        if self.kind == "position":
             paragraphs = self._list_paragraphs_of_position()
         if headed:
             paragraphs[0] = chain(self._write_head(), paragraphs[0])
@@ -180,8 +168,11 @@ class _SceneBlock:
             yield from self._write_remarks()
             return
         yield from self._write_stroke()
-        bars = self.facts.following
-        if bars:
+        solution = self.solution
+        if self.kind != "position" and solution.omega_4 is not None:
+            # over time all bars follow
+            commanded = 0 if solution.time is not None else solution.at.bar
+            bars = [bar for bar in MOVING_BARS if bar != commanded]
             heads = [f"bar {bar} ({BAR_NAMES[bar]})" for bar in bars]
             rows = [("rates", heads)]
             for label, unit in (("omega", "rad/s"), ("alpha", "rad/s^2")):
@@ -200,7 +191,7 @@ class _SceneBlock:
             from_rest = self._list_from_rest([*PIN_FORCES], "N")
             forces = sheet.write_pin_forces()
             if from_rest:
-                rows = [("pins", [*self.facts.pins]), *from_rest]
+                rows = [("pins", [*self.pins]), *from_rest]
                 forces += _align(rows, self.width)
             loads = [chain(self._write_drive(), forces), self._write_bending()]
         return [
@@ -255,7 +246,7 @@ class _SceneBlock:
 
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
-        first, last = self.facts.ends
+        first, last = self.ends
         text = self._value(
             drop_place_rounding(place, last - first),
             self.unit,
@@ -268,7 +259,7 @@ class _SceneBlock:
 
     def _write_head(self) -> Iterator[str]:
         """Write what the linkage is: type, title, branch, lengths, change points."""
-        motion = self.motion
+        motion = self.scene.motion
         name = name_assembly(self.linkage, motion.bar, motion.branch)
         title = f' "{clean_line(self.scene.title)}"' if self.scene.title else ""
         of_bar = "" if motion.bar == 2 else f" of the command {motion.commanded}"
@@ -287,7 +278,7 @@ class _SceneBlock:
 
     def _write_motion(self) -> Iterator[str]:
         """Write how far the linkage moves, and how well it transmits."""
-        least = self.facts.transmission
+        least = self.transmission
         yield self._write_ranges()
         yield (
             f"transmission angle: at least {self._angle(least.value)}, at"
@@ -317,7 +308,7 @@ class _SceneBlock:
         ]
         total = write_count(len(self.solution), "position")
         yield f"{total}: {', '.join(parts)}"
-        if self.facts.pins and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
+        if self.pins and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
             yield "    peaks and means are without the positions that have no forces"
 
     def _find_beside_change_points(self) -> Array:
@@ -338,7 +329,7 @@ class _SceneBlock:
     def _write_static_hint(self) -> Iterator[str]:
         """Say what asks for forces, if a scene with loads states positions alone."""
         if self.solution.F12 is None and acts(self.scene):
-            yield f"positions only, since {self.motion.names[1]} is left out:"
+            yield f"positions only, since {self.scene.motion.names[1]} is left out:"
             yield f"    {explain_static(self.scene)}"
 
     def _write_change_points(self) -> Iterator[str]:
@@ -347,7 +338,7 @@ class _SceneBlock:
         If there is none, write how nearly there would be one.
         """
         linkage = self.linkage
-        bar = self.motion.bar
+        bar = self.scene.motion.bar
         points = change_points(linkage, bar)
         met = self.scene.met_lengths
         if met is not None and met[1] == linkage.lengths:
@@ -381,9 +372,9 @@ class _SceneBlock:
 
         If the output is commanded, it is the input.
         """
-        kind = self.facts.kind
+        kind = self.kind
         bar = self.solution.at.bar
-        first, last = self.facts.ends
+        first, last = self.ends
         name = BAR_NAMES[bar]
         following = [4 if bar != 4 else 2]
         start, stop = (self._place(end, named=False) for end in (first, last))
@@ -408,11 +399,11 @@ class _SceneBlock:
 
     def _write_inset(self) -> str:
         """Write how far a range that the scene leaves out stays inside the limits."""
-        motion = self.motion
+        motion = self.scene.motion
         stated = motion.angle is not None or motion.stroke is not None
         if stated or turns_fully(self.linkage, motion.bar):
             return ""
-        first, last = self.facts.ends
+        first, last = self.ends
         inset = min(
             (first - low) % TURN
             for low, high in find_intervals(self.linkage, motion.bar)
@@ -422,13 +413,13 @@ class _SceneBlock:
         return f", {inside} inside its limits {low} and {high}"
 
     def _write_swing(self, bar: int) -> str:
-        low, high = self.facts.angles[bar]
+        low, high = self.angles[bar]
         width = high.value - low.value
-        if self.facts.kind == "turn" and width > 2.0 * math.pi - 1e-9:
+        if self.kind == "turn" and width > 2.0 * math.pi - 1e-9:
             return "turns fully"
         start = self._angle(low.value)
         stop = self._angle(high.value)
-        if self.facts.kind == "law" and bar == self.solution.at.bar:
+        if self.kind == "law" and bar == self.solution.at.bar:
             return f"from {start} to {stop}"
         places = [self._place(end.place, named=False) for end in (low, high)]
         if self.unit == "rad":  # the unit stands next to it
@@ -439,11 +430,11 @@ class _SceneBlock:
         )
 
     def _write_release(self) -> str:
-        free = self.motion.free
+        free = self.scene.motion.free
         assert free is not None
         begin = f"released for {write_digits(free.duration)} s, without a drive"
-        if self.facts.period is not None:
-            begin += f", period {write_digits(self.facts.period)} s"
+        if self.period is not None:
+            begin += f", period {write_digits(self.period)} s"
         if not self.solution.change_points:
             return begin
         instants = self.solution.change_points
@@ -461,7 +452,7 @@ class _SceneBlock:
                 for word, end in zip(("from", "up to"), stretch, strict=True)
                 if end is not None
             )
-            for stretch in self.facts.motion.stretches
+            for stretch in self.motion.stretches
         ]
         if parts:
             yield f"assembles {', and '.join(parts)}"
@@ -471,39 +462,37 @@ class _SceneBlock:
 
         The needs are those of a motor or a cylinder.
         """
-        facts = self.facts
         if self.drive is None:
             return
         yield self._write_drive_head()
-        yield _row("force" if facts.linear else "torque", self._write_peak())
-        if facts.held:
+        yield _row("force" if self.linear else "torque", self._write_peak())
+        if self.held:
             yield _row("at rest", self._write_held(self.drive.unit))
         yield from self._write_stroke()
         yield from self._write_power()
-        if self.pressure is not None and facts.stroke_range is not None:
+        if self.pressure is not None and self.stroke_range is not None:
             yield from self._write_bore(self.pressure)
 
     def _write_peak(self) -> str:
         """Write the largest and the RMS value of the drive's torque or force."""
-        facts = self.facts
         drive = self.drive
         assert drive is not None
-        if facts.peak is None:
+        if self.peak is None:
             return self._write_growth(drive.keys.value)
-        peak = self._value(self._without_rounding(facts.peak.value), drive.unit)
-        if facts.duty is None:
+        peak = self._value(self._without_rounding(self.peak.value), drive.unit)
+        if self.duty is None:
             return peak
-        row = f"peak {peak} at {self._place(facts.peak.place)}{self._of_positions}"
-        rms = facts.duty.rms_force if facts.linear else facts.duty.rms_torque
+        row = f"peak {peak} at {self._place(self.peak.place)}{self._of_positions}"
+        rms = self.duty.rms_force if self.linear else self.duty.rms_torque
         if rms is None:
             return row
         rms = self._without_rounding(rms)
-        mean = self._value(rms, drive.unit, facts.peak.value, FAR_BELOW_PEAK)
+        mean = self._value(rms, drive.unit, self.peak.value, FAR_BELOW_PEAK)
         return f"{row}, RMS {mean}"
 
     def _write_growth(self, name: str) -> str:
         """Write where a quantity grows without bound."""
-        poles = self.facts.motion.panels.list_poles(name)
+        poles = self.motion.panels.list_poles(name)
         places = [self._place(poles[0])]
         places += [self._place(pole, named=False) for pole in poles[1:_MOST_POLES]]
         if len(poles) > _MOST_POLES:
@@ -513,11 +502,11 @@ class _SceneBlock:
     @property
     def _of_positions(self) -> str:
         """Say that a peak is that of the positions, between which nothing stands."""
-        return " (of these positions)" if self.facts.kind == "list" else ""
+        return " (of these positions)" if self.kind == "list" else ""
 
     def _write_held(self, unit: str) -> str:
         """Write between which torques or forces dry friction holds, and where."""
-        held = self.facts.held
+        held = self.held
         parts = []
         for least, most, (first, last), varies in held[:_MOST_HELD]:
             bounds = [*map(self._without_rounding, (least, most))]
@@ -550,7 +539,7 @@ class _SceneBlock:
 
     def _is_balanced(self) -> bool:
         """Tell whether the drive has nothing to do: its peak is rounding alone."""
-        peak = self.facts.peak
+        peak = self.peak
         drive = self.drive
         if peak is None or drive is None or not np.nan_to_num(drive.sizes).any():
             return False
@@ -558,11 +547,10 @@ class _SceneBlock:
 
     def _write_power(self) -> Iterator[str]:
         """Write power and energy of the drive, and what a motor must have."""
-        facts = self.facts
-        duty = self.facts.duty
+        duty = self.duty
         power = self.solution.power
         if duty is None:
-            idle = facts.peak and not self._without_rounding(facts.peak.value)
+            idle = self.peak and not self._without_rounding(self.peak.value)
             if power is not None and power[0] and not idle:
                 yield _row("power", self._value(float(power[0]), "W"))
             return
@@ -573,16 +561,16 @@ class _SceneBlock:
         else:
             row = f"peak {self._write_peak_power(duty.peak_power)}{self._of_positions}"
         energies = duty.energy_in, duty.energy_out
-        if facts.kind != "list" and None not in energies:
-            over = "over the motion" if facts.kind == "law" else "over the sweep"
-            if facts.kind == "turn":
-                turns = round(abs(facts.ends[1] - facts.ends[0]) / (2.0 * math.pi))
+        if self.kind != "list" and None not in energies:
+            over = "over the motion" if self.kind == "law" else "over the sweep"
+            if self.kind == "turn":
+                turns = round(abs(self.ends[1] - self.ends[0]) / (2.0 * math.pi))
                 over = "per turn" if turns == 1 else f"in {turns} turns"
             forward, back = self._cells(energies, "J")
             row += f"; {forward} {over} given, {back} taken back"
         yield _row("power", row)
         yield from self._write_cycle(duty)
-        if not facts.linear:
+        if not self.linear:
             yield f"motor: {self._write_motor_needs(duty)}"
 
     def _write_motor_needs(self, duty: MotorDuty) -> str:
@@ -603,7 +591,7 @@ class _SceneBlock:
 
     def _write_peak_power(self, peak: float) -> str:
         """Write the largest power; if the drive brakes there, say what drives too."""
-        panels = self.facts.motion.panels
+        panels = self.motion.panels
         driving = max(panels.find_peak("power", 1).value, 0.0)
         text = self._value(peak, "W")
         if driving >= (1.0 - TIED) * peak:
@@ -626,7 +614,7 @@ class _SceneBlock:
 
     def _write_drive_head(self) -> str:
         scene = self.scene
-        motion = self.motion
+        motion = self.scene.motion
         if scene.drive is None:
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
         else:
@@ -652,28 +640,27 @@ class _SceneBlock:
 
     def _write_stroke(self) -> Iterator[str]:
         """Write the stroke, over what it assembles, and its speed."""
-        facts = self.facts
-        if facts.stroke_range is None:
+        if self.stroke_range is None:
             return
-        ends = [end.value for end in facts.stroke_range]
+        ends = [end.value for end in self.stroke_range]
         low, high = (self._value(end, "m", self.longest) for end in ends)
-        row = low if facts.kind == "position" else f"{low} to {high}"
-        if facts.stroke_limits is not None:
-            limits = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
+        row = low if self.kind == "position" else f"{low} to {high}"
+        if self.stroke_limits is not None:
+            limits = (self._value(x, "m", self.longest) for x in self.stroke_limits)
             row += f"; assembles from {' to '.join(limits)}"
         yield _row("stroke", row)
         speed = self.solution.stroke_speed
-        if speed is None or self.motion.stroke is not None:
+        if speed is None or self.scene.motion.stroke is not None:
             return
         largest = float(np.nanmax(np.abs(speed)))
         if not largest > 0.0:
             return
-        if facts.duty is None:
+        if self.duty is None:
             row = self._value(largest, "m/s")
-        elif facts.duty.peak_speed is None:
+        elif self.duty.peak_speed is None:
             row = self._write_growth("speed")
         else:
-            peak = self._value(facts.duty.peak_speed, "m/s")
+            peak = self._value(self.duty.peak_speed, "m/s")
             row = f"peak {peak}{self._of_positions}"
         yield _row("speed", row)
 
@@ -682,19 +669,18 @@ class _SceneBlock:
 
         Where dry friction holds a linkage at rest, they suffice to move it.
         """
-        facts = self.facts
-        if facts.peak is None:
+        if self.peak is None:
             yield _row("bore", "none is enough, as the force grows without bound")
             return
-        panels = facts.motion.panels
-        solution = facts.motion.solve_between() if facts.held else self.solution
+        panels = self.motion.panels
+        solution = self.motion.solve_between() if self.held else self.solution
         parts = []
         for sense, end, does in (
             (1, LINE.high, " to push"),
             (-1, LINE.low, ", and the rod's area besides, to pull"),
         ):
             force = sense * panels.find_peak(LINE.value, sense).value
-            if facts.held:
+            if self.held:
                 force = max(force, np.nanmax(sense * getattr(solution, end)))
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
@@ -706,7 +692,7 @@ class _SceneBlock:
 
     def _write_pins(self) -> Iterator[str]:
         """Write the loads of the four pins, side by side."""
-        pins = self.facts.pins
+        pins = self.pins
         if not pins:
             return
         cells, places = self._write_peaks([*PIN_FORCES], "N")
@@ -716,7 +702,7 @@ class _SceneBlock:
             rows.append(("  RMS", self._cells(means, "N")))
         rows += self._list_from_rest([*PIN_FORCES], "N")
         yield from _align(rows, self.width)
-        if self.facts.kind in ("list", "released"):
+        if self.kind in ("list", "released"):
             yield "  peak and RMS are those of these positions"
 
     def _list_from_rest(
@@ -726,16 +712,16 @@ class _SceneBlock:
 
         The list is empty where dry friction does not hold the linkage, or adds nothing.
         """
-        if not self.facts.held or np.any(self.solution.at.speed):
+        if not self.held or np.any(self.solution.at.speed):
             return []
-        from_rest = self.facts.motion.from_rest
+        from_rest = self.motion.from_rest
         cells = self._cells([from_rest[name] for name in names], unit)
         adds = cells != self._write_peaks(names, unit)[0]
         return [("  to move", cells)] if adds else []
 
     def _write_bending(self) -> Iterator[str]:
         """Write the largest bending moment of each bar, with its place and position."""
-        bending = self.facts.bending
+        bending = self.bending
         from_rest = self._list_from_rest(_BENDING, "N m")
         peaks = [bar.peak for bar in bending.values()]
         if not from_rest and all(peak and not peak.value for peak in peaks):
@@ -745,7 +731,7 @@ class _SceneBlock:
         for index, (number, (peak, x, *_)) in enumerate(bending.items()):
             if peak and peak.value:
                 along = self._value(x, "m", self.longest)
-                over = "" if self.facts.kind == "position" else f", {places[index]}"
+                over = "" if self.kind == "position" else f", {places[index]}"
                 places[index] = along + over
             # a bar without a cross-section has none
             modulus = self.linkage.bar(number).section_modulus
@@ -766,12 +752,12 @@ class _SceneBlock:
 
         A curve may grow without bound there.
         """
-        peaks = [self.facts.motion.find_peak(name) for name in names]
+        peaks = [self.motion.find_peak(name) for name in names]
         sizes = _drop_small([peak and peak.value for peak in peaks])
         places = []
         for peak, size, name in zip(peaks, sizes, names, strict=True):
             if peak is None:
-                place = self.facts.motion.panels.list_poles(name)[0]
+                place = self.motion.panels.list_poles(name)[0]
             else:
                 place = peak.place
             is_taken = peak is None or size
@@ -791,18 +777,17 @@ class _SceneBlock:
 
     def _write_remarks(self) -> Iterator[str]:
         """Write where pin forces jump, and what rounding does."""
-        facts = self.facts
         scene = self.scene
         solution = self.solution
-        passes = facts.pins and solution.change_points
-        if passes and has_growing_forces(scene, solution):
+        passes = self.pins and solution.change_points
+        if passes and has_growing_forces(solution):
             yield (
                 "at a change point pin forces grow without bound: the peaks are those "
                 "of these instants"
             )
-        if facts.pins and not facts.motion.is_steady:
+        if self.pins and not self.motion.is_steady:
             yield "the positions are passed at no one speed: no RMS values, no energies"
-        yield from facts.motion.list_jumps(
+        yield from self.motion.list_jumps(
             self.symbol, lambda place: self._place(place, named=False)
         )
         pins_from_rest = self._list_from_rest([*PIN_FORCES], "N")
@@ -819,12 +804,12 @@ class _SceneBlock:
         yield from list_torsion_notes(scene, solution, self.units)
         if self.drive is not None and self._is_balanced():
             yield f"the {self.drive.name} is zero within rounding"
-        elif facts.error is not None:
+        elif self.error is not None:
             below = "zero"
-            if facts.error:
-                below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}"
+            if self.error:
+                below = f"below 1e{math.ceil(math.log10(self.error)):+03d}"
             last_digit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
-            changed = "none of these" if facts.error < last_digit else "some"
+            changed = "none of these" if self.error < last_digit else "some"
             yield (
                 f"rounding changes {changed} digits (worst error bar {below} of the"
                 " value)"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError
 from fourbar.evaluation.free_motion import release_at
 from fourbar.quantities import CHANGE_POINT, PIN_FORCES, Array
-from fourbar.scene import Command, Scene, command_at
+from fourbar.scene import Command, command_at
 from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -31,29 +31,37 @@ ZERO_LIMIT = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
-class NoSideError(Exception):
+class _NoSideError(Exception):
     """A change point of which a side cannot be asked; says why."""
 
 
-def find_limits(scene: Scene, solution: Solution) -> Solution | None:
-    """Return the solution of one position with the limits of its pin forces.
+def find_limits(solution: Solution) -> tuple[Solution, str]:
+    """Return the solution of one position, and what is said of its pin forces.
 
-    Limits are those from both sides of a change point; a force without a limit keeps
-    NaN. None is returned for other positions, and without forces.
-
-    Raises NoSideError where a side cannot be asked: where a law or a release begins or
-    ends, or stands still, and where a cylinder is at an end of its range.
+    At a change point these are the limits from both sides; a force without a limit
+    keeps NaN, and so do all where a side cannot be asked: where a law or a release
+    begins or ends, or stands still, and where a cylinder is at an end of its range.
+    Other positions, and those without forces, stay as they are, without a word.
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
-        return None
+        return solution, ""
     rising, order = np.unique(MULTIPLES, return_inverse=True)
-    beside = solve(scene, "force", at=_list_places(scene, solution, rising))
+    try:
+        places = _list_places(solution, rising)
+    except _NoSideError as error:
+        return solution, f"on the change point pin forces have no value: {error}"
+    beside = solve(solution.scene, "force", at=places)
     limits = _extrapolate_forces(beside, order)
     forces: Any = {name: limit[None] for name, limit in limits.items()}
-    return replace(solution, **forces)
+    bounded = [np.isfinite(limit).all() for limit in limits.values()]
+    said = "on the change point no pin force has a limit"
+    if any(bounded):
+        said = "on the change point: the limits from both sides"
+        said += "" if all(bounded) else "; - has none"
+    return replace(solution, **forces), said
 
 
-def has_growing_forces(scene: Scene, solution: Solution) -> bool:
+def has_growing_forces(solution: Solution) -> bool:
     """Return True if pin forces grow without bound at a change point of a release.
 
     A change point at which the motion begins or ends has one side alone, and is not
@@ -74,7 +82,7 @@ def has_growing_forces(scene: Scene, solution: Solution) -> bool:
     times = times[within_motion.all(axis=1)]
     # the release begins at time 0, which is the first row
     rising, rows = np.unique([0.0, *times.ravel()], return_inverse=True)
-    beside = solve(scene, "force", at=solution.command_at(rising))
+    beside = solve(solution.scene, "force", at=solution.command_at(rising))
     for rows_of_one in rows[1:].reshape(times.shape):
         limits = _extrapolate_forces(beside, rows_of_one)
         if np.isnan([*limits.values()]).any():
@@ -82,11 +90,12 @@ def has_growing_forces(scene: Scene, solution: Solution) -> bool:
     return False
 
 
-def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
+def _list_places(solution: Solution, multiples: Array) -> Command:
     """List the positions at multiples of the step, which rise.
 
     Along a motion over time the bar has the speed and acceleration of each instant.
     """
+    scene = solution.scene
     at = solution.at
     law = scene.motion.law
     if law is None and scene.motion.free is None:
@@ -96,12 +105,12 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
         try:
             return command_at(scene, here + ANGLE_STEP / abs(turn) * multiples)
         except InputError as error:
-            raise NoSideError("the cylinder is at an end of its range") from error
+            raise _NoSideError("the cylinder is at an end of its range") from error
 
     moving = "the law" if law else "the release"
     speed = abs(float(np.ravel(np.asarray(at.speed, dtype=float))[0]))
     if speed == 0.0:
-        raise NoSideError(f"{moving} stands still there")
+        raise _NoSideError(f"{moving} stands still there")
     assert at.time is not None
     times = float(np.ravel(at.time)[0]) + ANGLE_STEP / speed * multiples
     begin = 0.0
@@ -114,7 +123,7 @@ def _list_places(scene: Scene, solution: Solution, multiples: Array) -> Command:
         released = release_at(scene, np.array([0.0, *times])).command
         if len(released.angle) > len(times):
             return released.part(slice(1, None))
-    raise NoSideError(f"{moving} begins or ends there, and has one side alone")
+    raise _NoSideError(f"{moving} begins or ends there, and has one side alone")
 
 
 def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import DERIVED_NAMES, PIN_FORCES, Array
-from fourbar.show.change_point import NoSideError, find_limits
+from fourbar.quantities import DERIVED_NAMES, Array
+from fourbar.show.change_point import find_limits
 from fourbar.show.columns import read_column
 from fourbar.show.derived import derive
 from fourbar.show.shown_units import (
@@ -54,18 +54,7 @@ class PositionSheet:
     def __init__(self, solution: Solution, units: Conversion) -> None:
         scene = self.scene = solution.scene
         self.units = units
-        self.on_change_point = ""
-        """What is said of the pin forces on a change point."""
-        self.solution = solution
-        try:
-            limits = find_limits(scene, solution)
-        except NoSideError as error:
-            reason = f"on the change point pin forces have no value: {error}"
-            self.on_change_point = reason
-        else:
-            if limits is not None:
-                self.solution = limits
-                self.on_change_point = _say_limits(limits)
+        self.solution, self.on_change_point = find_limits(solution)
         stage = "position" if solution.omega_2 is None else "acceleration"
         at = solution.at._replace(origin=None)
         self.beside = [
@@ -250,16 +239,6 @@ class PositionSheet:
             after = f" {name}{after}"
         (text,) = _write_cells_of(values)
         return f"{label:<{_NUMBER_LABEL}}{text}{after}"
-
-
-def _say_limits(limits: Solution) -> str:
-    """Say what the pin forces of a change point are."""
-    bounded = [np.isfinite(getattr(limits, name)).all() for name in PIN_FORCES]
-    if all(bounded):
-        return "on the change point: the limits from both sides"
-    if not any(bounded):
-        return "on the change point no pin force has a limit"
-    return "on the change point: the limits from both sides; - has none"
 
 
 def _write_cells_of(numbers: Array, form: str = f".{POSITION_DIGITS}g") -> list[str]:

@@ -171,14 +171,6 @@ class Facts:
             if self._has_forces
         }
 
-    @property
-    def following(self) -> list[int]:
-        """Return the bars that follow, over time all; none if no speed is stated."""
-        if len(self.solution) == 1 or self.solution.omega_4 is None:
-            return []
-        commanded = 0 if self.solution.time is not None else self.solution.at.bar
-        return [bar for bar in MOVING_BARS if bar != commanded]
-
     @cached_property
     def transmission(self) -> Peak:
         """Smallest transmission angle; it is 0 where its sine changes its sign."""

@@ -127,7 +127,11 @@ def print_positions(
         a pipe, which gets them all.
     every : show every so many positions; left out: as `width` says.
     """
-    step = every or (1 if width is None else _choose_step(len(solution)))
+    step = every or 1
+    if every is None and width is not None:
+        wanted = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1))
+        multiple = ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1])
+        step = next((step for step in ROW_STEPS if step >= wanted), multiple)
     cells = dict[str, list[str]]()
     for column in columns:
         cells |= _write_column(column, column.name, units)
@@ -163,13 +167,6 @@ def _fit_columns(cells: dict[str, list[str]], width: int | None) -> list[str]:
             break
         kept.append(name)
     return kept
-
-
-def _choose_step(count: int) -> int:
-    """Show every so many positions, so that no more than MOST_ROWS_PRINTED are."""
-    wanted = math.ceil((count - 1) / (MOST_ROWS_PRINTED - 1))
-    multiple = ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1])
-    return next((step for step in ROW_STEPS if step >= wanted), multiple)
 
 
 def list_columns(

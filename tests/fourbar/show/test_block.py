@@ -27,7 +27,7 @@ from fourbar import (
 from fourbar.files.scene_file import read_tables
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene.motion import Law
-from fourbar.show.block import write_block, write_facts
+from fourbar.show.block import write_block
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.studies import write_equilibria
@@ -396,7 +396,7 @@ def test_the_block_says(name):
 def test_the_block_has_the_numbers_of_the_facts():
     scene = crank_rocker(motion=turn(360))
     facts = Facts(solve(scene, "error"))
-    text = "\n".join(write_facts(facts))
+    text = "\n".join(write_block(facts.solution))
     duty = facts.duty
     peak = facts.peak
     torque, rms, most = (

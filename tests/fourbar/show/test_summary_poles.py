@@ -18,7 +18,7 @@ from fourbar.effects import PinFriction
 from fourbar.files import loads
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
-from fourbar.show.block import write_facts
+from fourbar.show.block import write_block
 from fourbar.show.duty import list_duty
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.summary import Facts
@@ -63,7 +63,7 @@ def find_facts(scene):
 
 
 def write(facts, **options):
-    lines = write_facts(facts, **options)
+    lines = write_block(facts.solution, **options)
     return " ".join(" ".join(lines).split())
 
 

@@ -3,6 +3,8 @@
 A path runs along its curve: no false corner, through both branches.
 """
 
+import re
+
 import numpy as np
 import pytest
 from pytest import approx
@@ -25,8 +27,8 @@ LONGEST = 2.0 / 150.0
 """Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
 
 
-def list_lines(figure, scene=SCENE):
-    drawing = draw_figure(scene, figure, units=fourbar.units("m"))
+def list_lines(figure, scene=SCENE, units="m"):
+    drawing = draw_figure(scene, figure, units=fourbar.units(units))
     lines = (line for axes in drawing.figure.axes for line in axes.lines)
     return {
         str(line.get_label()): np.asarray(line.get_xydata(), dtype=float)
@@ -49,6 +51,23 @@ def test_the_shaking_force_is_drawn_with_its_components():
     }.items():
         shown = np.interp(DEGREES, *lines[name].T)
         assert shown == approx(values, rel=1e-9, abs=1e-9 * np.abs(force).max())
+
+
+@pytest.mark.slow
+def test_curves_are_in_the_unit_of_their_axis():
+    line = list_lines("forces", units="mN")["$F_{12}$"]
+    force = 1e3 * np.hypot(*solve(SCENE).F12.T)
+    assert np.interp(DEGREES, *line.T) == approx(force, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_what_a_clipped_axis_leaves_out_is_a_pure_number():
+    """A ratio has no prefix: a thousand is no "k1"."""
+    scene = crank_rocker(motion=Motion(Sweep(0.0, 2.0 * np.pi, 3601), 10.0))
+    caption = draw_figure(scene, "ratios").figure.subfigs[0].get_supxlabel()
+    assert re.search(
+        r"clipped at [\d.]+; the largest evaluated, T₄/T₂\s=\s−?\d{4,}", caption
+    )
 
 
 @pytest.mark.slow
