@@ -167,6 +167,7 @@ class _Room:
         dots = np.concatenate(self.dots)
         widths = np.concatenate(self.widths)
         edge = 0.5 * self.per_point * widths
+        placed = [box.get_points() for box in self.boxes]
         best = (math.inf, point, point)
         for reach, k in product(_REACH, range(LABEL_DIRECTIONS)):
             # outwards first, then by turns to either side
@@ -182,7 +183,7 @@ class _Room:
             covered = float((hit_in_x & hit_in_y) @ widths)
             box = _make_box(centre, half)
             inside = self.inside.contains(*box.min) and self.inside.contains(*box.max)
-            clashes = box.count_overlaps(self.boxes) if self.boxes else 0
+            clashes = box.count_overlaps(placed) if placed else 0
             cost = 100.0 * clashes + 30.0 * (not inside)
             if reach > _LED:
                 crossed = self._count_crossed(start, _clip(start, box))

@@ -100,6 +100,10 @@ def test_the_json_holds_the_duty():
         (entry["pins"]["B"]["rms"], pound, bearing_load(s, "B").rms),
     ):
         assert printed * unit == approx(number, rel=ROUND_OFF)
+    work = 0.5 * (s.power[1:] + s.power[:-1]) * np.diff(s.theta_2) / 10.0
+    assert duty.energy_in - duty.energy_out == approx(work.sum(), abs=ROUND_OFF)
+    swing = np.ptp([0.0, *np.cumsum(work - work.mean())])
+    assert duty.energy_swing == approx(swing, rel=ROUND_OFF)
 
 
 def collect(solution):
