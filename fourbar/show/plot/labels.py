@@ -167,6 +167,7 @@ class _Room:
         dots = np.concatenate(self.dots)
         widths = np.concatenate(self.widths)
         edge = 0.5 * self.per_point * widths
+        lower, upper = (complex(*corner) for corner in self.inside.get_points())
         placed = [box.get_points() for box in self.boxes]
         best = (math.inf, point, point)
         for reach, k in product(_REACH, range(LABEL_DIRECTIONS)):
@@ -182,9 +183,11 @@ class _Room:
             hit_in_y = np.abs(dots.imag - centre.imag) < half.imag + edge
             covered = float((hit_in_x & hit_in_y) @ widths)
             box = _make_box(centre, half)
-            inside = self.inside.contains(*box.min) and self.inside.contains(*box.max)
+            below = centre - half - lower
+            above = upper - centre - half
+            leaves = min(below.real, below.imag, above.real, above.imag) < 0.0
             clashes = box.count_overlaps(placed) if placed else 0
-            cost = 100.0 * clashes + 30.0 * (not inside)
+            cost = 100.0 * clashes + 30.0 * leaves
             if reach > _LED:
                 crossed = self._count_crossed(start, _clip(start, box))
                 cost += _COST_OF_A_LEADER + 40.0 * crossed
