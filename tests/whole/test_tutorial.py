@@ -21,7 +21,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 STATUS_OF = {"fourbar": status, "fourbar-validation": harness}
 """Exit status of each program for some arguments."""
-PROGRAMS = ("docs/tutorial", "docs/thesis", "docs/recipes")
+PROGRAMS = ("docs/tutorial", "docs/thesis", "docs/recipes", "docs/inverse-dynamics")
 """Pages whose programs go on from one another."""
 
 
@@ -32,6 +32,7 @@ PROGRAMS = ("docs/tutorial", "docs/thesis", "docs/recipes")
         ("docs/tutorial", 12),
         ("docs/thesis", 3),
         ("docs/recipes", 8),
+        ("docs/inverse-dynamics", 0),
         ("README", 2),
         ("docs/commands", 7),
         ("docs/gallery", 1),
@@ -44,7 +45,7 @@ def test_a_page_does_and_prints_what_it_says(
 ):
     if page in ("docs/tutorial", "docs/recipes"):
         pytest.importorskip("pandas", reason="a table is made: pip install pandas")
-    if page == "docs/recipes":
+    if page == "docs/inverse-dynamics":
         pytest.importorskip("pinocchio", reason="a recipe needs it: pip install pin")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "models").symlink_to(ROOT / "models")

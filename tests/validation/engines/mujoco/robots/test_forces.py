@@ -10,8 +10,11 @@ import mujoco
 import numpy as np
 import pytest
 
+import fourbar
+from fourbar.errors import HOLDS
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
+from fourbar_validation.cli import status
 from fourbar_validation.engines.mujoco.robots.ancestry import list_lifted_masses
 from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
@@ -77,6 +80,24 @@ def test_pin_forces_are_those_of_the_free_body(scene, flags):
 
 SOLVED = 1e-6
 """Parts of the weight: MuJoCo's solver stops at a tolerance of 1e-8."""
+
+
+def test_the_torque_by_mj_inverse_is_that_of_rigid_pins(monkeypatch, tmp_path):
+    monkeypatch.chdir(ROOT)
+    names = {}
+    page = read("docs/inverse-dynamics.md")
+    with contextlib.redirect_stdout(io.StringIO()):
+        exec(blocks("python", page)[0], names)
+    line, _ = re.findall(r"`fourbar-validation (loops .*) -o", page)
+    scene = tmp_path / "gripper.toml"
+    assert status([*line.split(), "-o", str(scene)]) == HOLDS
+    stated = load(scene)
+    at = fourbar.command(stated).part(slice(1))
+    at = at._replace(angle=at.angle * 0.0 + math.pi / 2.0 + 0.3, speed=2.0)
+    right = fourbar.solve(stated, at=at._replace(acceleration=5.0))
+    assert names["torque"] == pytest.approx(right.torque[0], rel=1e-7)
+    x, _, z = names["force"]  # the scene's x is -x of the world
+    np.testing.assert_allclose((-x, z), right.F43[0], rtol=1e-7)
 
 
 def test_the_listing_of_the_guide_reads_what_the_harness_reads(monkeypatch):
