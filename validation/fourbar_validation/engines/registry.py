@@ -34,7 +34,6 @@ from fourbar_validation.compare.tolerance import (
     Mask,
 )
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.exact import BallArithmetic, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
@@ -388,7 +387,6 @@ def make_answer_nearby(
         or command.speed is None
     ):
         return None
-    omega, alpha = list_speeds(command)
 
     def answer(mask: Mask) -> dict[str, Array]:
         adapter = engine.start()
@@ -401,13 +399,7 @@ def make_answer_nearby(
             )
             if shift is not None:
                 row = slice(i, i + 1)
-                moved = Command(
-                    command.theta_2[row],
-                    command.branch[row],
-                    omega[row],
-                    alpha[row],
-                    origin=LimitOrigin(shift),
-                )
+                moved = command.part(row)._replace(origin=LimitOrigin(shift))
                 for name, values in ask_at(adapter, scene, moved).quantities.items():
                     out[name][row] = values
         return out
