@@ -133,15 +133,18 @@ class LengthsCommand(click.Command):
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:
-            if re.search(r"unexpected extra arguments? \([\d.]", error.message):
-                message = f"{error.message}: {ELSEWHERE}"
-                raise click.UsageError(message, ctx) from None
-            if not error.message.endswith("takes 4 values."):
+            message = error.message
+            if re.search(r"unexpected extra arguments? \([\d.]", message):
+                message += f": {ELSEWHERE}"
+            elif not message.endswith("takes 4 values."):
                 raise
-            message = f"{error.message.removesuffix('.')}: {', '.join(LENGTH_NAMES)}"
-            for word in words:
-                if word.endswith(".toml"):
-                    message += f"; for a scene file: fourbar analyze {word}"
+            else:
+                message = f"{message.removesuffix('.')}: {', '.join(LENGTH_NAMES)}"
+                scenes = [word for word in words if word.endswith(".toml")]
+                if scenes:
+                    message += f"; for a scene file: fourbar analyze {scenes[0]}"
+                else:
+                    message += f"; {ELSEWHERE}"
             raise click.UsageError(message, ctx) from None
 
 

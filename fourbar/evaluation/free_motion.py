@@ -437,9 +437,11 @@ class _Run:
             atol=ABSOLUTE,
         )
         if not solved.success:
+            reached = np.degrees(solved.y[0, -1])
             raise FourBarError(
-                f"the free motion cannot be continued beyond {solved.t[-1]:.9g} s:"
-                f" {solved.message}"
+                f"the free motion cannot be continued beyond {solved.t[-1]:.9g} s,"
+                f" theta_{reading.path.bar} = {reached:.6g} deg: its steps vanish"
+                " there, as where no bar that moves has a mass; give each bar its mass"
             )
         self._note_change_points(reading.path, solved)
         return solved

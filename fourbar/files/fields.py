@@ -91,11 +91,19 @@ _MEANT = {
     "end": "to",
 }
 """Words that are no keys, and the keys that may be meant by them."""
-_FORMULAS = dict.fromkeys(
-    ("radius_of_gyration", "gyration", "k_G"),
-    "write inertia = m k^2, or m (k^2 - r^2) if k is about a pin at r from the centre",
-)
-"""Words for what a key states by a formula."""
+_WAYS = {
+    **dict.fromkeys(
+        ("radius_of_gyration", "gyration", "k_G"),
+        "write inertia = m k^2, or m (k^2 - r^2) if k is about a pin at r from the"
+        " centre",
+    ),
+    **dict.fromkeys(
+        ("damper", "dampers", "damping", "damping_coefficient"),
+        "viscous is damping in the pins; a damper between two points is in MuJoCo, as"
+        " the damping of a spatial tendon",
+    ),
+}
+"""Ways to state what has no key, by words for it."""
 _TABLE_OF = {
     "ground_angle": "lengths",
     **dict.fromkeys(("branch", "side", "stroke", "law", "free"), "motion"),
@@ -192,8 +200,7 @@ class Entry:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
                 if _TABLE_OF.get(name, self.key) != self.key:
                     known = f"write it under [{_TABLE_OF[name]}]"
-                if "inertia" in names and name in _FORMULAS:
-                    known = _FORMULAS[name]
+                known = _WAYS.get(name, known)
                 if _is_elsewhere(self.key, self.value, names):
                     known = ELSEWHERE
                 unknown = self[name]

@@ -496,8 +496,8 @@ class Motion:
         omega_4: float | Array | None = None,
         alpha_4: float | Array = 0.0,
         stroke: float | Array | Sweep | None = None,
-        stroke_speed: float | None = None,
-        stroke_acceleration: float = 0.0,
+        stroke_speed: float | Array | None = None,
+        stroke_acceleration: float | Array = 0.0,
         side: str | None = None,
     ) -> None:
         given = locals()
@@ -607,7 +607,7 @@ class Motion:
             raise InputError(
                 f"motion.{omega if isinstance(self.speed, np.ndarray) else alpha}",
                 f"{len(angles)} numbers",
-                "are those of the stated angles: no other position has one",
+                "are those of the stated positions: no other has one",
             )
         speed, acceleration = (
             rate[index] if isinstance(rate, np.ndarray) else rate for rate in rates
@@ -683,10 +683,10 @@ def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array
         return require(key, rates, unit)
     array = require_numbers(key, rates, unit=unit)
     allowed = ""
-    if unit.startswith("m") or not isinstance(angle, np.ndarray):
-        allowed = "must be one number, unless angles are stated one by one"
+    if not isinstance(angle, np.ndarray):
+        allowed = "must be one number, unless positions are stated one by one"
     elif len(array) != len(angle):
-        allowed = f"must be one number, or {len(angle)}: one for each angle"
+        allowed = f"must be one number, or {len(angle)}: one for each position"
     if allowed:
         raise InputError(key, f"{len(array)} numbers", allowed)
     array.flags.writeable = False

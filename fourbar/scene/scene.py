@@ -692,7 +692,7 @@ def command_at(scene: Scene, places: Array) -> Command:
         if outside.size:
             allowed = f"this cylinder can have {write_stroke_ranges(scene)}"
             raise InputError("motion.stroke", float(outside[0]), allowed, unit="m")
-        return command_stroke(scene, places, motion.speed, motion.acceleration)
+        return command_stroke(scene, places, *motion.find_rates(places))
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:
         return Command(places, branch, *motion.find_rates(places), bar)

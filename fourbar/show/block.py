@@ -467,7 +467,8 @@ class SceneBlock(Facts):
         yield self._write_drive_head()
         yield _row("force" if self.linear else "torque", self._write_peak())
         if self.held:
-            yield _row("at rest", self._write_held(self.drive.unit))
+            name = "at rest" if self.is_held_at_rest else "range"
+            yield _row(name, self._write_held(self.drive.unit))
         yield from self._write_stroke()
         yield from self._write_power()
         if self.pressure is not None and self.stroke_range is not None:
@@ -507,13 +508,16 @@ class SceneBlock(Facts):
     def _write_held(self, unit: str) -> str:
         """Write between which torques or forces dry friction holds, and where."""
         held = self.held
+        rests = "dry friction holds"
+        if not self.is_held_at_rest:
+            rests = "a pin with dry friction rests"
         parts = []
         for least, most, (first, last), varies in held[:_MOST_HELD]:
             bounds = [*map(self._without_rounding, (least, most))]
             size = max(map(abs, bounds))
             holds = " to ".join(self._value(bound, unit, size) for bound in bounds)
             if len(self.solution) == 1:
-                return f"{holds}: dry friction holds it between them"
+                return f"{holds}: {rests}"
             if first == last:
                 parts.append(f"{holds} at {self._place(first)}")
             else:
@@ -523,7 +527,7 @@ class SceneBlock(Facts):
                 parts.append(f"{holds} over {over}{share}")
         if len(held) > _MOST_HELD:
             parts.append(f"and at {len(held) - _MOST_HELD} more places")
-        return f"{', '.join(parts)}: dry friction holds"
+        return f"{', '.join(parts)}: {rests}"
 
     def _without_rounding(self, value: float) -> float:
         """Return zero for a torque or force of the drive within its rounding."""

@@ -37,7 +37,9 @@ UNBOUNDED_BEYOND = 1e6
 EXTREMES = {"min": 1.0, "max": -1.0}
 """Signs by which the least or the greatest value of a column is its least."""
 USUAL = 90.0
-"""Percentile of a column's sizes, and of its distances from the median."""
+"""Percentile of a column's sizes other than zero, and of its distances from the
+median. A spring that only pushes may exert no force at nearly all positions.
+"""
 
 
 def locate(scene: Scene, name: str, text: str) -> Command:
@@ -118,7 +120,7 @@ class _LocatedSearch:
         if np.ptp(finite) <= CONSTANT * np.abs(finite).max():
             raise self._refuse(text, "it is constant", finite)
         # the largest value may stand beside a pole
-        usual = float(np.percentile(np.abs(finite), USUAL))
+        usual = _find_usual_size(finite)
         if text in EXTREMES:
             place, value = self._find_extreme(EXTREMES[text])
             if abs(value) > UNBOUNDED_BEYOND * usual:
@@ -224,7 +226,7 @@ class _LocatedSearch:
         """Make the error of a value that no position has, with the column's range."""
         located = np.array([self._find_extreme(side)[1] for side in EXTREMES.values()])
         ends = dict.fromkeys(drop_rounding(located, np.abs(values).max()).tolist())
-        usual = float(np.percentile(np.abs(values), USUAL))
+        usual = _find_usual_size(values)
         start = f"--at {self.name} = {text}: {why}"
         if np.abs(located).max() > UNBOUNDED_BEYOND * usual:
             return NotAssembledError(f"{start}, and grows without bound")
@@ -247,6 +249,11 @@ class _LocatedSearch:
             place = least.x
             value = side * least.f_x
         return float(place), float(value)
+
+
+def _find_usual_size(values: Array) -> float:
+    """Return the size that nine tenths of the values other than zero do not exceed."""
+    return float(np.percentile(np.abs(values[values != 0.0]), USUAL))
 
 
 def write_place(name: str, place: float) -> str:

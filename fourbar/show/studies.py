@@ -460,7 +460,7 @@ within less, and nothing is printed finer than 1e-6 rad.
 
 
 def _write_degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.4f}"
+    return write_cell(math.degrees(angle), ".4f")
 
 
 def write_equilibria_json(title: str, rest: Equilibria) -> str:

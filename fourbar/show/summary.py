@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
@@ -224,12 +225,12 @@ class Facts:
         A turn that begins at such a position ends at the same, which is listed once.
         """
         solution = self.solution
-        low = self.drive and getattr(solution, self.drive.keys.low)
-        if self.drive is None or low is None:
+        rows = self._held_rows
+        if self.drive is None or not len(rows):
             return []
+        low = getattr(solution, self.drive.keys.low)
         high = getattr(solution, self.drive.keys.high)
         places = solution.at.places
-        rows = np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
         ranges = list[HeldRange]()
         for run in split_runs(rows):
             is_end = run[0] == len(solution) - 1 and rows[0] == 0
@@ -241,6 +242,20 @@ class Facts:
             varies = bool(gap > TIED * (most - least))
             ranges.append(HeldRange(least, most, ends, varies))
         return ranges
+
+    @cached_property
+    def _held_rows(self) -> NDArray[np.intp]:
+        """Rows of the positions at which dry friction holds a pin, (k,)."""
+        low = self.drive and getattr(self.solution, self.drive.keys.low)
+        if self.drive is None or low is None:
+            return np.zeros(0, dtype=np.intp)
+        high = getattr(self.solution, self.drive.keys.high)
+        return np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
+
+    @cached_property
+    def is_held_at_rest(self) -> bool:
+        """Return True if nothing moves where dry friction holds a pin."""
+        return not np.any(self.solution.at.part(self._held_rows).speed)
 
     @cached_property
     def stroke_limits(self) -> tuple[float, float] | None:

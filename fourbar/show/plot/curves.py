@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import cycle
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -229,15 +228,16 @@ def _draw_rates(
     """Draw the rates of the bars; those of the commanded bar are left out if zero."""
     driven = view.sweep.at.bar
     rates = {bar: getattr(view.sweep, f"{letter}_{bar}") for bar in MOVING_BARS}
-    commanded = rates.pop(driven)
+    if not np.any(rates[driven]):
+        del rates[driven]
     name = {"omega": "ω", "alpha": "α"}[letter]
     curves = {f"{name}{_SUBSCRIPTS[bar]}": rate for bar, rate in rates.items()}
     chart = _Chart(axes, view, unit, curves)
-    if np.any(commanded):
-        look = {**choose_bar_line(driven), "ls": "-", "lw": 1.0}
-        chart.plot(commanded, label=rf"$\{letter}_{driven}$", **look)
     for bar, rate in rates.items():
-        chart.plot(rate, label=rf"$\{letter}_{bar}$", **choose_bar_line(bar))
+        look = choose_bar_line(bar)
+        if bar == driven:
+            look |= {"ls": "-", "lw": 1.0}
+        chart.plot(rate, label=rf"$\{letter}_{bar}$", **look)
     chart.finish(rf"$\{letter}$", title, what, sizes=False)
     place_legend(axes)
 
@@ -476,8 +476,6 @@ _RECOMMENDED = 40.0
 
 Source: R. L. Norton, Design of Machinery; H. Alt introduced the angle (1932).
 """
-_REMARK = 0.34
-"""Part that a remark takes along an axis, as a part of its length."""
 
 
 def draw_transmission(axes: "Axes", view: View) -> None:
@@ -488,42 +486,14 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     over = draw_axes(axes, view)
     mu = np.degrees(derive(view.sweep, "transmission"))
     axes.plot(over, mu, color=INK)
-    axes.axhline(_RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
-    place = find_free_place(mu)
-    axes.annotate(
-        f"{_RECOMMENDED:g}° recommended",
-        (over[0] + place * (over[-1] - over[0]), _RECOMMENDED),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        size=7.0,
-        color=MUTED,
-    )
+    least = f"{_RECOMMENDED:g}° recommended"
+    axes.axhline(_RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)), label=least)
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
     ring: dict[str, Any] = {"ms": 6.0, "mew": 1.1, "clip_on": False, **RING_MARK}
     for theta, height, marker, name in _list_marked(view):
         axes.plot(theta, height, marker, ls="none", label=name, zorder=5, **ring)
     axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
-    if view.time is None:
-        place_legend(axes, 1)
-
-
-def find_free_place(mu: Array) -> float:
-    """Return where the curve is furthest from a remark, as a part of the axis's length.
-
-    The remark stands at 40 deg.
-    """
-    half = _REMARK / 2.0
-    # the remark stands on the line of the recommended angle
-    distances = np.abs(mu - _RECOMMENDED - 3.0)
-    best = (-1.0, 1.0 - half)
-    for place in np.linspace(1.0 - half, half, 25).tolist():
-        first = int((place - half) * len(mu))
-        last = max(1, math.ceil((place + half) * len(mu)))
-        beside = distances[first:last]
-        if np.isfinite(beside).any():
-            best = max(best, (float(np.nanmin(beside)), place), key=itemgetter(0))
-    return best[1]
+    place_legend(axes, 1)
 
 
 def _list_marked(view: View) -> Iterator[tuple[list[float], list[float], str, str]]:

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 from dataclasses import replace
 from math import pi
 
@@ -94,6 +95,20 @@ system of 13 equations whose condition is below 1e4.
 def test_what_is_not_released_is_refused(motion, says):
     with raises(fourbar.InputError, match=says):
         release(replace(SWING, motion=motion))
+
+
+def test_what_has_no_inertia_at_a_dead_centre_is_named_with_its_place():
+    """Bar 4, which alone has a mass, stands still there whatever bar 2 does.
+
+    Bars 2 and 3 are in line, and B is at 0.25 m - 0.1 m from O2.
+    """
+    linkage = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22, 2.0))
+    dead = pi + math.acos((0.3**2 + 0.15**2 - 0.22**2) / (2.0 * 0.3 * 0.15))
+    falling = let_go(math.radians(100.0), 0.0, 0.5, 100, DOWN, linkage=linkage)
+    with raises(fourbar.FourBarError, match="give each bar its mass") as stopped:
+        release(falling)
+    angle = float(re.search(r"theta_2 = ([0-9.]+) deg", str(stopped.value))[1])
+    assert math.radians(angle) == approx(dead, abs=1e-3)
 
 
 LEAST_SINE = 1e-2

@@ -65,6 +65,7 @@ theta_2 = | angle = | did you mean "theta_2"?
 from_pin = | pin = | did you mean "from_pin"?
 mass = | cg = | did you mean "centre"?
 mass = | I = | did you mean "inertia"?
+mass = | damping = | a damper between two points is in MuJoCo
 mass = | radius_of_gyration = | write inertia = m k^2, or m (k^2 - r^2)
 [bars.input] | [bars.imput] | bars.imput | did you mean "input"?
 gravity | gravitiy | effects.gravitiy | did you mean "gravity"?

@@ -208,19 +208,20 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     # positions keep their rates where some are asked for, and no other has any
     some = solve(of_each, at=command_at(of_each, of_each.motion.angle[8:2:-2]))
     assert np.array_equal(some.torque, expected.torque[8:2:-2])
-    with raises(InputError, match="no other position has one"):
+    with raises(InputError, match="no other has one"):
         command_at(of_each, np.array([0.123]))
 
 
 @pytest.mark.parametrize(
     "motion, said",
     read_rows("""
-{"theta_2": [1, 2], "omega_2": [1]} | 2: one for each angle
-{"theta_2": [1, 2], "alpha_2": [1, 1, 1]} | 2: one for each angle
-{"theta_2": 1, "omega_2": [1]} | unless angles are stated one by one
+{"theta_2": [1, 2], "omega_2": [1]} | 2: one for each position
+{"theta_2": [1, 2], "alpha_2": [1, 1, 1]} | 2: one for each position
+{"theta_2": 1, "omega_2": [1]} | unless positions are stated one by one
 {"theta_2": [1, 2], "omega_2": [1, 1e200]} | must be below
 {"theta_2": [1, 2], "omega_2": [1, NaN]} | must be finite
-{"stroke": [1, 2], "stroke_speed": [1, 1], "side": "left"} | must be one number
+{"stroke": [1, 2], "stroke_speed": [1, 1, 1], "side": "left"} | 2: one for each
+{"stroke": 1, "stroke_speed": [1, 1], "side": "left"} | must be one number
 """),
 )
 def test_rates_that_belong_to_no_angle_are_refused(motion, said):

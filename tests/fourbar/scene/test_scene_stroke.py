@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pytest import raises
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Motion, solve, vary
 from fourbar.effects import LinearDrive, Place
 from fourbar.errors import FourBarError, InputError
+from fourbar.files import dump
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Sweep
 from fourbar_validation.engines.prediction import compute_reference
@@ -45,6 +46,17 @@ def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end():
         end = 0.12 * np.exp(1j * (s.theta_2[0] + 0.4))
         ground = 0.3 * np.exp(1j * (2.2 + crank_rocker().linkage.ground_angle))
         assert sign * (np.conj(ground) * end).imag > 0.0
+
+
+def test_strokes_with_rates_of_their_own_are_each_alone():
+    profile = np.array([[0.2, 0.0, 0.4], [0.3, 0.1, 0.0], [0.4, 0.0, -0.4]])
+    stroke, speed, acceleration = profile.T
+    rates = {"stroke_speed": speed, "stroke_acceleration": acceleration}
+    of_each = solve(fourbar.files.loads(dump(scene(2, stroke, **rates))))
+    for row, (length, v, a) in enumerate(profile.tolist()):
+        alone = solve(scene(2, length, stroke_speed=v, stroke_acceleration=a))
+        assert of_each.drive_force[row] == approx(alone.drive_force[0], rel=1e-14)
+        assert of_each.F14[row] == approx(alone.F14[0], rel=1e-13)
 
 
 @pytest.mark.parametrize(

@@ -451,7 +451,7 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     low = static.min() - 0.5
     high = static.max() + 0.5
     digits = 6
-    where = ": dry friction holds it between them"
+    where = ": dry friction holds"
     if steps > 1:
         digits = 4
         where = " over theta_2 = 11.46 deg to 80.21 deg, a part of it at each"
@@ -478,7 +478,7 @@ def test_each_position_at_rest_has_its_own_range():
         low, high = sorted(solve(replace(scene, motion=beside)).torque)
         ranges.append(f"{low:.4g} N m to {high:.4g} N m at theta_2 = {name} deg")
     text = block(scene)
-    assert f"at rest {', '.join(ranges)}: dry friction holds" in text
+    assert f"range {', '.join(ranges)}: a pin with dry friction rests" in text
     assert "at theta_2 = 0 deg (B), 10.52 deg (O4), 180 deg (B), 188.7 deg (O4)" in text
     assert "of these positions" not in text and "without bound" not in text
 

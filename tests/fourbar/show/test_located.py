@@ -1,6 +1,7 @@
 """Positions at which a column has a value, against closed forms."""
 
 import math
+from dataclasses import replace
 from math import acos, pi, radians
 
 import numpy as np
@@ -9,6 +10,7 @@ from pytest import approx, raises
 
 import fourbar
 from fourbar import solve
+from fourbar.effects import Spring
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
@@ -106,6 +108,18 @@ def test_the_least_and_the_greatest_value_are_located(name, value, place):
     sweep = '{ from = "0.3 deg", to = "178 deg", steps = 7 }'
     found = locate(parallelogram(sweep), name, value).places
     assert found == approx([radians(float(place))], abs=TOUCHED)
+
+
+def test_a_spring_that_seldom_pushes_has_a_least_force():
+    """O4 and A come nearer than 0.31 m within 7 deg alone, and are 0.3 m apart at 0."""
+    (springs,) = parallelogram().effects
+    ends = fourbar.Place(1, (0.8, 0.0)), fourbar.Place(2, (0.5, 0.0))
+    (spring,) = springs.springs
+    pushing = Spring(*ends, spring.stiffness, length=0.31, acts="push")
+    scene = replace(parallelogram(), effects=(fourbar.Springs((pushing,)),))
+    assert locate(scene, "spring_0_force", "min").places == approx([0.0])
+    with raises(NotAssembledError, match=r"goes from -0\.2 to 0 N"):
+        locate(scene, "spring_0_force", "1 N")
 
 
 def test_the_ends_of_a_motion_are_positions_and_one_position_is_one():
