@@ -17,7 +17,9 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
+    Influence,
     MeasureOptions,
+    RobotMeasurement,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
@@ -88,6 +90,24 @@ def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
     advice = SettingsAdvice(0.2, 9, tried, (), tried, 1, (), None)
     *_, table = describe_advice(SimpleNamespace(refusal="too many"), advice)
     assert table.rows == [("nothing", "0.1", "-", "-")]
+
+
+def test_what_has_no_answer_is_no_number_of_a_sentence():
+    """Of the file as it is MuJoCo loses the motion, and held less firmly too."""
+    settings = RobotSettings((0.02, 1.0), (0.9,), 1e-3, "Euler", "Newton", 100, 1e-8)
+    missing, found = WorstState(math.inf), WorstState(0.1, "F12", 0.5, 0.5)
+    before = TriedSettings(settings, {}, found, missing, math.inf, 1e-5)
+    changes = {"timestep": "0.0001"}
+    best = TriedSettings(settings, changes, found, found, 1e-4, 2e-5)
+    advice = SettingsAdvice(0.2, 9, before, (), best, 1, (), None)
+    (loop,) = measured().loops
+    *_, reached, _, _ = describe_advice(loop, advice)
+    assert reached == "error none -> 0.1, gap none -> 0.1 mm, 10 -> 20 us a step"
+    lost = replace(loop, influence=Influence(math.inf, math.inf))
+    measurement = RobotMeasurement((lost,), ())
+    sentences = [one for one in describe_measurement(measurement) if type(one) is str]
+    assert "a tenth of which has no errors to compare" in sentences[1]
+    assert not any(" inf" in one for one in sentences)
 
 
 def test_a_page_holds_sentences_tables_and_elements():

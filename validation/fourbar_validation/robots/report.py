@@ -287,11 +287,13 @@ def _write_held(loop: LoopMeasurement) -> str:
         text = f"{loop.held} other {are} held: at single states by generalized forces"
         through = ", through time (once the loop has settled) by armature"
     if loop.influence is not None:
-        text += through
-        text += (
-            f", a tenth of which changes the errors by {loop.influence.worst:.1g} of"
-            f" the largest, {loop.influence.median:.1g} in the median"
-        )
+        changes = "has no errors to compare"
+        if math.isfinite(loop.influence.worst):
+            changes = (
+                f"changes the errors by {loop.influence.worst:.1g} of the largest,"
+                f" {loop.influence.median:.1g} in the median"
+            )
+        text += f"{through}, a tenth of which {changes}"
     if loop.as_it_is:
         return f"{text}; contacts, joint limits and other motors act as in the file"
     return f"{text}; contacts, joint limits and motors are off"
@@ -430,11 +432,15 @@ def describe_advice(
     for element in advice.typed:
         yield Typed(element)
     if best.changes:
-        yield (
-            f"error {before.error:.2g} -> {best.error:.2g}, gap {1e3 * before.gap:.2g} "
-            f"-> {1e3 * best.gap:.2g} mm, {1e6 * before.seconds_per_step:.2g} -> "
-            f"{1e6 * best.seconds_per_step:.2g} us a step"
+        error, gap, step = (
+            " -> ".join(f"{one:.2g}" if math.isfinite(one) else "none" for one in pair)
+            for pair in (
+                (before.error, best.error),
+                (1e3 * before.gap, 1e3 * best.gap),
+                (1e6 * before.seconds_per_step, 1e6 * best.seconds_per_step),
+            )
         )
+        yield f"error {error}, gap {gap} mm, {step} us a step"
     yield from _describe_deciding(loop, advice)
     rows = [_write_tried(one) for one in (before, *advice.alone)]
     yield TextTable(_SETTINGS, rows)
