@@ -561,6 +561,15 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path
     assert data.efc_pos[:1] == pytest.approx([0.0], abs=AGREES)
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_gravity_that_no_world_states_is_named(stated, tmp_path):
+    gravity = () if stated else [("<gravity>0 -9.81 0</gravity>", "")]
+    model, notes = compile_text(tmp_path, put(*gravity))
+    assert model.opt.gravity.tolist() == ([0, -9.81, 0] if stated else [0, 0, -9.8])
+    named = "no <world> states gravity: SDFormat's own, 9.8 m/s^2, is taken" in notes
+    assert named == (not stated)
+
+
 def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path):
     text = put(
         ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
@@ -653,8 +662,8 @@ TREE = (
     " add a <connect> between two sites, one on each link"
 )
 IN_GAZEBO = (
-    'last of <gazebo> may close loops, but are no URDF: "gz sdf -p FILE > robot.sdf"'
-    " writes an SDF that has them"
+    "a joint in <gazebo> may close a loop, but is no URDF (last):"
+    ' "gz sdf -p FILE > robot.sdf" writes an SDF that has it'
 )
 
 

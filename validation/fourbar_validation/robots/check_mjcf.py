@@ -89,7 +89,8 @@ def _read_role_names(pairs: tuple[str, ...]) -> dict[str, str]:
     metavar="JOINT",
     help=(
         "Joint whose equality, a polynomial, stands for the loop of SCENE: what it"
-        " loses. --pose theta_2=ANGLE states the input in the rest pose of the file."
+        " loses. --pose theta_2=ANGLE states the input in the rest pose of the file;"
+        " no other option but --assets goes with it."
     ),
 )
 @click.option(

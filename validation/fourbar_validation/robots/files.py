@@ -199,8 +199,9 @@ class _RobotReading:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
         if closing:
             self.notes.append(
-                f"{', '.join(closing)} of <gazebo> may close loops, but are no URDF: "
-                '"gz sdf -p FILE > robot.sdf" writes an SDF that has them'
+                "a joint in <gazebo> may close a loop, but is no URDF"
+                f" ({', '.join(closing)}): "
+                '"gz sdf -p FILE > robot.sdf" writes an SDF that has it'
             )
         self.notes.append(
             "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "

@@ -278,6 +278,10 @@ class _Conversion:
         self._grow_tree(links)
         mujoco = ET.Element("mujoco")
         ET.SubElement(mujoco, "compiler", angle="radian")
+        if world.find("gravity") is None:
+            self.notes.append(
+                "no <world> states gravity: SDFormat's own, 9.8 m/s^2, is taken"
+            )
         gravity = _numbers(_text(world, "gravity", DEFAULT_GRAVITY), 3, "gravity")
         timestep = _text(world, "physics/max_step_size", DEFAULT_TIMESTEP)
         ET.SubElement(mujoco, "option", gravity=_write(gravity), timestep=timestep)
