@@ -161,6 +161,10 @@ def test_of_two_motors_one_is_taken_as_driven():
         ),
         (Planar(by="weld", cut="B", joint='type="slide"'), "slide"),
         (
+            Planar({"O2": (0, 0), "A": (0.2, 0), "B": (0.55, 0), "O4": (0.8, 0)}),
+            "it cannot move; an anchor is taken in the rest pose",
+        ),
+        (
             Planar(
                 more=(
                     '<equality><connect body1="input" body2="output" anchor="0.1 0.1'
@@ -315,6 +319,48 @@ def test_an_equality_of_joints_or_of_a_fixed_tendon_is_a_mimic(tendon, mimic, wo
     assert other.loop is None
     assert words in other.reason
     assert one.loop.other_equalities == (1,)
+
+
+def test_behind_a_slide_that_follows_a_hinge_no_four_bar_stands():
+    slide = (
+        '<body name="rack"><joint name="rack" type="slide"/><geom size=".1"/></body>'
+    )
+    follow = '<joint joint1="rack" joint2="O2" polycoef="0 .1 0 0 0"/></equality>'
+    text = Planar(ground=slide).text().replace("</equality>", follow)
+    _, rack = report_of(text).closures
+    assert rack.reason.endswith("(a slide is in it: no four-bar stands behind it)")
+
+
+CHAIN = """
+<mujoco><worldbody><body name="base" euler="20 30 0">
+<body name="thigh"><joint name="hip" axis="0 1 0"/><geom size=".1"/>
+ <body name="shin" pos="0 0 -.1"><joint name="knee" axis="0 -1 0"/><geom size=".1"/>
+  <body name="foot" pos="0 0 -.1" euler="0 0 {turned}">
+   <joint name="ankle" axis="0 1 0"/><geom size=".1"/></body></body></body></body>
+</worldbody><tendon><fixed name="rods"><joint joint="hip" coef="2"/>
+<joint joint="knee" coef="{knee}"/><joint joint="ankle" coef="2"/></fixed></tendon>
+<equality><tendon tendon1="rods"/></equality></mujoco>
+"""
+
+
+@pytest.mark.parametrize(("knee", "turned"), [(-2, 0), (2, 0), (-1, 0), (-2, 10)])
+def test_a_tendon_of_three_hinges_stands_for_parallelograms_if_directions_stay(
+    knee, turned
+):
+    """Directions are those of MuJoCo in a pose that leaves the tendon its length."""
+    text = CHAIN.format(knee=knee, turned=turned)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    directions = []
+    for hip, knee_turned in ((0.0, 0.0), (0.3, 0.5)):
+        data.qpos[:] = hip, knee_turned, -hip - 0.5 * knee * knee_turned
+        mujoco.mj_forward(model, data)
+        assert data.ten_length[0] == pytest.approx(0.0, abs=1e-12)
+        directions.append(data.xmat[model.body("foot").id].copy())
+    stays = np.allclose(*directions)
+    assert ("keeps the direction of foot against base" in closure_of(text).reason) == (
+        stays
+    )
 
 
 ON_COUPLER = '<site name="c1" pos=".1 0 0"/><site name="c2" pos=".2 0 0"/>'

@@ -27,7 +27,9 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_closing,
     list_followers,
     list_joints,
+    list_joints_between,
     list_motors,
+    list_tendon_joints,
     list_tied_joints,
     name_body,
     name_joint,
@@ -350,17 +352,45 @@ class _Finder:
             joint, leader, numbers = followers[0]
             follower = name_joint(model, joint)
             polynomial = " ".join(f"{c + 0.0:.6g}" for c in numbers)
+            advice = (
+                "write the loop that it stands for, by fourbar new SCENE --pins; then"
+                f" check-mjcf SCENE FILE --mimic {follower} says what it loses"
+            )
+            if (model.jnt_type[[joint, leader]] == SLIDE).any():
+                advice = "a slide is in it: no four-bar stands behind it"
             return (
                 f"{follower} follows {name_joint(model, leader)}, polycoef "
-                f"{polynomial}: no loop is closed (write the loop that it stands for, "
-                "by fourbar new SCENE --pins; then check-mjcf SCENE FILE --mimic "
-                f"{follower} says what it loses)"
+                f"{polynomial}: no loop is closed ({advice})"
             )
         if kind != "joint":
-            return f"a {kind} equality is no pin"
+            more = self._describe_parallel(number) if kind == "tendon" else ""
+            return f"a {kind} equality is no pin{more}"
         joint = int(model.eq_obj1id[number])
         rest = float(model.eq_data[number, 0])
         return f"{name_joint(model, joint)} is kept at {rest:.6g} of its rest"
+
+    def _describe_parallel(self, number: int) -> str:
+        """Say so where an equality keeps the direction of a chain's last body.
+
+        The tendon's length is then the sum of the turns of all joints of the chain.
+        """
+        model = self.model
+        factors = list_tendon_joints(model, int(model.eq_obj1id[number]))
+        if not factors or model.eq_obj2id[number] >= 0:
+            return ""
+        bodies: list[int] = model.jnt_bodyid[[*factors]].tolist()
+        last = max(bodies)
+        bearer = find_parent(model, min(bodies))
+        turns = np.array([*factors.values()])[:, None] * self.data.xaxis[[*factors]]
+        is_chain = {*list_joints_between(model, bearer, last)} == {*factors}
+        are_hinges = (model.jnt_type[[*factors]] == HINGE_JOINT).all()
+        if not (is_chain and are_hinges and np.allclose(turns, turns[0])):
+            return ""
+        return (
+            f": it keeps the direction of {name_body(model, last)} against"
+            f" {name_body(model, bearer)}, as parallelograms do whose rods are not in"
+            " the file; a body for each rod, closed by a <connect>, makes loops of them"
+        )
 
     def _list_reasons(self, chain: _Chain) -> Iterator[str]:
         """Say why a closure closes no four-bar; the first reason counts."""
@@ -720,6 +750,14 @@ class _Finder:
                 raise _NoFourBarError(
                     f"pins {one} and {other} are in one place: a bar has no length"
                 )
+        longest = max(loop.lengths)
+        if sum(loop.lengths) - 2.0 * longest <= COINCIDENT_PINS * longest:
+            raise _NoFourBarError(
+                "its longest bar reaches as far as the other three together"
+                f" ({loop.describe_lengths()}), or farther: it cannot move; an anchor"
+                " is taken in the rest pose, so if the loop is open there, state the"
+                " pin by two sites"
+            )
         closures, others = self._sort_equalities(loop)
         remarks += _describe_offset(self.posed, closures, loop, normal)
         return replace(
