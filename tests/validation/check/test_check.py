@@ -239,6 +239,11 @@ def gravity(*field):
     return solved(lambda scene: replace(scene, effects=effects))
 
 
+def rubbed(effect):
+    """Solve with one more effect."""
+    return solved(lambda scene: replace(scene, effects=(*scene.effects, effect)))
+
+
 def loads_times(factor, number=None):
     """Multiply the load of this number, or every one."""
 
@@ -542,6 +547,15 @@ IN_CRANK_ROCKER = {
         scaled(mass=1.2, inertia=1.2), "coupler"
     ),
     "coupler: mass 1.2 times ours": bars(scaled(mass=1.2), "coupler"),
+    "coupler: mass centre at 0.05 m and 36.8699 deg (fitted)": bars(
+        centred(lambda d, x, y: (0.04, 0.03)), "coupler"
+    ),
+    "viscous damping at A [N m s/rad]: 0.05, which the scene leaves out": rubbed(
+        fourbar.Viscous.at(A=0.05)
+    ),
+    "dry friction at O4 [N m]: 0.07, which the scene leaves out": rubbed(
+        Friction.at(O4=0.07)
+    ),
     "coupler: mass of the output": bars(scaled(mass=0.8), "coupler"),
     "input and output: mass and inertia are exchanged": solved(exchange_bars),
     "m a and I alpha in kg cm/s^2": inertial(100.0, 100.0),

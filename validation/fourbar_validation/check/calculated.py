@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Flywheel, Gravity, Load
+from fourbar.effects import Flywheel, Friction, Gravity, Load, Viscous
 from fourbar.errors import FourBarError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
@@ -131,6 +131,15 @@ _SPRING_NUMBERS = {
     "torsion": ("preload", "rest angle", "rest angle, its turn counted from 0,"),
 }
 """Numbers that shift the force of a spring, by the effect's key."""
+MISSING = {
+    f"{name} at {pin} [{unit}]:": (effect, pin)
+    for name, unit, effect in (
+        ("viscous damping", "N m s/rad", Viscous),
+        ("dry friction", "N m", Friction),
+    )
+    for pin in PINS
+}
+"""What a scene may leave out at a pin, by name."""
 _SPRINGS = {"springs": "spring", "torsion": "torsion spring"}
 """Name of one spring, by the effect's key."""
 
@@ -576,15 +585,53 @@ class Calculation:
         for name, text, more in self._list_bar_mistakes():
             yield Change(f"{name}: {text}", more)
 
-    def list_factors(self) -> Iterator[tuple[str, Array]]:
-        """List what may have a factor, with what it adds to the unknowns, (n, 13)."""
+    def list_factors(self) -> Iterator[tuple[str, list[Array]]]:
+        """List what may have another amount, with what a unit of it adds, (n, 13) each.
+
+        A unit is as much as there is. A mass centre has three: 1 m along and across its
+        bar, and 1 m^2 of the square of both.
+        """
         for name, text, less in self._list_bar_mistakes():
             if text.endswith(_LEFT_OUT):
-                yield f"{name}: {text.removesuffix(_LEFT_OUT)}", -less
+                yield f"{name}: {text.removesuffix(_LEFT_OUT)}", [-less]
         for name, acting, _ in self._list_acting():
-            yield name, acting
+            yield name, [acting]
         for name, less in self._list_numbers(0.0):
-            yield name, -less
+            yield name, [-less]
+        for name, (effect, pin) in MISSING.items():
+            there = [one for one in self.scene.effects if one.key == effect.key]
+            if not any(
+                pin in dict(getattr(one, _PART_FIELDS[one.key])) for one in there
+            ):
+                yield name, [self.apply(effect.at(**{pin: 1.0}))]
+        for bar in MOVING_BARS:
+            if mass := find_mass(self.of_bar[bar]):
+                yield f"{BAR_NAMES[bar]}: mass centre", self._shift_centre(bar, mass)
+
+    def _shift_centre(self, bar: int, mass: float) -> list[Array]:
+        """Return what shifts of a mass centre add, and their square.
+
+        A load that is stated from the centre goes with it.
+        """
+        motion = self.motion
+        acting = BodyWrenches(len(self.right))
+        for effect in self.gravity:
+            apply_effect(effect, motion, acting)
+        for stated, load in zip(self.stated.loads, self.scene.loads, strict=True):
+            if stated.from_centre is not None:
+                apply_load(load, motion, acting)
+        force = acting.force[bar] - mass * self.a_G[bar]
+        swing = 1j * motion.alpha[bar] - motion.omega[bar] ** 2
+        shifts = [
+            self.push(
+                bar,
+                -mass * swing * shift,
+                self.to_centre[bar],
+                cross_products(shift, force),
+            )
+            for shift in (motion.unit[bar], 1j * motion.unit[bar])
+        ]
+        return [*shifts, self.push(bar, 0.0, couple=-mass * motion.alpha[bar])]
 
     def _list_bar_mistakes(self) -> Iterator[tuple[str, str, Array]]:
         """List mistakes in mass and inertia of each bar, then of every bar."""

@@ -17,7 +17,12 @@ from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Command
-from fourbar_validation.check.calculated import Calculation, Change, join
+from fourbar_validation.check.calculated import (
+    MISSING,
+    Calculation,
+    Change,
+    join,
+)
 from fourbar_validation.check.judge_table import Column, Judge
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
@@ -225,7 +230,8 @@ def _compute_residual(
 def _try_factors(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
     """Try a moment of inertia, a mass, a load or an effect times a factor.
 
-    Forces and torque are linear in each, so that the doubled number tells the factor.
+    Damping or friction that the scene leaves out, and a mass centre elsewhere, too.
+    Forces and torque are linear in each, so that a unit of it tells the amount.
     """
     columns = [column for column in differing if column.quantity in FORCE_NAMES]
     # a magnitude is linear in none of them
@@ -237,16 +243,20 @@ def _try_factors(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
         return
     calculation = Calculation(judge.scene, judge.right)
     parts = dict(calculation.list_factors())
+    units = [Change(name, one) for name, several in parts.items() for one in several]
+    moves: dict[str, list[Array]] = {}
+    for unit in calculation.solve(units):
+        moved = theirs - _compute_residual(columns, unit)
+        moves.setdefault(unit.text, []).append(moved)
     fitted: list[tuple[str, float, Change]] = []
-    for doubled in calculation.solve([Change(*part) for part in parts.items()]):
-        moves = theirs - _compute_residual(columns, doubled)
-        squares = float(moves @ moves)
-        factor = 1.0 + float(moves @ theirs) / squares if squares else math.nan
-        if LEAST_FACTOR < factor < math.inf and factor != 1.0:
-            name = doubled.text
-            for f, what, times in _name_factors(name, factor):
-                change = Change(f"{name} {what}", (f - 1.0) * parts[name])
-                fitted.append((name, times, change))
+    centres = {name: bar.mass_centre for name, bar in list_moving(calculation.scene)}
+    for name, several in moves.items():
+        if not np.isfinite(several).all():
+            continue
+        amounts, *_ = np.linalg.lstsq(np.transpose(several), theirs, rcond=None)
+        for text, these, times in _name_amounts(name, amounts.tolist(), centres):
+            more = np.tensordot(these, np.array(parts[name]), 1)
+            fitted.append((name, times, Change(f"{name} {text}", more)))
     explained = set()
     solved = calculation.solve([change for _, _, change in fitted])
     for (name, times, _), mistake in zip(fitted, solved, strict=True):
@@ -261,17 +271,34 @@ def _try_factors(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
             explained.add(name)
 
 
-def _name_factors(name: str, factor: float) -> Iterator[tuple[float, str, float]]:
-    """Yield the plain factor near a fitted one, and the fitted one.
+def _name_amounts(
+    name: str, amounts: list[float], centres: dict[str, tuple[float, float]]
+) -> Iterator[tuple[str, tuple[float, ...], float]]:
+    """Yield what fitted amounts of something are, those near plain ones first.
 
-    Each comes with what was done, and the factor on what is allowed.
+    Each comes with the amounts and the factor on what is allowed.
     """
+    amount, *across = amounts
+    if name in MISSING:
+        if amount > 0.0:
+            text = f"{amount:.6g}, which the scene leaves out (fitted)"
+            yield text, (amount,), CARRIED
+        return
+    if across:
+        bar = name.partition(":")[0]
+        shift = complex(amount, across[0])
+        r, phi = cmath.polar(cmath.rect(*centres[bar]) + shift)
+        text = f"at {r:.6g} m and {math.degrees(phi):.4f} deg (fitted)"
+        yield text, (shift.real, shift.imag, abs(shift) ** 2), CARRIED
+        return
+    factor = 1.0 + amount
     if name.endswith(f": {_INERTIA}"):
         for plain, mistake in _FACTORS.items():
             if abs(factor / plain - 1.0) < NEAR_A_PLAIN_NUMBER:
-                yield plain, mistake, 1.0
+                yield mistake, (plain - 1.0,), 1.0
                 break
-    yield factor, f"{factor:.6g} times ours (fitted)", CARRIED
+    if amount and factor > LEAST_FACTOR:
+        yield f"{factor:.6g} times ours (fitted)", (amount,), CARRIED
 
 
 def _list_varied(judge: Judge, moved: bool) -> Iterator[_Vary]:
