@@ -6,7 +6,7 @@ from fourbar_validation.places import find_program
 
 
 @pytest.mark.parametrize(
-    ("started", "program"),
+    "started, program",
     [
         ("/usr/bin/fourbar-validation", "fourbar-validation"),
         ("/code/fourbar_validation/__main__.py", "fourbar-validation"),

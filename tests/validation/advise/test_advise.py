@@ -46,7 +46,7 @@ def call(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("omega", "required", "most"),
+    "omega, required, most",
     [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)],
 )
 def test_figures_of_the_crank_rocker(omega, required, most):
@@ -108,7 +108,7 @@ def test_no_curve_is_drawn_through_a_pole():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "most"),
+    "name, most",
     # of the thesis errors between the steps decide
     [("double_rocker", 1000), ("triple_rocker", 1000), ("thesis", 1600)],
 )

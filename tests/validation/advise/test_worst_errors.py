@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar.mjcf import Settings
@@ -43,13 +44,13 @@ def answer(**off):
 def test_each_error_is_the_part_that_an_answer_is_off(name, part):
     errors = compute_errors(SCENE, COMMAND, answer(**{name: part}))
     for field, error in zip(ERROR_NAMES, errors, strict=True):
-        assert error == pytest.approx(
+        assert error == approx(
             part if field == name else 0.0,
             rel=1e-4,
             abs=1e-12,
         )
-    assert errors.worst == pytest.approx(part, rel=1e-4)
-    assert errors.force == pytest.approx(0.0 if name == "torque" else part, abs=1e-12)
+    assert errors.worst == approx(part, rel=1e-4)
+    assert errors.force == approx(0.0 if name == "torque" else part, abs=1e-12)
 
 
 def test_what_is_no_number_is_no_small_error():
@@ -114,5 +115,5 @@ def test_the_greatest_deviation_of_the_speed_is_said():
     speed[7] = 10.5
     trial = SimpleNamespace(at=COMMAND._replace(speed=speed))
     found = advise._find_speed_error(Pretended(), trial)  # type: ignore[arg-type]
-    assert found == pytest.approx(0.05)
+    assert found == approx(0.05)
     assert isinstance(INFINITE_ERRORS, WorstErrors)

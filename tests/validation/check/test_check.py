@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar import Friction, Load, Motion, Sweep, Torsion
@@ -157,7 +158,7 @@ def test_right_digits_agree_and_the_last_of_them_is_judged(scene, differing):
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "digits"),
+    "first, second, digits",
     [("1.1", "3.17", "2 digits"), ("1.10", "3.2", "1 digit")],
 )
 def test_zeros_that_are_left_off_are_digits_if_they_are_right(
@@ -186,15 +187,15 @@ def test_blank_cells_are_counted_and_the_rest_of_their_row_is_judged(read):
     ]  # fmt: skip
     (wrong,) = judgement.differing
     assert wrong.theirs == (2 * second,)
-    assert wrong.ours == pytest.approx((second,), rel=1e-12)
+    assert wrong.ours == approx((second,), rel=1e-12)
     assert judgement.sentence().endswith("; 3 of 6 cells are blank")
 
 
-@pytest.mark.parametrize(("angle", "half"), [("20.5", 0.0), ("20.5003", 0.00005)])
+@pytest.mark.parametrize("angle, half", [("20.5", 0.0), ("20.5003", 0.00005)])
 def test_whole_degrees_are_positions_that_somebody_chose(angle, half, read):
     """Zeros may be left off: a column has the decimals of its longest number."""
     table = read(f"theta_2 [deg],torque\n10,1.0\n{angle},1.0\n")
-    assert table.places_rounding == pytest.approx(np.radians(half), rel=1e-9)
+    assert table.places_rounding == approx(np.radians(half), rel=1e-9)
 
 
 def solved(change=lambda scene: scene, **commanded):
@@ -623,7 +624,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    "name, words",
     [(name, words) for name, planted in MISTAKES.items() for words in planted],
 )
 def test_a_known_mistake_is_the_first_explanation(name, words, judged):
@@ -759,7 +760,7 @@ def test_the_table_of_another_scene_is_explained(words, read):
 
 
 @pytest.mark.parametrize(
-    ("part", "code", "words"),
+    "part, code, words",
     [
         (0.0, HOLDS, "24 of 24 numbers agree"),
         (-0.7, HOLDS, "friction, not judged: F12_x 12 of 12 numbers agree"),
@@ -800,7 +801,7 @@ def test_one_component_is_judged_by_itself(letter, read):
 
 
 @pytest.mark.parametrize(
-    ("torque", "code"),
+    "torque, code",
     slow_but(
         {("0.0", HOLDS), ("0.04", FAILED)},
         [("0.0", HOLDS), ("0.04", FAILED), ("5.0", FAILED)],
@@ -830,7 +831,7 @@ REFUSED_MOTIONS = [
 ]
 
 
-@pytest.mark.parametrize(("motion", "words"), REFUSED_MOTIONS)
+@pytest.mark.parametrize("motion, words", REFUSED_MOTIONS)
 def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
     motion, words, check
 ):
@@ -917,7 +918,7 @@ BAD_TABLES = {
 }
 
 
-@pytest.mark.parametrize(("text", "words"), BAD_TABLES.items())
+@pytest.mark.parametrize("text, words", BAD_TABLES.items())
 def test_a_bad_table_is_one_line(text, words, check):
     code, _, error = check(THESIS, text)
     assert code == BAD_INPUT and words in error
@@ -1033,7 +1034,7 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     assert (report["compared"], report["agree"]) == (count, count - rows)
     assert {finding["quantity"] for finding in report["differing"]} == {"torque"}
     first = report["differing"][0]
-    assert first["theirs"] == pytest.approx([off["torque"][0]], rel=1e-15)
+    assert first["theirs"] == approx([off["torque"][0]], rel=1e-15)
     code, printed, report, failing = judge("--rtol", "1e-3")
     agreed = f"{count} of {count} numbers agree within rtol 0.001, atol 0"
     assert code == HOLDS and f"{agreed}; {count - rows} to round-off" in printed
@@ -1167,7 +1168,7 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
 
 
 @pytest.mark.parametrize(
-    ("heading", "words"),
+    "heading, words",
     [
         ("omega", "rename it if it is omega_2"),
         ("R12x [N]", "rename it if it is F12_x or F12_y"),
@@ -1188,12 +1189,12 @@ def test_a_column_of_an_unknown_name_says_what_it_may_be(heading, words, torques
     table = torques(f"theta_2 [deg],torque,{heading}", "{theta:.0f},{torque:.9e},1")
     (why,) = table.left_out.values()
     assert why.startswith("not a known column: ") and words in why
-    with pytest.raises(InputError, match=r"needs a result.*rename it if it is"):
+    with raises(InputError, match=r"needs a result.*rename it if it is"):
         torques(f"theta_2 [deg],{heading}", "{theta:.0f},1")
 
 
 def test_columns_that_say_two_things_are_refused(torques):
-    with pytest.raises(InputError, match="columns 2 and 3 are both torque, with other"):
+    with raises(InputError, match="columns 2 and 3 are both torque, with other"):
         torques("theta_2 [deg],torque,T2", "{theta:.0f},{torque:.9e},0.5")
 
 
@@ -1219,7 +1220,7 @@ is said of them. A spreadsheet leaves off the zeros of 2.00.
 """
 
 
-@pytest.mark.parametrize(("rows", "code", "words"), COARSE)
+@pytest.mark.parametrize("rows, code, words", COARSE)
 def test_a_number_without_a_digit_agrees_with_nothing(rows, code, words, check):
     rows, *options = rows.split(" ")
     text = f"theta_2 [deg],torque [N m],F12 [N]\n{rows}\n"
@@ -1276,7 +1277,7 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     assert "looks like" not in printed
 
 
-@pytest.mark.parametrize(("alike", "explained"), [(9, True), (8, False)])
+@pytest.mark.parametrize("alike, explained", [(9, True), (8, False)])
 def test_a_mistake_that_explains_less_than_nine_tenths_is_not_printed(
     alike, explained, judged
 ):
@@ -1313,7 +1314,7 @@ length = "18 in"
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "options", "angle"),
+    "name, options, angle",
     [
         ("thesis", (), "theta_2 [deg]"),
         ("thesis", ("--csv-comma",), "theta_2 [deg]"),
@@ -1353,7 +1354,7 @@ def rounded(values, digits):
     return np.array([float(f"{x:.{digits - 1}e}") for x in values.tolist()])
 
 
-@pytest.mark.parametrize(("digits", "power"), slow_but({(5, -4)}, [(8, -7), (5, -4)]))
+@pytest.mark.parametrize("digits, power", slow_but({(5, -4)}, [(8, -7), (5, -4)]))
 @pytest.mark.slow
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     digits, power, check

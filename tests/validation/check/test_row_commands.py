@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar.errors import FAILED, HOLDS, InputError
@@ -86,7 +87,7 @@ def at_angles(angles):
     )
 
 
-@pytest.mark.parametrize(("bar", "ends"), [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
+@pytest.mark.parametrize("bar, ends", [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
 @pytest.mark.parametrize("same", [True, False])
 def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
     scene = commanding(bar, *ends)
@@ -150,9 +151,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(read):
         assert sum(not one.agrees for one in findings) == differ
 
 
-@pytest.mark.parametrize(
-    ("ends", "side"), [((60.0, 220.0), 1.0), ((245.0, 395.0), -1.0)]
-)
+@pytest.mark.parametrize("ends, side", [((60.0, 220.0), 1.0), ((245.0, 395.0), -1.0)])
 def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judged):
     """It is passed twice a turn, and once within the range of the scene."""
     scene = commanding(2, *ends)
@@ -195,7 +194,7 @@ def test_the_rounding_of_another_bars_angle_is_allowed_for(judged):
 def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
     scene = commanding(2, 0.0, 360.0)
     theta_4 = np.radians([120.0, 140.0])
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         judged(
             scene,
             "theta_4",
@@ -219,7 +218,7 @@ def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
 
 
 @pytest.mark.parametrize(
-    ("name", "commanded", "angle"),
+    "name, commanded, angle",
     [
         ("Angle", "theta_4", "theta_4"),
         ("Angle", "theta_2", "theta_2"),
@@ -261,7 +260,7 @@ def follow_rise(time):
     return theta, omega, alpha, fourbar.solve(SERVO, at=at).torque
 
 
-@pytest.mark.parametrize(("lag", "side"), [(2e-3, "before"), (-5e-3, "after")])
+@pytest.mark.parametrize("lag, side", [(2e-3, "before"), (-5e-3, "after")])
 def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
     time = np.arange(0.0123, 0.79, 0.0517)
     columns = time, follow_rise(time)[0], follow_rise(time - lag)[3]
@@ -271,7 +270,7 @@ def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
     assert only.complete and f"time {abs(lag):g} s {side} its own" in only.text
 
 
-@pytest.mark.parametrize(("names", "judged_as"), LOGGED)
+@pytest.mark.parametrize("names, judged_as", LOGGED)
 def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, read):
     time = np.arange(0.0123, 0.79, 0.0517)
     theta, omega, alpha, torque = follow_rise(time)
@@ -305,12 +304,12 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, judged_as, re
         findings = Judge(SERVO, read(wrong)).findings()
         assert [one.line for one in findings if not one.agrees] == [5]
     else:
-        with pytest.raises(InputError, match=judged_as) as caught:
+        with raises(InputError, match=judged_as) as caught:
             judge_table(SERVO, read(text))
         assert "Servo" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("speed", "start"), [(3.0, 20.0), (-2.0, 80.0)])
+@pytest.mark.parametrize("speed, start", [(3.0, 20.0), (-2.0, 80.0)])
 def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
     scene = crank_rocker(motion=fourbar.Motion(theta.tolist(), speed))
@@ -348,10 +347,10 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
     own = fourbar.solve(scene, "position")
     text = tabulate("theta_2", own.theta_2, own.stroke).replace("torque", "stroke")
     assert judge_table(scene, read(text)).status == HOLDS
-    with pytest.raises(InputError, match="needs a column stroke"):
+    with raises(InputError, match="needs a column stroke"):
         judged(scene, "theta_2", theta, theta)
 
 
 def test_a_table_without_an_angle_names_the_commanded_one(read):
-    with pytest.raises(InputError, match=r"needs a column theta_4 \(say theta_4 \[deg"):
+    with raises(InputError, match=r"needs a column theta_4 \(say theta_4 \[deg"):
         read("torque\n1.0\n", "theta_4")

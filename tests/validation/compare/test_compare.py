@@ -51,7 +51,7 @@ def judge_quantity(*error, predicted=None, **changes):
 
 
 @pytest.mark.parametrize(
-    ("predicted", "verdict", "allowed"),
+    "predicted, verdict, allowed",
     [
         (None, FAILS, ALLOWED),
         (1e-14, FAILS, 1e-13),
@@ -82,7 +82,7 @@ def test_within_what_is_allowed_no_prediction_is_needed_and_no_number_fails():
 
 
 @pytest.mark.parametrize(
-    ("allowed", "declared", "verdict"),
+    "allowed, declared, verdict",
     [
         (0.049, K * LAST_DIGIT, FAILS),
         (0.051, K * LAST_DIGIT, UNDECIDED),

@@ -95,7 +95,7 @@ IDENTITY = changed(engine="formulas", quantity="closure")
 
 
 @pytest.mark.parametrize(
-    ("rows", "sentence", "status"),
+    "rows, sentence, status",
     [
         (rows(agree=2), "All 2 comparisons hold: 2 agree", HOLDS),
         (
@@ -177,7 +177,7 @@ WITHOUT_EFFECTS = [
 """What an answer says where nothing acts, and the row of the inertia alone."""
 
 
-@pytest.mark.parametrize(("said", "verdict", "reason"), WITHOUT_EFFECTS)
+@pytest.mark.parametrize("said, verdict, reason", WITHOUT_EFFECTS)
 def test_what_is_wrong_with_the_inertia_alone_is_a_row(said, verdict, reason):
     class WithoutEffects(Echo):
         def answer(self, scene, command):
@@ -328,7 +328,7 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, 
 
 
 @pytest.mark.parametrize(
-    ("error", "allowed", "mask", "verdict", "worst"),
+    "error, allowed, mask, verdict, worst",
     [
         ([0.0, 2.0, 1.0], 2.0, None, AGREES, 1),
         ([0.0, 2.1, 1.0], 2.0, None, FAILS, 1),

@@ -29,7 +29,7 @@ NAN, INF = float("nan"), float("inf")
 
 
 @pytest.mark.parametrize(
-    ("name", "ours", "theirs", "apart"),
+    "name, ours, theirs, apart",
     [
         ("theta_3", math.pi - 0.25, -math.pi + 0.25, 0.5),
         ("theta_3", 1.0, 1.0 + math.pi, math.pi),
@@ -54,7 +54,7 @@ def test_arrays_of_two_shapes_have_no_error_and_no_size_demands_zero():
 
 
 @pytest.mark.parametrize(
-    ("error", "allowed", "share"),
+    "error, allowed, share",
     [
         (1.0, 4.0, 0.25),
         (0.0, 0.0, 0.0),
@@ -91,7 +91,7 @@ def test_conditions_of_several_quantities_are_those_of_their_units():
 
 
 @pytest.mark.parametrize(
-    ("bound", "power"),
+    "bound, power",
     [(EQUIVALENCE, 1.0), (IDENTITY, 0.0), (SIMULATED, 0.0), (FULL_ACCURACY, 0.0)],
 )
 def test_only_an_exact_comparison_is_allowed_more_as_the_condition_falls(bound, power):

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pytest import approx, raises
 from scipy.interpolate import make_interp_spline
 
 import fourbar
@@ -65,7 +66,7 @@ def tried(scene):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("integrator", "order", "steps"),
+    "integrator, order, steps",
     [
         ("Euler", 1.0, (160, 320, 640, 1280)),
         ("implicitfast", 1.0, (160, 320, 640, 1280)),
@@ -109,8 +110,8 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     spots = tuple(spot for spot in curve.spots if spot.x in (320, 2560))
     coarse, fine = (p.at_steps for p in made._try_curve(replace(curve, spots=spots)))
     assert fine.worst > laws.FLOORED * coarse.worst
-    assert fine.torque == pytest.approx(4e-3, rel=0.3)
-    assert fine.force == pytest.approx(7e-3, rel=0.3)
+    assert fine.torque == approx(4e-3, rel=0.3)
+    assert fine.force == approx(7e-3, rel=0.3)
 
 
 @pytest.mark.slow
@@ -144,7 +145,7 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit(scene):
         return compute_errors(scene, commanded, answer.quantities).worst
 
     soft, stiff = wrong(0.999), wrong(0.9999)
-    assert soft / stiff == pytest.approx(10.0, rel=0.1)
+    assert soft / stiff == approx(10.0, rel=0.1)
     assert wrong(0.9999, 0.9998, 0.9996, 0.9992) < 1e-5 * stiff
 
 
@@ -169,7 +170,7 @@ def test_single_precision_slides_too():
     commanded = command(scene)
     single = formulas.evaluate_single(scene, commanded)
     assert compute_errors(scene, commanded, single).worst < 1e-4
-    with pytest.raises(NotImplementedError, match="pin forces"):
+    with raises(NotImplementedError, match="pin forces"):
         formulas.solve_thirteen_equations(scene, commanded)
 
 
@@ -205,7 +206,7 @@ def fit_by_quantity(curves):
 
 def test_fit_floor_and_warning():
     slope, sigma = laws.fit([1.0, 2.0, 4.0, 8.0], [3.0, 6.0, 12.0, 24.0])
-    assert slope == pytest.approx(1.0) and sigma < 1e-9
+    assert slope == approx(1.0) and sigma < 1e-9
     falling = [point(10.0 * 2**k, 2.0 ** (-4 * k)) for k in range(6)]
     assert laws.find_floor(falling, "F12") is None
     floored = [*falling, point(640.0, 9e-7), point(1280.0, 9e-7)]
@@ -273,7 +274,7 @@ def test_each_quantity_has_its_own_order_and_floor():
     curves = {"RK4, tc held": ladder}
     laws_found = fit_by_quantity(curves)
     assert laws_found["torque"].holds and not laws_found["F14"].holds
-    assert laws_found["F14"].exponent == pytest.approx(1.0)
+    assert laws_found["F14"].exponent == approx(1.0)
     warning = "RK4, tc held: F32: 1.0e-03 from 20 steps a revolution on"
     assert laws.list_warnings(curves) == [warning]
 
@@ -336,7 +337,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
         made.units = {name: lambda name=name: unit(name) for name in ("a", "b", "c")}  # type: ignore[misc]
         return made
 
-    with pytest.raises(KeyboardInterrupt):
+    with raises(KeyboardInterrupt):
         list(units("b").points())
     points = dict(units(None).points())
     curves = [p.curve for row in points.values() for p in row]
@@ -456,10 +457,10 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     assert (ratio > 10.0) == (drive != 2)
     assert trial.readings == trial.steps + 1
     seconds = step * trial.steps + reading * trial.readings
-    assert cost_point.seconds_per_revolution == pytest.approx(seconds, rel=1e-12)
+    assert cost_point.seconds_per_revolution == approx(seconds, rel=1e-12)
 
 
-@pytest.mark.parametrize(("drive", "column"), [(2, 1), (4, 3)])
+@pytest.mark.parametrize("drive, column", [(2, 1), (4, 3)])
 def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
     page = (MODELS.parent / "docs" / "cost.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)
@@ -469,7 +470,7 @@ def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
         printed = [float(cell) for cell in cells.split("|")][column - 1 : column + 1]
         missed = [miss_between(scene, int(count), degree) for degree in (3, 7)]
         # the least of them is the rounding of the torque
-        assert missed == pytest.approx(printed, rel=0.05, abs=2e-13)
+        assert missed == approx(printed, rel=0.05, abs=2e-13)
 
 
 def miss_between(scene, count, degree):

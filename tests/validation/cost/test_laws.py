@@ -30,7 +30,7 @@ def fit_order(order):
     return law
 
 
-@pytest.mark.parametrize(("order", "holds"), [(4.0, True), (3.8, True), (3.5, False)])
+@pytest.mark.parametrize("order, holds", [(4.0, True), (3.8, True), (3.5, False)])
 def test_a_law_holds_within_a_third_of_an_order(order, holds):
     law = fit_order(order)
     assert law.exponent == pytest.approx(order, abs=1e-6) and law.expected == 4.0

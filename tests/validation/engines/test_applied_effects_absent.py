@@ -33,7 +33,7 @@ BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionlos
 
 
 @pytest.mark.parametrize(
-    ("name", "enabled", "more_rows", "tendons", "actuators"),
+    "name, enabled, more_rows, tendons, actuators",
     [
         (None, set(), 0, 0, 1),
         ("gravity", set(), 0, 0, 1),
@@ -65,7 +65,7 @@ def moved(*motion):
 
 
 @pytest.mark.parametrize(
-    ("motion", "reason"),
+    "motion, reason",
     [
         (
             (fourbar.Sweep(0.0, 6.0, 20), 0.0),

@@ -447,7 +447,7 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
 
 
 @pytest.mark.parametrize(
-    ("drive", "mu", "r", "theta_2"),
+    "drive, mu, r, theta_2",
     [
         (4, 0.3, 0.1, 1.0891061452513966),
         (4, 0.5, 0.05, 1.0198324022346368),

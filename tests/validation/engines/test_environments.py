@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar.errors import LONGEST_MESSAGE, DependencyError, InputError
@@ -129,7 +130,7 @@ def test_two_versions_are_judged_side_by_side(tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.usefixtures("made_once")
 @pytest.mark.parametrize(
-    ("stated", "words"),
+    "stated, words",
     [
         (
             {"requires": ("no-such-thing==1",)},
@@ -139,7 +140,7 @@ def test_two_versions_are_judged_side_by_side(tmp_path, monkeypatch):
     ],
 )
 def test_an_environment_that_cannot_be_made_is_one_line(stated, words, tmp_path):
-    with pytest.raises(DependencyError, match=words):
+    with raises(DependencyError, match=words):
         make_environment(Entry("none", adapter="a:B", **stated), tmp_path)
 
 
@@ -162,7 +163,7 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
         )
 
     monkeypatch.setattr(environments, "run_to_end", fails_at_pip)
-    with pytest.raises(DependencyError, match="none: its environment cannot be made"):
+    with raises(DependencyError, match="none: its environment cannot be made"):
         make_environment(Entry("none", adapter="a:B", requires=("x",)), tmp_path)
     (made, filled) = lines
     assert made[:3] == [sys.executable, "-m", "venv"]
@@ -172,7 +173,7 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text, words",
     [
         ("[[engine]", "is no TOML"),
         ("engine = [1]", "must be a table"),
@@ -195,21 +196,21 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
 def test_what_is_no_entry_is_named_with_its_file(text, words, tmp_path):
     file = tmp_path / "engines.toml"
     file.write_text(text)
-    with pytest.raises(InputError) as error:
+    with raises(InputError) as error:
         read_engines([tmp_path])
     assert words in str(error.value) and str(error.value).startswith(str(file))
 
 
 def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known():
     known = r"must be among pinocchio-inverse, .*mujoco 3\.3\.7"
-    with pytest.raises(InputError, match=known):
+    with raises(InputError, match=known):
         choose_engines("nobody")
-    with pytest.raises(InputError, match="among Newton: MuJoCo solver, Newton: Kam"):
+    with raises(InputError, match="among Newton: MuJoCo solver, Newton: Kam"):
         choose_engines("newton")
 
 
 def test_the_list_of_known_engines_has_whole_names():
-    with pytest.raises(InputError) as error:
+    with raises(InputError) as error:
         choose_engines("nobody")
     names, count = re.search(r"among (.*) and (\d+) more$", str(error.value)).groups()
     table = fill_table()

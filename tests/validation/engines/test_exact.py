@@ -17,7 +17,7 @@ INCH = 0.0254
 
 
 @pytest.mark.parametrize(
-    ("unit", "stated"),
+    "unit, stated",
     [
         (1e-3, ("80", "100", "120", "60")),
         (1e-3, ("100.1", "70.3", "60.7", "109.7")),

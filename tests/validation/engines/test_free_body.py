@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar.effects import (
@@ -88,7 +89,7 @@ NOTHING, LEFT, RIGHT = (0.0, 0.0), (-10.0, 0.0), (10.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("drive", "forces"),
+    "drive, forces",
     [(2, (LEFT, RIGHT, RIGHT, NOTHING)), (4, (NOTHING, NOTHING, NOTHING, LEFT))],
 )
 def test_a_lever_of_an_upright_rectangle(drive, forces):
@@ -99,9 +100,9 @@ def test_a_lever_of_an_upright_rectangle(drive, forces):
     load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
     scene = Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,))
     got = answered(scene)
-    assert got["torque"][0] == pytest.approx(1.0, abs=1e-14)
+    assert got["torque"][0] == approx(1.0, abs=1e-14)
     for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
-        assert got[name][0] == pytest.approx(force, abs=1e-13), name
+        assert got[name][0] == approx(force, abs=1e-13), name
 
 
 SPRING = Springs(
@@ -130,7 +131,7 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
     of_2, of_4 = power(2), power(4)
     most = np.abs(of_2).max()
     assert abs(of_2.sum()) < 512 * 1e-14 * most
-    assert of_4 == pytest.approx(of_2, abs=1e-10 * np.abs(of_4).max(), rel=0)
+    assert of_4 == approx(of_2, abs=1e-10 * np.abs(of_4).max(), rel=0)
     assert most > 1.0
 
 
@@ -171,11 +172,11 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect):
     more = 10.0 * (braked["torque"] - free["torque"])
     assert (loss > 0.0).all()
     allowed = 1e-12 * 10.0 * np.abs(braked["torque"]).max()
-    assert more == pytest.approx(loss, abs=allowed, rel=0)
+    assert more == approx(loss, abs=allowed, rel=0)
 
 
 @pytest.mark.parametrize(
-    ("F", "C", "x"),
+    "F, C, x",
     [
         (1.0, 0.5, 2.0),
         (1.0, -0.5, 2.0 / 3.0),
@@ -192,7 +193,7 @@ def test_friction_of_one_pin(F, C, x):
     """
     load, couple = np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex)
     couples = continue_couples(load, couple, np.array([1.0]))
-    assert couples[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
+    assert couples[0, 0] == approx(x, rel=1e-14, nan_ok=True)
 
 
 def test_friction_of_several_pins_fulfils_its_equations():

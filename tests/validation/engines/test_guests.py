@@ -235,7 +235,7 @@ FINE = {
 
 
 @pytest.mark.parametrize(
-    ("errors", "line"),
+    "errors, line",
     [
         (
             "node:internal/modules/cjs/loader:1145\n  throw err;\n  ^\n\n"
@@ -415,7 +415,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("stated", "names"),
+    "stated, names",
     [
         (["wg 1.2"], ["wg"]),
         (["wg 1.2", "wg 1.3"], ["wg 1.2", "wg 1.3"]),
@@ -454,7 +454,7 @@ def test_names_stand_apart():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("entry", "part"),
+    "entry, part",
     [
         ("no such program", "the command line of a program that is there"),
         ("'", "is no command line"),
@@ -471,7 +471,7 @@ def test_what_is_not_there_is_refused_in_one_line(entry, part):
 
 @pytest.mark.usefixtures("hosted")
 @pytest.mark.parametrize(
-    ("name", "reason"),
+    "name, reason",
     [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")],
 )
 def test_a_hello_that_fails_is_one_failing_row(name, reason):

@@ -102,7 +102,7 @@ def test_what_the_input_decides_is_predicted_to_its_last_digits():
 
 
 @pytest.mark.parametrize("stretched", (True, False))
-@pytest.mark.parametrize(("b", "c"), ((0.1, 0.22), (0.4, 0.07), (0.3, 1e-3)))
+@pytest.mark.parametrize("b, c", ((0.1, 0.22), (0.4, 0.07), (0.3, 1e-3)))
 def test_the_bound_of_the_angles_is_that_of_the_triangle(b, c, stretched):
     """Close a triangle that misses its line by the margin.
 
@@ -144,7 +144,7 @@ WHEEL_ON_COUPLER = Scene(
 
 
 @pytest.mark.parametrize(
-    ("name", "scene"),
+    "name, scene",
     (
         ("pinocchio-inverse", UNEVEN),
         ("mujoco-inverse", UNEVEN),

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar.errors import FourBarError, InputError
@@ -241,7 +242,7 @@ def test_what_an_answer_leaves_out_has_defaults():
     np.testing.assert_array_equal(answer.at.angle, list_positions(THREE).angle)
     assert np.isnan(answer.quantities["F12"][1:]).all()
     assert read_answer({"refusal": "no springs here"}).refusal == "no springs here"
-    with pytest.raises(EngineError, match="no licence"):
+    with raises(EngineError, match="no licence"):
         read_answer({"error": "no licence"})
 
 
@@ -327,12 +328,12 @@ READ = {
 
 
 @pytest.mark.parametrize(
-    ("part", "number"),
+    "part, number",
     [(part, n) for part, (_, wrong) in READ.items() for n in range(len(wrong))],
 )
 def test_what_is_none_is_refused_in_one_line(part, number):
     read, wrong = READ[part]
-    with pytest.raises(FourBarError) as raised:
+    with raises(FourBarError) as raised:
         read(wrong[number])
     assert str(raised.value) and "\n" not in str(raised.value)
 
@@ -340,7 +341,7 @@ def test_what_is_none_is_refused_in_one_line(part, number):
 @pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)
 def test_a_setting_that_is_none_is_refused_in_one_line(data):
     words = r"^setting = [^\n]*: must be an object with name, and steps_per_turn"
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         protocol.read_setting(data)
 
 
@@ -365,5 +366,5 @@ def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives():
     steady = command._replace(acceleration=0.0 * acceleration)
     standing = faster._replace(speed=0.0 * speed)
     for made, asked in ((standing, command), (faster, steady)):
-        with pytest.raises(InputError, match=r"must be within .* of the command"):
+        with raises(InputError, match=r"must be within .* of the command"):
             protocol.require_near(made, asked)

@@ -125,7 +125,7 @@ def test_rows_for_the_report():
 
 
 @pytest.mark.parametrize(
-    ("printed", "ours", "noise", "verdict"),
+    "printed, ours, noise, verdict",
     [
         ("0.12", 0.1249, 0.0, "rounded"),
         ("0.13", 0.1251, 0.0, "rounded"),

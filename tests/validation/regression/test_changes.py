@@ -114,7 +114,7 @@ def test_settings_are_paired_only_where_each_run_has_one_of_its_own():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "status"),
+    "old, new, status",
     [
         ([ROW], [OTHER], FAILED),
         ([], [ROW], FAILED),
@@ -155,7 +155,7 @@ def test_the_worst_change_comes_first():
 
 
 @pytest.mark.parametrize(
-    ("factor", "weaker"), [("1.001e-14", True), ("1e-14", False), ("9e-15", False)]
+    "factor, weaker", [("1.001e-14", True), ("1e-14", False), ("9e-15", False)]
 )
 def test_a_factor_that_grew_by_a_thousandth_is_a_weaker_rule(factor, weaker):
     rules = [{"engine": {"factor": text}} for text in ("1e-14", factor)]
@@ -175,7 +175,7 @@ def about(engines, **settings):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "pairs"),
+    "old, new, pairs",
     [
         ({"wg": "1"}, {"wg": "2"}, {}),
         ({"wg": "1"}, {"wg 2": "2", "wg 3": "3"}, {"wg": "wg 2"}),

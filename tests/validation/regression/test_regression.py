@@ -17,6 +17,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from pytest import raises
 
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
@@ -262,7 +263,7 @@ def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted
 
 
 @pytest.mark.parametrize(
-    ("rows", "reason"),
+    "rows, reason",
     [
         ([], "at least one comparison"),
         ([ROW], "a run that was finished"),
@@ -282,12 +283,12 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(
     if "--even-failing" in reason:
         assert call("accept", run, "--even-failing")[0] == HOLDS
     else:
-        with pytest.raises(InputError, match=reason):
+        with raises(InputError, match=reason):
             read_run(run)
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    "options, words",
     [
         ("--type crank-rocker", "say --random N too"),
         ("--seed 3", "say --random N too"),
@@ -326,10 +327,10 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
     file = tmp_path / "results.parquet"
     assert pq.read_table(file)["error"].null_count == 1
     file.write_bytes(b"no columns")
-    with pytest.raises(InputError, match="is damaged: no rows that can be read of 2"):
+    with raises(InputError, match="is damaged: no rows that can be read of 2"):
         read_run(tmp_path)
     (tmp_path / ABOUT).unlink()
-    with pytest.raises(InputError, match="is not a table written by"):
+    with raises(InputError, match="is not a table written by"):
         read_run(tmp_path)
 
 
@@ -389,7 +390,7 @@ def disagreeing(worse):
 
 
 @pytest.mark.parametrize(
-    ("worse", "sentence"),
+    "worse, sentence",
     slow_but(
         [("sim F12, sim torque", "only sim")],
         [
@@ -482,7 +483,7 @@ QUESTIONS = [
 """Scenes of a new run, fields of its row, why it is not compared, and what is told."""
 
 
-@pytest.mark.parametrize(("scenes", "fields", "why", "told"), QUESTIONS)
+@pytest.mark.parametrize("scenes, fields, why, told", QUESTIONS)
 def test_rows_that_answer_another_question_are_named_first_and_not_compared(
     scenes, fields, why, told
 ):
@@ -576,7 +577,7 @@ RULES = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "what"), RULES)
+@pytest.mark.parametrize("old, new, what", RULES)
 def test_each_entry_of_a_rule_can_weaken_it(old, new, what):
     weakened = rules.list_weakened(*(rules.list_rules([one]) for one in (old, new)))
     assert [weakening.what for weakening in weakened] == what
@@ -734,12 +735,12 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
     assert all(f">c{night}<" in figure.svg for night in range(3))
     assert collect_history(tmp_path) == []
     (kept / HISTORY).write_bytes(b"no columns")
-    with pytest.raises(InputError, match="is damaged, or no table"):
+    with raises(InputError, match="is damaged, or no table"):
         summarise(kept / HISTORY)
 
 
 @pytest.mark.parametrize(
-    ("runs", "failure", "words"),
+    "runs, failure, words",
     [
         ([HELD], FAILED_ROW, "held in {before}"),
         ([HELD, HELD], FAILED_ROW, "held in {before}"),
@@ -822,7 +823,7 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     printed = sorted(["a\\x1b", *names[1:]])
     assert [*kept.frame().scene.unique()] == printed == [*kept.about.scenes]
     assert [*kept.times().scene.unique()] == printed
-    with pytest.raises(InputError, match="must have a name of its own"):
+    with raises(InputError, match="must have a name of its own"):
         read_scene_files([files[0], files[-1]])
 
 
@@ -859,7 +860,7 @@ def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path, monkeypatch, sav
         )
 
     monkeypatch.setattr("fourbar_validation.regression.record.shutil.copyfile", fill)
-    with pytest.raises(OSError) as caught:
+    with raises(OSError) as caught:
         record.accept(open_run(run), kept)
     assert caught.value.filename == str(kept / TABLE)
     assert caught.value.filename2 is None

@@ -84,7 +84,7 @@ def test_a_missing_answer_uses_all_that_is_allowed():
 
 
 @pytest.mark.parametrize(
-    ("rows", "good"),
+    "rows, good",
     [
         ((ROW,), True),
         ((ROW, replace(ROW, quantity="F12", verdict=FAILS)), False),

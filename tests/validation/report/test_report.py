@@ -198,7 +198,7 @@ def test_the_times_of_engines_are_those_of_the_run():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("motion", "pictures"),
+    "motion, pictures",
     [
         (Motion(Sweep(0.0, 6.0, 24)), 3),
         (Motion(1.0, 5.0), 1),  # the linkage alone
@@ -267,7 +267,7 @@ def printed(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("error", "allowed", "cell"),
+    "error, allowed, cell",
     [(2.5e-7, 1e-5, "2.5e-07 of 1e-05"), (1.16e-9, 1.28e-9, "1.2e-09 of 1.3e-09")],
 )
 def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
@@ -463,7 +463,7 @@ CAUSES = [
 ]
 
 
-@pytest.mark.parametrize(("wrong", "words"), CAUSES)
+@pytest.mark.parametrize("wrong, words", CAUSES)
 def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
     wrong, words
 ):
@@ -494,7 +494,7 @@ ALONE_TOO = replace(ALONE, engine="two")
 
 
 @pytest.mark.parametrize(
-    ("rows", "against", "wrong"),
+    "rows, against, wrong",
     [
         ([], {"alpha_3": ["mine", "two"]}, {FORMULAS}),
         ([OF_MINE, BROKEN], {}, {FORMULAS}),
@@ -556,7 +556,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
 
 
 @pytest.mark.parametrize(
-    ("verdict", "reason", "kind"),
+    "verdict, reason, kind",
     [
         (REFUSES, "nothing acts", "at declared limits of an engine"),
         (REFUSES, f"{NO_VALUE}: 1 singular", "where the formulas state no value"),
@@ -583,7 +583,7 @@ def test_a_weaker_rule_stands_before_a_verdict_that_holds():
     )
 
 
-@pytest.mark.parametrize(("declared", "confirmed"), [(1e-4, 1), (1.1e-4, 0)])
+@pytest.mark.parametrize("declared, confirmed", [(1e-4, 1), (1.1e-4, 0)])
 def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     declared, confirmed
 ):
@@ -608,7 +608,7 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
 
 
 @pytest.mark.parametrize("columns", ["80", "40"])
-@pytest.mark.parametrize(("theta_2", "at"), [(0.5, "28.6"), (math.nan, "-")])
+@pytest.mark.parametrize("theta_2, at", [(0.5, "28.6"), (math.nan, "-")])
 def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
     columns, theta_2, at, monkeypatch, printed
 ):

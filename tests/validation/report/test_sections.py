@@ -100,7 +100,7 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("value", "text"),
+    "value, text",
     [
         (628.0, "628"),
         (0.0, "0"),

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from pytest import approx, raises
 
 import fourbar
 from fourbar.effects import Friction, Gravity, Place, Spring, Springs, Torsion
@@ -200,7 +201,7 @@ def test_what_is_welded_to_a_bar_is_part_of_it():
     parts = ("mass", "centre.distance", "centre.angle", "inertia")
     numbers = [listed[f"bars.output.{part}"].value for part in parts]
     right = [0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0]
-    assert numbers == pytest.approx(right, rel=1e-12, abs=1e-14)
+    assert numbers == approx(right, rel=1e-12, abs=1e-14)
 
 
 EDITS = [
@@ -348,7 +349,7 @@ def planted(what):
     return re.sub(f'({"|".join(off)})="disable"', "", text)
 
 
-@pytest.mark.parametrize(("what", "key", "word"), [(e[0], *e[3:]) for e in EDITS])
+@pytest.mark.parametrize("what, key, word", [(e[0], *e[3:]) for e in EDITS])
 def test_a_planted_difference_is_named(what, key, word):
     of_scene = described(GENERATED)
     listed = find_differences(of_scene, described(planted(what)))
@@ -360,7 +361,7 @@ ARMATURE = "tendons.ground output.armature"
 
 
 @pytest.mark.parametrize(
-    ("key", "ours", "theirs", "remark"),
+    "key, ours, theirs, remark",
     [
         ("pins.A.damping", 0.0, 0.1, "a couple at this pin that the scene does not"),
         ("pins.A.friction", 0.2, 0.0, "a couple at this pin that the file does not"),
@@ -393,7 +394,7 @@ def work_of_load(s):
 
 
 @pytest.mark.parametrize(
-    ("what", "more"),
+    "what, more",
     [
         ("motor at a pin", slip_at_A),
         ("damping", lambda s: 0.1 * slip_at_A(s)),
@@ -603,7 +604,7 @@ def spoil(group):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("group", "key"), [(group, key) for group in SPOILT for key in SPOILT[group][3]]
+    "group, key", [(group, key) for group in SPOILT for key in SPOILT[group][3]]
 )
 def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
     group, key
@@ -616,7 +617,7 @@ def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
     spoilt, priced = spoil(group)
     of_file = errors(scene, spoilt[key])
     worst = max(of_file[name] for name in TORQUE_AND_PINS)
-    assert priced[key].cost == pytest.approx(worst, rel=off, abs=FLOOR)
+    assert priced[key].cost == approx(worst, rel=off, abs=FLOOR)
     if "option.tolerance" in priced:
         assert priced["option.tolerance"].cost < 0.01 * worst
 
@@ -639,7 +640,7 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone():
     expected = errors(scene, examine(scene, text, {}))
     priced = {row.quantity: row.error for row in rows_of(scene, missing[:1])}
     for name in TORQUE_AND_PINS:
-        assert priced[name] == pytest.approx(expected[name], abs=FLOOR)
+        assert priced[name] == approx(expected[name], abs=FLOOR)
 
 
 def test_each_entry_is_mended_in_a_model_of_its_own(monkeypatch):
@@ -672,7 +673,7 @@ def test_body_anchors_on_an_open_rest_state_build_another_linkage():
         "in the pose of the file"
         in differences(FEW, examination)["lengths.output"].remark
     )
-    assert values(examination)["lengths.output"] == pytest.approx(0.05)
+    assert values(examination)["lengths.output"] == approx(0.05)
 
 
 def test_lengths_of_another_linkage_come_before_what_costs_more():
@@ -789,7 +790,7 @@ def test_a_file_that_overdoes_it_is_one_line_with_its_name():
         for what, old, new, words in OVERDONE:
             text = re.sub(old, new, GENERATED)
             assert text != GENERATED
-            with pytest.raises(InputError) as caught:
+            with raises(InputError) as caught:
                 examined(EXAMINE, CRANK_ROCKER, RobotFile(MINE_XML, text))
             message = str(caught.value)
             assert message.startswith("mine.xml: MJCF = 'mine.xml': "), what
@@ -814,17 +815,17 @@ def rows_with(torque, force):
 
 
 @pytest.mark.parametrize(
-    ("key", "cost"), [("closure.solref", 0.0), ("bars.coupler.mass", 0.048)]
+    "key, cost", [("closure.solref", 0.0), ("bars.coupler.mass", 0.048)]
 )
 def test_a_setting_that_leaves_the_worst_error_costs_nothing(key, cost):
     """The output's mass is wrong, and both time constants leave F12 0.3 off."""
     difference = Difference(key, 0.02, 0.03, "")
     priced = price(difference, rows_with(0.05, 0.3), rows_with(0.002, 0.3))
-    assert priced.cost == pytest.approx(cost)
+    assert priced.cost == approx(cost)
 
 
 @pytest.mark.parametrize(
-    ("key", "finer"),
+    "key, finer",
     [("option.timestep", 0.5), ("option.tolerance", 0.5), ("option.iterations", 2.0)],
 )
 def test_a_setting_that_is_finer_is_no_difference(key, finer):
@@ -852,10 +853,10 @@ def test_a_range_is_asked_of_both_files(monkeypatch):
     file = RobotFile(MINE_XML, GENERATED)
     judgement = judge_file("range", CRANK_ROCKER, file, options)
     joints = [row.joint for row in judgement.measured.states.rows]
-    assert (min(joints), max(joints)) == pytest.approx((0.5, 0.9))
+    assert (min(joints), max(joints)) == approx((0.5, 0.9))
     at_states = [e for e in judgement.errors if e.row.engine == FILE_AT_ONE_STATE]
     for error in at_states:
-        assert error.generated == pytest.approx(error.row.error, rel=1e-6, abs=1e-12)
+        assert error.generated == approx(error.row.error, rel=1e-6, abs=1e-12)
 
 
 REFUSED = [
@@ -900,7 +901,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(
-    ("what", "text", "names", "word"),
+    "what, text, names, word",
     REFUSED,
     ids=[case[0] for case in REFUSED],
 )
@@ -910,7 +911,7 @@ def test_a_file_that_is_no_four_bar_is_one_line(
     names,
     word,
 ):
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         examine(FEW, text, names)
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -937,7 +938,7 @@ def test_ctrl_c_does_not_wait_for_the_file():
     threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
         with (
-            pytest.raises(KeyboardInterrupt),
+            raises(KeyboardInterrupt),
             guard.examine_guarded(NO_FILE) as examined,
         ):
             examined(f"{__name__}:hang", FEW, "<mujoco/>", {})
@@ -948,7 +949,7 @@ def test_ctrl_c_does_not_wait_for_the_file():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("what", "word"),
+    "what, word",
     [
         (crash, "crashed"),
         (hang, "did not come back"),
@@ -964,7 +965,7 @@ def test_a_file_that_breaks_the_engine_is_one_line(
         guard, "ROBOT_SECONDS", 4.0 if what is hang else 60.0
     )  # a busy machine starts a process slowly
     with (
-        pytest.raises(InputError, match=word),
+        raises(InputError, match=word),
         guard.examine_guarded(NO_FILE) as examined,
     ):
         examined(f"{__name__}:{what.__name__}", FEW, "<mujoco/>", {})  # type: ignore[attr-defined]
@@ -982,7 +983,7 @@ def call(folder, text, *options, scene=FEW):
 
 
 @pytest.mark.parametrize(
-    ("with_scene", "options", "words"),
+    "with_scene, options, words",
     [
         (True, ("--name", "wheel=a"), "ROLE=NAME"),
         (False, ("--name", "input=input"), "--name needs a SCENE"),
@@ -1013,5 +1014,5 @@ def test_a_required_error_is_what_their_file_is_held_to(tmp_path):
     text = write_mjcf(FEW).replace("0.0016133333333333336", "0.0017")
     assert run(tmp_path, text) == (1, [0.0, SIMULATED.factor])
     assert run(tmp_path, text, "--error", "0.5") == (0, [0.0, 0.5])
-    with pytest.raises(InputError, match="above 0 and below 1"):
+    with raises(InputError, match="above 0 and below 1"):
         run(tmp_path, text, "--error", "2")

@@ -12,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx
 
 import fourbar
 from fourbar.effects import Flywheel, Friction
@@ -186,22 +187,22 @@ def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it(
     for pin in PIN_FORCES:
         size = float(np.hypot(*np.asarray(getattr(ours, pin)).T).max())
         off = error_of(DRY, examined_dry(), FILE_AT_ONE_STATE, pin)
-        assert left[pin] / size == pytest.approx(off, rel=1e-3)
+        assert left[pin] / size == approx(off, rel=1e-3)
 
 
 @pytest.mark.slow
 def test_the_couple_is_the_one_that_bisection_finds():
     answer = answer_of(examined_dry(), FILE_AT_ONE_STATE)
-    assert answer.at.theta_2[0] == pytest.approx(math.radians(30.0))
+    assert answer.at.theta_2[0] == approx(math.radians(30.0))
     bisected = bisect_on_the_couple(default_friction(), math.radians(30.0), 0.0)
-    assert answer.quantities["torque"][0] == pytest.approx(bisected, rel=BISECTED)
-    assert bisected == pytest.approx(1.2243167, abs=5e-8)  # and 1.2243155 by formulas
+    assert answer.quantities["torque"][0] == approx(bisected, rel=BISECTED)
+    assert bisected == approx(1.2243167, abs=5e-8)  # and 1.2243155 by formulas
 
 
 def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene():
     examined = examine(ROTOR, rotor_as_armature(), {})
     torque = answer_of(examined, FILE_AT_ONE_STATE).quantities["torque"]
-    assert torque[0] == pytest.approx(0.3624249, abs=2e-7)
+    assert torque[0] == approx(0.3624249, abs=2e-7)
     for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
         assert error_of(ROTOR, examined, how, "torque") < 1e-6
     assert not list_keys(ROTOR, examined, "bars.", "pins.")
@@ -262,7 +263,7 @@ def test_a_stop_inside_the_motion_is_where_the_bars_meet_it():
         BARE, counted_from_elsewhere(limited("O4", middle, 3.0), "O4"), {}
     )
     stops = examined.described["pins.O4.range"].value
-    assert stops == pytest.approx((middle, 3.0))
+    assert stops == approx((middle, 3.0))
     answer = answer_of(examined, FILE_AT_ONE_STATE)
     ours = solve(BARE, "force", at=answer.at)
     off = np.abs(answer.quantities["torque"] - ours.torque)
@@ -280,7 +281,7 @@ def measure_rocker(scene, drawn, theta_4, branch):
     return " ".join(loop.measured.remarks)
 
 
-@pytest.mark.parametrize(("branch", "behind"), [("open", False), ("crossed", True)])
+@pytest.mark.parametrize("branch, behind", [("open", False), ("crossed", True)])
 def test_angles_to_which_no_motion_leads_are_named(branch, behind):
     theta_4 = solve(BARE, "position").theta_4
     here = np.linspace(theta_4.min() + 0.05, theta_4.max() - 0.05, 3)
@@ -352,7 +353,7 @@ def report_of(spoil, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("spoil", "key"),
+    "spoil, key",
     [(colliding, "contacts"), (stopped, "pins.O4.range")],
 )
 def test_the_cause_that_explains_the_error_stands_first(
@@ -426,7 +427,7 @@ def default_constraint(scene):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "off"),
+    "name, off",
     [("crank_rocker", 0.037), ("drag_link", 0.10), ("gallery/landing_gear", 0.88)],
 )
 def test_how_wrong_the_default_constraint_is_as_the_pages_say(
@@ -435,7 +436,7 @@ def test_how_wrong_the_default_constraint_is_as_the_pages_say(
 ):
     scene = fourbar.load(MODELS / f"{name}.toml")
     examined = examine(scene, default_constraint(scene), {})
-    assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == pytest.approx(
+    assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == approx(
         off,
         rel=0.05,
     )
@@ -451,7 +452,7 @@ PARALLELOGRAM = Scene(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("scene", "motor"),
+    "scene, motor",
     [
         (fourbar.load(MODELS / "crank_rocker.toml"), 3e-5),
         (PARALLELOGRAM, 1.3e-3),
@@ -538,7 +539,7 @@ def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too():
         if name.startswith("theta"):
             away = wrap_difference(away)
         off = float(np.nanmax(np.abs(away)))
-        assert left[name] == pytest.approx(off, rel=PREDICTED), name
+        assert left[name] == approx(off, rel=PREDICTED), name
         assert off > ROUND_OFF, name
 
 

@@ -96,7 +96,7 @@ def test_no_file_outside_is_opened(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text, words",
     [
         ("<mujoco><include file='robot.xml'/></mujoco>", "nested deeper than 100"),
         ("<mujoco><asset><model file='x.xml'/></asset></mujoco>", "mj_saveLastXML"),
@@ -136,7 +136,7 @@ def test_what_a_file_may_not_hold_is_one_line(
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "kind"),
+    "name, text, kind",
     [
         ("robot.xml", "<mujoco><worldbody><body/></worldbody></mujoco>", "MJCF"),
         ("robot.sdf", "<sdf", "SDF"),
@@ -232,7 +232,7 @@ def test_a_plugin_is_left_out_and_said(tmp_path, inertial):
 
 
 @pytest.mark.parametrize(
-    ("before", "text"),
+    "before, text",
     [
         ("", '<geom type="sphere"size=".1"/>'),
         ("", "<geom type='sphere'size='.1'/>"),

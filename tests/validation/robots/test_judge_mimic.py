@@ -7,6 +7,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar.errors import BAD_INPUT, InputError
@@ -71,7 +72,7 @@ def write_upright(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("sense", "pad"), [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
+@pytest.mark.parametrize("sense, pad", [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
 def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     sense,
     pad,
@@ -81,7 +82,7 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     report = measure_mimic(
         write_upright(tmp_path, sense=sense, pad=pad), "rocker_j", GRIPPER
     )
-    assert math.degrees(report.file.angle) == pytest.approx(0.95783, abs=5e-6)
+    assert math.degrees(report.file.angle) == approx(0.95783, abs=5e-6)
     show_mimic(report)
     sign = "+" if sense > 0 else "-"
     printed = " ".join(capsys.readouterr().out.split())
@@ -92,7 +93,7 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     again = measure_mimic(
         write_upright(tmp_path, polycoef, sense, pad), "rocker_j", GRIPPER
     )
-    assert again.file.angle == pytest.approx(best.angle, rel=1e-9)
+    assert again.file.angle == approx(best.angle, rel=1e-9)
     assert abs(best.coefficients[0]) <= best.angle + ROUND_OFF
 
 
@@ -100,7 +101,7 @@ def test_a_motion_through_a_change_point_is_refused(tmp_path):
     angles = np.radians(np.linspace(-30.0, 30.0, 61))
     motion = PARALLELOGRAM.motion.replace(angle=angles)
     through = replace(PARALLELOGRAM, motion=motion)
-    with pytest.raises(InputError, match=r"'0 deg'.*change point"):
+    with raises(InputError, match=r"'0 deg'.*change point"):
         measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
 
@@ -112,10 +113,10 @@ def test_the_range_of_the_file_is_the_motion_of_a_scene_over_a_whole_turn(tmp_pa
     path.write_text(limited)
     report = measure_mimic(path, "rocker_j", turn)
     # the crank stands at 90 deg
-    assert np.degrees(report.swing) == pytest.approx((50.0, 110.0))
+    assert np.degrees(report.swing) == approx((50.0, 110.0))
     assert report.file.angle <= ROUND_OFF
     path.write_text(limited.replace("0 0.04 0", "0 0.03 0"))  # no end of a bar
-    with pytest.raises(InputError, match=r"change point.*from -40 to 20 deg"):
+    with raises(InputError, match=r"change point.*from -40 to 20 deg"):
         measure_mimic(path, "rocker_j", turn)
 
 
@@ -147,16 +148,16 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path):
     first, _, third, *_ = (one.angle for one in report.squares)
     angles = report.file.angle, report.shifted, report.centred, first, third
     figures = [1.7507, 1.2722, 0.8864, 1.2716, 0.0588, 0.0285]
-    assert np.degrees([*angles, smallest[2]]) == pytest.approx(figures, abs=5e-5)
-    assert math.degrees(smallest[0]) == pytest.approx(0.783, abs=5e-4)
+    assert np.degrees([*angles, smallest[2]]) == approx(figures, abs=5e-5)
+    assert math.degrees(smallest[0]) == approx(0.783, abs=5e-4)
     for ratio in (report.file.ratio, report.squares[0].ratio):
-        assert ratio == pytest.approx(0.1267, abs=5e-5)
+        assert ratio == approx(0.1267, abs=5e-5)
     assert smallest == sorted(smallest, reverse=True)
     leader, follower = ask_mujoco(write(tmp_path))
     branch = np.ones(len(leader), np.int8)
     theta_4 = solve(KNEE, "position", at=Command(leader, branch, None, 0.0)).theta_4
     off = np.abs(follower - (theta_4 - theta_4[20])).max()
-    assert report.file.angle == pytest.approx(off, rel=1e-9)
+    assert report.file.angle == approx(off, rel=1e-9)
 
 
 def test_each_error_stands_with_its_name(
@@ -187,11 +188,11 @@ def test_an_axis_the_other_way_takes_the_opposite_polynomial(tmp_path):
     best = measure_mimic(write(tmp_path), "s", KNEE).fitted[2]
     opposite = " ".join(f"{-number!r}" for number in best.coefficients)
     turned = measure_mimic(write(tmp_path, opposite, axis=-1), "s", KNEE)
-    assert turned.file.angle == pytest.approx(best.angle, rel=1e-9)
+    assert turned.file.angle == approx(best.angle, rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("function", "degree", "smallest"),
+    "function, degree, smallest",
     [(np.square, 1, 0.5), (np.abs, 2, 0.125), (lambda x: x**3, 2, 0.25)],
 )
 def test_the_smallest_largest_error_is_that_of_the_textbooks(
@@ -206,7 +207,7 @@ def test_the_smallest_largest_error_is_that_of_the_textbooks(
     x = np.linspace(-1.0, 1.0, 2001)
     y = function(x)  # type: ignore[operator]
     left = np.polynomial.polynomial.polyval(x, fit_minimax(x, y, degree)) - y
-    assert np.abs(left).max() == pytest.approx(smallest, rel=1e-5)
+    assert np.abs(left).max() == approx(smallest, rel=1e-5)
 
 
 def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):
@@ -220,24 +221,24 @@ def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):
     path.write_text('<mujoco><include file="mimic.xml"/></mujoco>')
     report = measure_mimic(path, "s", KNEE, elsewhere)
     assert report.equality.leader == "c"
-    with pytest.raises(InputError, match="is not there"):
+    with raises(InputError, match="is not there"):
         measure_mimic(path, "s", KNEE)
 
 
 def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path):
     few = replace(KNEE, motion=KNEE.motion.replace(angle=np.linspace(-0.5, 0.5, 5)))
-    with pytest.raises(InputError, match="range of at least 6 positions"):
+    with raises(InputError, match="range of at least 6 positions"):
         measure_mimic(write(tmp_path), "s", few)
 
 
 def test_a_joint_that_follows_none_is_refused(tmp_path):
-    with pytest.raises(InputError, match="follows no other"):
+    with raises(InputError, match="follows no other"):
         measure_mimic(write(tmp_path), "c", KNEE)
-    with pytest.raises(InputError, match="no such joint"):
+    with raises(InputError, match="no such joint"):
         measure_mimic(write(tmp_path), "knee", KNEE)
     path = tmp_path / "leg.urdf"
     path.write_text(URDF.replace("<mimic", "<gone"))
-    with pytest.raises(InputError, match="the file has no <mimic> in its knee"):
+    with raises(InputError, match="the file has no <mimic> in its knee"):
         measure_mimic(path, "knee", KNEE)
 
 
@@ -256,7 +257,7 @@ COUPLER_SCENE = Scene(
 
 
 @pytest.mark.parametrize(
-    ("polycoef", "angles", "error", "told"),
+    "polycoef, angles, error, told",
     [
         ("0 -1 0 0 0", "", math.nan, "7.4176 deg with the constant of least squares"),
         ("0 -1 .1 0 0", "", math.nan, "of the file loses depends on theta_2 at that"),
@@ -272,13 +273,13 @@ def test_what_the_file_does_not_tell_is_stated_or_left_out(
     path.write_text(COUPLER.replace("0 -1 0 0 0", polycoef))
     stated = dict(one.split("=") for one in angles.split(",") if one)
     report = measure_mimic(path, "j3", COUPLER_SCENE, angles=stated)
-    assert math.degrees(report.file.angle) == pytest.approx(error, nan_ok=True)
+    assert math.degrees(report.file.angle) == approx(error, nan_ok=True)
     show_mimic(report)
     printed = capsys.readouterr().out
     assert told in " ".join(printed.split())
     assert ("a0 to a4 -0.3616111 -0.8158249 0 0 0" in printed) == (not angles)
     for wrong, reason in (("j3", "theta_2 or theta_3"), ("theta_3", "theta_2.*need")):
-        with pytest.raises(InputError, match=reason):
+        with raises(InputError, match=reason):
             measure_mimic(path, "j3", COUPLER_SCENE, angles={wrong: "1 deg"})
 
 
@@ -290,7 +291,7 @@ LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="0.02"/>
 
 
 @pytest.mark.parametrize(
-    ("millimetres", "centres", "rest", "mimic", "error", "zero"),
+    "millimetres, centres, rest, mimic, error, zero",
     [
         # bars at 85 deg and where the loop has the output: no end of the input
         ((60, 20, 55, 45), (10, 22), (85, 101.36063), (0.3935185, 0), 1.57838, "101."),
@@ -320,9 +321,9 @@ def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
     scene = Scene(FourBar(ground, *map(Bar, moving)), motion)
     report = measure_mimic(path, "dist_j", scene)
     degrees = math.degrees(report.file.angle)
-    assert degrees == pytest.approx(error, abs=2e-5, nan_ok=True)
+    assert degrees == approx(error, abs=2e-5, nan_ok=True)
     centred = 0.78919 if millimetres[0] == 60 else 1.32753
-    assert math.degrees(report.centred) == pytest.approx(centred, abs=2e-5)
+    assert math.degrees(report.centred) == approx(centred, abs=2e-5)
     show_mimic(report)
     assert zero in " ".join(capsys.readouterr().out.split())
 
@@ -350,7 +351,7 @@ def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
 
 
 @pytest.mark.parametrize(
-    ("tree", "bars"),
+    "tree, bars",
     [
         ("(L)(F)", (4, 1)),
         ("(L(F))", (3, 2)),
@@ -393,7 +394,7 @@ BEHIND = {"theta_2": "126.2761691 deg"}
 
 
 @pytest.mark.parametrize(
-    ("change", "angles", "told"),
+    "change, angles, told",
     [
         ({}, {}, "126.276 deg - lead, from 90.2762 to 162.276 deg, the range of the"),
         ({"motion": AT_36, "drawing": None}, {}, "126.276 deg - lead, from 90.276 to"),
@@ -414,9 +415,9 @@ def test_the_side_of_a_scene_is_that_of_its_drawing_its_range_or_stated(
     assert told in " ".join(capsys.readouterr().out.split())
     if "other" not in told:
         errors = np.degrees([report.file.angle, report.centred])
-        assert errors == pytest.approx([1.0203, 0.69427], abs=1e-4)
+        assert errors == approx([1.0203, 0.69427], abs=1e-4)
         # even powers tell the sense of theta_2
-        assert report.fitted[1].coefficients[2] == pytest.approx(0.01616, abs=1e-5)
+        assert report.fitted[1].coefficients[2] == approx(0.01616, abs=1e-5)
 
 
 @pytest.mark.parametrize("option", ["--key", "--hold", "--error"])

@@ -68,7 +68,7 @@ def test_the_states_are_those_that_were_asked_at():
 
 
 @pytest.mark.parametrize(
-    ("part", "written"),
+    "part, written",
     [
         (0.0, "0 %"),
         (5e-8, "< 0.00001 %"),
@@ -154,7 +154,7 @@ def test_the_report_is_printed_and_written(
     assert torque.error in [error.part for error in errors]
 
 
-@pytest.mark.parametrize(("ground", "grow"), [(0.0, True), (90.0, False)])
+@pytest.mark.parametrize("ground, grow", [(0.0, True), (90.0, False)])
 @pytest.mark.parametrize("side", [-5.0, 5.0])
 def test_forces_are_said_to_grow_only_where_those_of_rigid_pins_do(ground, grow, side):
     """The bars of a rhombus in line hang along gravity, or across it.
@@ -189,7 +189,7 @@ def test_a_small_transmission_angle_is_told_as_well():
 
 
 @pytest.mark.parametrize(
-    ("changes", "error", "reached", "said"),
+    "changes, error, reached, said",
     [
         ({}, 0.001, True, "The file is within 0.01 as it is."),
         ({"solref": "1 1"}, 0.001, True, "Type this for an error within 0.01:"),

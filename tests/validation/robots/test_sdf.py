@@ -6,6 +6,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 from scipy.spatial.transform import Rotation
 
 import fourbar
@@ -299,7 +300,7 @@ def test_torque_and_pin_forces_are_those_of_the_bars(way, tmp_path):
     (tmp_path / "rod").mkdir()
     (tmp_path / "rod" / "model.sdf").write_text(ROD_MODEL)
     made = read_loop_scene(read(tmp_path, STATED[way]), PoseOptions(), None, 10.0)
-    assert made.scene.linkage.lengths == pytest.approx((D, A, B, C), rel=AGREES)
+    assert made.scene.linkage.lengths == approx((D, A, B, C), rel=AGREES)
     turned = made.scene.linkage.ground_angle
     command = command_of(SCENE)
     expected = solve(SCENE, at=command)
@@ -355,7 +356,7 @@ LIMITED = "<limit><lower>-3</lower></limit></axis>"
 
 
 @pytest.mark.parametrize(
-    ("kinds", "closing"),
+    "kinds, closing",
     [
         ({}, "B"),
         ({"B": LIMITED}, "A"),
@@ -381,7 +382,7 @@ def test_the_joint_that_loses_least_closes_the_loop(kinds, closing, tmp_path):
     (closure,) = list_closures(robot, PoseOptions()).closures
     assert closure.name == closing
     lengths = sorted(closure.loop.lengths)
-    assert lengths == pytest.approx(sorted((D, A, B, C)), rel=AGREES)
+    assert lengths == approx(sorted((D, A, B, C)), rel=AGREES)
     lost = [note.partition("; lost: ")[2] for note in robot.notes]
     assert lost == ([] if closing == "halves" else ["range" * (closing in kinds)])
 
@@ -405,7 +406,7 @@ def test_a_tensor_is_turned_with_its_frame(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("shape", "volume"),
+    "shape, volume",
     [
         ("<box><size>1 2 3</size></box>", 6.0),
         ("<sphere><radius>2</radius></sphere>", 32.0 * math.pi / 3.0),
@@ -422,7 +423,7 @@ def test_a_tensor_is_turned_with_its_frame(tmp_path):
     ],
 )
 @pytest.mark.parametrize(
-    ("density", "stated"),
+    "density, stated",
     [(1000.0, ""), (500.0, "<density>500</density>")],
 )
 def test_auto_inertials_are_volumes_by_densities(
@@ -433,7 +434,7 @@ def test_auto_inertials_are_volumes_by_densities(
     collision = f"<collision name='c'>{stated}<geometry>{shape}</geometry>"
     text = f'<inertial auto="true"/>{collision}</collision>'
     model, _ = compile_text(tmp_path, put((write_inertial(A), text)))
-    assert model.body("crank").mass[0] == pytest.approx(density * volume, rel=1e-7)
+    assert model.body("crank").mass[0] == approx(density * volume, rel=1e-7)
 
 
 def test_numbers_of_a_joint_are_those_of_its_file(tmp_path):
@@ -468,7 +469,7 @@ def test_numbers_of_a_joint_are_those_of_its_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "names", "freedoms"),
+    "kind, names, freedoms",
     [
         ("fixed", [], 0),
         ("prismatic", ["A"], 1),
@@ -518,7 +519,7 @@ def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
         assert text.count(old) == 1, old
         text = text.replace(old, new)
     (closure,) = list_closures(read(tmp_path, text), PoseOptions()).closures
-    assert closure.gap == pytest.approx(0.0, abs=AGREES * D)
+    assert closure.gap == approx(0.0, abs=AGREES * D)
     model, _ = compile_text(tmp_path, text)
     assert [model.joint(name).qpos0[0] for name in ("O2", "A", "O4")] == turned
     data = mujoco.MjData(model)
@@ -535,7 +536,7 @@ def test_a_slide_begins_at_its_initial_position(tmp_path):
     model, _ = compile_text(tmp_path, text)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    assert data.body("rod").xpos[2] == pytest.approx(0.07, rel=AGREES)
+    assert data.body("rod").xpos[2] == approx(0.07, rel=AGREES)
     assert model.joint("A").qpos0[0] == 0.07
 
 
@@ -558,7 +559,7 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path
     data.joint("O2").qpos[0] = 0.7
     data.joint("A").qpos[0] = -2.0 * (0.7 - 0.1) + 0.3
     mujoco.mj_forward(model, data)
-    assert data.efc_pos[:1] == pytest.approx([0.0], abs=AGREES)
+    assert data.efc_pos[:1] == approx([0.0], abs=AGREES)
 
 
 @pytest.mark.parametrize("stated", [True, False])
@@ -598,7 +599,7 @@ def test_what_stands_and_what_floats(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    "old, new, message",
     [
         (MODEL, "", None),
         ("<parent>crank</parent>", "<parent>crunk</parent>", "'crunk'.*is no link"),
@@ -629,7 +630,7 @@ def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, tmp_p
     if message is None:
         assert compile_text(tmp_path, text)[0].nbody == 1
         return
-    with pytest.raises(InputError, match=message):
+    with raises(InputError, match=message):
         compile_text(tmp_path, text)
 
 
@@ -668,7 +669,7 @@ IN_GAZEBO = (
 
 
 @pytest.mark.parametrize(
-    ("gazebo", "ways"),
+    "gazebo, ways",
     [
         ("<gazebo/>", (TREE,)),
         ('<gazebo><joint name="last"/></gazebo>', (IN_GAZEBO, TREE)),

@@ -253,7 +253,7 @@ def test_a_mistake_is_named_wherever_the_drive_acts(bar):
 
 
 @pytest.mark.parametrize(
-    ("cut", "bar", "joint", "behind"),
+    "cut, bar, joint, behind",
     [("A", 3, "B", (3,)), ("O4", 4, "B", (4,)), ("O4", 3, "A", (3, 4))],
 )
 def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(cut, bar, joint, behind):
@@ -546,7 +546,7 @@ DONE = {"missing": 0.0, "doubled": 2.0, "reversed": -1.0}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "word"), list(zip(ACTING, cycle(DONE))))
+@pytest.mark.parametrize("name, word", list(zip(ACTING, cycle(DONE))))
 def test_what_acts_may_be_left_out_doubled_or_reversed(name, word):
     bare = replace(SCENE, effects=(Gravity(),))
     acting, *left = ACTING[name]
@@ -721,7 +721,7 @@ def test_another_scene_of_an_adversary_is_named_first(words):
 
 
 @pytest.mark.parametrize(
-    ("names", "where"),
+    "names, where",
     [  # osrf/drcsim#193: the wrench of the constraints alone
         (PIN_FORCES, "in the pin forces alone"),
         (("torque",), "in what drives alone"),
@@ -860,7 +860,7 @@ ARM_FROM_PIN = AT_PIN | {"moment": 3.0 * 0.05 * math.sin(0.7 - 1.0)}
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "words"),
+    "right, wrong, words",
     [
         (ARM, ARM_FROM_PIN, "its arm is measured from the bar's first pin, not from G"),
         (

@@ -124,7 +124,7 @@ def test_angles_close_the_loop_to_what_their_engine_declares():
 
 
 @pytest.mark.parametrize(
-    ("adapter", "failing"),
+    "adapter, failing",
     [(Turned, ["closure", "theta_3"]), (Silent, ["assembled"])],
 )
 def test_what_fails_with_the_loads_is_not_told_again_of_the_inertia(adapter, failing):

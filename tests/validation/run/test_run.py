@@ -55,7 +55,7 @@ def test_a_rule_that_is_weaker_than_before_stands_first(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("before", "error", "words"),
+    "before, error, words",
     [
         ([ROW, replace(ROW, scene="b")], 1e-15, "GONE: scene b is gone (1 row), "),
         ([replace(ROW, quantity="F12"), ROW], 1e-15, "GONE: a / mine / exact / F12: "),

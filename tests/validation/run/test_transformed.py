@@ -101,7 +101,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
 
 
 @pytest.mark.parametrize(
-    ("scene", "lines"),
+    "scene, lines",
     [
         (
             SCENES["arm"],

@@ -410,7 +410,7 @@ def test_a_free_motion_through_change_points_in_every_engine():
 
 
 @pytest.mark.parametrize(
-    ("name", "why"),
+    "name, why",
     [
         ("speeds-+1e+6", "mjMAXVAL"),
         ("toggle-double-rocker-0-folded-open", "below 0.05"),

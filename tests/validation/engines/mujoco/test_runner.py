@@ -70,7 +70,7 @@ def simulated(posed):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(("name", "drive"), [*zip(LAWS, (2, 4, 2, 4, 2), strict=True)])
+@pytest.mark.parametrize("name, drive", [*zip(LAWS, (2, 4, 2, 4, 2), strict=True)])
 def test_a_motion_law_is_run_through(name, drive):
     """A load over theta_2, gravity and dry friction act at once.
 

@@ -121,7 +121,7 @@ def test_it_is_run_near_the_requested_positions_and_a_wrong_load_is_seen():
 
 
 @pytest.mark.parametrize(
-    ("motion", "reason"),
+    "motion, reason",
     [
         (fourbar.Motion(TURN, 0.0), "nothing to simulate"),
         (fourbar.Motion(TURN), "nothing to simulate"),
@@ -212,7 +212,7 @@ def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch):
     assert failed.reason == f"softness and time step: 1e-05 of the scale; {words}"
 
 
-@pytest.mark.parametrize(("links", "output"), [(0.0, None), (0.01, 0.0)])
+@pytest.mark.parametrize("links, output", [(0.0, None), (0.01, 0.0)])
 def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links, output):
     rows = judged(hood(links, output))
     (refused,) = (row for row in rows if row.quantity == "all")
@@ -223,7 +223,7 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
+@pytest.mark.parametrize("one, other", list(combinations((1, 2, 3, 4), 2)))
 def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     one, other, monkeypatch
 ):
@@ -260,7 +260,7 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("what", "branch"),
+    "what, branch",
     [
         ("theta_3", 1),
         ("theta_4", -1),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pytest import approx
 
 from fourbar_validation.engines.mujoco.robots.answers import (
     RobotSettings,
@@ -34,17 +35,17 @@ def test_what_vanishes_is_judged_by_the_largest_pin_force(torque):
     """
     sizes = {"torque": np.array(torque), **FORCES}
     scales = find_scales(sizes, CONDITIONS, 0.5)
-    assert scales["torque"] == pytest.approx(1500.0)
-    assert scales["F43"] == pytest.approx(3000.0)
+    assert scales["torque"] == approx(1500.0)
+    assert scales["F43"] == approx(3000.0)
     for name in ("F12", "F32", "F14"):
-        assert scales[name] == pytest.approx(sizes[name].max())
+        assert scales[name] == approx(sizes[name].max())
 
 
 @pytest.mark.parametrize("torque", [[1.0, 1.0], [1e-3, 0.0]])
 def test_a_torque_is_none_because_pin_forces_grow_beside_a_change_point(torque):
     sizes = {"torque": np.array(torque), **FORCES}
     scales = find_scales(sizes, CONDITIONS, 0.5)
-    assert scales["torque"] == pytest.approx(max(torque))
+    assert scales["torque"] == approx(max(torque))
 
 
 def test_an_error_is_over_its_scale():

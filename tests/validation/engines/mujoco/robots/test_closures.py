@@ -10,6 +10,7 @@ from itertools import product
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.closures import (
@@ -38,7 +39,7 @@ def loop_of(text, **options):
 CUTS = [*product(("A", "B", "O4"), ("anchor", "site")), ("B", "weld")]
 
 
-@pytest.mark.parametrize(("cut", "by"), CUTS)
+@pytest.mark.parametrize("cut, by", CUTS)
 def test_a_loop_is_where_its_pins_are_wherever_it_is_cut(cut, by):
     planar = Planar(cut=cut, by=by)
     loop = loop_of(planar.text())
@@ -48,7 +49,7 @@ def test_a_loop_is_where_its_pins_are_wherever_it_is_cut(cut, by):
     hinges = {"O2", "A", "B", "O4"} - ({cut} if by != "weld" else set())
     named = {pin: model.joint(joint).name for pin, joint in loop.hinges.items()}
     assert named == {pin: pin for pin in hinges}
-    assert loop.misaligned == pytest.approx(0.0, abs=1e-12)
+    assert loop.misaligned == approx(0.0, abs=1e-12)
     named = {bar: model.body(bodies[0]).name for bar, bodies in loop.bodies.items()}
     assert named == {1: "ground", 2: "input", 3: "coupler", 4: "output"}
     assert len(loop.bodies[3]) == (2 if by == "weld" else 1)
@@ -75,7 +76,7 @@ def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign):
     normal = float(sign) * rotation(TILT)[:, 2]
     along = rotation(TILT) @ loop.along
     gravity = model.opt.gravity - (model.opt.gravity @ normal) * normal
-    assert along @ gravity == pytest.approx(0.0, abs=1e-12)
+    assert along @ gravity == approx(0.0, abs=1e-12)
     assert np.cross(normal, along) @ gravity < 0.0
     # the angles close the polygon, and turn the other way about the other axis
     sides = loop.lengths * np.exp(1j * np.array(loop.angles))
@@ -84,7 +85,7 @@ def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign):
     pins = {pin: complex(*place) for pin, place in planar.pins.items()}
     between = np.angle((pins["B"] - pins["O4"]) / (pins["B"] - pins["A"]))
     assert math.remainder(four - three - float(sign) * between, math.tau) == (
-        pytest.approx(0.0, abs=1e-12)
+        approx(0.0, abs=1e-12)
     )
     assert loop.senses["O2"] == 1.0
     assert loop.senses["A"] == -float(sign)
@@ -108,7 +109,7 @@ def test_five_hinges_are_a_four_bar_once_one_is_held():
     text = FIVE_BAR.format(more="")
     loop = loop_of(text, held=("d",))
     model = mujoco.MjModel.from_xml_string(text)
-    assert loop.lengths == pytest.approx(
+    assert loop.lengths == approx(
         (0.05, 0.1, math.hypot(0.05, 0.08), math.hypot(0.0, 0.18)),
         abs=1e-12,
     )
@@ -125,7 +126,7 @@ NO_NAME = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    "text, words",
     [
         (
             FIVE_BAR.format(more=""),
@@ -151,7 +152,7 @@ def test_of_two_motors_one_is_taken_as_driven():
 
 
 @pytest.mark.parametrize(
-    ("planar", "words"),
+    "planar, words",
     [
         (Planar(axes={"A": "0 0.0524078 1"}), "A and O2 are 3 deg apart"),
         (Planar(equality='active="false"'), "switched off"),
@@ -189,7 +190,7 @@ def test_a_weld_of_three_hinges_leaves_no_freedom():
     pins = Planar().pins
     x, y = np.subtract(pins["B"], pins["A"])
     closed_at = (pins["O4"][0] + x, pins["O4"][1] + y)
-    assert loop_of(pin).lengths[2:] == pytest.approx(
+    assert loop_of(pin).lengths[2:] == approx(
         (math.dist(pins["A"], closed_at), math.hypot(x, y))
     )
 
@@ -217,7 +218,7 @@ def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(limited)
     typed = reason.partition("(")[2].partition(" in the file)")[0]
     assert ("limited" in typed) == bool(limited)
     loop = loop_of(f"{start}{typed}{end}")
-    assert loop.lengths == pytest.approx(planar.lengths(), rel=1e-6)
+    assert loop.lengths == approx(planar.lengths(), rel=1e-6)
     assert loop.misaligned < 1e-6
 
 
@@ -277,7 +278,7 @@ def test_a_body_that_floats_between_two_pins_is_told_its_hinge():
     typed = TOP.format(pos=".9 0 .3", joint=hinge)
     loop = loop_of(FLOATING.format(inside=typed, outside="", pin=""))
     side = math.hypot(0.5, 0.3)
-    assert loop.lengths == pytest.approx((1.0, side, 0.8, side), rel=1e-12)
+    assert loop.lengths == approx((1.0, side, 0.8, side), rel=1e-12)
 
 
 def test_two_connects_along_one_axis_are_one_pin():
@@ -295,7 +296,7 @@ def test_two_connects_along_one_axis_are_one_pin():
 
 
 @pytest.mark.parametrize(
-    ("tendon", "mimic", "words"),
+    "tendon, mimic, words",
     [
         (
             "",
@@ -343,7 +344,7 @@ CHAIN = """
 """
 
 
-@pytest.mark.parametrize(("knee", "turned"), [(-2, 0), (2, 0), (-1, 0), (-2, 10)])
+@pytest.mark.parametrize("knee, turned", [(-2, 0), (2, 0), (-1, 0), (-2, 10)])
 def test_a_tendon_of_three_hinges_stands_for_parallelograms_if_directions_stay(
     knee, turned
 ):
@@ -355,7 +356,7 @@ def test_a_tendon_of_three_hinges_stands_for_parallelograms_if_directions_stay(
     for hip, knee_turned in ((0.0, 0.0), (0.3, 0.5)):
         data.qpos[:] = hip, knee_turned, -hip - 0.5 * knee * knee_turned
         mujoco.mj_forward(model, data)
-        assert data.ten_length[0] == pytest.approx(0.0, abs=1e-12)
+        assert data.ten_length[0] == approx(0.0, abs=1e-12)
         directions.append(data.xmat[model.body("foot").id].copy())
     stays = np.allclose(*directions)
     assert ("keeps the direction of foot against base" in closure_of(text).reason) == (
@@ -371,7 +372,7 @@ ON_GROUND = (
 
 
 @pytest.mark.parametrize(
-    ("path", "acts"),
+    "path, acts",
     [
         ('<site site="c1"/><site site="g1"/>', True),
         ('<site site="g1"/><geom geom="drum"/><site site="c1"/>', True),
@@ -408,7 +409,7 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one():
     planar = Planar()
     loop = loop_of(planar.text(), drive="O4")
     d, a, b, c = planar.lengths()
-    assert loop.lengths == pytest.approx((d, c, b, a))
+    assert loop.lengths == approx((d, c, b, a))
     assert loop.cut == "A"
     other = loop_of(planar.text(), drive="O2").seen_from_other_end()
     if other.axis @ loop.axis < 0.0:
@@ -417,12 +418,12 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one():
         assert getattr(other, name) == getattr(loop, name), name
     turned = np.subtract(other.angles, loop.angles)
     np.testing.assert_allclose(np.exp(1j * (turned - turned[0])), 1.0)
-    assert other.lengths == pytest.approx(loop.lengths)
+    assert other.lengths == approx(loop.lengths)
     for place, point in loop.points.items():
         np.testing.assert_allclose(other.points[place], point, atol=1e-12)
-    with pytest.raises(InputError, match="drives no four-bar"):
+    with raises(InputError, match="drives no four-bar"):
         loop_of(planar.text(), drive="A")
-    with pytest.raises(InputError, match="no such joint; the file has: joint 0, O2"):
+    with raises(InputError, match="no such joint; the file has: joint 0, O2"):
         loop_of(planar.text(), drive="wheel")
 
 
@@ -438,14 +439,14 @@ def test_a_hinge_that_another_loop_moves_is_the_driven_one():
 def test_a_loop_is_chosen_by_its_name():
     closures = report_of(Planar().text()).closures
     assert choose_loop(closures, "coupler-output") is closures[0].loop
-    with pytest.raises(InputError, match="the file has: coupler-output"):
+    with raises(InputError, match="the file has: coupler-output"):
         choose_loop(closures, "knee")
     spatial = report_of(replace(Planar(), axes={"A": "0 1 1"}).text()).closures
-    with pytest.raises(InputError, match="is no four-bar: the axes"):
+    with raises(InputError, match="is no four-bar: the axes"):
         choose_loop(spatial, "coupler-output")
-    with pytest.raises(InputError, match="coupler-output: the axes"):
+    with raises(InputError, match="coupler-output: the axes"):
         require_loops(spatial)
-    with pytest.raises(InputError, match="loops says why of its 2 equalities"):
+    with raises(InputError, match="loops says why of its 2 equalities"):
         require_loops(spatial * 2)
 
 
@@ -469,7 +470,7 @@ TWO_LOOPS = """
 
 
 @pytest.mark.parametrize(
-    ("held", "counts", "ground"),
+    "held, counts, ground",
     [
         ((), "6 hinges, 2 loops and two freedoms: a six-bar once one of its", "g"),
         (("m2",), "5 hinges, 2 loops and one freedom: a six-bar (", "world"),
@@ -479,7 +480,7 @@ def test_loops_that_share_bars_are_counted_together(held, counts, ground):
     first, second = report_of(TWO_LOOPS, held=held).closures
     if held:  # a, b and e on the ground and g, whose pin is at (3, 1) dm
         sides = [math.hypot(0.3, 0.1), *[math.hypot(0.1, 0.1)] * 3]
-        assert first.loop.lengths == pytest.approx(sides)
+        assert first.loop.lengths == approx(sides)
     else:
         # its bars belong to loop2 too, so no hold is offered
         assert "--hold" not in first.reason and "on g" not in first.reason
@@ -523,7 +524,7 @@ def test_a_four_bar_whose_lever_hangs_on_a_slide_is_named_and_can_be_made_one():
     tip = '<site name="foot" pos=".1 0 .1"/>'
     *_, closure = report_of(PUSHED.format(tip=tip, lever=low)).closures
     assert closure.loop is not None
-    assert closure.loop.lengths == pytest.approx((0.4, 0.2, 0.4, 0.2))
+    assert closure.loop.lengths == approx((0.4, 0.2, 0.4, 0.2))
 
 
 STANDS = """
@@ -542,7 +543,7 @@ def test_a_bar_that_is_pinned_on_the_axis_of_another_hinge_stands():
     """Its bars are those of a parallelogram that the second closure does not hold."""
     finger, idle = report_of(STANDS).closures
     assert finger.loop is not None
-    assert finger.loop.lengths == pytest.approx((0.05, 0.07, 0.05, 0.07))
+    assert finger.loop.lengths == approx((0.05, 0.07, 0.05, 0.07))
     assert finger.loop.remarks[0].startswith("no motor acts on it: f is taken")
     assert idle.reason == (
         "it lies on the axis of f and leaves it free; b cannot turn by it, and counts"
@@ -577,7 +578,7 @@ def test_a_slide_is_no_hinge():
     assert piston.other_joints == ("stroke (slide)",)
 
 
-@pytest.mark.parametrize(("cut", "by"), [("B", "anchor"), ("B", "weld")])
+@pytest.mark.parametrize("cut, by", [("B", "anchor"), ("B", "weld")])
 def test_a_slide_beside_four_pins_is_to_be_held(cut, by):
     """It lifts the input's bearing; with skew axes or in place of a pin it stays."""
     hinge = '<joint name="O2"'
@@ -586,7 +587,7 @@ def test_a_slide_beside_four_pins_is_to_be_held(cut, by):
     text = planar.text().replace(hinge, slide + hinge)
     assert closure_of(text).reason.endswith("; --hold lift makes it a four-bar")
     loop = loop_of(text, held=("lift",))
-    assert loop.lengths == pytest.approx(planar.lengths(), rel=1e-12)
+    assert loop.lengths == approx(planar.lengths(), rel=1e-12)
     skew = replace(planar, axes={"A": "0 0.1 1"}).text().replace(hinge, slide + hinge)
     guided = planar.text().replace('"O4" axis="0 0 1"', '"O4" type="slide"')
     for other in (skew, guided):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx
 
 from fourbar.formulas.mobility import classify
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
@@ -70,7 +71,7 @@ def list_equal(made):
 
 
 @pytest.mark.parametrize(
-    ("vector", "rounding"),
+    "vector, rounding",
     [
         ((-0.055821, 0.0, 0.022), 5e-7 * math.sqrt(2.0)),
         ((0.982434, 0.0, 0.18661, 0.0), 5e-7 * math.sqrt(2.0)),
@@ -83,22 +84,22 @@ def list_equal(made):
 def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(
     vector, rounding
 ):
-    assert find_rounding(vector) == pytest.approx(rounding, rel=1e-12)
+    assert find_rounding(vector) == approx(rounding, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("text", "size"),
+    "text, size",
     [(FREE, 1.0), (FIVE_DIGITS, 1.0), (TURNED, 1.0), (LARGE, 10.0)],
     ids=["six digits", "five digits", "quaternions", "large"],
 )
 def test_a_parallelogram_of_rounded_numbers_is_the_one_that_was_built(text, size):
     made = read(text)
     lengths = np.multiply(size, (0.14, 0.06, 0.14, 0.06))
-    assert made.scene.linkage.lengths == pytest.approx(lengths, rel=1e-12)
+    assert made.scene.linkage.lengths == approx(lengths, rel=1e-12)
     assert made.loop.rounding > 1e-8 * size
     assert classify(made.scene.linkage).name == "parallelogram"
     sweep = made.scene.motion.angle
-    assert sweep.stop - sweep.start == pytest.approx(math.tau)
+    assert sweep.stop - sweep.start == approx(math.tau)
 
 
 def test_what_is_read_as_equal_is_said_with_its_difference():
@@ -119,7 +120,7 @@ def test_the_range_of_the_motor_is_that_of_the_file():
     """It passes the change point at which the rounded lengths would stop it."""
     made = read(FOOT_PARALLELOGRAM)
     sweep = made.scene.motion.angle
-    assert sweep.stop - sweep.start == pytest.approx(2.4, rel=1e-9)
+    assert sweep.stop - sweep.start == approx(2.4, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +135,7 @@ def test_what_the_digits_tell_apart_stays(text):
     made = read(text)
     assert not list_equal(made)
     assert made.loop.rounding == 0.0
-    assert made.scene.linkage.lengths == pytest.approx(made.loop.lengths, rel=1e-11)
+    assert made.scene.linkage.lengths == approx(made.loop.lengths, rel=1e-11)
     assert classify(made.scene.linkage).name != "parallelogram"
 
 
@@ -150,7 +151,7 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
     mujoco.mj_saveLastXML(str(saved), mujoco.MjModel.from_xml_string(exact))
     made = read(saved.read_text(encoding="utf-8"))
     assert list_equal(made)
-    assert made.scene.linkage.lengths == pytest.approx((0.14, 0.06) * 2, rel=2e-6)
+    assert made.scene.linkage.lengths == approx((0.14, 0.06) * 2, rel=2e-6)
     assert classify(made.scene.linkage).name == "parallelogram"
 
 
@@ -179,7 +180,7 @@ def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     in_line = 0.5 * math.pi
     ground, crank, coupler, output = made.loop.lengths
     miss = abs(ground + crank - coupler - output)
-    assert RESIDUAL_OF_AN_OPEN_LOOP < miss == pytest.approx(made.loop.rounding)
+    assert RESIDUAL_OF_AN_OPEN_LOOP < miss == approx(made.loop.rounding)
     assert LoopInside(model, made.loop).close(in_line) is not None
     exact = replace(made.loop, rounding=0.0)
     assert LoopInside(model, exact).close(in_line) is None
@@ -189,4 +190,4 @@ def test_one_equality_alone_is_met_by_chance():
     """The sum d + a is b + c but for 1e-5: less than three roundings of 5e-6."""
     made = read(CHANGE_POINT)
     assert not list_equal(made)
-    assert made.scene.linkage.lengths == pytest.approx((4.0, 1.00001, 2.00001, 3.00001))
+    assert made.scene.linkage.lengths == approx((4.0, 1.00001, 2.00001, 3.00001))

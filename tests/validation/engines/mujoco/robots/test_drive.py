@@ -128,7 +128,7 @@ def list_ways(scene):
 
 
 @pytest.mark.parametrize(
-    ("cut", "bar", "away"),
+    "cut, bar, away",
     slow_but(
         {("O2", 4, True), ("A", 2, False), ("B", 3, True), ("O4", 2, False)},
         product(["O2", "A", "B", "O4"], [2, 3, 4], [False, True]),
@@ -167,7 +167,7 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
 
 
 @pytest.mark.parametrize(
-    ("name", "refusal"), slow_but([*COMMANDS.items()][:2], COMMANDS.items())
+    "name, refusal", slow_but([*COMMANDS.items()][:2], COMMANDS.items())
 )
 def test_every_command_is_judged_at_single_states(name, refusal):
     loop = examine_file(load(MODELS / f"{name}.toml"), None).measured

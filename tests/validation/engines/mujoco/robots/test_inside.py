@@ -10,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx
 
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
@@ -128,7 +129,7 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(name):
     inside, made = open_loop(name)
     theta_2 = float(spread_over_range(inside, made, 3)[-1])
     (row,) = inside.answer_states(LoopMotion((theta_2,), 2.0, 3.0)).rows
-    assert row.soft.torque == pytest.approx(
+    assert row.soft.torque == approx(
         ask_again(inside, theta_2, 3.0),
         rel=ASKED_TWICE,
     )
@@ -165,9 +166,9 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     right = np.concatenate([-bias[passive], data.efc_aref[: data.nefc]])
     solved = np.linalg.solve(equations, right)
     torque = mass[0, passive] @ solved[:2] + bias[0] - jacobian[:, 0] @ solved[2:]
-    assert row.soft.torque == pytest.approx(torque, rel=ROUNDED)
+    assert row.soft.torque == approx(torque, rel=ROUNDED)
     force = np.linalg.norm(solved[2:5])
-    assert np.linalg.norm(row.soft.forces["F43"]) == pytest.approx(force, rel=ROUNDED)
+    assert np.linalg.norm(row.soft.forces["F43"]) == approx(force, rel=ROUNDED)
 
 
 ROUNDED = 1e-12
@@ -253,4 +254,4 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
     wanted = moved + (0.25 if bar == 2 else -0.25)
     if branch == CROSSED:
         wanted = mirror(wanted, moved, 0.25 if bar == 2 else 0.0)
-    assert follows == pytest.approx(wanted, abs=1e-9)
+    assert follows == approx(wanted, abs=1e-9)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar.errors import InputError
@@ -182,13 +183,13 @@ def compare(text, made, speed=3.0):
         for part in np.linspace(0.0, turned, 20)[1:]:  # on the same branch
             qpos = robot.place(qpos, in_pose + part)
         whole = robot.ask(qpos, speed)
-        assert whole.torque == pytest.approx(
+        assert whole.torque == approx(
             solution.torque[row],
             abs=EXACT * torque_scale,
         )
         for pin, force in whole.forces.items():
             scale = sizes[pin].max()
-            assert force == pytest.approx(sizes[pin][row], abs=EXACT * scale), pin
+            assert force == approx(sizes[pin][row], abs=EXACT * scale), pin
         compared += 1
     assert compared > 5
 
@@ -251,8 +252,8 @@ def test_a_motor_counts_behind_its_gear():
     if not hasattr(mujoco.MjModel, "actuator_armature"):
         pytest.skip("this MuJoCo has no armature of motors")
     effects = {effect.key: effect for effect in read(text).scene.effects}
-    assert effects["flywheel"].inertia == pytest.approx(0.01)
-    assert effects["viscous"].coefficients == (("O2", pytest.approx(0.2)),)
+    assert effects["flywheel"].inertia == approx(0.01)
+    assert effects["viscous"].coefficients == (("O2", approx(0.2)),)
 
 
 def test_armature_between_moving_bars_is_named_with_its_size():
@@ -262,7 +263,7 @@ def test_armature_between_moving_bars_is_named_with_its_size():
 
 
 @pytest.mark.parametrize(
-    ("tendon", "actuator", "named"),
+    "tendon, actuator, named",
     [
         ('armature="0.02"', "", "the tendon T (armature 0.02)"),
         (
@@ -311,7 +312,7 @@ def test_the_range_of_another_hinge_ends_the_sweep_and_is_named():
     )
     made = read(text, loop="right_finger-right_follower")
     motion = made.scene.motion.angle
-    assert motion.stop - motion.start == pytest.approx(math.radians(30.0), rel=0.01)
+    assert motion.stop - motion.start == approx(math.radians(30.0), rel=0.01)
     assert motion.stop - motion.start < math.radians(30.0) + 1e-9
     assert any("range of right_follower ends the motion" in r for r in made.remarks)
 
@@ -323,7 +324,7 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     # the input turns fully, for it and the longest bar are shorter than the other two
     assert a + d < b + c
     motion = made.scene.motion.angle
-    assert motion.stop - motion.start == pytest.approx(math.tau)
+    assert motion.stop - motion.start == approx(math.tau)
     rocker = replace(planar, pins={**planar.pins, "A": (0.12, 0.2)})
     made = read(rocker.text())
     d, a, b, c = rocker.lengths()
@@ -332,7 +333,7 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     most = math.acos((a * a + d * d - (b + c) ** 2) / (2.0 * a * d))
     motion = made.scene.motion.angle
     width = motion.stop - motion.start
-    assert width == pytest.approx(2.0 * most - 2.0 * math.radians(1.0))
+    assert width == approx(2.0 * most - 2.0 * math.radians(1.0))
 
 
 REVERSED = """
@@ -374,7 +375,7 @@ RELATION = (
 
 
 @pytest.mark.parametrize(
-    ("text", "joint", "crank"),
+    "text, joint, crank",
     [
         (REVERSED, 30.0, (math.cos(math.pi / 3.0), math.sin(math.pi / 3.0), 0.0)),
         (REVERSED, 120.0, (math.sin(math.pi / 3.0), -math.cos(math.pi / 3.0), 0.0)),
@@ -393,7 +394,7 @@ def test_the_relation_of_joint_and_angle_is_that_of_the_world(text, joint, crank
         for minus, name in (axes[:2], axes[2:])
     )
     apart = theta_2 - math.degrees(math.atan2(y, x))
-    assert math.remainder(apart, 360.0) == pytest.approx(0.0, abs=1e-9)
+    assert math.remainder(apart, 360.0) == approx(0.0, abs=1e-9)
     sweep = made.scene.motion.angle
     assert sweep.start - 1e-9 <= math.radians(theta_2) <= sweep.stop + 1e-9
 
@@ -405,16 +406,16 @@ def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts():
     assert load.bar == 4
     # the toe's mass centre from the ankle: 150, -50 mm; the foot's line ends at the rod
     toe, rod = complex(0.15, -0.05), complex(-0.064, -0.006)
-    assert load.from_pin[0] == pytest.approx(abs(toe))
+    assert load.from_pin[0] == approx(abs(toe))
     turned = math.remainder(cmath.phase(toe / rod) - load.from_pin[1], math.tau)
-    assert turned == pytest.approx(0.0, abs=1e-9)
+    assert turned == approx(0.0, abs=1e-9)
     compare(text, made)
 
 
 def test_a_loop_is_asked_for_where_there_are_several():
-    with pytest.raises(InputError, match="right_finger-right_follower, left_finger"):
+    with raises(InputError, match="right_finger-right_follower, left_finger"):
         read(GRIPPER)
-    with pytest.raises(InputError, match="no such closure"):
+    with raises(InputError, match="no such closure"):
         read(GRIPPER, loop="thumb")
 
 

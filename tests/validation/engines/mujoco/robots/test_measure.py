@@ -10,6 +10,7 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 import fourbar
 from fourbar.errors import InputError
@@ -169,9 +170,7 @@ def test_states_without_a_value_of_the_formulas_are_named_and_not_judged():
     loop = measure(driven_by_a_motor(wound), wound)
     assert find_left_out(loop) < LEFT_OUT
     half_and_beyond = [10.0 * step for step in range(18, 37)]
-    assert np.degrees(list_without_value(loop)["wound"]) == pytest.approx(
-        half_and_beyond
-    )
+    assert np.degrees(list_without_value(loop)["wound"]) == approx(half_and_beyond)
     blocks = map(str, describe_measurement(RobotMeasurement((loop,), ())))
     assert any("at 19 of 37 states (O2 = 180 to 360 deg" in text for text in blocks)
 
@@ -181,7 +180,7 @@ def test_a_hinge_that_turns_fully_is_measured_in_any_range():
     span = (-7.0, -5.5)
     loop = measure(driven_by_a_motor(ROCKER), ROCKER, span=span)
     joints = [row.joint for row in loop.states.rows]
-    assert (min(joints), max(joints)) == pytest.approx(span, abs=1e-9)
+    assert (min(joints), max(joints)) == approx(span, abs=1e-9)
     assert find_left_out(loop) < LEFT_OUT
 
 
@@ -228,7 +227,7 @@ def test_axes_sides_and_twins_have_the_same_errors():
         ),
     ):
         worst = find_worst_of_loop(one)
-        assert find_worst_of_loop(other) == pytest.approx(worst, rel=same)
+        assert find_worst_of_loop(other) == approx(worst, rel=same)
 
 
 def angles_of(loop):
@@ -243,7 +242,7 @@ HALVES = Planar(
 
 
 def test_a_loop_that_is_not_there_is_refused():
-    with pytest.raises(InputError, match="no such closure"):
+    with raises(InputError, match="no such closure"):
         measure(read_robot(ROBOTS / "gripper.xml"), loop="tail")
 
 
@@ -268,7 +267,7 @@ def test_a_full_turn_of_a_parallelogram_is_measured_but_for_its_change_points(fi
     loop = measure(file)
     assert len(loop.states.in_line) == 2
     across = [math.cos(joint) for joint in loop.states.in_line]
-    assert across == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert across == approx([0.0, 0.0], abs=1e-6)
     assert len(loop.states.rows) == POSITIONS_OF_A_LOOP - 2
     assert find_left_out(loop) < LEFT_OUT
     errors = list_errors_by_method(loop)
@@ -287,7 +286,7 @@ def test_a_torque_that_vanishes_is_judged_on_the_pin_forces_times_a_bar():
     speed = loop.states.rows[0].speed
     largest = (0.5 * coupler + 0.5 * crank) * 0.4 * speed**2
     assert torque.vanishes
-    assert torque.scale == pytest.approx(largest * 0.5, rel=1e-6)
+    assert torque.scale == approx(largest * 0.5, rel=1e-6)
     assert torque.part == torque.error / torque.scale
     assert loop.influence.worst < 1.0
 
@@ -300,7 +299,7 @@ def test_a_torque_beside_a_change_point_is_judged_by_itself():
     assert len(torques) == 3
     for torque in torques:
         assert not torque.vanishes
-        assert torque.scale == pytest.approx(largest, rel=1e-3)
+        assert torque.scale == approx(largest, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -311,12 +310,12 @@ def test_one_scale_for_a_column_where_the_torque_is_rounding():
     force = max(np.hypot(*row.rigid.forces["F12"]) for row in loop.states.rows)
     for torque in torques.values():
         assert torque.vanishes
-        assert torque.scale == pytest.approx(4.0 * force, rel=1e-9)
-        assert torque.scale == pytest.approx(8042.0, abs=0.5)
+        assert torque.scale == approx(4.0 * force, rel=1e-9)
+        assert torque.scale == approx(8042.0, abs=0.5)
         assert torque.part == torque.error / torque.scale
         assert torque.median < torque.part
-    assert torques[MEASURED_THROUGH_TIME].part == pytest.approx(0.126, abs=0.002)
-    assert torques[STATES].part == pytest.approx(0.0674, abs=1e-4)
+    assert torques[MEASURED_THROUGH_TIME].part == approx(0.126, abs=0.002)
+    assert torques[STATES].part == approx(0.0674, abs=1e-4)
     assert loop.influence is not None and loop.influence.worst < 0.01
 
 
@@ -331,7 +330,7 @@ def test_what_the_scene_leaves_out_is_no_error_of_mujoco():
     at = BARE.motion.replace(angle=angles_of(loop))
     s = fourbar.solve(replace(BARE, motion=at))
     taken = 0.01 * (s.alpha_3 - s.alpha_2) * (s.omega_3 - s.omega_2) / s.omega_2
-    assert errors[RIGID].error == pytest.approx(np.abs(taken).max(), rel=1e-8)
+    assert errors[RIGID].error == approx(np.abs(taken).max(), rel=1e-8)
     soft = [row.soft.torque - row.rigid.torque for row in loop.states.rows]
     assert errors[STATES].error == np.abs(soft).max()
     # the closure of a generated file is nearly rigid, with the armature or without
@@ -406,7 +405,7 @@ def test_what_a_second_solver_of_dry_friction_changes_is_said():
     (remark,) = (text for text in with_it.remarks if "noslip" in text)
     told = float(remark.split("errors by ")[1].split()[0])
     assert changed > 1e-3
-    assert told == pytest.approx(changed, rel=0.5)  # one digit, the size of a vector
+    assert told == approx(changed, rel=0.5)  # one digit, the size of a vector
     assert not any("noslip" in text for text in without.remarks)
 
 
@@ -415,7 +414,7 @@ def test_a_state_after_a_turn_is_that_of_the_same_motion():
     """Beyond its change point the other assembly has the branch of the scene."""
     loop = past_a_change_point(1.0)
     theta_2 = angles_of(loop)
-    assert np.ptp(theta_2) == pytest.approx(math.tau)
+    assert np.ptp(theta_2) == approx(math.tau)
     linkage = loop.scene.linkage
     signs = find_signs(linkage, theta_2, loop.scene.motion.branch)
     theta_4 = np.unwrap(close(linkage, theta_2, signs).theta[1])
@@ -441,7 +440,7 @@ def test_an_offset_along_the_axes_changes_nothing_in_the_plane(offset):
     loop = measure(apart_along_the_axes(offset), speed=1.0)
     torques = {round(np.degrees(row.joint), 6): row.rigid for row in loop.states.rows}
     for joint, torque in TORQUES.items():
-        assert torques[joint].torque == pytest.approx(torque, rel=SAME)
+        assert torques[joint].torque == approx(torque, rel=SAME)
     assert len(loop.states.rows) == POSITIONS_OF_A_LOOP
     assert not loop.through_time.lost
     assert max(row.gap for row in loop.states.rows) < 1e-12
@@ -453,7 +452,7 @@ def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset):
     report = list_closures(file_of(text), PoseOptions())
     (closure,) = report.closures
     assert not report.notes
-    assert closure.gap == pytest.approx(0.0, abs=1e-12)
+    assert closure.gap == approx(0.0, abs=1e-12)
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

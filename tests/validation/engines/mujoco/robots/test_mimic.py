@@ -52,7 +52,7 @@ EXACT = 1e-13
 
 
 @pytest.mark.parametrize(
-    ("equality", "followers"),
+    "equality, followers",
     [
         ('<tendon tendon1="both"/>', ["lead", "follow"]),
         ('<tendon tendon1="both" polycoef="0.3 1 0 0 0"/>', ["lead", "follow"]),

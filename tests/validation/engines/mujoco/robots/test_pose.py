@@ -9,6 +9,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
@@ -58,7 +59,7 @@ GRAB = """
 
 
 @pytest.mark.parametrize(
-    ("text", "joints"),
+    "text, joints",
     slow_but(
         [(CLAMP, {"handle": "1.62 rad"}), (GRAB, {"handle": "70 deg"})],
         [
@@ -78,7 +79,7 @@ def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(text, joints):
     inside = (low <= qpos) & (qpos <= high)
     assert inside[model.jnt_limited != 0].all()
     if joints:
-        assert qpos[0] == pytest.approx(require("handle", joints["handle"], "rad"))
+        assert qpos[0] == approx(require("handle", joints["handle"], "rad"))
 
 
 def test_a_stated_joint_stays_and_the_loop_closes_around_it():
@@ -87,8 +88,8 @@ def test_a_stated_joint_stays_and_the_loop_closes_around_it():
     posed = pose_robot(model, PoseOptions(joints=joints))
     at = {name: posed.data.qpos[model.joint(name).qposadr[0]] for name in joints}
     assert at == {
-        "crank": pytest.approx(math.radians(20.0)),
-        "knee": pytest.approx(math.radians(60.0)),
+        "crank": approx(math.radians(20.0)),
+        "knee": approx(math.radians(60.0)),
     }
     assert gap(model, posed.stated) > 0.01
     assert gap(model, posed.data.qpos) < 1e-9
@@ -123,7 +124,7 @@ def test_closing_does_not_leave_the_range_of_a_joint():
     bounds = f"{min(end, -50.0)} {max(end, 0.0)}" if turned > 0 else f"{end} 40"
     text = FOOT.read_text().replace('range="-50 40"', f'range="{bounds}"')
     posed = pose_robot(compiled(text), PoseOptions(joints=joints))
-    assert math.degrees(posed.data.qpos[address]) == pytest.approx(end)
+    assert math.degrees(posed.data.qpos[address]) == approx(end)
     assert any(
         "cannot close all loops within the joints' ranges" in note
         for note in posed.notes
@@ -137,7 +138,7 @@ def test_a_keyframe_is_a_pose():
     assert posed.data.qpos[model.joint("knee").qposadr[0]] == 1.0
     same = pose_robot(model, PoseOptions(key="0"))
     assert np.array_equal(same.data.qpos, posed.data.qpos)
-    with pytest.raises(InputError, match="no such keyframe; the file has: crouch"):
+    with raises(InputError, match="no such keyframe; the file has: crouch"):
         pose_robot(model, PoseOptions(key="jump"))
 
 
@@ -149,7 +150,7 @@ def test_a_pose_that_cannot_close_says_what_is_left():
 
 
 @pytest.mark.parametrize(
-    ("joints", "words"),
+    "joints, words",
     [
         ({"crank": "20"}, 'did you mean "20rad" or "20deg"'),
         ({"crank": "20 mm"}, "crank"),
@@ -158,7 +159,7 @@ def test_a_pose_that_cannot_close_says_what_is_left():
 )
 def test_what_is_no_position_is_refused(joints, words):
     model = compiled(FOOT.read_text())
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         pose_robot(model, PoseOptions(joints=joints))
 
 
@@ -185,9 +186,9 @@ def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop():
     # the stroke is along (1, 1)/sqrt(2) of the tube: the distance of the eye decides it
     reach = np.array([0.4, 0.35]) + stroke * np.sqrt([0.5, 0.5])
     assert boom == 0.0
-    assert np.hypot(*reach) == pytest.approx(math.hypot(0.4, 0.4), abs=1e-8)
+    assert np.hypot(*reach) == approx(math.hypot(0.4, 0.4), abs=1e-8)
     away = math.atan2(0.4, 0.4) - math.atan2(reach[1], reach[0])
-    assert tilt == pytest.approx(away, abs=1e-8)
+    assert tilt == approx(away, abs=1e-8)
     (note,) = posed.notes
     assert f"tilt by {math.degrees(tilt):.4g} deg, stroke by {1e3 * stroke:.4g} mm" in (
         note
@@ -223,4 +224,4 @@ def test_a_floating_body_that_is_tied_to_the_ground_moves_there():
         "the loops are closed again by least squares: free by 1000 mm and 30 deg",
     )
     turned = [math.cos(math.radians(15.0)), 0.0, 0.0, -math.sin(math.radians(15.0))]
-    assert posed.data.qpos[3:] == pytest.approx(turned, abs=1e-9)
+    assert posed.data.qpos[3:] == approx(turned, abs=1e-9)

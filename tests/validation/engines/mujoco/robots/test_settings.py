@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from pytest import approx, raises
 from scipy.optimize import brentq
 
 from fourbar.errors import InputError
@@ -73,7 +74,7 @@ def test_what_is_typed_reaches_the_error_that_was_wanted():
     typed = search(replace(file, text=paste(file.text, advice)))
     again = typed.measure(typed.own)
     assert again.settings.list_changes(advice.best.settings) == {}
-    assert again.error == pytest.approx(advice.best.error, rel=1e-3)
+    assert again.error == approx(advice.best.error, rel=1e-3)
 
 
 LIMIT = math.acos((0.2**2 + 0.3**2 - (0.12 + 0.15) ** 2) / (2.0 * 0.2 * 0.3))
@@ -135,11 +136,11 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     error = whole.measure(stiff).error
     assert error > 2.0 * wanted
     deciding = whole.measure(stiff).deciding
-    assert deciding.error == pytest.approx(error, rel=1e-9)
-    assert deciding.angle == pytest.approx(last, abs=1e-2)
+    assert deciding.error == approx(error, rel=1e-9)
+    assert deciding.angle == approx(last, abs=1e-2)
     within = whole.find_range(stiff, wanted)
     count = min(range(9), key=lambda step: abs(angles[step] - first - within[1]))
-    assert within[0] == pytest.approx(0.0, abs=1e-9) and 4 < count < 8
+    assert within[0] == approx(0.0, abs=1e-9) and 4 < count < 8
     assert search(0, count).measure(stiff).error <= wanted
     assert search(0, 8).find_range(stiff, 1e-12) is None
 
@@ -202,7 +203,7 @@ def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
 
     smooth, rate = ask(free)
     due = LOSS * abs(rate)
-    assert ask(joint)[0] - smooth == pytest.approx(due, rel=0.02)
+    assert ask(joint)[0] - smooth == approx(due, rel=0.02)
     assert ask(f'{free} frictionloss="{LOSS}"')[0] - smooth < 0.0
 
 
@@ -213,13 +214,13 @@ def test_a_range_is_that_of_the_driven_joint(sense):
     options = MeasureOptions(PoseOptions(), span=span)
     measurement = measure_loops(write_leg(sense), options, None)
     joints = [row.joint for row in measurement.loops[0].states.rows]
-    assert (min(joints), max(joints)) == pytest.approx(span, abs=1e-9)
+    assert (min(joints), max(joints)) == approx(span, abs=1e-9)
     far = [error.joint for error in list_errors_by_method(measurement.loops[0])]
     low, high = (span[0] - ONE_STEP, span[1] + ONE_STEP)
     assert all(low <= joint <= high for joint in far)
     loop = measure(write_leg(sense), span=(-9.0, 9.0))
     assert any("--range is cut to the motion of knee, " in one for one in loop.remarks)
-    with pytest.raises(InputError, match="must overlap the motion of knee, "):
+    with raises(InputError, match="must overlap the motion of knee, "):
         measure_loops(
             write_leg(sense),
             replace(options, span=(2.0, 3.0)),
@@ -228,12 +229,12 @@ def test_a_range_is_that_of_the_driven_joint(sense):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    "text, message",
     [("-40deg", "two angles"), ("30deg,-40deg", "begin below"), ("1deg,2m", "--range")],
 )
 def test_a_range_is_two_angles(text, message):
     robot = {"pose": (), "key": None, "hold": (), "drive": None, "speed": None}
     read = read_measure_options(None, None, {**robot, "span": "-40deg, 0.5 rad"})
-    assert read.span == pytest.approx((math.radians(-40.0), 0.5))
-    with pytest.raises(InputError, match=message):
+    assert read.span == approx((math.radians(-40.0), 0.5))
+    with raises(InputError, match=message):
         read_measure_options(None, None, {**robot, "span": text})
