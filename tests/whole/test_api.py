@@ -19,24 +19,16 @@ import pytest
 import fourbar
 from fourbar import (
     Bar,
-    DrawnPins,
     FourBar,
     FourBarError,
     Free,
     Friction,
     InputError,
     Law,
-    Load,
     Motion,
     PinFriction,
-    Place,
-    Point,
-    PointDrive,
     Rise,
     Scene,
-    Sine,
-    Spring,
-    Springs,
     Tolerance,
     Torsion,
     Viscous,
@@ -133,10 +125,6 @@ def put(whole, path, value):
     return change(whole, **{first: part})
 
 
-PAIR, END = (0.1, 0.2), Place(4, (0.1, 0.2))
-P = Point("P", 2, PAIR)
-AT_P, SPAN = {"point": "P"}, {"from_centre": PAIR}
-PULL = Spring(Place(2, **SPAN), END, 1.0, 0.2, 0.1, 0.1)
 PINS = (0.0, 0.0), (0.0, 0.1), (0.175, 0.05), (0.25, 0.05)
 MOTIONS = [
     {"theta_2": 1.0, "omega_2": 10.0, "alpha_2": 0.1, "branch": 1},
@@ -144,38 +132,16 @@ MOTIONS = [
     {"theta_4": 1.9, "omega_4": 1.0, "alpha_4": 1.0},
     {"stroke": 0.25, "stroke_speed": 0.1, "stroke_acceleration": 0.1, "side": "left"},
 ]
-LAWS = [
-    Sine(1.0, 0.5, 2.0, 3.0, 0.1, 8),
-    *(
-        Rise("345", PAIR, steps=8, **{f"theta_{bar}": angle})
-        for bar, angle in ((3, 0.4), (4, 1.9))
-    ),
-    *(
-        Law((0.0, 1.0, 2.0, 3.0), steps=2, **{name: angles})
-        for name, angles in (
-            ("theta_3", (0.4, 0.5, 0.6, 0.5)),
-            ("theta_4", (1.9, 2.0, 2.1, 2.0)),
-        )
-    ),
-]
-STEEL = Bar(0.1, density=7850.0, section=(0.02, 0.01))
 MADE = [
     *FAULT_SCENES.values(),
-    crank_rocker(drawing=DrawnPins(*PINS)),
-    *(crank_rocker(motion=Motion(law=law)) for law in LAWS),
-    crank_rocker(drive=PointDrive(END, 0.3)),
-    crank_rocker(points=(P, Point("Q", 3, **SPAN))),
-    crank_rocker(points=(P,), loads=(Load(2, (1.0, 0.0), **AT_P),)),
-    crank_rocker(loads=(Load(2, (1.0, 0.0), moment=0.1, **SPAN),)),
-    crank_rocker(tolerances=(Tolerance("lengths.input", 0.1, False),)),
-    crank_rocker(effects=(Springs((PULL,)),)),
+    crank_rocker(motion=Motion(law=Rise("345", (0.1, 0.2), theta_3=0.4, steps=8))),
     crank_rocker(
-        points=(P,),
-        effects=(Springs((replace(PULL, start=Place(2, **AT_P)),)),),
+        motion=Motion(
+            law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.4, 0.5, 0.6, 0.5), steps=2)
+        )
     ),
-    *(
-        crank_rocker(linkage=replace(crank_rocker().linkage, input=bar))
-        for bar in (STEEL, Bar(0.1, mass_per_length=4.2))
+    crank_rocker(
+        linkage=replace(crank_rocker().linkage, input=Bar(0.1, mass_per_length=4.2))
     ),
 ]
 """Scenes in which each field of each record is stated somewhere."""
@@ -184,25 +150,22 @@ MADE = [
 def uses():
     """Each argument of a class: a scene that is solved with it, and a good value."""
 
-    def move(stated, name):
+    def move(stated, name, value):
         drive = CYLINDER if "stroke" in stated else None
-        return lambda x: fourbar.solve(
-            crank_rocker(motion=Motion(**{**stated, name: x}), drive=drive)
-        )
+        return crank_rocker(motion=Motion(**{**stated, name: value}), drive=drive)
 
-    found = {}
-    for scene in MADE:
-        for path, name, value in list_arguments(scene):
-            if value is not None and name not in found:
-                found[name] = partial(put, scene, path), (value,)
-    uses = {
-        name: (lambda x, make=make: fourbar.solve(make(x)), good)
-        for name, (make, good) in found.items()
-    }
-    return uses | {
-        f"Motion.{name}": (move(stated, name), (good,))
+    made = {
+        f"Motion.{name}": (partial(move, stated, name), good)
         for stated in MOTIONS
         for name, good in stated.items()
+    }
+    for scene in MADE:
+        for path, name, value in list_arguments(scene):
+            if value is not None:
+                made.setdefault(name, (partial(put, scene, path), value))
+    return {
+        name: (lambda x, make=make: fourbar.solve(make(x)), (good,))
+        for name, (make, good) in made.items()
     }
 
 
