@@ -4,17 +4,14 @@
 """
 
 import os
-import subprocess
-import sys
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 from fourbar_validation.report.machine import find_blas
+from tests.support.processes import run_python
 
-ROOT = Path(__file__).parents[2]
 BEFORE = "MACHINE_BEFORE"
 """The environment variable that tells the child what its parent calculates with."""
 
@@ -80,16 +77,9 @@ def machine(core=None):
     """Return what a fresh process calculates with, under the variables of a core if one
     is named.
     """
-    line = [sys.executable, "-c", f"from {__name__} import here; print(here())"]
-    changed = os.environ | ({} if core is None else environment(core))
-    return subprocess.run(
-        line,
-        cwd=ROOT,
-        env=changed,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.strip()
+    code = f"from {__name__} import here; print(here())"
+    done = run_python("-c", code, **({} if core is None else environment(core)))
+    return done.stdout.strip()
 
 
 def why_not(core):

@@ -14,7 +14,7 @@ import pytest
 
 from fourbar_validation import engine
 from fourbar_validation.engines import guests, programs
-from tests.whole.test_imports import ROOT
+from tests.support.processes import ROOT
 
 PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
 (PLAIN,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)

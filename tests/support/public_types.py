@@ -7,14 +7,13 @@ is 1 if a type of it, of its parameters or of its fields is unknown.
 import importlib.util
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import fourbar
+from tests.support.processes import ROOT, run_python
 
-ROOT = Path(__file__).parents[2]
 SKIPPED = "not checked: pyright is not installed: pip install 'pyright[nodejs]'"
 
 
@@ -34,22 +33,8 @@ def list_unknown() -> Iterator[str]:
     # pyright reads the libraries of the first Python on PATH: that is this one, also
     # where another environment is active
     programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "pyright",
-            "--outputjson",
-            "--verifytypes",
-            "fourbar",
-            "--ignoreexternal",
-        ],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": path, "PATH": programs},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    line = "-m pyright --outputjson --verifytypes fourbar --ignoreexternal"
+    done = run_python(*line.split(), PYTHONPATH=path, PATH=programs)
     symbols = json.loads(done.stdout)["typeCompleteness"]["symbols"]
     public = list_public()
     named = {symbol["name"] for symbol in symbols}

@@ -4,13 +4,10 @@ Read from the page, registered, and judged by the engines.
 """
 
 import math
-import os
 import re
 import shutil
-import subprocess
 import sys
 import textwrap
-from pathlib import Path
 
 import pytest
 
@@ -24,6 +21,7 @@ from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.run.judge import judge
+from tests.support.processes import ROOT, run_python
 from tests.validation.engines.test_applied_effects import (
     EXACT,
     ON_TREES,
@@ -31,7 +29,6 @@ from tests.validation.engines.test_applied_effects import (
     outcome,
 )
 
-ROOT = Path(__file__).parents[2]
 FOLDERS = ("", "fourbar", "validation", "validation/fourbar_validation")
 THE_READER_MAKES = {"fourbar/effects/latch.py", "tests/fourbar/effects/test_latch.py"}
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
@@ -228,14 +225,8 @@ def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(tmp_path):
     loop = tmp_path / "fourbar_validation" / "engines" / "loop.py"
     text = loop.read_text(encoding="utf-8")
     loop.write_text(text.replace('"v_A",', '"slip_B", "v_A",'), encoding="utf-8")
-    judged = subprocess.run(
-        [sys.executable, "-c", f"SCENE = {SCENE!r}\n{JUDGED}"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    code = f"SCENE = {SCENE!r}\n{JUDGED}"
+    judged = run_python("-c", code, folder=tmp_path, PYTHONPATH=str(tmp_path))
     assert judged.returncode == 0, judged.stderr
     exact = {engine.name for engine in HARD_ENGINES if not engine.through_time}
     assert {*judged.stdout.splitlines()} == {f"{name} agrees" for name in exact}

@@ -29,14 +29,15 @@ from fourbar.errors import (
     InputError,
     run,
 )
-from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
+from fourbar_validation.compare.rows import FAILS, write_results
 from fourbar_validation.published.printed_figures import PublishedFigure
 from fourbar_validation.regression.record import find_baseline
 from tests.support.alone import alone
 from tests.support.here import judge_here
+from tests.support.processes import ROOT, run_python
+from tests.support.runs import ROW, changed
 from tests.support.scenes import crank_rocker
 
-ROOT = Path(__file__).parents[2]
 MODEL = str(ROOT / "models" / "crank_rocker.toml")
 NO_FILE = "no-such-file"
 
@@ -140,14 +141,7 @@ def test_every_end_has_its_status(group, status, monkeypatch, capsys):
 def test_an_interruption_while_the_libraries_are_imported_is_one_line(module, tmp_path):
     (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
     paths = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "validation")))
-    line = [sys.executable, "-m", module, "--help"]
-    done = subprocess.run(
-        line,
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_python("-m", module, "--help", PYTHONPATH=paths)
     assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
 
 
@@ -164,18 +158,12 @@ def test_a_program_without_output_streams_runs(monkeypatch):
     sys.stderr.close()
 
 
-ROW = Row(
-    "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
-)
-TABLE = "theta_2 [deg], torque\n60, 1.0\n"
-"""A torque that is not that of the crank-rocker."""
-
-
 def study(folder):
     """Files that the commands of the table are given."""
     write_results([ROW], folder / "good.csv")
-    write_results([replace(ROW, error=1.0, verdict=FAILS)], folder / "bad.csv")
-    (folder / "theirs.csv").write_text(TABLE)
+    write_results([changed(error=1.0, verdict=FAILS)], folder / "bad.csv")
+    # a torque that is not that of the crank-rocker
+    (folder / "theirs.csv").write_text("theta_2 [deg], torque\n60, 1.0\n")
     (folder / "scene.toml").write_text(fourbar.dump(crank_rocker()))
 
 
@@ -286,12 +274,7 @@ def test_the_help_says_of_each_command_what_the_command_says(group):
 def test_the_help_of_the_harness_imports_no_engine():
     code = "import sys; from fourbar_validation.cli import status; status(['--help']); "
     code += "sys.exit(bool({'scipy', 'mujoco', 'pint', 'rich'} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        check=False,
-    )
-    assert done.returncode == HOLDS
+    assert run_python("-c", code).returncode == HOLDS
 
 
 @pytest.mark.slow

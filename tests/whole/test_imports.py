@@ -2,15 +2,13 @@
 
 import ast
 import runpy
-import subprocess
-import sys
 from collections import Counter
 from functools import cache
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.support.processes import ROOT, run_python
+
 HEAVY = (
     "pint",
     "click",
@@ -118,12 +116,7 @@ def test_solving_loads_numpy_alone():
         "import sys; from fourbar import FourBar, Motion, Scene, solve, uniform;"
         " print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     )
-    out = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.split()
+    out = run_python("-c", code).stdout.split()
     assert "numpy" in out
     assert not set(HEAVY) & set(out)
 

@@ -7,19 +7,17 @@ every numerical test file, and the whole `validation run`.
 """
 
 import os
-import subprocess
-import sys
 
 import pytest
 
 from tests.support.another_machine import (
     BEFORE,
     CORES,
-    ROOT,
     environment,
     machine,
     why_not,
 )
+from tests.support.processes import ROOT, run_python
 
 ALL = os.environ.get("MACHINES") == "all"
 TESTS = ROOT / "tests"
@@ -48,33 +46,14 @@ def test_the_numbers_hold_on_another_machine(core, tmp_path):
             "not run: "
             + "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         )
-    child = os.environ | environment(possible[0]) | {BEFORE: machine()}
-    files = [
-        str(TESTS / "support/another_machine.py"),
-        *map(str, NUMERICAL if ALL else SAMPLE),
-    ]
-    lines = [
-        [
-            "pytest",
-            "-p",
-            "no:cacheprovider",
-            *(("-n", "2") if ALL else ("-p", "no:xdist")),
-            *files,
-        ]
-    ]
+    child = environment(possible[0]) | {BEFORE: machine()}
+    files = [TESTS / "support/another_machine.py", *(NUMERICAL if ALL else SAMPLE)]
+    workers = "-n 2" if ALL else "-p no:xdist"
+    lines = [["pytest", "-p", "no:cacheprovider", *workers.split(), *files]]
     if ALL:
-        lines.append(
-            ["validation", "run", "--against", "accepted", "--out", str(tmp_path)]
-        )
+        lines.append(["validation", "run", "--against", "accepted", "-o", tmp_path])
     for line in lines:
-        done = subprocess.run(
-            [sys.executable, "-m", *line],
-            cwd=ROOT,
-            env=child,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = run_python("-m", *line, **child)
         assert done.returncode == 0, (
             f"{machine(possible[0])}\n{done.stdout}{done.stderr}"
         )

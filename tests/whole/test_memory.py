@@ -1,9 +1,6 @@
 """Memory and processor time of long sweeps, looked at from outside the process."""
 
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +10,9 @@ from fourbar.errors import HOLDS
 from fourbar.scene import command
 from fourbar.show import motion_curves
 from fourbar.solving import solve
+from tests.support.processes import ROOT, run_python
 
-MODELS = Path(__file__).parents[2] / "models"
+MODELS = ROOT / "models"
 MOST_MEMORY, MOST_TIME = 600, 8.0
 """MB, s: what `analyze` of a million positions may take. The arrays of its solution are
 400 MB, and their evaluation with error bars takes 4 s.
@@ -45,8 +43,7 @@ def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
     longer, steps = re.subn(r"steps = \d+", "steps = 999998", text)
     assert steps == 1
     scene.write_text(longer, encoding="utf-8")
-    line = [sys.executable, "-c", ANALYZE_AND_LOOK, "analyze", str(scene)]
-    done = subprocess.run(line, capture_output=True, text=True, check=True)
+    done = run_python("-c", ANALYZE_AND_LOOK, "analyze", scene)
     status, peak, seconds = done.stderr.split()
     assert int(status) == HOLDS
     assert int(peak) / 1024 < MOST_MEMORY

@@ -5,12 +5,11 @@
 
 import importlib.util
 import runpy
-import subprocess
 import sys
 
 import pytest
 
-from tests.whole.test_imports import ROOT
+from tests.support.processes import ROOT, run_python
 
 PAGE = "tests/support/user_code.py"
 
@@ -21,9 +20,8 @@ PAGE = "tests/support/user_code.py"
     reason="not run: pyright is not installed: pip install 'pyright[nodejs]'",
 )
 def test_pyright_passes_the_page():
-    line = [sys.executable, "-m", "pyright", "--pythonpath", sys.executable, PAGE]
-    done = subprocess.run(line, cwd=ROOT, stdout=subprocess.PIPE, check=False)
-    assert done.returncode == 0, done.stdout.decode()
+    done = run_python("-m", "pyright", "--pythonpath", sys.executable, PAGE)
+    assert done.returncode == 0, done.stdout
 
 
 def test_the_page_runs(monkeypatch):
