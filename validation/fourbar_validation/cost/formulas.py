@@ -4,7 +4,7 @@ Compared are double and single precision, the thirteen equations, and fifty digi
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import WorstErrors, find_greatest
 from fourbar_validation.compare.scales import scale_of
-from fourbar_validation.compare.tolerance import divide, join_components
+from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.published import thirteen
 
 FIFTY_DIGITS = 167 + 30
@@ -33,26 +33,20 @@ POSITIONS_WITH_REFERENCE = 25
 milliseconds each.
 """
 QuantityValues = dict[str, Any]
+_QUANTITIES = ("torque", *PIN_FORCES)
 
 
 def choose_few(command: Command) -> Command:
     """Choose at most POSITIONS_WITH_REFERENCE positions, evenly over the sweep."""
-    rows = np.unique(
-        np.linspace(
-            0,
-            len(command.theta_2) - 1,
-            min(POSITIONS_WITH_REFERENCE, len(command.theta_2)),
-        )
-        .round()
-        .astype(int)
-    )
-    return command.part(rows)
+    n = len(command.theta_2)
+    places = np.linspace(0, n - 1, min(POSITIONS_WITH_REFERENCE, n))
+    return command.part(np.unique(places.round().astype(int)))
 
 
 def evaluate_double(scene: Scene, command: Command) -> QuantityValues:
     """Evaluate by `fourbar.solve`."""
     s = solve(scene, "force", at=command)
-    return {name: getattr(s, name) for name in ("torque", *PIN_FORCES)}
+    return {name: s[name] for name in _QUANTITIES}
 
 
 def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
@@ -71,26 +65,21 @@ def evaluate_single(scene: Scene, command: Command) -> QuantityValues:
         state = change_numbers(state, _round_single)
         dynamics = case.dynamics(state, growth)
     assert dynamics.effort.dtype == np.float32
-    return {
-        "torque": dynamics.effort,
-        **{
-            name: _broadcast_vector(getattr(dynamics.pins, name), len(theta_2))
-            for name in PIN_FORCES
-        },
-    }
+    pins = [getattr(dynamics.pins, name) for name in PIN_FORCES]
+    forces = np.moveaxis(_stack(pins, len(theta_2)), 1, 0)
+    return {"torque": dynamics.effort, **dict(zip(PIN_FORCES, forces, strict=True))}
 
 
 def _round_single(value: Any) -> Any:
     """Round to single precision, both parts of a vector too."""
-    return np.asarray(value).astype(
-        np.complex64 if np.iscomplexobj(value) else np.float32
-    )[()]
+    kind = np.complex64 if np.iscomplexobj(value) else np.float32
+    return np.asarray(value).astype(kind)[()]
 
 
-def _broadcast_vector(vector: Any, n: int) -> Array:
-    """Stack the components of a complex vector, (n, 2)."""
-    values = np.broadcast_to(vector, (n,))
-    return join_components(values.real, values.imag)
+def _stack(vectors: Sequence[Any], n: int) -> Array:
+    """Stack k complex vectors, each of one position or of n, to (n, k, 2)."""
+    stacked = np.stack([np.broadcast_to(one, n) for one in vectors], 1)
+    return np.stack((stacked.real, stacked.imag), -1).astype(float)
 
 
 def solve_thirteen_equations(scene: Scene, command: Command) -> QuantityValues:
@@ -100,11 +89,11 @@ def solve_thirteen_equations(scene: Scene, command: Command) -> QuantityValues:
             "friction that depends on the pin forces is not linear in them"
         )
     x = thirteen.solve_thirteen(make_bodies(scene, command), scene.drive_bar)
-    columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
-    return {
-        "torque": x[:, thirteen.TORQUE_COLUMN],
-        **{name: x[:, k : k + 2] for name, k in columns.items()},
-    }
+    values = {"torque": x[:, -1]}
+    for name in PIN_FORCES:
+        column = 2 * thirteen.FORCES.index(name)
+        values[name] = x[:, column : column + 2]
+    return values
 
 
 def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:
@@ -118,23 +107,23 @@ def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:
     placed = scene.settled()
     actions = Actions(state, parts).add((*placed.loads, *placed.effects))
     acting = actions.wrenches(Wrenches())
-    first = {}
-    second = {}
-    force = {}
-    moment = {}
+    arms: list[Any] = []
+    forces = []
+    moments = []
     for k, body in zip(MOVING_BARS, parts, strict=True):
         direction = state.direction(k)
         centre = body.z * direction
         # the thesis's order: bar 4's second pin is B as well, and its first is O4
         tip = scene.linkage.bar(k).length * direction
-        first[k] = _broadcast_vector(-centre, n)
-        second[k] = _broadcast_vector(tip - centre, n)
+        arms += (-centre, tip - centre)
         R, M = acting.on(k)
-        force[k] = _broadcast_vector(body.m * state.acceleration(k, body.z) - R, n)
+        forces.append(body.m * state.acceleration(k, body.z) - R)
         about_G = M - cross(centre, R + 0.0j)
         inertial = body.I * np.asarray(state.alpha(k))
-        moment[k] = np.broadcast_to(inertial, (n,)) - about_G
-    return thirteen.EquationTerms(first, second, force, moment)
+        moments.append(np.broadcast_to(inertial, n) - about_G)
+    return thirteen.EquationTerms(
+        _stack(arms, n).reshape(n, 3, 2, 2), _stack(forces, n), np.stack(moments, 1)
+    )
 
 
 def evaluate_balls(
@@ -148,27 +137,17 @@ def evaluate_balls(
     from fourbar_validation.engines.balls import collect_inputs, compute_outputs
 
     command = with_signs(scene.linkage, command)
-    before = ctx.prec
-    ctx.prec = bits
-    try:
-        outputs = []
-        for theta_2, branch in zip(
-            command.theta_2.tolist(),
-            command.branch.tolist(),
-            strict=True,
-        ):
-            x = {
-                name: arb(value)
-                for name, value in collect_inputs(scene, theta_2).items()
-            }
-            outputs.append(compute_outputs(scene, branch, x) or {})
-    finally:
-        ctx.prec = before
-    out: QuantityValues = {"torque": [y.get("torque") for y in outputs]}
-    return out | {
-        name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in outputs]
-        for name in PIN_FORCES
-    }
+    out: QuantityValues = {name: [] for name in _QUANTITIES}
+    with ctx.workprec(bits):
+        positions = zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)
+        for theta_2, branch in positions:
+            inputs = collect_inputs(scene, theta_2)
+            x = {name: arb(value) for name, value in inputs.items()}
+            y = compute_outputs(scene, branch, x) or {}
+            out["torque"].append(y.get("torque"))
+            for name in PIN_FORCES:
+                out[name].append((y.get(f"{name}_x"), y.get(f"{name}_y")))
+    return out
 
 
 def compare_with_reference(
@@ -180,20 +159,13 @@ def compare_with_reference(
     """Find the worst errors on their scales against balls of many more digits."""
     formulas = solve(scene, "force", at=command)
     worst = {}
-    for name in ("torque", *PIN_FORCES):
-        sizes = scale_of(name, scene, formulas, getattr(formulas, name)).size
+    for name in _QUANTITIES:
+        sizes = scale_of(name, scene, formulas, formulas[name]).size.tolist()
         errors = []
-        for ours, exact, size in zip(
-            quantities[name],
-            reference[name],
-            sizes.tolist(),
-            strict=True,
-        ):
-            pairs = [(ours, exact)]
-            if name != "torque":
-                pairs = list(zip(ours, exact, strict=True))
-            if all(y is not None for _, y in pairs):
-                apart = [_compute_difference(x, y) for x, y in pairs]
+        for size, *pair in zip(sizes, quantities[name], reference[name], strict=True):
+            ours, exact = map(np.atleast_1d, pair)
+            if None not in exact:
+                apart = map(_compute_difference, ours, exact)
                 errors.append(float(divide(math.hypot(*apart), size)))
         worst[name] = find_greatest(errors)
     return WorstErrors(**worst)

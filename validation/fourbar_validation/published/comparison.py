@@ -4,26 +4,30 @@ Ours stand beside them, and differences are explained.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 
 import click
 
 from fourbar.errors import FAILED, HOLDS, needing
+from fourbar.show.folded import FoldedTable
+from fourbar.show.lines import wrap_line
 from fourbar.writing import write_text
 from fourbar_validation.places import HARNESS_PROGRAM
 from fourbar_validation.published.printed_figures import (
     ERRATA,
     FIGURE_VERDICTS,
+    Erratum,
     PublishedFigure,
     read_printed,
 )
-from fourbar_validation.published.textbook import compare_textbooks, compute_worksheet
+from fourbar_validation.published.textbook import compare_textbooks
 from fourbar_validation.published.thesis import (
+    AS_PRINTED,
     LADDER,
     ThesisProgram,
-    compute_tables,
+    compute_numbers,
     find_noise,
 )
 from fourbar_validation.report.sentences import make_words_table
@@ -38,17 +42,23 @@ def list_figures() -> Iterator[PublishedFigure]:
     The sources are the thesis, the Maple worksheet, and public test cases.
     """
     noise = find_noise()
+    ours = compute_numbers()
     for table, figures in read_printed().items():
         for name, (text, errata) in figures.items():
-            ours, made = (
-                compute_worksheet() if table == "Maple" else compute_tables(ids)[table]
-                for ids in ((), errata)
-            )
+            made = errata
+            if errata and table == "manual, unknowns":
+                made = (*errata, AS_PRINTED)
+            wrong = compute_numbers(made)[name]
             apart = noise.get(table, {}).get(name, 0.0)
-            yield PublishedFigure(
-                table, name, text, ours[name], errata, made[name], apart
-            )
+            yield PublishedFigure(table, name, text, ours[name], errata, wrong, apart)
     yield from compare_textbooks()
+
+
+def _find_errata(figure: PublishedFigure) -> list[Erratum]:
+    """Find what a figure names; nothing if one of them is not known."""
+    if set(figure.errata) <= set(ERRATA):
+        return [ERRATA[name] for name in figure.errata]
+    return []
 
 
 def is_explained(figure: PublishedFigure) -> bool:
@@ -56,21 +66,19 @@ def is_explained(figure: PublishedFigure) -> bool:
 
     A misprint that no erratum can give is explained too.
     """
-    if not figure.errata or not set(figure.errata) <= set(ERRATA):
-        return False
-    return figure.reproduced() or not all(
-        ERRATA[name].reproduced for name in figure.errata
-    )
+    errata = _find_errata(figure)
+    known = all(erratum.reproduced for erratum in errata)
+    return bool(errata) and (figure.reproduced() or not known)
 
 
 def explain_difference(figure: PublishedFigure) -> str:
     """Explain in a phrase why a figure differs."""
-    if not figure.errata or not set(figure.errata) <= set(ERRATA):
+    errata = _find_errata(figure)
+    if not errata:
         return "no erratum explains this"
-    if len(figure.errata) > 3 and set(figure.errata) <= set(LADDER):
+    text = "; ".join(f"#{erratum.id} {erratum.title}" for erratum in errata)
+    if len(errata) > 3 and set(figure.errata) <= set(LADDER):
         text = "#" + " #".join(figure.errata) + ", the steps of the table above"
-    else:
-        text = "; ".join(f"#{name} {ERRATA[name].title}" for name in figure.errata)
     if figure.reproduced():
         decimals = len(figure.printed.partition(".")[2])
         return f"{text}: gives {figure.made:.{min(decimals + 1, 12)}f}"
@@ -86,58 +94,55 @@ def compare_figures(show_all: bool) -> int:
     """
     from rich.console import Console
 
-    from fourbar.show.folded import FoldedTable
-    from fourbar.show.lines import wrap_line
-
     console = Console(highlight=False, markup=False)
     page = min(PAGE_WIDTH, console.width)
     which = "" if show_all else " that differ from ours, and why"
     console.print(f"Printed figures{which}:")
-    figures = list(list_figures())
-    differing = [figure for figure in figures if figure.verdict() == "differs"]
-    for figure in figures if show_all else differing:
+    counts: dict[str, Counter[str]] = {}
+    differing = []
+    for figure in list_figures():
         verdict = figure.verdict()
-        differs = verdict == "differs"
-        ours = f"ours {figure.ours:.10g}" + f", {verdict}" * (not differs)
-        line = f"{figure.table}: {figure.name}  printed {figure.printed}  {ours}"
-        click.echo("\n".join(wrap_line(line, console.width)))
-        if differs:
+        counts.setdefault(figure.table, Counter())[verdict] += 1
+        line = f"{figure.table}: {figure.name}  printed {figure.printed}"
+        line += f"  ours {figure.ours:.10g}" + f", {verdict}" * (verdict != "differs")
+        if show_all or verdict == "differs":
+            click.echo("\n".join(wrap_line(line, console.width)))
+        if verdict == "differs":
+            differing.append(figure)
             why = explain_difference(figure)
             click.echo(click.wrap_text(why, page, "    ", "    "))
-    met = {erratum for figure in differing for erratum in figure.errata}
-    unexplained = [figure for figure in differing if not is_explained(figure)]
-    reproduced = sum(figure.reproduced() for figure in differing)
-    counts = Counter((figure.table, figure.verdict()) for figure in figures)
+    sums = sum(counts.values(), Counter())
     total = FoldedTable("table", *FIGURE_VERDICTS, title="Printed figures against ours")
-    tables = dict.fromkeys(figure.table for figure in figures)
-    rows = [[counts[table, one] for one in FIGURE_VERDICTS] for table in tables]
-    for table, row in zip(tables, rows, strict=True):
-        total.add_row(table, *map(str, row))
+    for table, row in counts.items():
+        total.add_row(table, *(str(row[one]) for one in FIGURE_VERDICTS))
     total.add_section()
-    sums = [sum(column) for column in zip(*rows, strict=True)] or [0, 0, 0]
-    total.add_row(f"{len(figures)} figures", *map(str, sums))
+    every = f"{sums.total()} figures"
+    total.add_row(every, *(str(sums[one]) for one in FIGURE_VERDICTS))
     console.print(total)
-    misprints = sums[2] - reproduced - len(unexplained)
+    unexplained = sum(not is_explained(figure) for figure in differing)
+    reproduced = sum(figure.reproduced() for figure in differing)
+    misprints = len(differing) - reproduced - unexplained
     summary = (
         "A figure is rounded or truncated if ours, rounded or cut to its digits,"
-        f" equals it. {sums[2]} figures differ: the errata named reproduce {reproduced}"
-        f" of them digit for digit, and {misprints} are misprints."
+        f" equals it. {len(differing)} figures differ: the errata named reproduce"
+        f" {reproduced} of them digit for digit, and {misprints} are misprints."
     )
     click.echo(click.wrap_text(summary, page) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
+    met = {name for figure in differing for name in figure.errata}
     for name, erratum in ERRATA.items():
         if name in met:
             text = (
                 f"#{name} {erratum.where}: printed {erratum.printed}. Right:"
-                f" {erratum.right}. "
+                f" {erratum.right}. Why: {erratum.derivation}. Effect:"
+                f" {erratum.effect}."
             )
-            text += f"Why: {erratum.derivation}. Effect: {erratum.effect}."
             click.echo(click.wrap_text(text, page, "", "    "))
     if unexplained:
-        console.print(f"No erratum explains {len(unexplained)} of the differences.")
-    if not figures:
+        console.print(f"No erratum explains {unexplained} of the differences.")
+    if not counts:
         console.print("Nothing was compared: there is no figure.")
-    if unexplained or not figures:
+    if unexplained or not counts:
         return FAILED
     return HOLDS
 
@@ -158,28 +163,24 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
     the manual and section 5.7 print: 308.804 N cm and (161.418, -156.506) N. After each
     of these answers stand the figures as printed.
     """
-    printed = read_printed()
-    tables = {"manual": printed["manual, unknowns"], "5b": printed["5.7 unknowns"]}
-
-    def write(T4: float, *F12: float) -> tuple[str, ...]:
-        return (f"{T4:.9f}", *(f"{component:.3f}" for component in F12))
-
     names = ("T4", "F12x", "F12y")
-    rows: list[tuple[str, ...]] = []
-    for step, erratum in enumerate(("", *LADDER)):
-        x = ThesisProgram(LADDER[:step]).unknowns()
-        did = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
-        right = "the answer of this project"
-        if erratum in ERRATA:
-            did = f"#{erratum} {ERRATA[erratum].title}"
-            right = ERRATA[erratum].right
-        elif erratum:
-            did = "I_G3, I_G4 as printed in the manual, ten digits"
-            right = "see #3"
-        rows.append((did, right, *write(*(x[name] for name in names))))
-        if table := tables.get(erratum):
-            unknowns = [float(table[name].printed) for name in names]
-            rows.append(("", "as printed:", *write(*unknowns)))
+
+    def write(*did: str, of: Mapping[str, float]) -> tuple[str, ...]:
+        torque, *forces = (of[name] for name in names)
+        return (*did, f"{torque:.9f}", *(f"{force:.3f}" for force in forces))
+
+    first = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
+    rows = [write(first, "the answer of this project", of=ThesisProgram().unknowns())]
+    printed = {AS_PRINTED: "manual, unknowns", "5b": "5.7 unknowns"}
+    for step, name in enumerate(LADDER, 1):
+        did = ("I_G3, I_G4 as printed in the manual, ten digits", "see #3")
+        if name in ERRATA:
+            did = (f"#{name} {ERRATA[name].title}", ERRATA[name].right)
+        rows.append(write(*did, of=ThesisProgram(LADDER[:step]).unknowns()))
+        if name in printed:
+            figures = read_printed()[printed[name]].items()
+            as_printed = {unknown: float(figure.printed) for unknown, figure in figures}
+            rows.append(write("", "as printed:", of=as_printed))
     return rows
 
 

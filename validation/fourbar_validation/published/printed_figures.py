@@ -12,7 +12,7 @@ FIGURE_VERDICTS = ("rounded", "truncated", "differs")
 POSITIONS = "2.4 positions"
 
 
-class _Erratum(NamedTuple):
+class Erratum(NamedTuple):
     """One error of a source."""
 
     id: str
@@ -28,10 +28,8 @@ class _Erratum(NamedTuple):
     """True if it may be a slip of the transcription that was read."""
 
 
-LISTED_ERRATA = tomllib.loads((FOLDER / "errata.toml").read_text(encoding="utf-8"))[
-    "erratum"
-]
-ERRATA = {entry["id"]: _Erratum(**entry) for entry in LISTED_ERRATA}
+_FILE = tomllib.loads((FOLDER / "errata.toml").read_text(encoding="utf-8"))
+ERRATA = {entry["id"]: Erratum(**entry) for entry in _FILE["erratum"]}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
