@@ -35,6 +35,7 @@ from tests.support.guests import (
     write_program,
 )
 from tests.support.here import Heard, judge_here
+from tests.support.rows import read_rows
 from tests.support.scenes import CYLINDER, crank_rocker
 from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
@@ -416,17 +417,17 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
 
 @pytest.mark.parametrize(
     "stated, names",
-    [
-        (["wg 1.2"], ["wg"]),
-        (["wg 1.2", "wg 1.3"], ["wg 1.2", "wg 1.3"]),
-        (["wg 1.2 released"], ["wg released"]),
-        (["wg 1.2", "wg 1.2"], ["wg 1.2", "wg 1.2-2"]),
-        (["free-body 2.0"], ["free-body 2.0"]),
-        (["1.2"], ["1.2"]),
-    ],
+    read_rows("""
+wg 1.2 | wg
+wg 1.2, wg 1.3 | wg 1.2, wg 1.3
+wg 1.2 released | wg released
+wg 1.2, wg 1.2 | wg 1.2, wg 1.2-2
+free-body 2.0 | free-body 2.0
+1.2 | 1.2
+"""),
 )
 def test_a_version_stands_in_a_name_only_beside_another_one(stated, names, monkeypatch):
-    programs = [(one, "", guests.Program((one,))) for one in stated]
+    programs = [(one, "", guests.Program((one,))) for one in stated.split(", ")]
 
     def say_hello(program):
         (name,) = program.command
@@ -436,8 +437,8 @@ def test_a_version_stands_in_a_name_only_beside_another_one(stated, names, monke
     monkeypatch.setattr(guests, "ask_hello", say_hello)
     made = guests.name_guests(programs, ["free-body"])
     named = guests.name_by_versions(made, [*(one.name for one in made), "free-body"])
-    assert [guest.name for guest in named] == names
-    assert [guest.start().name for guest in named] == names
+    assert ", ".join(guest.name for guest in named) == names
+    assert ", ".join(guest.start().name for guest in named) == names
 
 
 @pytest.mark.usefixtures("hosted")

@@ -48,6 +48,7 @@ from fourbar_validation.published.thesis import (
     make_model_scene,
 )
 from tests.support import scenes
+from tests.support.rows import read_rows
 
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""
@@ -126,22 +127,22 @@ def test_rows_for_the_report():
 
 @pytest.mark.parametrize(
     "printed, ours, noise, verdict",
-    [
-        ("0.12", 0.1249, 0.0, "rounded"),
-        ("0.13", 0.1251, 0.0, "rounded"),
-        ("-0.12", -0.1299, 0.0, "truncated"),
-        ("0.12", 0.1299, 0.0, "truncated"),
-        ("0.12", 0.1301, 0.0, "differs"),
-        ("0.12", -0.12, 0.0, "differs"),
-        ("308", 308.9, 0.0, "truncated"),
-        ("0", -0.4, 0.0, "rounded"),
-        ("308.8044071267012", 308.8044071267003, 1e-12, "rounded"),
-        ("308.8044071267012", 308.8044071267027, 1e-12, "differs"),
-    ],
+    read_rows("""
+0.12 | 0.1249 | 0.0 | rounded
+0.13 | 0.1251 | 0.0 | rounded
+-0.12 | -0.1299 | 0.0 | truncated
+0.12 | 0.1299 | 0.0 | truncated
+0.12 | 0.1301 | 0.0 | differs
+0.12 | -0.12 | 0.0 | differs
+308 | 308.9 | 0.0 | truncated
+0 | -0.4 | 0.0 | rounded
+308.8044071267012 | 308.8044071267003 | 1e-12 | rounded
+308.8044071267012 | 308.8044071267027 | 1e-12 | differs
+"""),
 )
 def test_verdicts(printed, ours, noise, verdict):
     """Noise is of the last digits alone."""
-    assert compare_figure(printed, ours, noise) == verdict
+    assert compare_figure(printed, float(ours), float(noise)) == verdict
 
 
 @pytest.mark.slow

@@ -50,6 +50,7 @@ from fourbar_validation.regression.scenes import describe_changes
 from fourbar_validation.report.junit import list_cases
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.here import judge_here
+from tests.support.rows import read_rows
 from tests.support.runs import (
     FORMS,
     HERE,
@@ -289,16 +290,16 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(
 
 @pytest.mark.parametrize(
     "options, words",
-    [
-        ("--type crank-rocker", "say --random N too"),
-        ("--seed 3", "say --random N too"),
-        ("--random 3 --type crank", "crank-rocker, drag-link"),
-        ("--engines ,", "must be among pinocchio-inverse"),
-        ("--against none", "--against = 'none': must be a folder with results.csv"),
-        ("--html changes.html", "say --against BASELINE too"),
-        ("a.toml --random 3", "leave out the scene files"),
-        ("--suite hard --random 3", "leave out scene files and --random"),
-    ],
+    read_rows("""
+--type crank-rocker | say --random N too
+--seed 3 | say --random N too
+--random 3 --type crank | crank-rocker, drag-link
+--engines , | must be among pinocchio-inverse
+--against none | --against = 'none': must be a folder with results.csv
+--html changes.html | say --against BASELINE too
+a.toml --random 3 | leave out the scene files
+--suite hard --random 3 | leave out scene files and --random
+"""),
 )
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
     options, words, tmp_path, call
@@ -389,28 +390,20 @@ def disagreeing(worse):
     return old, new
 
 
+AT_FAULT = read_rows("""
+sim F12, sim torque | only sim
+one torque, sim torque | only one, sim
+one torque, two torque, three torque, formulas power | all engines and the identity \
+disagree: the formulas
+one F12, two F12, three F12 | all engines disagree, and the identities hold: the \
+formulas, or what all engines are given
+formulas power | only the identities: the formulas, or what is stated of them
+""")
+
+
 @pytest.mark.parametrize(
     "worse, sentence",
-    slow_but(
-        [("sim F12, sim torque", "only sim")],
-        [
-            ("sim F12, sim torque", "only sim"),
-            ("one torque, sim torque", "only one, sim"),
-            (
-                "one torque, two torque, three torque, formulas power",
-                "all engines and the identity disagree: the formulas",
-            ),
-            (
-                "one F12, two F12, three F12",
-                "all engines disagree, and the identities hold: the formulas, or what"
-                " all engines are given",
-            ),
-            (
-                "formulas power",
-                "only the identities: the formulas, or what is stated of them",
-            ),
-        ],
-    ),
+    slow_but(AT_FAULT[:1], AT_FAULT),
 )
 def test_the_report_says_who_is_at_fault(worse, sentence):
     old, new = disagreeing(worse.split(", "))
@@ -739,51 +732,42 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
         summarise(kept / HISTORY)
 
 
-@pytest.mark.parametrize(
-    "runs, failure, words",
-    [
-        ([HELD], FAILED_ROW, "held in {before}"),
-        ([HELD, HELD], FAILED_ROW, "held in {before}"),
-        ([FAILED_ROW], FAILED_ROW, "failed too in {before}"),
-        (
-            [FAILED_ROW, FAILED_ROW],
-            FAILED_ROW,
-            "failed too in {before}, and in every accepted run since {runs[0]}",
-        ),
-        (
-            [FAILED_ROW, HELD, FAILED_ROW, FAILED_ROW],
-            FAILED_ROW,
-            "has not held since {runs[2]}; it held in {runs[1]}",
-        ),
-        (
-            [HELD, SILENT],  # the engine broke down: nothing of it held
-            FAILED_ROW,
-            "has not held since {runs[1]}; it held in {runs[0]}",
-        ),
-        ([replace(HELD, quantity="F43")], FAILED_ROW, "is not in {before}"),
-        (
-            [HELD, replace(HELD, quantity="F43")],
-            FAILED_ROW,
-            "is not in {before}; it held in {runs[0]}",
-        ),
-        ([replace(FAILED_ROW, engine="theirs")], FAILED_ROW, "is not in {before}"),
-        ([replace(FAILED_ROW, scene="b")], FAILED_ROW, "is not in {before}"),
-        ([HELD], SILENT, "answered in {before}"),
-        ([FAILED_ROW], SILENT, "answered in {before}"),
-        (
-            [HELD, SILENT],
-            SILENT,
-            "has not answered since {runs[1]}; it answered in {runs[0]}",
-        ),
-    ],
-)
+ROWS = {
+    "held": HELD,
+    "fails": FAILED_ROW,
+    "silent": SILENT,
+    "F43": replace(HELD, quantity="F43"),
+    "theirs": replace(FAILED_ROW, engine="theirs"),
+    "b": replace(FAILED_ROW, scene="b"),
+}
+SINCE = read_rows("""
+held | fails | held in {before}
+held held | fails | held in {before}
+fails | fails | failed too in {before}
+fails fails | fails | failed too in {before}, and in every accepted run since {runs[0]}
+fails held fails fails | fails | has not held since {runs[2]}; it held in {runs[1]}
+# the engine broke down: nothing of it held
+held silent | fails | has not held since {runs[1]}; it held in {runs[0]}
+F43 | fails | is not in {before}
+held F43 | fails | is not in {before}; it held in {runs[0]}
+theirs | fails | is not in {before}
+b | fails | is not in {before}
+held | silent | answered in {before}
+fails | silent | answered in {before}
+held silent | silent | has not answered since {runs[1]}; it answered in {runs[0]}
+""")
+"""A row of each accepted run, one of a later run, and what is said of it."""
+
+
+@pytest.mark.parametrize("runs, failure, words", SINCE)
 def test_a_failure_is_looked_up_in_the_accepted_runs(
     runs, failure, words, tmp_path, nights
 ):
     """A run that was not accepted tells of itself."""
-    kept = nights(*([row, replace(HELD, scene="other")] for row in runs))
-    key = (failure.scene, failure.engine, failure.quantity)
-    for folder in (kept, tmp_path / "night 0")[: 1 + (len(runs) == 1)]:
+    accepted = runs.split()
+    kept = nights(*([ROWS[row], replace(HELD, scene="other")] for row in accepted))
+    key = ("scene", "mine", ROWS[failure].quantity)
+    for folder in (kept, tmp_path / "night 0")[: 1 + (len(accepted) == 1)]:
         run = open_run(folder)
         since = find_since(read_history(run), run, [key])[key]
         assert since == words.format(before=run.describe(), runs=RUNS)

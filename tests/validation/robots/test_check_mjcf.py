@@ -60,6 +60,7 @@ from fourbar_validation.robots.judge_loop import (
 )
 from tests.support.robots import answer_of, answers_of, change, mend, notes_of
 from tests.support.robots import examine_text as examine
+from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
@@ -204,131 +205,40 @@ def test_what_is_welded_to_a_bar_is_part_of_it():
     assert numbers == approx(right, rel=1e-12, abs=1e-14)
 
 
-EDITS = [
-    (
-        "coupler's mass",
-        'mass="0.5"',
-        'mass="5"',
-        "bars.coupler.mass",
-        "10^1 times: units?",
-    ),
-    (
-        "inertia about the pin",
-        "0.0016133333333333336",
-        "0.0073733333333333336",
-        "bars.output.inertia",
-        "",
-    ),
-    (
-        "mass centre",
-        'pos="0.05 0 0" mass="0.2"',
-        'pos="0.06 0 0" mass="0.2"',
-        "bars.input.centre.distance",
-        "",
-    ),
-    (
-        "length",
-        '"B4" pos="0.22 0 0"',
-        '"B4" pos="0.23 0 0"',
-        "lengths.output",
-        "another linkage",
-    ),
-    ("gravity left out", "-9.81", "0.0", "gravity.y", "weight"),
-    (
-        "damping",
-        'name="A" type="hinge"',
-        'name="A" type="hinge" damping="0.1"',
-        "pins.A.damping",
-        "couple",
-    ),
-    (
-        "timestep",
-        'timestep="0.00100',
-        'timestep="0.00200',
-        "option.timestep",
-        "integration",
-    ),
-    ("integrator", '"RK4"', '"Euler"', "option.integrator", "RK4 four"),
-    (
-        "impedance",
-        "0.9999 0.9999",
-        "0.95 0.95",
-        "closure.softness",
-        "at every timestep",
-    ),
-    ("solimp", "0.9999 0.9999", "0.95 0.95", "closure.solimp", "(1-d)/d"),
-    ("solref", 'solref="0.02', 'solref="0.03', "closure.solref", "sags under load"),
-    (
-        "tolerance",
-        'tolerance="0"',
-        'tolerance="1e-8"',
-        "option.tolerance",
-        "only 0 is tight",
-    ),
-    (
-        "range",
-        'name="O4" type="hinge"',
-        'name="O4" type="hinge" range="0 3"',
-        "pins.O4.range",
-        "stop",
-    ),
-    (
-        "load missing",
-        '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"',
-        "",
-        "loads.coupler, axes of the coupler.force",
-        "summed here bar by bar",
-    ),
-    (
-        "load turned",
-        "3.061616997868383e-17 -0.5",
-        "-0.5 0.0",
-        "loads.coupler, axes of the coupler.force",
-        "N; the",
-    ),
-    (
-        "load elsewhere",
-        'name="load_2" pos="0.15',
-        'name="load_2" pos="0.16',
-        "loads.coupler, axes of the coupler.point",
-        "along the bar",
-    ),
-    (
-        "line search",
-        'iterations="10"',
-        'iterations="10" ls_iterations="1"',
-        "option.ls_iterations",
-        "line search",
-    ),
-    (
-        "wind",
-        'iterations="10"',
-        'iterations="10" density="1.2" wind="1 0 0"',
-        "option.wind",
-        "drag",
-    ),
-    (
-        "motor at a pin",
-        "</actuator>",
-        '<velocity joint="A" kv="1"/></actuator>',
-        "pins.A.motor",
-        "couple at this pin",
-    ),
-    (
-        "a hinge that is not parallel",
-        'name="A" type="hinge" axis="0 0 1"',
-        'name="A" type="hinge" axis="0 1e-6 1"',
-        "skew",
-        "across the plane",
-    ),
-    (
-        "bars that collide",
-        'contype="0" conaffinity="0"',
-        'contype="1" conaffinity="1"',
-        "contacts",
-        "push each other",
-    ),
-]
+EDITS = read_rows("""
+coupler's mass | mass="0.5" | mass="5" | bars.coupler.mass | 10^1 times: units?
+inertia about the pin | 0.0016133333333333336 | 0.0073733333333333336 | \
+bars.output.inertia |
+mass centre | pos="0.05 0 0" mass="0.2" | pos="0.06 0 0" mass="0.2" | \
+bars.input.centre.distance |
+length | "B4" pos="0.22 0 0" | "B4" pos="0.23 0 0" | lengths.output | another linkage
+gravity left out | -9.81 | 0.0 | gravity.y | weight
+damping | name="A" type="hinge" | name="A" type="hinge" damping="0.1" | pins.A.damping \
+| couple
+timestep | timestep="0.00100 | timestep="0.00200 | option.timestep | integration
+integrator | "RK4" | "Euler" | option.integrator | RK4 four
+impedance | 0.9999 0.9999 | 0.95 0.95 | closure.softness | at every timestep
+solimp | 0.9999 0.9999 | 0.95 0.95 | closure.solimp | (1-d)/d
+solref | solref="0.02 | solref="0.03 | closure.solref | sags under load
+tolerance | tolerance="0" | tolerance="1e-8" | option.tolerance | only 0 is tight
+range | name="O4" type="hinge" | name="O4" type="hinge" range="0 3" | pins.O4.range | \
+stop
+load missing | <general gaintype="fixed" gainprm="0" biastype="affine" name="load_2" | \
+ | loads.coupler, axes of the coupler.force | summed here bar by bar
+load turned | 3.061616997868383e-17 -0.5 | -0.5 0.0 | loads.coupler, axes of the \
+coupler.force | N; the
+load elsewhere | name="load_2" pos="0.15 | name="load_2" pos="0.16 | loads.coupler, \
+axes of the coupler.point | along the bar
+line search | iterations="10" | iterations="10" ls_iterations="1" | \
+option.ls_iterations | line search
+wind | iterations="10" | iterations="10" density="1.2" wind="1 0 0" | option.wind | drag
+motor at a pin | </actuator> | <velocity joint="A" kv="1"/></actuator> | pins.A.motor \
+| couple at this pin
+a hinge that is not parallel | name="A" type="hinge" axis="0 0 1" | name="A" \
+type="hinge" axis="0 1e-6 1" | skew | across the plane
+bars that collide | contype="0" conaffinity="0" | contype="1" conaffinity="1" | \
+contacts | push each other
+""")
 
 
 def described(text, scene=CRANK_ROCKER):
@@ -512,58 +422,33 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
     assert errors(FEW, examination)["theta_4"] < STIFF_ENOUGH
 
 
-COSTLY = [
-    ("bars.coupler.mass", 'mass="0.5"', 'mass="0.6"'),
-    (
-        "bars.output.inertia",
-        " ".join(["0.0016133333333333336"] * 3),
-        "0.003 0.003 0.003",
-    ),
-    (
-        "bars.output.centre.angle",
-        "0.11883216824898844 0 -0.0167",
-        "0.11883216824898844 0 0.0167",
-    ),
-    (
-        "bars.input.centre.distance",
-        'pos="0.05 0 0.0" mass="0.2"',
-        'pos="0.06 0 0.0" mass="0.2"',
-    ),
-    ("lengths.coupler", 'name="r" pos="0.25', 'name="r" pos="0.26'),
-    ("lengths.input", 'name="rod" pos="0.1', 'name="rod" pos="0.11'),
-    ("lengths.output", 'name="q" pos="0.22', 'name="q" pos="0.23'),
-    ("lengths.ground", 'name="rocker" pos="1.3', 'name="rocker" pos="1.31'),
-    ("gravity.y", "0 0 -9.81", "0 0 -8.81"),
-    (
-        "pins.A.damping",
-        'name="rod" pos="0.1 0 0"><joint',
-        'name="rod" pos="0.1 0 0"><joint damping="0.1"',
-    ),
-    (
-        "pins.O4.stiffness",
-        'pos="1.3 2 3"><joint',
-        'pos="1.3 2 3"><joint stiffness="0.5"',
-    ),
-]
+COSTLY = read_rows("""
+bars.coupler.mass | mass="0.5" | mass="0.6"
+bars.output.inertia | 0.0016133333333333336 0.0016133333333333336 \
+0.0016133333333333336 | 0.003 0.003 0.003
+bars.output.centre.angle | 0.11883216824898844 0 -0.0167 | 0.11883216824898844 0 0.0167
+bars.input.centre.distance | pos="0.05 0 0.0" mass="0.2" | pos="0.06 0 0.0" mass="0.2"
+lengths.coupler | name="r" pos="0.25 | name="r" pos="0.26
+lengths.input | name="rod" pos="0.1 | name="rod" pos="0.11
+lengths.output | name="q" pos="0.22 | name="q" pos="0.23
+lengths.ground | name="rocker" pos="1.3 | name="rocker" pos="1.31
+gravity.y | 0 0 -9.81 | 0 0 -8.81
+pins.A.damping | name="rod" pos="0.1 0 0"><joint | name="rod" pos="0.1 0 0"><joint \
+damping="0.1"
+pins.O4.stiffness | pos="1.3 2 3"><joint | pos="1.3 2 3"><joint stiffness="0.5"
+""")
 
 
-ATTACHED = {  # loads of the generated file itself, and what is attached to it
-    "loads.output, world axes.couple": ('0 0 0 0 0 -0.05"', '0 0 0 0 0 -0.5"'),
-    "loads.coupler, axes of the coupler.force": (
-        "3.061616997868383e-17 -0.5",
-        "-0.5 0.0",
-    ),
-    "loads.coupler, axes of the coupler.point": (
-        'name="load_2" pos="0.15',
-        'name="load_2" pos="0.05',
-    ),
-    "tendons.ground output.stiffness": ('stiffness="200"', 'stiffness="300"'),
-    "tendons.ground output.springlength": (
-        'springlength="0.05"',
-        'springlength="0.06"',
-    ),
-    "pins.O4.spring angle": ('springref="', 'springref="1'),
-}
+ATTACHED = read_rows("""
+loads.output, world axes.couple | 0 0 0 0 0 -0.05" | 0 0 0 0 0 -0.5"
+loads.coupler, axes of the coupler.force | 3.061616997868383e-17 -0.5 | -0.5 0.0
+loads.coupler, axes of the coupler.point | name="load_2" pos="0.15 | name="load_2" \
+pos="0.05
+tendons.ground output.stiffness | stiffness="200" | stiffness="300"
+tendons.ground output.springlength | springlength="0.05" | springlength="0.06"
+pins.O4.spring angle | springref=" | springref="1
+""")
+"""Loads of the generated file itself, and what is attached to it."""
 
 
 def price_all(scene, listed):
@@ -581,7 +466,7 @@ SPOILT = {
         STILL,
         other_plane(f'site1="r" site2="q" {STIFF}'),
         MINE,
-        {key: edit for key, *edit in COSTLY},
+        COSTLY,
         0.2,
     ),
     "attached": (STILL_SPRUNG, write_mjcf(SPRUNG), {}, ATTACHED, 0.0),
@@ -595,7 +480,7 @@ def spoil(group):
     scene, text, names, edits, _ = SPOILT[group]
     spoilt = {}
     listed = {}
-    for key, edit in edits.items():
+    for key, *edit in edits:
         spoilt[key] = examine(scene, put(text, edit), names)
         found = differences(scene, spoilt[key])
         listed |= {one: found[one] for one in (key, "option.tolerance") if one in found}
@@ -604,7 +489,7 @@ def spoil(group):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "group, key", [(group, key) for group in SPOILT for key in SPOILT[group][3]]
+    "group, key", [(group, key) for group in SPOILT for key, *_ in SPOILT[group][3]]
 )
 def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(
     group, key
@@ -746,42 +631,18 @@ def test_an_absurd_timestep_is_reported_and_not_run_through(timestep):
     )
 
 
-OVERDONE = [
-    (
-        "every mass",
-        'mass="[^"]*"',
-        'mass="1e308"',
-        "body_mass of 1e+308 is out of range",
-    ),
-    (
-        "lengths",
-        ' pos="[^"]*"',
-        ' pos="1e308 1e308 0"',
-        "body_pos of 1e+308 is out of range",
-    ),
-    (
-        "user data",
-        "<worldbody>",
-        '<size nuser_body="2000000000"/><worldbody>',
-        "is a size in it too large?",
-    ),
-    (
-        "keyframes",
-        "<worldbody>",
-        '<size nkey="2000000000"/><worldbody>',
-        "asks for 2000000000 keyframes",
-    ),
-    *(
-        (
-            f"timestep {t}",
-            'timestep="[^"]*"',
-            f'timestep="{t}"',
-            f"its timestep of {t} s must be above 0",
-        )
-        for t in ("-1", "0", "nan")
-    ),
-    ("no MJCF", "mass=", "weight=", "MuJoCo does not compile it"),
-]
+OVERDONE = read_rows("""
+every mass | mass="[^"]*" | mass="1e308" | body_mass of 1e+308 is out of range
+lengths | \\bpos="[^"]*" | pos="1e308 1e308 0" | body_pos of 1e+308 is out of range
+user data | <worldbody> | <size nuser_body="2000000000"/><worldbody> | is a size in it \
+too large?
+keyframes | <worldbody> | <size nkey="2000000000"/><worldbody> | asks for 2000000000 \
+keyframes
+timestep -1 | timestep="[^"]*" | timestep="-1" | its timestep of -1 s must be above 0
+timestep 0 | timestep="[^"]*" | timestep="0" | its timestep of 0 s must be above 0
+timestep nan | timestep="[^"]*" | timestep="nan" | its timestep of nan s must be above 0
+no MJCF | mass= | weight= | MuJoCo does not compile it
+""")
 
 
 @pytest.mark.slow
@@ -859,58 +720,40 @@ def test_a_range_is_asked_of_both_files(monkeypatch):
         assert error.generated == approx(error.row.error, rel=1e-6, abs=1e-12)
 
 
-REFUSED = [
-    (
-        "no such body",
+NOT_CLOSED = "has no equality that closes a loop; where something else does, say where"
+REFUSED = {
+    "no such body": (
         other_plane(),
         {"input": "wheel"},
         "the file has: crank, rod, rocker",
     ),
-    (
-        "a slide",
+    "a slide": (
         other_plane().replace("<joint/>", '<joint type="slide"/>', 1),
         MINE,
         "joint 0 is a slide",
     ),
-    (
-        "nothing closes",
-        re.sub("<site [^>]*>", "", other_plane("")),
-        MINE,
-        "has no equality that closes a loop; where something else does, say where",
-    ),
-    (
-        "too few",
+    "nothing closes": (re.sub("<site [^>]*>", "", other_plane("")), MINE, NOT_CLOSED),
+    "too few": (
         "<mujoco><worldbody><body name='input'><joint/><geom size='.1'/></body>"
         "</worldbody></mujoco>",
         {},
-        "has no equality that closes a loop; where something else does, say where",
+        NOT_CLOSED,
     ),
-    (
-        "does not compile",
+    "does not compile": (
         other_plane().replace("mass=", "weight="),
         MINE,
         "does not compile",
     ),
-    (
-        "two names, one body",
+    "two names, one body": (
         other_plane(),
         {**MINE, "coupler": "crank"},
         "no four-bar has these bars: input crank, coupler rod, output rocker",
     ),
-]
+}
 
 
-@pytest.mark.parametrize(
-    "what, text, names, word",
-    REFUSED,
-    ids=[case[0] for case in REFUSED],
-)
-def test_a_file_that_is_no_four_bar_is_one_line(
-    what,
-    text,
-    names,
-    word,
-):
+@pytest.mark.parametrize("text, names, word", REFUSED.values(), ids=REFUSED)
+def test_a_file_that_is_no_four_bar_is_one_line(text, names, word):
     with raises(InputError) as caught:
         examine(FEW, text, names)
     assert word in str(caught.value)

@@ -11,6 +11,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
 )
 from fourbar_validation.robots import files
 from fourbar_validation.robots.files import read_robot
+from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
 TETRAHEDRON = (
@@ -98,53 +99,45 @@ def test_no_file_outside_is_opened(tmp_path):
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("<mujoco><include file='robot.xml'/></mujoco>", "nested deeper than 100"),
-        ("<mujoco><asset><model file='x.xml'/></asset></mujoco>", "mj_saveLastXML"),
-        (
-            "<mujoco><worldbody><body><attach name='x'/></body></worldbody></mujoco>",
-            "'<attach>': is not read here",
-        ),
-        (
-            '<!DOC<!-- -->TYPE m [<!ENT<!-- -->ITY a "b">]><mujoco name="&a;"/>',
-            "needs no document type",
-        ),
-        ("<mujoco><option iterations='100000'/></mujoco>", "whole number up to 1000"),
-        ("<mujoco><option ls_iterations=' 1001'/></mujoco>", "up to 1000"),
-        ("<mujoco><option noslip_iterations='0x7fffffff'/></mujoco>", "up to 1000"),
-        ("<mujoco><option ccd_iterations='1e9'/></mujoco>", "up to 1000"),
-        ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "no document type"),
-        ("<mujoco model='a\0b'/>", "no XML"),
-        (b"\xff\xfe\x00", "UTF-8"),
-        (b"<mujoco model='\xff'/>", "UTF-8"),
-        ("<svg/>", "must be an MJCF, an SDF or a URDF"),
-        ("<mujoco>", "no XML"),
-        (
-            "<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:macro/></robot>",
-            'is a xacro: "xacro FILE > robot.urdf"',
-        ),
+        *read_rows("""
+<mujoco><include file='robot.xml'/></mujoco> | nested deeper than 100
+<mujoco><asset><model file='x.xml'/></asset></mujoco> | mj_saveLastXML
+<mujoco><worldbody><body><attach name='x'/></body></worldbody></mujoco> | '<attach>': \
+is not read here
+<!DOC<!-- -->TYPE m [<!ENT<!-- -->ITY a "b">]><mujoco name="&a;"/> | needs no document \
+type
+<mujoco><option iterations='100000'/></mujoco> | whole number up to 1000
+<mujoco><option ls_iterations=' 1001'/></mujoco> | up to 1000
+<mujoco><option noslip_iterations='0x7fffffff'/></mujoco> | up to 1000
+<mujoco><option ccd_iterations='1e9'/></mujoco> | up to 1000
+<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/> | no document type
+<mujoco model='a\\x00b'/> | no XML
+\\xff\\xfe\\x00 | UTF-8
+<mujoco model='\\xff'/> | UTF-8
+<svg/> | must be an MJCF, an SDF or a URDF
+<mujoco> | no XML
+<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:macro/></robot> | is a xacro: \
+"xacro FILE > robot.urdf"
+"""),
         ("<mujoco>" + 200 * "<body>" + 200 * "</body>" + "</mujoco>", "deeper"),
     ],
 )
-def test_what_a_file_may_not_hold_is_one_line(
-    tmp_path,
-    text,
-    words,
-):
+def test_what_a_file_may_not_hold_is_one_line(tmp_path, text, words):
     path = tmp_path / "robot.xml"
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    path.write_bytes(text.encode().decode("unicode_escape").encode("latin-1"))
     assert_refused(path, words)
 
 
 @pytest.mark.parametrize(
     "name, text, kind",
-    [
-        ("robot.xml", "<mujoco><worldbody><body/></worldbody></mujoco>", "MJCF"),
-        ("robot.sdf", "<sdf", "SDF"),
-        ("robot.world", "<sdf><world/><!DOCTYPE a></sdf>", "SDF"),
-        ("robot.xml", "<sdf><world/></sdf>", "SDF"),
-        ("robot.urdf", "<robot", "URDF"),
-        ("robot.xml", "<robot name='r'><link name='a'/></robot>", "URDF"),
-    ],
+    read_rows("""
+robot.xml | <mujoco><worldbody><body/></worldbody></mujoco> | MJCF
+robot.sdf | <sdf | SDF
+robot.world | <sdf><world/><!DOCTYPE a></sdf> | SDF
+robot.xml | <sdf><world/></sdf> | SDF
+robot.urdf | <robot | URDF
+robot.xml | <robot name='r'><link name='a'/></robot> | URDF
+"""),
 )
 def test_a_message_begins_with_the_format_of_the_file(
     name, text, kind, tmp_path, capsys

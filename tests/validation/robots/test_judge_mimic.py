@@ -20,6 +20,7 @@ from fourbar_validation.robots.judge_mimic import (
     measure_mimic,
     show_mimic,
 )
+from tests.support.rows import read_rows
 from tests.validation.robots.test_sdf import URDF
 
 ROUND_OFF = 1e-12
@@ -258,12 +259,12 @@ COUPLER_SCENE = Scene(
 
 @pytest.mark.parametrize(
     "polycoef, angles, error, told",
-    [
-        ("0 -1 0 0 0", "", math.nan, "7.4176 deg with the constant of least squares"),
-        ("0 -1 .1 0 0", "", math.nan, "of the file loses depends on theta_2 at that"),
-        ("0 -1 0 0 0", "theta_2=0deg", 38.65134, "theta_2 of the loop is -43.954 deg"),
-        ("1 -1 0 0 0", "theta_2=0deg,theta_3=-0.3rad", 57.19297, "is -17.189 deg"),
-    ],
+    read_rows("""
+0 -1 0 0 0 |  | nan | 7.4176 deg with the constant of least squares
+0 -1 .1 0 0 |  | nan | of the file loses depends on theta_2 at that
+0 -1 0 0 0 | theta_2=0deg | 38.65134 | theta_2 of the loop is -43.954 deg
+1 -1 0 0 0 | theta_2=0deg,theta_3=-0.3rad | 57.19297 | is -17.189 deg
+"""),
 )
 def test_what_the_file_does_not_tell_is_stated_or_left_out(
     polycoef, angles, error, told, tmp_path, capsys
@@ -273,7 +274,7 @@ def test_what_the_file_does_not_tell_is_stated_or_left_out(
     path.write_text(COUPLER.replace("0 -1 0 0 0", polycoef))
     stated = dict(one.split("=") for one in angles.split(",") if one)
     report = measure_mimic(path, "j3", COUPLER_SCENE, angles=stated)
-    assert math.degrees(report.file.angle) == approx(error, nan_ok=True)
+    assert math.degrees(report.file.angle) == approx(float(error), nan_ok=True)
     show_mimic(report)
     printed = capsys.readouterr().out
     assert told in " ".join(printed.split())
@@ -292,37 +293,38 @@ LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="0.02"/>
 
 @pytest.mark.parametrize(
     "millimetres, centres, rest, mimic, error, zero",
-    [
-        # bars at 85 deg and where the loop has the output: no end of the input
-        ((60, 20, 55, 45), (10, 22), (85, 101.36063), (0.3935185, 0), 1.57838, "101."),
-        # the loop closes at the zero, and is not what the file has there
-        ((60, 20, 55, 45), (10, 22), (0, 0), (0.3935185, 1.2), 0.84337, "is 0 deg"),
-        ((60, 20, 55, 45), (10, 22), (-40, 0), (0.3935185, 0.9252723), 0.84337, "+ p"),
-        # the loop is open at the zero, as the file has it
-        ((30, 40, 22, 38), (20, 19), (0, 0), (1.1, -0.4), 29.01356, "is 0 deg"),
-        ((30, 40, 22, 38), (20, 12), (0, 0), (1.1, -0.4), math.nan, "theta_4=ANGLE"),
-        ((30, 40, 22, 38), (12, 19), (0, 0), (1.1, -0.4), math.nan, "theta_2=ANGLE"),
-    ],
+    read_rows("""
+# bars at 85 deg and where the loop has the output: no end of the input
+60 20 55 45 | 10 22 | 85 101.36063 | 0.3935185 0 | 1.57838 | 101.
+# the loop closes at the zero, and is not what the file has there
+60 20 55 45 | 10 22 | 0 0 | 0.3935185 1.2 | 0.84337 | is 0 deg
+60 20 55 45 | 10 22 | -40 0 | 0.3935185 0.9252723 | 0.84337 | + p
+# the loop is open at the zero, as the file has it
+30 40 22 38 | 20 19 | 0 0 | 1.1 -0.4 | 29.01356 | is 0 deg
+30 40 22 38 | 20 12 | 0 0 | 1.1 -0.4 | nan | theta_4=ANGLE
+30 40 22 38 | 12 19 | 0 0 | 1.1 -0.4 | nan | theta_2=ANGLE
+"""),
 )
 def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
     millimetres, centres, rest, mimic, error, zero, tmp_path, capsys
 ):
     """The errors are those of pins B at the intersection of two circles."""
-    ground, *moving = (1e-3 * length for length in millimetres)
-    places = [
-        (1e-3 * at, math.radians(turn)) for at, turn in zip(centres, rest, strict=True)
-    ]
-    follow = '<mimic joint="prox_j" multiplier="{}" offset="{}"/>'.format(*mimic)
-    prox = LINK.format("prox", places[0][0], 0.0, places[0][1], "")
-    dist = LINK.format("dist", places[1][0], ground, places[1][1], follow)
+    ground, *moving = 1e-3 * np.array(millimetres.split(), float)
+    near, far = 1e-3 * np.array(centres.split(), float)
+    begin, end = np.radians(np.array(rest.split(), float))
+    follow = '<mimic joint="prox_j" multiplier="{}" offset="{}"/>'.format(
+        *mimic.split()
+    )
+    prox = LINK.format("prox", near, 0.0, begin, "")
+    dist = LINK.format("dist", far, ground, end, follow)
     path = tmp_path / "finger.urdf"
     path.write_text(FINGER.format(prox, dist))
     motion = fourbar.Motion(np.radians(np.linspace(60.0, 110.0, 51)), 1.0)
     scene = Scene(FourBar(ground, *map(Bar, moving)), motion)
     report = measure_mimic(path, "dist_j", scene)
     degrees = math.degrees(report.file.angle)
-    assert degrees == approx(error, abs=2e-5, nan_ok=True)
-    centred = 0.78919 if millimetres[0] == 60 else 1.32753
+    assert degrees == approx(float(error), abs=2e-5, nan_ok=True)
+    centred = 0.78919 if ground == 0.06 else 1.32753
     assert math.degrees(report.centred) == approx(centred, abs=2e-5)
     show_mimic(report)
     assert zero in " ".join(capsys.readouterr().out.split())

@@ -42,6 +42,7 @@ from fourbar_validation.robots.report import (
     write_states,
 )
 from tests.support.robots import FINGER
+from tests.support.rows import read_rows
 
 SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
 """A parallelogram, in line at 0 and 180 deg."""
@@ -69,18 +70,18 @@ def test_the_states_are_those_that_were_asked_at():
 
 @pytest.mark.parametrize(
     "part, written",
-    [
-        (0.0, "0 %"),
-        (5e-8, "< 0.00001 %"),
-        (5e-7, "0.0000500 %"),
-        (0.0999951, "10.0 %"),
-        (1.01, "101 %"),
-        (12345.6, "1230000 %"),
-        (math.inf, "inf %"),
-    ],
+    read_rows("""
+0.0 | 0 %
+5e-08 | < 0.00001 %
+5e-07 | 0.0000500 %
+0.0999951 | 10.0 %
+1.01 | 101 %
+12345.6 | 1230000 %
+inf | inf %
+"""),
 )
 def test_percentages_have_one_notation(part, written):
-    assert write_percent(part) == written
+    assert write_percent(float(part)) == written
 
 
 def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():

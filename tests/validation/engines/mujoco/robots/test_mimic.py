@@ -10,6 +10,7 @@ from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import list_followers
 from fourbar_validation.engines.mujoco.robots.mimic import read_joint_equality
 from fourbar_validation.robots.files import read_robot
+from tests.support.rows import read_rows
 
 FILE = """<mujoco><worldbody>
 <body name="one"><joint name="lead" axis="0 0 1" ref="30"/><geom size="0.1"/></body>
@@ -53,20 +54,17 @@ EXACT = 1e-13
 
 @pytest.mark.parametrize(
     "equality, followers",
-    [
-        ('<tendon tendon1="both"/>', ["lead", "follow"]),
-        ('<tendon tendon1="both" polycoef="0.3 1 0 0 0"/>', ["lead", "follow"]),
-        (
-            '<tendon tendon1="first" tendon2="second" polycoef=".1 .2 .3 .4 .5"/>',
-            ["follow"],
-        ),
-        ('<joint joint1="follow" joint2="lead" polycoef=".1 2 3 4 5"/>', ["follow"]),
-        ('<tendon tendon1="both" tendon2="second"/>', []),
-        ('<tendon tendon1="none" tendon2="second"/>', []),
-        ('<tendon tendon1="half"/>', []),
-        ('<tendon tendon1="first"/>', []),
-        ('<joint joint1="follow"/>', []),
-    ],
+    read_rows("""
+<tendon tendon1="both"/> | lead follow
+<tendon tendon1="both" polycoef="0.3 1 0 0 0"/> | lead follow
+<tendon tendon1="first" tendon2="second" polycoef=".1 .2 .3 .4 .5"/> | follow
+<joint joint1="follow" joint2="lead" polycoef=".1 2 3 4 5"/> | follow
+<tendon tendon1="both" tendon2="second"/> |
+<tendon tendon1="none" tendon2="second"/> |
+<tendon tendon1="half"/> |
+<tendon tendon1="first"/> |
+<joint joint1="follow"/> |
+"""),
 )
 def test_a_follower_at_its_polynomial_leaves_the_equality_no_residual(
     equality, followers
@@ -74,7 +72,7 @@ def test_a_follower_at_its_polynomial_leaves_the_equality_no_residual(
     model = mujoco.MjModel.from_xml_string(TENDONS.format(equality))
     data = mujoco.MjData(model)
     ties = list_followers(model, 0)
-    assert [model.joint(tie.joint).name for tie in ties] == followers
+    assert [model.joint(tie.joint).name for tie in ties] == followers.split()
     for tie in ties:
         for angle in (-0.7, 0.0, 0.4):
             data.qpos[tie.leader] = model.qpos0[tie.leader] + angle
