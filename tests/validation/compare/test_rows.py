@@ -38,6 +38,7 @@ from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.judge import judge, judge_for_report
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_here, summary_of
+from tests.support.rows import read_rows
 from tests.support.runs import HERE, ROW, changed, compare_rows
 from tests.support.scenes import bare, crank_rocker
 from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, Refuses
@@ -329,35 +330,30 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, 
 
 @pytest.mark.parametrize(
     "error, allowed, mask, verdict, worst",
-    [
-        ([0.0, 2.0, 1.0], 2.0, None, AGREES, 1),
-        ([0.0, 2.1, 1.0], 2.0, None, FAILS, 1),
-        ([0.0, 2.0, 1.0], [1.0, 3.0, 0.5], None, FAILS, 2),
-        ([0.0, NAN, 1.0], 2.0, None, FAILS, 1),
-        ([0.0, math.inf, 1.0], math.inf, None, FAILS, 1),
-        ([0.0, 0.0, 0.0], 0.0, None, AGREES, 0),
-        ([0.0, 1e-300, 0.0], 0.0, None, FAILS, 1),
-        ([0.0, NAN, 1.0], 2.0, [True, False, True], AGREES, 2),
-        ([9.0, NAN, 9.0], 2.0, [False, False, False], UNDECIDED, 0),
-    ],
+    read_rows("""
+0 2 1 | 2 |  | agrees | 1
+0 2.1 1 | 2 |  | fails | 1
+0 2 1 | 1 3 0.5 |  | fails | 2
+0 nan 1 | 2 |  | fails | 1
+0 inf 1 | inf |  | fails | 1
+0 0 0 | 0 |  | agrees | 0
+0 1e-300 0 | 0 |  | fails | 1
+0 nan 1 | 2 | 1 0 1 | agrees | 2
+9 nan 9 | 2 | 0 0 0 | undecided | 0
+"""),
 )
 def test_one_rule_of_agreement(error, allowed, mask, verdict, worst):
-    """A lone number is judged by the same rule."""
-    places, bound = np.array([1.0, 2.0, 3.0]), np.asarray(allowed)
-    where = None if mask is None else np.array(mask)
-    key = ("a", "b", "c")
+    """A lone number is judged by the same rule.
+
+    What is allowed is one number or one each, and the mask, if any, says what counts.
+    """
+    errors, bounds = (np.array(text.split(), float) for text in (error, allowed))
+    where = np.array(mask.split()) == "1" if mask else None
+    bound = bounds if len(bounds) > 1 else bounds[0]
+    key, place = ("a", "b", "c"), int(worst)
     row = Row.judged(
-        key,
-        "F12",
-        np.array(error),
-        bound,
-        "",
-        places,
-        1.0,
-        where,
+        key, "F12", errors, bound, "", np.array([1.0, 2.0, 3.0]), 1.0, where
     )
-    assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)
-    lone = Row.judged(
-        key, "F12", error[worst], float(bound.flat[worst % bound.size]), ""
-    )
+    assert (row.verdict, row.theta_2) == (verdict, place + 1.0)
+    lone = Row.judged(key, "F12", errors[place], bounds[place % len(bounds)], "")
     assert lone.passed == (verdict == AGREES)

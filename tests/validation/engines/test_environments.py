@@ -27,6 +27,7 @@ from fourbar_validation.engines.programs import Ended
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.judge import judge
 from tests.support.guests import end_guests
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
@@ -174,28 +175,21 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "text, words",
-    [
-        ("[[engine]", "is no TOML"),
-        ("engine = [1]", "must be a table"),
-        ('[[engine]]\nadapter = "free-body"', "with a name"),
-        ('[[engine]]\nname = "a"', "must have an adapter or a command"),
-        (
-            '[[engine]]\nname = "a"\nadapter = "b"\ncommand = ["c"]',
-            "must have an adapter or a command",
-        ),
-        *(
-            (f'[[engine]]\nname = "a"\n{key} = {value}', f"engine.{key} = {shown}")
-            for key, value, shown in (
-                ("command", '"c"', "'c': allowed: name"),
-                ("steps", "[1.5]", "[1.5]: allowed: name"),
-                ("adaptor", '"c"', "'c': allowed: name"),
-            )
-        ),
-    ],
+    read_rows("""
+[[engine] | is no TOML
+engine = [1] | must be a table
+[[engine]]\\nadapter = "free-body" | with a name
+[[engine]]\\nname = "a" | must have an adapter or a command
+[[engine]]\\nname = "a"\\nadapter = "b"\\ncommand = ["c"] | must have an adapter or a \
+command
+[[engine]]\\nname = "a"\\ncommand = "c" | engine.command = 'c': allowed: name
+[[engine]]\\nname = "a"\\nsteps = [1.5] | engine.steps = [1.5]: allowed: name
+[[engine]]\\nname = "a"\\nadaptor = "c" | engine.adaptor = 'c': allowed: name
+"""),
 )
 def test_what_is_no_entry_is_named_with_its_file(text, words, tmp_path):
     file = tmp_path / "engines.toml"
-    file.write_text(text)
+    file.write_text(text.replace(r"\n", "\n"))
     with raises(InputError) as error:
         read_engines([tmp_path])
     assert words in str(error.value) and str(error.value).startswith(str(file))

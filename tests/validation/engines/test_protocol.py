@@ -26,6 +26,7 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
+from tests.support.rows import read_rows
 from tests.support.scenes import bare, crank_rocker
 
 FILES = sorted(MODELS.rglob("*.toml"))
@@ -246,103 +247,90 @@ def test_what_an_answer_leaves_out_has_defaults():
         read_answer({"error": "no licence"})
 
 
-LENGTHS = {
-    "ground": 0.3,
-    "input": 0.1,
-    "coupler": 0.25,
-    "output": 0.22,
-}
-
-
-WRONG_SCENES = [
-    None,
-    [],
-    {"lengths": {}},
-    {"lengths": LENGTHS | {"ground": "0.3 m"}},
-    {"lengths": LENGTHS | {"ground": True}},
-    {"lengths": LENGTHS | {"ground": 10**400}},
-    {"lengths": LENGTHS | {"ground": math.inf}},
-    {"lengths": LENGTHS | {"ground": 9.0}},
-    {"lengths": LENGTHS, "bars": {"input": {"mass": -1.0}}},
-    {"lengths": LENGTHS, "effects": {"gravity": [9.81]}},
-    {"lengths": LENGTHS, "motion": {}},
-]
-WRONG_COMMANDS = [
-    None,
-    {},
-    {"theta_2": [], "omega_2": 1.0},
-    {"theta_2": 1.0},
-    {"theta_2": [1.0], "theta_3": [1.0]},
-    {"theta_2": [True]},
-    {"theta_2": ["1"]},
-    {"theta_2": [math.nan]},
-    {"theta_2": [1.0], "omega_2": [1.0, 2.0]},
-    {"theta_2": [1.0], "omega_2": "fast"},
-    {"theta_2": [1.0], "branch": 0},
-    {"theta_2": [1.0], "branch": [1, 1]},
-    {"theta_2": [1.0], "remainder": ["x"]},
-    {"theta_2": [1.0], "omega_3": 1.0},
-    {"stroke": [0.3], "side": "left"},
-]
-WRONG_ANSWERS = [
-    None,
-    [],
-    {},
-    {"answers": []},
-    {"answers": {"torque": [1.0]}},
-    {"answers": {"torque": [1.0, 2.0, True]}},
-    {"answers": {"torque": [1.0, 2.0, "3"]}},
-    {"answers": {"torque": [1.0, 2.0, math.inf]}},
-    {"answers": {"torque": [1.0, 2.0, math.nan]}},
-    {"answers": {"torque": [1.0, 2.0, 10**400]}},
-    {"answers": {"torque": [[1.0], [2.0], [3.0]]}},
-    {"answers": {"F12": [1.0, 2.0, 3.0]}},
-    {"answers": {"F12": [[1.0, 2.0], [1.0, 2.0], [1.0]]}},
-    {"answers": {}, "assembled": [1, 1, 1]},
-    {"answers": {}, "alarms": "one"},
-    {"answers": {}, "setting": 3},
-    {"answers": {}, "seconds": -1.0},
-    {"answers": {}, "at": {"theta_2": [5.0, 6.0, 7.0], "omega_2": 1.0}},
-    {"answers": {}, "at": {"theta_2": [0.0, 1.0, 2.0]}},
-    {"answers": {}, "at": {"theta_2": [0.0, 1.0, 2.0], "omega_2": 1.0, "branch": -1}},
-    {"refusal": " "},
-    {"refusal": 3},
-]
-WRONG_SETTINGS = [
-    [],
-    {"name": 1},
-    {"steps_per_turn": 3.5},
-    {"steps_per_turn": 0},
-    {"error": 1.0},
-    {"error": "small"},
-    {"steps_per_turn": 9, "error": 0.1},
-    {"timestep": 0.1},
-]
-
-
 READ = {
-    "scene": (protocol.scene_from_json, WRONG_SCENES),
-    "command": (partial(protocol.command_from_json, crank_rocker()), WRONG_COMMANDS),
-    "answer": (read_answer, WRONG_ANSWERS),
+    "scene": protocol.scene_from_json,
+    "command": partial(protocol.command_from_json, crank_rocker()),
+    "answer": read_answer,
 }
+MOVING = '"input": 0.1, "coupler": 0.25, "output": 0.22'
+WRONG = read_rows("""
+scene | null
+scene | []
+scene | {"lengths": {}}
+scene | {"lengths": {"ground": "0.3 m", MOVING}}
+scene | {"lengths": {"ground": true, MOVING}}
+scene | {"lengths": {"ground": HUGE, MOVING}}
+scene | {"lengths": {"ground": Infinity, MOVING}}
+scene | {"lengths": {"ground": 9.0, MOVING}}
+scene | {"lengths": {"ground": 0.3, MOVING}, "bars": {"input": {"mass": -1.0}}}
+scene | {"lengths": {"ground": 0.3, MOVING}, "effects": {"gravity": [9.81]}}
+scene | {"lengths": {"ground": 0.3, MOVING}, "motion": {}}
+command | null
+command | {}
+command | {"theta_2": [], "omega_2": 1.0}
+command | {"theta_2": 1.0}
+command | {"theta_2": [1.0], "theta_3": [1.0]}
+command | {"theta_2": [true]}
+command | {"theta_2": ["1"]}
+command | {"theta_2": [NaN]}
+command | {"theta_2": [1.0], "omega_2": [1.0, 2.0]}
+command | {"theta_2": [1.0], "omega_2": "fast"}
+command | {"theta_2": [1.0], "branch": 0}
+command | {"theta_2": [1.0], "branch": [1, 1]}
+command | {"theta_2": [1.0], "remainder": ["x"]}
+command | {"theta_2": [1.0], "omega_3": 1.0}
+command | {"stroke": [0.3], "side": "left"}
+answer | null
+answer | []
+answer | {}
+answer | {"answers": []}
+answer | {"answers": {"torque": [1.0]}}
+answer | {"answers": {"torque": [1.0, 2.0, true]}}
+answer | {"answers": {"torque": [1.0, 2.0, "3"]}}
+answer | {"answers": {"torque": [1.0, 2.0, Infinity]}}
+answer | {"answers": {"torque": [1.0, 2.0, NaN]}}
+answer | {"answers": {"torque": [1.0, 2.0, HUGE]}}
+answer | {"answers": {"torque": [[1.0], [2.0], [3.0]]}}
+answer | {"answers": {"F12": [1.0, 2.0, 3.0]}}
+answer | {"answers": {"F12": [[1.0, 2.0], [1.0, 2.0], [1.0]]}}
+answer | {"answers": {}, "assembled": [1, 1, 1]}
+answer | {"answers": {}, "alarms": "one"}
+answer | {"answers": {}, "setting": 3}
+answer | {"answers": {}, "seconds": -1.0}
+answer | {"answers": {}, "at": {"theta_2": [5.0, 6.0, 7.0], "omega_2": 1.0}}
+answer | {"answers": {}, "at": {"theta_2": [0.0, 1.0, 2.0]}}
+answer | {"answers": {}, "at": {"theta_2": [0.0, 1.0, 2.0], "omega_2": 1.0, "branch": \
+-1}}
+answer | {"refusal": " "}
+answer | {"refusal": 3}
+""")
 
 
-@pytest.mark.parametrize(
-    "part, number",
-    [(part, n) for part, (_, wrong) in READ.items() for n in range(len(wrong))],
-)
-def test_what_is_none_is_refused_in_one_line(part, number):
-    read, wrong = READ[part]
+@pytest.mark.parametrize("part, text", WRONG)
+def test_what_is_none_is_refused_in_one_line(part, text):
+    data = json.loads(text.replace("MOVING", MOVING).replace("HUGE", "9" * 400))
     with raises(FourBarError) as raised:
-        read(wrong[number])
+        READ[part](data)
     assert str(raised.value) and "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)
-def test_a_setting_that_is_none_is_refused_in_one_line(data):
+WRONG_SETTINGS = read_rows("""
+[]
+{"name": 1}
+{"steps_per_turn": 3.5}
+{"steps_per_turn": 0}
+{"error": 1.0}
+{"error": "small"}
+{"steps_per_turn": 9, "error": 0.1}
+{"timestep": 0.1}
+""")
+
+
+@pytest.mark.parametrize("text", [text for (text,) in WRONG_SETTINGS])
+def test_a_setting_that_is_none_is_refused_in_one_line(text):
     words = r"^setting = [^\n]*: must be an object with name, and steps_per_turn"
     with raises(InputError, match=words):
-        protocol.read_setting(data)
+        protocol.read_setting(json.loads(text))
 
 
 def test_a_setting_is_read_as_it_is_stated():

@@ -2,6 +2,7 @@
 
 import html
 import math
+import re
 from collections import Counter
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from fourbar_validation.regression.engines import list_gone
 from fourbar_validation.regression.record import NOTHING_KNOWN
 from fourbar_validation.regression.rules import list_weakened
 from tests.support import runs
+from tests.support.rows import read_rows
 from tests.support.runs import FORMS, HERE, compare_rows, kinds
 
 WHY = "Cannot find module 'x'"
@@ -176,22 +178,22 @@ def about(engines, **settings):
 
 @pytest.mark.parametrize(
     "old, new, pairs",
-    [
-        ({"wg": "1"}, {"wg": "2"}, {}),
-        ({"wg": "1"}, {"wg 2": "2", "wg 3": "3"}, {"wg": "wg 2"}),
-        ({"wg 1": "1", "wg 2": "2"}, {"wg": "3"}, {"wg 1": "wg"}),
-        ({"wg 1": "1", "wg 2": "2"}, {"wg": "2"}, {"wg 2": "wg"}),
-        (
-            {"wg 1": "1", "wg 2": "2"},
-            {"wg 2": "2", "wg 3": "3"},
-            {"wg 1": "wg 3"},
-        ),
-        ({"wg": ""}, {"wg2": ""}, {"wg": "wg2"}),
-        ({"wg": "", "a": ""}, {"wg2": "", "b": ""}, {}),
-        ({"wg": "", "a": ""}, {"wg2": "", "a": ""}, {"wg": "wg2"}),
-    ],
+    read_rows("""
+wg=1 | wg=2 |
+wg=1 | wg 2=2, wg 3=3 | wg=wg 2
+wg 1=1, wg 2=2 | wg=3 | wg 1=wg
+wg 1=1, wg 2=2 | wg=2 | wg 2=wg
+wg 1=1, wg 2=2 | wg 2=2, wg 3=3 | wg 1=wg 3
+wg= | wg2= | wg=wg2
+wg=, a= | wg2=, b= |
+wg=, a= | wg2=, a= | wg=wg2
+"""),
 )
 def test_versions_and_a_renamed_guest_are_compared_as_one(old, new, pairs):
+    """Guests and their versions, and who is compared with whom."""
+    old, new, pairs = (
+        dict(re.findall("([^=,]+)=([^,]*)(?:, )?", text)) for text in (old, new, pairs)
+    )
     runs = [
         (about(engines), [changed(engine=name) for name in engines])
         for engines in (old, new)
