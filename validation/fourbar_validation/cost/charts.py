@@ -5,6 +5,7 @@ The settings are those that decide.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,6 +45,11 @@ from fourbar_validation.report.svg import (
 )
 
 _BLUE, _GREEN, _ORANGE, _PINK, _VIOLET = (LIGHT_COLOURS[f"--e{n}"] for n in range(1, 6))
+_DASHED = (0, (4, 2))
+_DOTTED = (0, (1, 1.5))
+LONG = (0, (7, 2, 1.5, 2))
+Style = Mapping[str, Any]
+"""Options of matplotlib's `plot`."""
 
 
 class Look(NamedTuple):
@@ -53,49 +59,65 @@ class Look(NamedTuple):
     """
 
     curve: str
-    colour: str
-    marker: str
-    dashes: Any = "solid"
+    style: Style
 
 
-_DASHED = (0, (4, 2))
-_DOTTED = (0, (1, 1.5))
-LONG = (0, (7, 2, 1.5, 2))
-INTEGRATOR_LOOKS = {
-    "Euler": Look("Euler, tc held", _ORANGE, "s", _DASHED),
-    "implicitfast": Look("implicitfast, tc held", _PINK, "v", _DOTTED),
-    "discrete": Look("discrete, tc held", _GREEN, "D", LONG),
-    "RK4": Look("RK4, tc held", _BLUE, "o"),
-}
-METHOD_LOOKS = {
-    "Euler, defaults": Look("Euler, MuJoCo's defaults", _ORANGE, "s", _DASHED),
-    "RK4, defaults": Look("RK4, MuJoCo's defaults", _PINK, "D", _DOTTED),
-    "Euler, stiff closure": Look("Euler, tc held", _GREEN, "v", LONG),
-    "RK4, no pads": Look("RK4, no pads, tc = 10 steps", _VIOLET, "P", (0, (5, 1))),
-    "advised": Look("recommended", _BLUE, "o"),
-}
-TIMESTEPS = {
-    "tc = 3 steps": Look("RK4, pads, tc = 3 steps", _ORANGE, "s", _DASHED),
-    "tc = 10 steps": Look("RK4, pads, tc = 10 steps", _PINK, "D", _DOTTED),
-    "tc = 30 steps": Look("RK4, pads, tc = 30 steps", _GREEN, "v", LONG),
-    "tc = 100 steps": Look("RK4, pads, tc = 100 steps", _VIOLET, "P", (0, (5, 1))),
-    "tc a quarter turn": Look("RK4, tc held", _BLUE, "o"),
-}
-SOFTNESS_LOOKS = {
-    "at the scene's speed": Look("softness d", _BLUE, "o"),
-    "at 0.1 rad/s": Look("sag d, slow", _ORANGE, "s", _DASHED),
-    "at 0.1 rad/s, nothing acts": Look(
-        "sag d, slow, nothing acts",
-        _GREEN,
-        "^",
-        _DOTTED,
-    ),
-}
-SOLVERS = {
-    "Newton": Look("tolerance, Newton", _BLUE, "o"),
-    "PGS": Look("tolerance, PGS", _ORANGE, "s", _DASHED),
-    "CG": Look("tolerance, CG", _GREEN, "^", _DOTTED),
-}
+def _dress(curves: Mapping[str, str], *styles: tuple[str, str, Any]) -> dict[str, Look]:
+    """Give curves, by their labels, colour, marker and dashes."""
+    every = {"mec": PAPER, "mew": 0.5, "ms": 5.0, "lw": 1.7}
+    looks = {}
+    for (label, curve), (colour, marker, dashes) in zip(
+        curves.items(), styles, strict=True
+    ):
+        own = {"color": colour, "ls": dashes, "marker": marker}
+        looks[label] = Look(curve, own | every)
+    return looks
+
+
+_FIVE = (
+    (_ORANGE, "s", _DASHED),
+    (_PINK, "D", _DOTTED),
+    (_GREEN, "v", LONG),
+    (_VIOLET, "P", (0, (5, 1))),
+    (_BLUE, "o", "solid"),
+)
+_THREE = ((_BLUE, "o", "solid"), (_ORANGE, "s", _DASHED), (_GREEN, "^", _DOTTED))
+INTEGRATOR_LOOKS = _dress(
+    {name: f"{name}, tc held" for name in ("Euler", "implicitfast", "discrete", "RK4")},
+    (_ORANGE, "s", _DASHED),
+    (_PINK, "v", _DOTTED),
+    (_GREEN, "D", LONG),
+    (_BLUE, "o", "solid"),
+)
+METHOD_LOOKS = _dress(
+    {
+        "Euler, defaults": "Euler, MuJoCo's defaults",
+        "RK4, defaults": "RK4, MuJoCo's defaults",
+        "Euler, stiff closure": "Euler, tc held",
+        "RK4, no pads": "RK4, no pads, tc = 10 steps",
+        "advised": "recommended",
+    },
+    *_FIVE,
+)
+TIMESTEPS = _dress(
+    {
+        **{f"tc = {n} steps": f"RK4, pads, tc = {n} steps" for n in (3, 10, 30, 100)},
+        "tc a quarter turn": "RK4, tc held",
+    },
+    *_FIVE,
+)
+SOFTNESS_LOOKS = _dress(
+    {
+        "at the scene's speed": "softness d",
+        "at 0.1 rad/s": "sag d, slow",
+        "at 0.1 rad/s, nothing acts": "sag d, slow, nothing acts",
+    },
+    *_THREE,
+)
+SOLVERS = _dress(
+    {name: f"tolerance, {name}" for name in ("Newton", "PGS", "CG")}, *_THREE
+)
+_RING = {"ls": "none", "marker": "o", "ms": 12, "mfc": "none", "mec": INK, "mew": 1.4}
 LARGEST_DRAWN_ERROR = 10.0
 """Largest error over the timestep that is drawn in its place. A larger one, and one
 without end, is drawn at the upper edge.
@@ -140,28 +162,6 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     if curves.get("RK4, tc held"):
         made["orders"] = draw_orders(curves, title)
     return made
-
-
-def _draw_look(
-    axes: Any,
-    x: Sequence[float],
-    y: Sequence[float],
-    label: str,
-    look: Look,
-) -> None:
-    """Draw a curve in its colour, with its marker and line."""
-    axes.plot(
-        x,
-        y,
-        label=label,
-        color=look.colour,
-        ls=look.dashes,
-        marker=look.marker,
-        mec=PAPER,
-        mew=0.5,
-        ms=5.0,
-        lw=1.7,
-    )
 
 
 def make_figure(
@@ -217,6 +217,39 @@ def set_axes(axes: Any) -> None:
         )
 
 
+class _WorkPrecision:
+    """Picture of the error of one quantity over the cost."""
+
+    def __init__(self, curves: Curves, quantity: str, title: str) -> None:
+        self.quantity = quantity
+        self.figure = make_figure(6.0, write_statement(curves, quantity), title)
+        self.axes = self.figure.add_axes((0.135, 0.085, 0.84, 0.675))
+        self.labels = Labels()
+
+    def draw(self, points: Sequence[CostPoint], **style: Any) -> list[complex]:
+        """Draw points, and return their places: ms of a simulated second, and error.
+
+        What lies below the picture is put at its edge.
+        """
+        x = [1e3 * point.seconds_per_second for point in points]
+        y = [max(point.error(self.quantity), _LOWEST) for point in points]
+        self.axes.plot(x, y, **style)
+        return [*map(complex, x, y)]
+
+    def draw_line(
+        self, points: Sequence[CostPoint], width: float, **style: Any
+    ) -> None:
+        """Draw a line that no name covers."""
+        self.labels.keep_off(self.axes, *self.draw(points, **style), width=width)
+
+    def mark(self, point: CostPoint, text: str, **style: Any) -> None:
+        """Mark a point, and write next to it where the name covers nothing."""
+        (at,) = self.draw([point], **style)
+        self.labels.keep_off(self.axes, at)
+        shun = complex(0.5 * at.real, at.imag)
+        self.labels.add(Label(self.axes, text, at, shun, INK, TEXT))
+
+
 def draw_work_precision(
     curves: Curves,
     quantity: str,
@@ -226,42 +259,46 @@ def draw_work_precision(
 
     Cost is the time of a simulated second.
     """
-    height = 6.0
-    figure = make_figure(height, write_statement(curves, quantity), title)
-    axes = figure.add_axes((0.135, 0.085, 0.84, 0.675))
-    labels = Labels()
+    picture = _WorkPrecision(curves, quantity, title)
+    axes = picture.axes
     front = find_pareto(list_stepped(curves), quantity)
-    broad = {"lw": 8.0, "solid_capstyle": "round", "solid_joinstyle": "round"}
-    axes.plot(
-        *_take_coordinates(front, quantity),
-        **broad,
+    picture.draw_line(
+        front,
+        8.0,
+        lw=8.0,
+        solid_capstyle="round",
+        solid_joinstyle="round",
         zorder=1,
         color=BAND,
         label="cheapest of everything stepped",
     )
-    labels.keep_off(axes, *map(complex, *_take_coordinates(front, quantity)), width=8.0)
     for name, look in METHOD_LOOKS.items():
+        row = curves.get(look.curve, ())
         label = name
         if look.curve == "recommended":
-            most = _measure_distance(curves, quantity)
-            label += "" if most <= _NEAR_FRONT else f", up to {most:.1f} times as long"
-        row = [
-            point
-            for point in curves.get(look.curve, ())
-            if getattr(point.errors, quantity) < LARGEST_DRAWN_ERROR
-        ]
+            most = _measure_distance(row, front, quantity)
+            label += f", up to {most:.1f} times as long" * (most > _NEAR_FRONT)
+        row = [point for point in row if point.error(quantity) < LARGEST_DRAWN_ERROR]
         if row:
-            _draw_look(axes, *_take_coordinates(row, quantity), label, look)
-            places = map(complex, *_take_coordinates(row, quantity))
-            labels.keep_off(axes, *places, width=1.8)
+            picture.draw_line(row, 1.8, label=label, **look.style)
     default = find_default(curves)
-    if default is not None and getattr(default.errors, quantity) < LARGEST_DRAWN_ERROR:
-        place = _take_coordinates([default], quantity)
-        axes.plot(*place, marker="*", ms=16, color=_ORANGE, mec=INK, mew=0.8, zorder=5)
-        _name_point(labels, axes, default, quantity, "Euler, 2 ms")
-    _mark_price(labels, axes, curves, quantity)
-    for point in (point for row in curves.values() for point in row):
-        _mark_exact(labels, axes, point, quantity)
+    if default is not None and default.error(quantity) < LARGEST_DRAWN_ERROR:
+        star = {"marker": "*", "ms": 16, "mec": INK, "mew": 0.8}
+        picture.mark(default, "Euler, 2 ms", color=_ORANGE, zorder=5, **star)
+    digits, priced = _find_price(curves, quantity)
+    if priced is not None:
+        text = f"{digits.lower()}, {1e3 * priced.seconds_per_second:.2g} ms"
+        picture.mark(priced, text, zorder=6, **_RING)
+    for point in chain.from_iterable(curves.values()):
+        if (
+            point.kind != STEPPED_MOTION
+            and math.isfinite(point.seconds_per_second)
+            and _LOWEST <= point.error(quantity) < LARGEST_DRAWN_ERROR
+        ):
+            marker, colour = _MARKS[point.kind]
+            drawn = {"marker": marker, "ms": 9, "mec": PAPER, "mew": 0.6}
+            text = SHORT.get(point.setting, point.setting)
+            picture.mark(point, text, color=colour, zorder=4, **drawn)
     axes.set_ylabel(
         f"error of the {QUANTITY_WORDS[quantity]}, of its scale",
         labelpad=1.0,
@@ -270,71 +307,17 @@ def draw_work_precision(
     axes.set_ylim(_LOWEST / 4.0, 3.0)
     low, high = axes.get_xlim()
     axes.set_xlim(low / 1.2, high * 1.5)
-    _name_time(axes, front)
-    labels.settle(figure)
-    return figure
-
-
-def _take_coordinates(
-    points: Sequence[CostPoint],
-    quantity: str,
-) -> tuple[list[float], list[float]]:
-    """Return ms of a simulated second, and errors.
-
-    What lies below the picture is put at its edge.
-    """
-    errors = [max(getattr(point.errors, quantity), _LOWEST) for point in points]
-    return [1e3 * point.seconds_per_second for point in points], errors
-
-
-def _name_time(axes: Any, front: Sequence[CostPoint]) -> None:
-    """Say what the time is of, and what part of it a revolution takes."""
     text = "CPU time of a simulated second [ms]"
     if front:
         ratio = front[0].seconds_per_revolution / front[0].seconds_per_second
         text += f"; of a revolution: times {ratio:.3g}"
     axes.set_xlabel(text)
+    picture.labels.settle(picture.figure)
+    return picture.figure
 
 
-def _name_point(
-    labels: Labels,
-    axes: Any,
-    point: CostPoint,
-    quantity: str,
-    text: str,
-) -> None:
-    """Write next to a point, where it covers nothing."""
-    (x,), (y,) = _take_coordinates([point], quantity)
-    labels.keep_off(axes, complex(x, y))
-    labels.add(Label(axes, text, complex(x, y), complex(0.5 * x, y), INK, TEXT))
-
-
-def _mark_exact(
-    labels: Labels,
-    axes: Any,
-    point: CostPoint,
-    quantity: str,
-) -> None:
-    """Mark a method that answers each position by itself."""
-    marks = {EXACT_MOTION: ("h", _GREEN), FORMULAS_CURVE: ("*", INK)}
-    value = getattr(point.errors, quantity)
-    if point.kind == STEPPED_MOTION or not math.isfinite(point.seconds_per_second):
-        return
-    if not _LOWEST <= value < LARGEST_DRAWN_ERROR:
-        return
-    marker, colour = marks[point.kind]
-    axes.plot(
-        *_take_coordinates([point], quantity),
-        marker=marker,
-        ms=9,
-        color=colour,
-        mec=PAPER,
-        mew=0.6,
-        zorder=4,
-    )
-    _name_point(labels, axes, point, quantity, SHORT.get(point.setting, point.setting))
-
-
+_MARKS = {EXACT_MOTION: ("h", _GREEN), FORMULAS_CURVE: ("*", INK)}
+"""Marker and colour of a method that answers each position by itself."""
 SHORT = {
     "formulas, double": "formulas",
     "formulas, single": "formulas, float32",
@@ -351,25 +334,18 @@ def write_statement(curves: Curves, quantity: str) -> str:
     The error is the greatest at the steps and between them, as in the front. Where no
     setting reaches six digits, the cost is that of four.
     """
-    digits, cheapest = _find_price(curves, quantity)
-    default = find_default(curves)
-    if quantity == "torque":
-        name = QUANTITY_WORDS[quantity].split()[-1]
-    else:
-        name = "pin force"
+    name = QUANTITY_WORDS[quantity]
+    short = "torque" if quantity == "torque" else "pin force"
     parts = []
+    digits, cheapest = _find_price(curves, quantity)
     if cheapest is not None:
-        parts.append(
-            f"{digits} of {name} cost {1e3 * cheapest.seconds_per_second:.2g} ms "
-            "a simulated second"
-        )
-    if default is not None:
-        error = getattr(default.errors, quantity)
-        if math.isfinite(error):
-            parts.append(f"MuJoCo's defaults have an error of {write_one_digit(error)}")
-    return (
-        ";\n".join(parts) or f"Error of the {QUANTITY_WORDS[quantity]} against its cost"
-    )
+        time = 1e3 * cheapest.seconds_per_second
+        parts.append(f"{digits} of {short} cost {time:.2g} ms a simulated second")
+    default = find_default(curves)
+    if default is not None and math.isfinite(default.error(quantity)):
+        error = write_one_digit(default.error(quantity))
+        parts.append(f"MuJoCo's defaults have an error of {error}")
+    return ";\n".join(parts) or f"Error of the {name} against its cost"
 
 
 def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
@@ -384,46 +360,19 @@ def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
     return "", None
 
 
-def _mark_price(
-    labels: Labels,
-    axes: Any,
-    curves: Curves,
-    quantity: str,
-) -> None:
-    """Ring the point that the title prices, with its digits and time."""
-    digits, point = _find_price(curves, quantity)
-    if point is None:
-        return
-    axes.plot(
-        *_take_coordinates([point], quantity),
-        ls="none",
-        marker="o",
-        ms=12,
-        mfc="none",
-        mec=INK,
-        mew=1.4,
-        zorder=6,
-    )
-    text = f"{digits.lower()}, {1e3 * point.seconds_per_second:.2g} ms"
-    _name_point(labels, axes, point, quantity, text)
-
-
-def _measure_distance(curves: Curves, quantity: str) -> float:
-    """Return the greatest time of an advised setting over that of the front.
+def _measure_distance(
+    points: Sequence[CostPoint], front: Sequence[CostPoint], quantity: str
+) -> float:
+    """Return the greatest time of a point over that of the front.
 
     The error is the same.
     """
-    front = find_pareto(list_stepped(curves), quantity)
     most = 1.0
-    for point in curves.get("recommended", ()):
-        error = getattr(point.errors, quantity)
-        cheaper = [
-            other.seconds_per_second
-            for other in front
-            if getattr(other.errors, quantity) <= error
-        ]
-        if cheaper:
-            most = max(most, point.seconds_per_second / min(cheaper))
+    for point in points:
+        error = point.error(quantity)
+        cheaper = (one for one in front if one.error(quantity) <= error)
+        if first := next(cheaper, None):
+            most = max(most, point.seconds_per_second / first.seconds_per_second)
     return most
 
 
@@ -486,43 +435,33 @@ def _draw_setting(curves: Curves, title: str, picture: SettingPicture) -> Any:
     figure = make_figure(4.4, picture.statement, title)
     axes = figure.add_axes((0.135, 0.12, 0.84, 0.565))
     for label, look in picture.looks.items():
-        row = [
-            point
-            for point in curves.get(look.curve, ())
-            if point.at_steps.worst < LARGEST_DRAWN_ERROR
-        ]
-        row.sort(key=picture.abscissa)
+        row = sorted(curves.get(look.curve, ()), key=picture.abscissa)
+        row = [point for point in row if point.at_steps.worst < LARGEST_DRAWN_ERROR]
+        x = [*map(picture.abscissa, row)]
         y = [point.at_steps.worst for point in row]
-        _draw_look(axes, [*map(picture.abscissa, row)], y, label, look)
+        axes.plot(x, y, label=label, **look.style)
     axes.set_ylabel("worst error of torque and pin forces")
     axes.set_xlabel(picture.xlabel)
     set_axes(axes)
-    for slope in picture.slopes:
-        _draw_slope(axes, *slope)
-    if picture.looks is SOLVERS:
-        axes.set_xticks(
-            [ZERO_TOLERANCE_PLACE, 1e-15, 1e-12, 1e-9, 1e-6],
-            ["0", "1e-15", "1e-12", "1e-9", "1e-6"],
+    for exponent, left, low in picture.slopes:
+        axes.plot([left, 4.0 * left], [low, low * 4.0**exponent], color=INK, lw=1.0)
+        axes.annotate(
+            f"slope {exponent:g}",
+            (2.0 * left, low * 2.0**exponent),
+            xytext=(6, -10),
+            textcoords="offset points",
+            fontsize=TEXT,
+            color=INK,
         )
+    if picture.looks is SOLVERS:
+        named = ["1e-15", "1e-12", "1e-9", "1e-6"]
+        places = [ZERO_TOLERANCE_PLACE, *map(float, named)]
+        axes.set_xticks(places, ["0", *named])
     return figure
 
 
-def _draw_slope(
-    axes: Any,
-    exponent: float,
-    x: float,
-    y: float,
-) -> None:
-    """Draw a slope with its exponent next to it."""
-    axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
-    axes.annotate(
-        f"slope {exponent:g}",
-        (2.0 * x, y * 2.0**exponent),
-        xytext=(6, -10),
-        textcoords="offset points",
-        fontsize=TEXT,
-        color=INK,
-    )
+def _list_coarse_first(curves: Curves, look: Look) -> list[CostPoint]:
+    return sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
 
 
 def _draw_over_timestep(
@@ -531,27 +470,17 @@ def _draw_over_timestep(
     quantity: str,
 ) -> None:
     """Draw one quantity's error over the timestep, by integrator; ring the jumps."""
+
+    def draw(points: Sequence[CostPoint], **style: Any) -> None:
+        x = [*map(_take_timestep, points)]
+        errors = (getattr(point.at_steps, quantity) for point in points)
+        y = [min(error, LARGEST_DRAWN_ERROR) for error in errors]
+        axes.plot(x, y, **style)
+
     for label, look in INTEGRATOR_LOOKS.items():
-        row = sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
-        errors = {
-            point.setting_value: min(
-                getattr(point.at_steps, quantity), LARGEST_DRAWN_ERROR
-            )
-            for point in row
-        }
-        _draw_look(axes, [1.0 / n for n in errors], list(errors.values()), label, look)
-        leaps = [point.setting_value for point in find_jumps(row, quantity)]
-        axes.plot(
-            [1.0 / n for n in leaps],
-            [errors[n] for n in leaps],
-            gid=f"jump-{quantity}",
-            ls="none",
-            marker="o",
-            ms=12,
-            mfc="none",
-            mec=INK,
-            mew=1.4,
-        )
+        row = _list_coarse_first(curves, look)
+        draw(row, label=label, **look.style)
+        draw(find_jumps(row, quantity), gid=f"jump-{quantity}", **_RING)
 
 
 def draw_orders(curves: Curves, title: str) -> Any:
@@ -591,22 +520,21 @@ def draw_orders(curves: Curves, title: str) -> Any:
 def state_jumps(curves: Curves) -> str:
     """Say what the picture means."""
     leaping: dict[str, None] = {}
-    never: dict[str, list[str]] = {}
+    lost: dict[str, None] = {}
+    losing: dict[str, None] = {}
     for label, look in INTEGRATOR_LOOKS.items():
-        row = sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
+        row = _list_coarse_first(curves, look)
         for quantity in ERROR_NAMES:
             if find_jumps(row, quantity):
                 leaping[quantity] = None
             errors = [getattr(point.at_steps, quantity) for point in row]
             if row and min(errors) >= LARGEST_LAWFUL_ERROR:
-                never.setdefault(label, []).append(quantity)
+                lost[quantity] = losing[label] = None
     if leaping:
         return f"{', '.join(leaping)} jumps where it is ringed"
-    if never:
-        quantities = [quantity for row in never.values() for quantity in row]
-        lost = ", ".join(dict.fromkeys(quantities))
+    if lost:
         return (
-            f"No timestep brings {lost} below {LARGEST_LAWFUL_ERROR:g}\n"
-            f"with {', '.join(never)}"
+            f"No timestep brings {', '.join(lost)} below {LARGEST_LAWFUL_ERROR:g}\n"
+            f"with {', '.join(losing)}"
         )
     return "No error of torque or pin force jumps\ntowards finer steps"

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 
 from fourbar_validation.advise.matters import (
     DEGREE_BETWEEN,
     SettingInfluence,
     write_sentence,
 )
+from fourbar_validation.advise.worst_errors import ERROR_NAMES
 from fourbar_validation.cost.laws import ErrorLaw, find_floor
 from fourbar_validation.cost.work_precision import (
     EXACT_MOTION,
@@ -46,20 +48,14 @@ def find_cheapest(
 
     The error is that at the steps and between them.
     """
-    points = [
-        point
-        for point in list_stepped(curves)
-        if getattr(point.errors, quantity) <= error
-    ]
+    points = (one for one in list_stepped(curves) if one.error(quantity) <= error)
     return min(points, key=lambda point: point.seconds_per_second, default=None)
 
 
 def find_default(curves: Curves) -> CostPoint | None:
     """Find the point that a new user gets."""
-    points = (
-        point for row in curves.values() for point in row if point.setting == DEFAULT
-    )
-    return next(points, None)
+    points = chain.from_iterable(curves.values())
+    return next((point for point in points if point.setting == DEFAULT), None)
 
 
 def _write_time(point: CostPoint) -> str:
@@ -123,31 +119,28 @@ def _write_defaults(curves: Curves) -> Iterator[str]:
         f" {write_one_digit(errors.torque)} in the torque,"
         f" {write_one_digit(errors.force)} in the worst pin force"
     )
-    floors = [
-        find_floor(curves.get(_DEFAULT_LADDER, ()), quantity)
-        for quantity in ("torque", "F12", "F32", "F43", "F14")
-    ]
-    if None not in floors:
-        least = min(floor for floor in floors if floor is not None)
+    ladder = curves.get(_DEFAULT_LADDER, ())
+    floors = [find_floor(ladder, quantity) or math.inf for quantity in ERROR_NAMES]
+    if max(floors) < math.inf:
         text += (
-            f"; no timestep brings them all below {write_one_digit(least)}, "
+            f"; no timestep brings them all below {write_one_digit(min(floors))}, "
             "because their closure is soft"
         )
     yield text + "."
 
 
 def _write_exact(curves: Curves) -> Iterator[str]:
-    points = [
-        point
-        for row in curves.values()
-        for point in row
-        if point.kind != STEPPED_MOTION and math.isfinite(point.seconds_per_second)
-    ]
     for kind, what in (
         (EXACT_MOTION, "Position by position"),
         (FORMULAS_CURVE, "The formulas"),
     ):
-        exact = [p for p in points if p.kind == kind and p.errors.worst < SIX_DIGITS]
+        exact = [
+            point
+            for point in chain.from_iterable(curves.values())
+            if point.kind == kind
+            and math.isfinite(point.seconds_per_second)
+            and point.errors.worst < SIX_DIGITS
+        ]
         if exact:
             cheapest = min(exact, key=lambda point: point.seconds_per_second)
             error = write_one_digit(cheapest.errors.worst)

@@ -1,7 +1,8 @@
 """`fourbar-validation cost`: the study of scenes, its table, laws and pictures."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 import click
@@ -12,7 +13,12 @@ from fourbar.writing import write_text
 from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import MATTERS, measure_influences
 from fourbar_validation.compare.rows import write_csv_rows
-from fourbar_validation.cost.conclusion import conclude, find_cheapest, list_stepped
+from fourbar_validation.cost.conclusion import (
+    Curves,
+    conclude,
+    find_cheapest,
+    list_stepped,
+)
 from fourbar_validation.cost.laws import (
     ErrorLaw,
     find_pareto,
@@ -23,7 +29,6 @@ from fourbar_validation.cost.laws import (
 from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.work_precision import (
     COST_COLUMNS,
-    CostPoint,
     CostStudy,
     list_cells,
 )
@@ -85,33 +90,35 @@ def cost(
             )
         )
         laws = fit_laws(curves)
+        decided = [law for law in laws if law.decided]
         influences = measure_influences(scene, setup, BEST)
-        fitted += [law for law in laws if law.decided]
-        title = scene.title or name
         conclusion = conclude(curves, laws, influences)
-        write_cost(study, curves, laws, title, conclusion)
-        for sentence in (write_subtitle(scene, title), *conclusion):
+        subtitle = write_subtitle(scene, scene.title or name)
+        write_cost(study, curves, laws, scene.title or name, conclusion)
+        for sentence in (subtitle, *conclusion):
             print_sentence(sentence)
         if verbose:
-            _print_details(study, curves, laws)
+            Console().print(make_words_table(COST_HEADINGS, list_front(curves)))
+            for line in (
+                *write_laws(laws),
+                *(f"warning: {line}" for line in list_warnings(curves)),
+                *(f"left out: {line}" for line in study.left_out),
+            ):
+                print_sentence(line)
         click.echo(f"Pictures, laws and every point: {out / name / 'cost.md'}")
-        held = sum(law.holds for law in laws if law.decided)
         matters = influences and influences[0].times >= MATTERS
         rows.append(
             (
                 name,
                 *(_write_price(curves, error) for error in _WANTED),
-                f"{held} of {sum(law.decided for law in laws)}",
+                f"{sum(law.holds for law in decided)} of {len(decided)}",
                 influences[0].setting if matters else "none by itself",
             )
         )
+        fitted += decided
     if len(rows) > 1:
-        head = (
-            "scene",
-            *(f"ms for {error:g}" for error in _WANTED),
-            "laws hold",
-            "matters most",
-        )
+        prices = (f"ms for {error:g}" for error in _WANTED)
+        head = ("scene", *prices, "laws hold", "matters most")
         Console().print(make_words_table(head, rows, show_edge=False))
     if not fitted:
         print_sentence("Nothing was compared: no law has points enough for a fit.")
@@ -120,30 +127,9 @@ def cost(
     return FAILED
 
 
-def _print_details(
-    study: CostStudy,
-    curves: Mapping[str, Sequence[CostPoint]],
-    laws: Sequence[ErrorLaw],
-) -> None:
-    """Print the cheapest settings of every error, the laws, and warnings.
-
-    The last lines name what was left out.
-    """
-    from rich.console import Console
-
-    Console().print(make_words_table(COST_HEADINGS, list_front(curves)))
-    lines = [
-        *write_laws(laws),
-        *(f"warning: {line}" for line in list_warnings(curves)),
-        *(f"left out: {line}" for line in study.left_out),
-    ]
-    for line in lines:
-        print_sentence(line)
-
-
 def write_cost(
     study: CostStudy,
-    curves: Mapping[str, Sequence[CostPoint]],
+    curves: Curves,
     laws: Sequence[ErrorLaw],
     title: str,
     conclusion: Sequence[str],
@@ -163,7 +149,7 @@ def write_cost(
         "warnings": list_warnings(curves),
         "left_out": study.left_out,
     }
-    rows = (list_cells(point) for points in curves.values() for point in points)
+    rows = map(list_cells, chain.from_iterable(curves.values()))
     texts = {
         "cost.csv": write_csv_rows(COST_COLUMNS, rows),
         "cost.md": render("fourbar_validation.cost", "cost.md.j2", **what),
@@ -177,14 +163,15 @@ def write_subtitle(scene: Scene, title: str) -> str:
     """Describe what was run, in one line under the statement of a picture."""
     acting = [type(effect).__name__.lower() for effect in scene.effects]
     acting += ["loads"] if scene.loads else []
-    if scene.motion.omega_2 is None:
-        omega = ""
-    else:
-        omega = f", {scene.motion.omega_2:g} rad/s"
-    return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
+    parts = [title]
+    if scene.motion.omega_2 is not None:
+        parts.append(f"{scene.motion.omega_2:g} rad/s")
+    if acting:
+        parts.append(" and ".join(acting))
+    return ", ".join(parts)
 
 
-def _write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str:
+def _write_price(curves: Curves, error: float) -> str:
     """Write the least ms of a simulated second within an error.
 
     A dash stands where nothing reaches it.
@@ -195,7 +182,7 @@ def _write_price(curves: Mapping[str, Sequence[CostPoint]], error: float) -> str
     return f"{1e3 * point.seconds_per_second:.2g}"
 
 
-def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[tuple[str, ...]]:
+def list_front(curves: Curves) -> list[tuple[str, ...]]:
     """List the Pareto front of everything stepped, under COST_HEADINGS.
 
     The error is the worse of torque and force.

@@ -4,8 +4,9 @@ A law is an exponent with its uncertainty; floors and jumps are found too.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -105,21 +106,19 @@ class ErrorLaw:
 def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
     """Write each law in one line, quantity by quantity."""
     shown = []
-    for name in dict.fromkeys(law.name for law in all_laws):
-        laws = [law for law in all_laws if law.name == name]
-        texts = _group_quantities([(law.quantity, str(law)) for law in laws])
+    for name, group in groupby(all_laws, key=lambda law: law.name):
+        laws = list(group)
+        texts = _group_quantities((law.quantity, str(law)) for law in laws)
         shown.append(f"{name}, expected {laws[0].expected:g}: {'; '.join(texts)}")
     return shown
 
 
-def _group_quantities(pairs: Sequence[tuple[str, str]]) -> list[str]:
+def _group_quantities(pairs: Iterable[tuple[str, str]]) -> list[str]:
     """Group quantities with the same text."""
-    texts = dict.fromkeys(text for _, text in pairs)
-    return [
-        f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}:"
-        f" {text}"
-        for text in texts
-    ]
+    grouped: dict[str, list[str]] = {}
+    for quantity, text in pairs:
+        grouped.setdefault(text, []).append(quantity)
+    return [f"{', '.join(names)}: {text}" for text, names in grouped.items()]
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
@@ -137,35 +136,22 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Return the error that more steps no longer lessen, None if it still falls."""
-    errors = [_error_at_steps(point, quantity) for point in _list_by_steps(points)]
-    if (
-        len(errors) < 2
-        or not math.isfinite(errors[-1])
-        or errors[-1] < FLOORED * errors[-2]
-    ):
+    errors = _list_errors(_list_by_steps(points), quantity)
+    if len(errors) < 2 or not FLOORED * errors[-2] <= errors[-1] < math.inf:
         return None
-    return float(errors[-1])  # before it two sources may cancel: a dip is not a floor
-
-
-def _find_steps_at_floor(
-    points: Sequence[CostPoint],
-    quantity: str,
-) -> CostPoint | None:
-    """Find the first point of a ladder from which its error stays near its last."""
-    floor = find_floor(points, quantity)
-    if floor is None:
-        return None
-    ladder = _list_by_steps(points)
-    first = ladder[-1]
-    for point in reversed(ladder):
-        if not FLOORED * floor <= _error_at_steps(point, quantity) <= floor / FLOORED:
-            break
-        first = point
-    return first
+    return errors[-1]  # before it two sources may cancel: a dip is not a floor
 
 
 def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
     return sorted(points, key=lambda point: point.steps_per_revolution)
+
+
+def _list_errors(points: Sequence[CostPoint], quantity: str) -> list[float]:
+    """List the errors of a quantity at the steps.
+
+    Between them the laws are those of a spline.
+    """
+    return [getattr(point.at_steps, quantity) for point in points]
 
 
 def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
@@ -173,20 +159,31 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
 
     A point counts once the motion is the scene's.
     """
+    return [points[i] for i in _list_jumps(_list_errors(points, quantity))]
+
+
+def _list_jumps(errors: Sequence[float]) -> list[int]:
+    """List the places in a ladder where its errors jump up."""
     jumps = []
-    for i, point in enumerate(points[1:], 1):
-        value = _error_at_steps(point, quantity)
-        before = [
-            _error_at_steps(point_before, quantity)
-            for point_before in points[max(i - 2, 0) : i]
-        ]
+    for i in range(1, len(errors)):
+        before = errors[i - 1]
         # two sources that cancel make a dip, and its far side is no jump; a motion that
         # is lost again is one
-        if before[-1] < LARGEST_LAWFUL_ERROR and not value <= _LAWLESS_RISE * (
-            max(before) if value < LARGEST_LAWFUL_ERROR else before[-1]
-        ):
-            jumps.append(point)
+        allowed = before
+        if errors[i] < LARGEST_LAWFUL_ERROR:
+            allowed = max(errors[max(i - 2, 0) : i])
+        rises = not errors[i] <= _LAWLESS_RISE * allowed
+        if before < LARGEST_LAWFUL_ERROR and rises:
+            jumps.append(i)
     return jumps
+
+
+def _describe_jumps(ladder: Sequence[CostPoint], quantity: str) -> list[str]:
+    errors = _list_errors(ladder, quantity)
+    return [
+        f"jumps from {errors[i - 1]:.1e} to {errors[i]:.1e} at {ladder[i].setting}"
+        for i in _list_jumps(errors)
+    ]
 
 
 def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
@@ -194,86 +191,51 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
 
     A law is fitted as far as its curves exist.
     """
-    one_state = [
-        point for point in curves.get("one state", ()) if point.setting_value > 0.0
-    ]
-    ladders = [
-        *(
-            (f"order of {name} in the timestep", curves.get(f"{name}, tc held"), order)
-            for name, order in _EXPECTED_ORDER.items()
-        ),
-        ("softness in (1-d)", curves.get("softness d"), 1.0),
-        ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow"), 1.0),
-        ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
-    ]
-    laws = [
-        _fit_law(name, quantity, points, order, by_steps=name.startswith("order"))
-        for name, points, order in ladders
-        if points
-        for quantity in ERROR_NAMES
-    ]
-    if curves.get("sag tc, slow"):
-        laws += [_fit_sag(curves, quantity) for quantity in ERROR_NAMES]
-    stiff = [_fit_stiff(curves, quantity) for quantity in ERROR_NAMES]
+    laws: list[ErrorLaw] = []
+    for integrator, order in _EXPECTED_ORDER.items():
+        name = f"order of {integrator} in the timestep"
+        points = curves.get(f"{integrator}, tc held", ())
+        laws += _fit_law(name, points, order, by_steps=True)
+    for name, curve, order, rest in (
+        ("softness in (1-d)", "softness d", 1.0, ""),
+        ("sag at 0.1 rad/s in (1-d)", "sag d, slow", 1.0, ""),
+        ("MuJoCo at one state in (1-d)/d", "one state", 1.0, ""),
+        ("sag at 0.1 rad/s in tc", "sag tc, slow", 2.0, "softness alone, slow"),
+    ):
+        laws += _fit_law(name, curves.get(curve, ()), order, curves.get(rest, ()))
+    stiff = (_fit_stiff(curves, quantity) for quantity in ERROR_NAMES)
     return laws + [law for law in stiff if law.points > 0]
 
 
 def _fit_law(
     name: str,
-    quantity: str,
     points: Sequence[CostPoint],
     expected: float,
+    rest: Sequence[CostPoint] = (),
     *,
     by_steps: bool = False,
-) -> ErrorLaw:
-    least = find_floor(points, quantity) or 0.0 if by_steps else 0.0
-    ordered = sorted(
-        (p for p in points if p.setting_value > 0.0),
-        key=lambda p: p.setting_value if by_steps else -p.setting_value,
-    )
-    leaps = tuple(
-        _measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity)
-    )
-    used = [
-        p
-        for p in ordered
-        if _ABOVE_FLOOR * least < _error_at_steps(p, quantity) < LARGEST_LAWFUL_ERROR
-    ]
-    x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
-    slope = fit(x, [_error_at_steps(p, quantity) for p in used])
-    return ErrorLaw(name, quantity, *slope, expected, len(used), leaps)
+) -> Iterator[ErrorLaw]:
+    """Fit a law of each quantity.
 
-
-def _error_at_steps(point: CostPoint, quantity: str) -> float:
-    """Return the error of a quantity at the steps.
-
-    Between them the laws are those of a spline.
+    `rest`: a point of what does not depend on the setting. The sag is of second order
+    where the error of softness alone is small next to it.
     """
-    return float(getattr(point.at_steps, quantity))
-
-
-def _measure_leap(
-    point: CostPoint,
-    ladder: Sequence[CostPoint],
-    quantity: str,
-) -> str:
-    before = _error_at_steps(ladder[ladder.index(point) - 1], quantity)
-    after = _error_at_steps(point, quantity)
-    return f"jumps from {before:.1e} to {after:.1e} at {point.setting}"
-
-
-def _fit_sag(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
-    """Fit the law of the sag over the time constant.
-
-    The sag is of second order where the error of softness alone is small next to it.
-    """
-    points = curves["sag tc, slow"]
-    law = _fit_law("sag at 0.1 rad/s in tc", quantity, points, 2.0)
-    least = min(_error_at_steps(point, quantity) for point in points)
-    alone = curves.get("softness alone, slow", ())
-    if not alone or not 0.0 < least < math.inf:
-        return law
-    return replace(law, constant=_error_at_steps(alone[0], quantity) / least)
+    ladder = [point for point in points if point.setting_value > 0.0]
+    ladder.sort(key=lambda p: p.setting_value if by_steps else -p.setting_value)
+    for quantity in ERROR_NAMES if ladder else ():
+        errors = _list_errors(ladder, quantity)
+        floor = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
+        fitted = {}
+        for point, error in zip(ladder, errors, strict=True):
+            if _ABOVE_FLOOR * floor < error < LARGEST_LAWFUL_ERROR:
+                x = point.setting_value
+                fitted[1.0 / x if by_steps else x] = error
+        slope = fit([*fitted], [*fitted.values()])
+        constant = 0.0
+        if rest and 0.0 < min(errors) < math.inf:
+            constant = _list_errors(rest, quantity)[0] / min(errors)
+        jumps = tuple(_describe_jumps(ladder, quantity))
+        yield ErrorLaw(name, quantity, *slope, expected, len(fitted), jumps, constant)
 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
@@ -281,17 +243,14 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
 
     At a time constant of k steps it goes as k^-4, whatever the timestep.
     """
-    ladders = (
-        (tc, curves.get(f"RK4, pads, tc = {tc:g} steps", ()))
-        for tc in (3.0, 10.0, 30.0, 100.0)
-    )
-    floors = {
-        tc: least
-        for tc, points in ladders
-        if (least := find_floor(points, quantity)) is not None
-    }
+    floors = {}
+    for tc in (3.0, 10.0, 30.0, 100.0):
+        points = curves.get(f"RK4, pads, tc = {tc:g} steps", ())
+        floor = find_floor(points, quantity)
+        if floor is not None:
+            floors[tc] = floor
+    slope = fit([*floors], [*floors.values()])
     name = "floor of RK4 in tc/h"
-    slope = fit(list(floors), list(floors.values()))
     return ErrorLaw(name, quantity, *slope, -_FOURTH_ORDER, len(floors))
 
 
@@ -303,63 +262,52 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     warnings = []
     for name, points in curves.items():
         ladder = _list_by_steps(
-            [
-                p
-                for p in points
-                if p.kind == STEPPED_MOTION
-                and p.setting_value == p.setting_value
-                and p.setting_value >= 2.0
-            ]
+            [p for p in points if p.kind == STEPPED_MOTION and p.setting_value >= 2.0]
         )
+        steps = {round(point.steps_per_revolution) for point in ladder}
         if (
             name == "recommended"
-            or len(ladder) < 4
+            or len(steps) < 4
             or ladder[0].setting_value == ladder[-1].setting_value
         ):
             continue
-        if len({round(p.steps_per_revolution) for p in ladder}) < 4:
-            continue
-        leaps = [
-            (q, _measure_leap(p, ladder, q))
-            for q in ERROR_NAMES
-            for p in find_jumps(ladder, q)
-        ]
-        warnings += [f"{name}: {line}" for line in _group_quantities(leaps)]
-        floored = [
-            (q, _describe_floor(ladder, q))
-            for q in ERROR_NAMES
-            if find_floor(ladder, q) is not None
-        ]
-        warnings += [f"{name}: {line}" for line in _group_quantities(floored)]
-        never = [
-            q
-            for q in ERROR_NAMES
-            if not any(_error_at_steps(p, q) < LARGEST_LAWFUL_ERROR for p in ladder)
-        ]
+        jumps = []
+        floors = []
+        never = []
+        for quantity in ERROR_NAMES:
+            jumps += [(quantity, text) for text in _describe_jumps(ladder, quantity)]
+            floors += [(quantity, text) for text in _describe_floor(ladder, quantity)]
+            if min(_list_errors(ladder, quantity)) >= LARGEST_LAWFUL_ERROR:
+                never.append(quantity)
+        lines = _group_quantities(jumps) + _group_quantities(floors)
         if never:
-            warnings.append(
-                f"{name}: no timestep of the ladder brings {', '.join(never)} below"
+            lines.append(
+                f"no timestep of the ladder brings {', '.join(never)} below"
                 f" {LARGEST_LAWFUL_ERROR:g}"
             )
+        warnings += [f"{name}: {line}" for line in lines]
     return warnings
 
 
-def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> str:
+def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]:
     """Say from how many steps on more steps do not lessen an error.
 
     An error that was less on the way is told too: two errors cancel there.
     """
     floor = find_floor(ladder, quantity)
-    first = _find_steps_at_floor(ladder, quantity)
-    assert floor is not None and first is not None
-    text = f"{floor:.1e} from {first.steps_per_revolution:.0f} steps a revolution on"
-    least = min(ladder, key=lambda point: _error_at_steps(point, quantity))
-    if _error_at_steps(least, quantity) < FLOORED * floor:
-        text += (
-            f", but for {_error_at_steps(least, quantity):.1e} at "
-            f"{least.steps_per_revolution:.0f}, where two errors cancel"
-        )
-    return text
+    if floor is None:
+        return
+    errors = _list_errors(ladder, quantity)
+    steps = [f"{point.steps_per_revolution:.0f}" for point in ladder]
+    first = len(errors) - 1
+    while first and FLOORED * floor <= errors[first - 1] <= floor / FLOORED:
+        first -= 1
+    text = f"{floor:.1e} from {steps[first]} steps a revolution on"
+    least = min(errors)
+    if least < FLOORED * floor:
+        at = steps[errors.index(least)]
+        text += f", but for {least:.1e} at {at}, where two errors cancel"
+    yield text
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
@@ -369,13 +317,11 @@ def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     them, as the advice judges it.
     """
     front: list[CostPoint] = []
+    least = math.inf
     for point in sorted(
-        points,
-        key=lambda p: (p.seconds_per_second, getattr(p.errors, quantity)),
+        points, key=lambda one: (one.seconds_per_second, one.error(quantity))
     ):
-        error = getattr(point.errors, quantity)
-        if math.isfinite(error) and (
-            not front or error < getattr(front[-1].errors, quantity)
-        ):
+        if point.error(quantity) < least:
+            least = point.error(quantity)
             front.append(point)
     return front

@@ -4,8 +4,9 @@ The other settings are the recommended ones or MuJoCo's defaults.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene
@@ -26,7 +27,7 @@ _SAGGING = 0.999
 _MANY_STEPS = 10240
 """Steps per revolution at which a time constant of ten steps is too short to sag."""
 SOLVER_TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
-_PADS = (None, 1e-1, 1e-2, 1e-3, 1e-4)
+_PADS = (1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
 """rad/s at which gravity and loads outweigh inertia, and the loop sags under them."""
 MUJOCO_TIMESTEP = 0.002
@@ -74,177 +75,103 @@ BEST = Settings(
     time_constant_steps=20.0,
     steps_per_revolution=MIDDLE,
 )
-
-
-def make_curve(
-    name: str,
-    label: str,
-    values: Iterable[float],
-    settings: Callable[[float], Settings],
-    edit: Edit | None = None,
-) -> Curve:
-    """Make a curve over the values of a setting, each with its label and settings."""
-    spots = [Spot(label.format(x), settings(x), edit, x) for x in values]
-    return Curve(name, tuple(spots))
-
-
-def _trace_steps(
-    name: str,
-    settings: Settings,
-    edit: Edit | None = None,
-    steps: Iterable[int] = STEPS_PER_TURN,
-    held: float | None = None,
-) -> Curve:
-    """Make a curve over the timestep.
-
-    `held`: a part of a revolution at which the closure's time constant is held in
-    seconds, so that the timestep alone changes; None: it is so many steps as in the
-    settings.
-    """
-
-    def at(n: float) -> Settings:
-        tc = settings.time_constant_steps if held is None else held * n
-        return replace(settings, steps_per_revolution=n, time_constant_steps=tc)
-
-    return make_curve(name, "{:g} steps a revolution", steps, at, edit)
-
-
-def design_curves(scene: Scene) -> list[Curve]:
-    """Design the curves of one scene."""
-    curves = [
-        _vary_default_closure(name, abs(scene.motion.omega_2 or 1.0))
-        for name in INTEGRATORS
-    ]
-    for suffix, tc, held in (
-        ("pads, tc = 10 steps", 10.0, None),
-        ("tc held", 20.0, _PART_OF_TURN),
-    ):
-        for name in INTEGRATORS:
-            settings = replace(BEST, integrator=name, time_constant_steps=tc)
-            curves.append(
-                _trace_steps(
-                    f"{name}, {suffix}",
-                    settings,
-                    steps=_choose_ladder(name),
-                    held=held,
-                )
-            )
-    for tc in (3.0, 30.0, 100.0):
-        curves.append(
-            _trace_steps(
-                f"RK4, pads, tc = {tc:g} steps", replace(BEST, time_constant_steps=tc)
-            )
-        )
-    curves.append(_trace_steps("RK4, no pads, tc = 10 steps", WITHOUT_PADS))
-    for factor in (1e2, 1e4, 1e6, 1e8):
-        settings = replace(BEST, flywheel=factor)
-        curves.append(_trace_steps(f"RK4, flywheel {factor:g}", settings))
-    return [*curves, *_vary_softness(), *_vary_sag(), *_vary_tolerance()]
-
-
 WITHOUT_PADS = replace(BEST, pad=None, time_constant_steps=10.0)
 
 
-def _choose_ladder(integrator: str) -> tuple[int, ...]:
-    if integrator == "RK4":
-        return STEPS_PER_TURN
-    return _MORE_STEPS
+def _vary(
+    field: str, label: str, values: Iterable[float], settings: Settings
+) -> tuple[Spot, ...]:
+    """Vary one field of the settings."""
+    spots = []
+    for x in values:
+        changed: dict[str, Any] = {field: x}
+        spots.append(Spot(label.format(x), replace(settings, **changed), x=x))
+    return tuple(spots)
 
 
-def _vary_default_closure(integrator: str, speed: float) -> Curve:
-    """Vary MuJoCo's solref, solimp and solver around Euler at 2 ms.
-
-    A new user gets these.
-    """
-    settings = replace(BEST, integrator=integrator, pad=None)
-    curve = _trace_steps(
-        f"{integrator}, MuJoCo's defaults",
-        settings,
-        restore_defaults,
-        steps=_choose_ladder(integrator),
-    )
-    spots = list(curve.spots)
-    if integrator == "Euler":
-        n = 2.0 * math.pi / speed / MUJOCO_TIMESTEP
-        spots.append(
-            Spot(
-                "MuJoCo's defaults",
-                replace(settings, steps_per_revolution=n),
-                restore_defaults,
-                x=n,
-            )
-        )
-    return replace(
-        curve,
-        spots=tuple(sorted(spots, key=lambda spot: spot.x)),
-        settled=True,
-    )
-
-
-def _vary_softness() -> list[Curve]:
-    pads = (
-        Spot(
-            "no pads" if f is None else f"pads {f:g}",
-            replace(BEST, pad=f),
-            x=f or 1.0,
-        )
-        for f in _PADS
-    )
-    by_tc = make_curve(
-        "softness tc",
-        "tc = {:g} steps",
-        TIME_CONSTANTS,
-        lambda tc: replace(WITHOUT_PADS, time_constant_steps=tc),
-    )
-    return [
-        Curve("softness d", _list_impedances()),
-        by_tc,
-        Curve("pads", tuple(pads)),
-    ]
-
-
-def _list_impedances() -> tuple[Spot, ...]:
+def _vary_impedance() -> tuple[Spot, ...]:
     return tuple(
         Spot(f"d = {d:g}", replace(WITHOUT_PADS, impedance=d), x=1.0 - d)
         for d in _IMPEDANCES
     )
 
 
-def _vary_sag() -> list[Curve]:
+def _vary_steps(held: float | None = None, **changes: Any) -> tuple[Spot, ...]:
+    """Vary the timestep of settings that are the best ones but for some changes.
+
+    `held`: a part of a revolution at which the closure's time constant is held in
+    seconds, so that the timestep alone changes; None: it is so many steps as in the
+    settings.
+    """
+    settings = replace(BEST, **changes)
+    steps = STEPS_PER_TURN if settings.integrator == "RK4" else _MORE_STEPS
+    spots = _vary("steps_per_revolution", "{:g} steps a revolution", steps, settings)
+    if held is None:
+        return spots
+    return tuple(
+        replace(
+            spot, settings=replace(spot.settings, time_constant_steps=held * spot.x)
+        )
+        for spot in spots
+    )
+
+
+def design_curves(scene: Scene) -> Iterator[Curve]:
+    """Design the curves of one scene."""
+    for name in INTEGRATORS:
+        yield _vary_defaults(name, abs(scene.motion.omega_2 or 1.0))
+    for name in INTEGRATORS:
+        spots = _vary_steps(integrator=name, time_constant_steps=10.0)
+        yield Curve(f"{name}, pads, tc = 10 steps", spots)
+    for name in INTEGRATORS:
+        yield Curve(f"{name}, tc held", _vary_steps(_PART_OF_TURN, integrator=name))
+    for tc in (3.0, 30.0, 100.0):
+        spots = _vary_steps(time_constant_steps=tc)
+        yield Curve(f"RK4, pads, tc = {tc:g} steps", spots)
+    spots = _vary_steps(pad=None, time_constant_steps=10.0)
+    yield Curve("RK4, no pads, tc = 10 steps", spots)
+    for factor in (1e2, 1e4, 1e6, 1e8):
+        yield Curve(f"RK4, flywheel {factor:g}", _vary_steps(flywheel=factor))
+    yield Curve("softness d", _vary_impedance())
+    label = "tc = {:g} steps"
+    tc_varied = _vary("time_constant_steps", label, TIME_CONSTANTS, WITHOUT_PADS)
+    yield Curve("softness tc", tc_varied)
+    pads = _vary("pad", "pads {:g}", _PADS, BEST)
+    yield Curve("pads", (Spot("no pads", replace(BEST, pad=None), x=1.0), *pads))
+    yield from _vary_sag()
+    for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
+        settings = replace(BEST, solver=solver, iterations=iterations)
+        label = solver + ", tolerance {:g}"
+        spots = _vary("tolerance", label, SOLVER_TOLERANCES, settings)
+        yield Curve(f"tolerance, {solver}", spots)
+
+
+def _vary_defaults(integrator: str, speed: float) -> Curve:
+    """Vary the timestep with MuJoCo's solref, solimp and solver.
+
+    A new user gets these, with Euler at 2 ms.
+    """
+    steps = [*_vary_steps(integrator=integrator, pad=None)]
+    if integrator == "Euler":
+        n = 2.0 * math.pi / speed / MUJOCO_TIMESTEP
+        settings = replace(steps[0].settings, steps_per_revolution=n)
+        steps.append(Spot("MuJoCo's defaults", settings, x=n))
+        steps.sort(key=lambda spot: spot.x)
+    spots = tuple(replace(spot, edit=restore_defaults) for spot in steps)
+    return Curve(f"{integrator}, MuJoCo's defaults", spots, settled=True)
+
+
+def _vary_sag() -> Iterator[Curve]:
     """Vary what a loop at rest would sag by.
 
     The rest of the error at a short time constant is varied too.
     """
-    by_tc = make_curve(
-        "sag tc, slow",
-        "tc = {:g} steps",
-        _SAGGING_CONSTANTS,
-        lambda tc: replace(WITHOUT_PADS, impedance=_SAGGING, time_constant_steps=tc),
-    )
-    short = Spot(
-        f"{_MANY_STEPS} steps a revolution",
-        replace(WITHOUT_PADS, impedance=_SAGGING, steps_per_revolution=_MANY_STEPS),
-        x=_MANY_STEPS,
-    )
-    return [
-        Curve("sag d, slow", _list_impedances(), slow=True),
-        replace(by_tc, slow=True),
-        Curve("softness alone, slow", (short,), slow=True),
-        Curve("sag d, slow, nothing acts", _list_impedances(), slow=True, bare=True),
-    ]
-
-
-def _vary_tolerance() -> list[Curve]:
-    curves = []
-    for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
-        settings = replace(BEST, solver=solver, iterations=iterations)
-        label = solver + ", tolerance {:g}"
-        curves.append(
-            make_curve(
-                f"tolerance, {solver}",
-                label,
-                SOLVER_TOLERANCES,
-                lambda x, s=settings: replace(s, tolerance=x),  # type: ignore[misc]
-            )
-        )
-    return curves
+    sagging = replace(WITHOUT_PADS, impedance=_SAGGING)
+    label = "tc = {:g} steps"
+    by_tc = _vary("time_constant_steps", label, _SAGGING_CONSTANTS, sagging)
+    label = "{} steps a revolution"
+    short = _vary("steps_per_revolution", label, (_MANY_STEPS,), sagging)
+    yield Curve("sag d, slow", _vary_impedance(), slow=True)
+    yield Curve("sag tc, slow", by_tc, slow=True)
+    yield Curve("softness alone, slow", short, slow=True)
+    yield Curve("sag d, slow, nothing acts", _vary_impedance(), slow=True, bare=True)

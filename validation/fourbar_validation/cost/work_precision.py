@@ -2,9 +2,10 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import partial
+from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from statistics import median
 from typing import Any, TypeVar
@@ -92,30 +93,27 @@ class CostPoint:
         """Return the curve and the setting."""
         return f"{self.curve}, {self.setting}"
 
+    def error(self, quantity: str) -> float:
+        """Return an error at the steps and between them, "force" the worst of pins."""
+        return float(getattr(self.errors, quantity))
 
-_COLUMNS_OF = {
-    "errors": ERROR_NAMES,
-    "at_steps": tuple(f"{quantity}_at_steps" for quantity in ERROR_NAMES),
-}
-COST_COLUMNS = tuple(
-    column
-    for field in fields(CostPoint)
-    for column in _COLUMNS_OF.get(field.name, (field.name,))
-)
+
+_AT_STEPS = [f"{quantity}_at_steps" for quantity in ERROR_NAMES]
+COST_COLUMNS = [field.name for field in fields(CostPoint)]
+_ERRORS = slice(COST_COLUMNS.index("errors"), COST_COLUMNS.index("at_steps") + 1)
+COST_COLUMNS[_ERRORS] = [*ERROR_NAMES, *_AT_STEPS]
 
 
 def list_cells(point: CostPoint) -> list[Any]:
     """List the values of a point under COST_COLUMNS."""
-    cells: list[Any] = []
-    for field in fields(point):
-        value = getattr(point, field.name)
-        cells += value if field.name in _COLUMNS_OF else (value,)
+    cells = [getattr(point, field.name) for field in fields(point)]
+    cells[_ERRORS] = [*point.errors, *point.at_steps]
     return cells
 
 
 def _read_cost_point(row: dict[str, Any]) -> CostPoint:
-    errors = {name: WorstErrors(*row[name]) for name in _COLUMNS_OF}
-    return CostPoint(**{**row, **errors})
+    errors = {name: WorstErrors(*row[name]) for name in ("errors", "at_steps")}
+    return CostPoint(**row | errors)
 
 
 class CostStudy:
@@ -132,8 +130,9 @@ class CostStudy:
         self.folder = folder
         self.command = command_of(scene)
         self.left_out: list[str] = []
-        self._rigs: dict[tuple[bool, bool, bool], JudgedSetup] = {}
-        self.units: dict[str, Callable[[], list[CostPoint]]] = {
+        self.setup = cache(self._set_up)
+        """The scene set up for trials; a second call returns the same object."""
+        self.units: dict[str, Callable[[], Iterable[CostPoint]]] = {
             "formulas": self._time_formulas,
             "inverse": self._time_inverse,
             "one state": self._try_one_state,
@@ -157,28 +156,27 @@ class CostStudy:
         with Store(self.folder, identity).held() as store:
             done = store.done()
             for number, (name, unit) in enumerate(self.units.items()):
-                if number in done:
+                if number not in done:
+                    known = len(self.left_out)
+                    points: list[dict[str, Any]] = []
+                    try:
+                        points += map(asdict, unit())
+                    except (FourBarError, NotImplementedError) as error:
+                        points = []
+                        self.left_out.append(f"{name}: {error}")
+                    store.put(number, [points, self.left_out[known:]])
+                else:
                     points, reasons = store.read(number)
                     self.left_out += reasons
-                    yield name, [_read_cost_point(row) for row in points]
-                    continue
-                reasons = []
-                try:
-                    points = unit()
-                except (FourBarError, NotImplementedError) as error:
-                    points = []
-                    reasons = [f"{name}: {error}"]
-                self.left_out += reasons
-                store.put(number, [[asdict(point) for point in points], reasons])
-                yield name, points
+                yield name, [_read_cost_point(row) for row in points]
 
-    def setup(
+    def _set_up(
         self,
         slow: bool = False,
         bare: bool = False,
         settled: bool = False,
     ) -> JudgedSetup:
-        """Return the scene set up for trials; a second call returns the same object.
+        """Set the scene up for trials.
 
         Parameters
         ----------
@@ -186,25 +184,20 @@ class CostStudy:
         bare : without loads and effects.
         settled : begin a turn before the scene.
         """
-        if (slow, bare, settled) not in self._rigs:
-            scene = self.scene
-            if slow:
-                sign = math.copysign(1.0, scene.motion.omega_2 or 1.0)
-                scene = replace(
-                    scene,
-                    motion=scene.motion.replace(speed=sign * SLOW, acceleration=0.0),
-                )
-            if bare:
-                scene = replace(scene, loads=(), effects=())
-            before = None
-            if settled:
-                angles = command_of(scene).theta_2
-                turn = math.copysign(2.0 * math.pi, scene.motion.omega_2 or 1.0)
-                before = float(angles.min() if turn > 0.0 else angles.max()) - turn
-            self._rigs[slow, bare, settled] = JudgedSetup(scene, before=before)
-        return self._rigs[slow, bare, settled]
+        scene = self.scene
+        sense = math.copysign(1.0, scene.motion.omega_2 or 1.0)
+        if slow:
+            motion = scene.motion.replace(speed=sense * SLOW, acceleration=0.0)
+            scene = replace(scene, motion=motion)
+        if bare:
+            scene = replace(scene, loads=(), effects=())
+        before = None
+        if settled:
+            first = float(np.min(sense * self.command.theta_2))
+            before = sense * (first - 2.0 * math.pi)
+        return JudgedSetup(scene, before=before)
 
-    def _try_curve(self, curve: Curve) -> list[CostPoint]:
+    def _try_curve(self, curve: Curve) -> Iterator[CostPoint]:
         settled = (
             curve.settled
             and turns_fully(self.scene.linkage)
@@ -216,58 +209,50 @@ class CostStudy:
     def _try_spots(
         self,
         name: str,
-        spots: tuple[Spot, ...],
+        spots: Sequence[Spot],
         setup: JudgedSetup,
         settled: bool = False,
-    ) -> list[CostPoint]:
+    ) -> Iterator[CostPoint]:
         """Try each spot: its errors, and CPU time of steps and readings.
 
         The timings are interleaved with those of the others.
         """
         trials = [setup.try_out(spot.settings, spot.edit) for spot in spots]
-        readings = [trial.readings for trial in trials]
-        if settled:
-            for trial in trials:
-                _leave_out_first(trial)
         clocks: dict[tuple[str, int], Callable[[], float]] = {}
         for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
             time_steps, time_readings = setup.make_clocks(spot.settings, spot.edit)
             steps = min(trial.steps, MOST_STEPS_TIMED) or 1
             clocks["step", number] = partial(_time_each, time_steps, steps)
             clocks["reading", number] = partial(
-                _time_each,
-                time_readings,
-                TIMED_READINGS,
+                _time_each, time_readings, TIMED_READINGS
             )
         times = time_in_turns(clocks, TIMINGS_OF_A_SETTING)
-        points = []
         for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
             step, scatter = summarise_timings(times["step", number])
             reading, _ = summarise_timings(times["reading", number])
-            total = step * trial.steps + reading * readings[number]
+            total = step * trial.steps + reading * trial.readings
+            if settled:
+                _leave_out_first(trial)
             at_steps = errors = INFINITE_ERRORS
             if not trial.broken:
                 at_steps = compute_errors(setup.scene, trial.at, trial.quantities)
                 errors = judge_trial(setup.scene, trial)
-            points.append(
-                CostPoint(
-                    name,
-                    STEPPED_MOTION,
-                    spot.label,
-                    spot.x,
-                    trial.steps,
-                    trial.steps_per_revolution or spot.settings.steps_per_revolution,
-                    errors,
-                    at_steps,
-                    total / setup.simulated_seconds,
-                    total / setup.revolutions,
-                    scatter,
-                    trial.broken,
-                )
+            yield CostPoint(
+                name,
+                STEPPED_MOTION,
+                spot.label,
+                spot.x,
+                trial.steps,
+                trial.steps_per_revolution or spot.settings.steps_per_revolution,
+                errors,
+                at_steps,
+                total / setup.simulated_seconds,
+                total / setup.revolutions,
+                scatter,
+                trial.broken,
             )
-        return points
 
-    def _try_recommended(self) -> list[CostPoint]:
+    def _try_recommended(self) -> Iterator[CostPoint]:
         """Try what the advice gives for each required error, where it is reached."""
         setup = self.setup()
         spots = []
@@ -278,7 +263,7 @@ class CostStudy:
                 spots.append(Spot(label, advice.best.settings, x=required))
             else:
                 self.left_out.append(f"recommended: {advice.reason}")
-        return self._try_spots("recommended", tuple(spots), setup)
+        return self._try_spots("recommended", spots, setup)
 
     def _make_point(
         self,
@@ -286,17 +271,20 @@ class CostStudy:
         kind: str,
         label: str,
         errors: WorstErrors,
-        times: Sequence[float],
         n: int,
+        action: Callable[[], object] | None,
         setting_value: float = math.nan,
     ) -> CostPoint:
         """Make a point of a method that answers each position by itself.
 
-        The timings are those of n positions.
+        The action, which is timed, answers n positions.
         """
         setup = self.setup()
         positions = sum(map(len, setup.segments))
-        seconds, scatter = summarise_timings(times) if times else (math.nan, math.nan)
+        seconds = scatter = math.nan
+        if action is not None:
+            times = [time_call(action) for _ in range(TIMINGS_OF_A_SETTING)]
+            seconds, scatter = summarise_timings(times)
         total = seconds / n * positions
         return CostPoint(
             name,
@@ -312,39 +300,23 @@ class CostStudy:
             scatter,
         )
 
-    def _time_formulas(self) -> list[CostPoint]:
+    def _time_formulas(self) -> Iterator[CostPoint]:
+        scene = self.scene
         few = formulas.choose_few(self.command)
-        exact = formulas.evaluate_balls(self.scene, few, 2 * formulas.FIFTY_DIGITS)
-        points = []
+        exact = formulas.evaluate_balls(scene, few, 2 * formulas.FIFTY_DIGITS)
         for label, method in formulas.METHODS_TIMED.items():
             try:
-                errors = formulas.compare_with_reference(
-                    self.scene,
-                    few,
-                    method(self.scene, few),
-                    exact,
-                )
+                answer = method(scene, few)
+                errors = formulas.compare_with_reference(scene, few, answer, exact)
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
             command = few if label == "50 digits" else self.command
-            times = [
-                time_call(partial(method, self.scene, command))
-                for _ in range(TIMINGS_OF_A_SETTING)
-            ]
-            points.append(
-                self._make_point(
-                    "formulas",
-                    FORMULAS_CURVE,
-                    label,
-                    errors,
-                    times,
-                    len(command.theta_2),
-                )
-            )
-        return points
+            action = partial(method, scene, command)
+            n = len(command.theta_2)
+            yield self._make_point("formulas", FORMULAS_CURVE, label, errors, n, action)
 
-    def _time_inverse(self) -> list[CostPoint]:
+    def _time_inverse(self) -> Iterator[CostPoint]:
         """Time the exact engines in a plain loop over their own calls.
 
         The loop goes from position to position.
@@ -352,13 +324,9 @@ class CostStudy:
         from fourbar_validation.engines.mujoco.inverse import MujocoTree
         from fourbar_validation.engines.pinocchio import PinocchioTree
 
-        kinds: dict[str, Any] = {
-            PINOCCHIO: PinocchioTree,
-            MUJOCO_INVERSE: MujocoTree,
-        }
-        points = []
+        kinds: dict[str, Any] = {PINOCCHIO: PinocchioTree, MUJOCO_INVERSE: MujocoTree}
         setup = self.setup()
-        rows = sorted(row for segment in setup.segments for row in segment)
+        rows = sorted(chain.from_iterable(setup.segments))
         command = setup.command.part(np.array(rows))
         for label, kind in kinds.items():
             try:
@@ -366,57 +334,36 @@ class CostStudy:
             except LimitError as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
-            errors = compute_errors(self.scene, command, loop.answer(command))
-            times = [
-                time_call(partial(loop.answer, command))
-                for _ in range(TIMINGS_OF_A_SETTING)
-            ]
-            points.append(
-                self._make_point(
-                    "inverse",
-                    EXACT_MOTION,
-                    label,
-                    errors,
-                    times,
-                    len(rows),
-                )
+            action = partial(loop.answer, command)
+            errors = compute_errors(self.scene, command, action())
+            yield self._make_point(
+                "inverse", EXACT_MOTION, label, errors, len(rows), action
             )
-        return points
 
-    def _try_one_state(self) -> list[CostPoint]:
-        """Return points of MuJoCo at single states, by several impedances.
+    def _try_one_state(self) -> Iterator[CostPoint]:
+        """Yield points of MuJoCo at single states, by several impedances.
 
         Errors are measured, and no time.
         """
         from fourbar_validation.engines.mujoco.forward import MujocoOneState
 
-        tried = [
-            (f"MuJoCo at one state, d = {d:g}", MujocoOneState((d,)), (1.0 - d) / d)
+        tried = {
+            f"d = {d:g}": (MujocoOneState((d,)), (1.0 - d) / d)
             for d in IMPEDANCES_AT_ONE_STATE
-        ]
-        tried.append(("MuJoCo at one state, extrapolated", MujocoOneState(), 0.0))
-        points = []
-        for label, engine, softness in tried:
+        }
+        tried["extrapolated"] = (MujocoOneState(), 0.0)
+        for how, (engine, softness) in tried.items():
             answer = ask_at(engine, self.scene, self.command)
             if answer.refusal is not None:
                 raise LimitError(f"{engine.name}: {answer.refusal}")
             assert answer.assembled is not None
             rows = np.flatnonzero(answer.assembled)
-            command = self.command.part(rows)
             quantities = {name: x[rows] for name, x in answer.quantities.items()}
-            errors = compute_errors(self.scene, command, quantities)
-            points.append(
-                self._make_point(
-                    "one state",
-                    EXACT_MOTION,
-                    label,
-                    errors,
-                    (),
-                    len(rows),
-                    softness,
-                )
+            errors = compute_errors(self.scene, self.command.part(rows), quantities)
+            label = f"MuJoCo at one state, {how}"
+            yield self._make_point(
+                "one state", EXACT_MOTION, label, errors, len(rows), None, softness
             )
-        return points
 
 
 def _leave_out_first(trial: Trial) -> None:
