@@ -12,17 +12,15 @@ through limit positions, and through change points on its assembly, where anothe
 is possible.
 """
 
-import cmath
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.effect import Actions, Effect, list_bodies
+from fourbar.effects.effect import Actions
 from fourbar.errors import (
     FourBarError,
     InputError,
@@ -33,12 +31,9 @@ from fourbar.errors import (
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import angle
 from fourbar.formulas.mobility import TURN
-from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath, drive_sine, prepare_path
-from fourbar.formulas.pin_forces import Body
-from fourbar.formulas.position import Position, loop
+from fourbar.formulas.motion import State, rates
+from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine, prepare_path
 from fourbar.formulas.torque import half_slope, inertia
-from fourbar.linkage import FourBar
 from fourbar.quantities import NO_DIRECTION, Array
 from fourbar.scene import Command, ReleaseOrigin, Scene, command
 
@@ -51,6 +46,10 @@ works with a smaller one.
 """
 _CHANGE_OVER = 0.5
 """Part of the other angle's sine below which the angle is changed."""
+_LONGEST_TURN = 1.0
+"""Angle, rad, through which a bar turns at most between two instants that are looked
+at.
+"""
 MOST_INTEGRATION_STEPS = 200_000
 """A motion that needs more steps than this is given up, after a few minutes: some
 hundred turns of the fastest bar take a thousand, so it is thousands of turns long, or
@@ -152,70 +151,102 @@ def release_at(scene: Scene, times: Array) -> Released:
     if len(start.angle) != 1:
         allowed = "a free motion is released at one angle"
         raise InputError(f"motion.{start.commanded}", scene.motion.angle, allowed)
-    run = _Run(scene, times, float(start.branch[0]))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        run.begin(float(start.angle[0]), float(scene.motion.speed or 0.0), start.bar)
-    return run.report(times)
-
-
-def _convert_to_floats(numbers: Any) -> Any:
-    """Return numbers as those of Python, with which one position is quicker."""
-    converted = []
-    for number in numbers:
-        of_numpy = isinstance(number, np.generic | np.ndarray)
-        converted.append(number.item() if of_numpy else number)
-    return type(numbers)(*converted)
+    run = _Run(scene, times)
+    with np.errstate(all="ignore"):
+        run.follow(*run.begin(start))
+        return run.report(times)
 
 
 class _Reading(NamedTuple):
-    """The angle in which a motion is read: that of bar 2, 3 or 4, with its assembly."""
+    """A motion as it is read in the angle of bar 2 or 4.
 
-    path: LoopPath
+    Its numbers y are theta_2, theta_4, both continuous over the turns, the speed of the
+    bar that is read, and the work done; one instant in Python's own numbers, or (4, n).
+    """
+
+    case: Case
+    """Linkage in the angle of the bar, and what acts."""
     branch: float
-
-    @classmethod
-    def of(cls, linkage: FourBar, bar: int, branch: float) -> Self:
-        """Read a linkage in the angle of a bar, in Python's own numbers."""
-        path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
-        plain = path._replace(
-            lengths=_convert_to_floats(path.lengths),
-            u1=complex(path.u1),
-            unit=float(path.unit),
-        )
-        return cls(plain, branch)
-
-    def close(self, q: Any) -> tuple[Position, Coefficients]:
-        """Compute position and coefficients at one angle, a Python float, or at (n,).
-
-        A motion may start at a limit of the bar that it is read from: coefficients are
-        then infinite, and another bar is taken.
-        """
-        half = self.path.half_angle(q)
-        if not isinstance(q, float):
-            return self.path.close(q, half, self.branch, margin=-1.0)[:2]
-        try:
-            plain = _convert_to_floats(half)
-            position, k, _ = self.path.close(q, plain, self.branch, margin=-1.0)
-        except ZeroDivisionError:  # NumPy's numbers give inf or NaN instead
-            position, k, _ = self.path.close(q, half, self.branch, margin=-1.0)
-        if self.path.may_stay_parallel:
-            return _convert_to_floats(position), _convert_to_floats(k)
-        return position, k
-
-    def measure_room(self, position: Position) -> float:
-        """Return how far the bar's sine is above that at which the other one is read.
-
-        Bar 3, in which a motion may start alone, has none.
-        """
-        if self.path.bar == 3:
-            return -1.0
-        own, other = (drive_sine(position, bar) for bar in (self.path.bar, self.other))
-        return float(abs(own) - _CHANGE_OVER * abs(other))
+    side: float = 0.0
+    """Sense in which dry friction lets the linkage move, 0: there is none; or the
+    fraction of its torque with which it holds the linkage.
+    """
+    stands: bool = False
+    """True if dry friction holds it."""
 
     @property
-    def other(self) -> int:
-        """Number of the other bar of 2 and 4."""
-        return 6 - self.path.bar
+    def bar(self) -> int:
+        """Number of the bar."""
+        return self.case.path.bar
+
+    def angle(self, y: Any) -> Any:
+        """Return the angle that is read, rad."""
+        return y[0] if self.bar == 2 else y[1]
+
+    def state(self, y: Any, rate: Any = None) -> State:
+        """Compute positions and speeds; `rate`: in place of the speed in y."""
+        q = self.angle(y)
+        rate = y[2] if rate is None else rate
+        at = Command(q, np.float64(self.branch), rate, 0.0, self.bar)  # type: ignore[arg-type]
+        return self.case.assemble(at, self.case.path.half_angle(q))
+
+    def generalized_force(self, state: State) -> Any:
+        """Compute the generalized force of all that acts, N m."""
+        actions = Actions(state, self.case.bodies).add(self.case.terms)
+        return actions.generalized_forces()[0]
+
+    def inertia(self, state: State) -> Any:
+        """Compute the equivalent inertia, kg m^2."""
+        a = self.case.lengths.a
+        return sum(inertia(a, self.case.bodies, state.position, state.k))
+
+    def compute_rates(self, y: Any) -> list[Any]:
+        """Compute the rates of the numbers y.
+
+        Friction keeps its side beyond a standstill, at which the step is then cut.
+        """
+        rate = y[2]
+        moving = rate
+        if self.side:
+            moving = self.side * np.maximum(self.side * rate, VANISHING_SPEED)
+        state = self.state(y, moving)
+        Q = self.generalized_force(state)
+        bodies = self.case.bodies
+        slope = half_slope(self.case.lengths.a, bodies, state.position, state.k)
+        # NumPy's division raises no error where the inertia vanishes
+        growth = np.divide(Q - slope * rate * rate, self.inertia(state))
+        return [state.k.h2 * rate, state.k.h4 * rate, growth, Q * rate]
+
+    def measure_room(self, state: State) -> float:
+        """Return how far the bar's sine is above that at which the other is read."""
+        own = drive_sine(state.position, self.bar)
+        other = drive_sine(state.position, 6 - self.bar)
+        return float(abs(own) - _CHANGE_OVER * abs(other))
+
+    def on_its_side(self, y: Array) -> "_Reading":
+        """Return the same reading on the side of dry friction.
+
+        At a standstill it holds the linkage against any weaker force.
+        """
+        if not any(term.dry for term in self.case.terms):
+            return self
+        numbers = y.tolist()
+        if numbers[2]:
+            return self._replace(side=math.copysign(1.0, numbers[2]))
+        ahead, back = (
+            float(self.generalized_force(self.state(numbers, slow)))
+            for slow in (VANISHING_SPEED, -VANISHING_SPEED)
+        )
+        if ahead <= 0.0 <= back:
+            held = (ahead + back) / (back - ahead) if ahead < back else 0.0
+            return self._replace(side=held, stands=True)
+        return self._replace(side=1.0 if ahead > 0.0 else -1.0)
+
+
+def _count_turns(u: Any, near: Any) -> Any:
+    """Return the angle of a direction with the whole turns of one that is near, rad."""
+    phase = angle(u)
+    return phase + TURN * np.rint((near - phase) / TURN)
 
 
 class _Stretch(NamedTuple):
@@ -224,178 +255,106 @@ class _Stretch(NamedTuple):
     reading: _Reading
     stop: float
     """Time of its end, s; inf where the linkage stands from then on."""
-    extremes: Array
-    """Times at which an angle or sin(mu) turns back, s."""
-    instants: Array
-    """Times at which the angles of both bars are kept, s."""
-    angles: dict[int, Array]
-    """Angles of bars 2 and 4 at these times, continuous over the turns."""
-    energies: Array
-    """Kinetic energy and work at these times, (2, n), J."""
     solve: Callable[[Array], Array]
-    """Angle, speed and work at times, (3, n)."""
-    side: float
-    moves: bool
+    """Numbers of the reading at times, (4, n)."""
+    extremes: list[float]
+    """Times at which an angle or sin(mu) turns back, s."""
 
 
 def _stand_at(y: Array, times: Array) -> Array:
-    """Return angle, speed and work of a linkage that stays where it is, (3, n)."""
+    """Return the numbers of a linkage that stays where it is, (4, n)."""
     return np.repeat(y[:, np.newaxis], times.size, axis=1)
 
 
 class _Run:
-    """Integration of a motion: the linkage, what acts on it, and its stretches."""
+    """Integration of a motion, stretch by stretch."""
 
-    def __init__(self, scene: Scene, times: Array, branch: float) -> None:
-        placed = scene.settled()
+    def __init__(self, scene: Scene, times: Array) -> None:
         self.scene = scene
-        self.linkage = scene.linkage
-        self.terms: tuple[Effect, ...] = (*placed.loads, *placed.effects)
-        if any(term.loaded_pins for term in self.terms):
-            raise LimitError(
-                "a free motion cannot carry friction that depends on the pin forces"
-            )
-        self.times = times
-        self.branch = branch
-        self.lengths = _convert_to_floats(loop(*self.linkage.lengths))
-        two, three, four = map(
-            _convert_to_floats, list_bodies(self.linkage, self.terms)
-        )
-        self.bodies: tuple[Body, Body, Body] = two, three, four
-        self.is_dry = any(term.dry for term in self.terms)
+        self.end = float(times[-1])
         self.steps = 0
         self.stretches: list[_Stretch] = []
         self.change_points: list[float] = []
 
-    def begin(self, theta: float, omega: float, bar: int) -> None:
-        """Follow the motion from an angle and a speed of a bar."""
-        reading = _Reading.of(self.linkage, bar, self.branch)
-        position, k = reading.close(theta)
-        if not np.isfinite(position.u3):
+    def begin(self, start: Command) -> tuple[_Reading, Array]:
+        """Read the motion where it is released."""
+        bar = start.bar
+        case = Case.of_released(self.scene, bar, 0)
+        if any(term.loaded_pins for term in case.terms):
+            raise LimitError(
+                "a free motion cannot carry friction that depends on the pin forces"
+            )
+        speed = float(self.scene.motion.speed or 0.0)
+        theta: Any = start.angle.item()
+        one = start.part((0,))._replace(angle=theta, speed=speed, acceleration=0.0)
+        state = case.at(one)
+        if not np.isfinite(state.position.u3):
             key = f"motion.theta_{bar}"
             raise InputError(key, theta, "the linkage does not assemble there")
-        if not float(self._compute_inertia(position, k)) > 0.0:
-            raise FourBarError(
-                "nothing that moves has inertia: the free motion is undetermined"
-            )
-        for term in self.terms:
-            codes = term.status(self._make_state(reading, theta, omega), None)
+        for term in case.terms:
+            codes = term.status(state, None)
             if codes is not None and np.any(codes == NO_DIRECTION):
                 # rounding would give the force a direction at each step
                 raise LimitError(
                     f"effects.{term.key}: two points coincide where the linkage is "
                     "released, and a force along their line has no direction"
                 )
-        angles = {2: cmath.phase(position.u2), 4: cmath.phase(position.u4), bar: theta}
-        y = np.array([theta, omega, 0.0])
-        if reading.measure_room(position) < 0.0:
-            reading, y = self._change_over(reading, angles, y)
-        self._follow(reading, angles, y)
+        y = np.zeros(4)
+        for row, of_bar in enumerate((2, 4)):
+            y[row] = theta if of_bar == bar else angle(state.direction(of_bar))
+        reading = self._read_in(bar if bar != 3 else 2, state, y)
+        if reading.measure_room(state) < 0.0:
+            reading = self._read_in(6 - reading.bar, state, y)
+        if speed:
+            y[2] = state.omega(reading.bar)
+        if not float(reading.inertia(reading.state(y.tolist()))) > 0.0:
+            raise FourBarError(
+                "nothing that moves has inertia: the free motion is undetermined"
+            )
+        return reading, y
 
-    def _compute_inertia(self, position: Position, k: Coefficients) -> Any:
-        return sum(inertia(self.lengths.a, self.bodies, position, k))
+    def _read_in(self, bar: int, state: State, y: Array) -> _Reading:
+        """Read a motion in the angle of bar 2 or 4, from one of its positions."""
+        case = Case.of_released(self.scene, bar, 0)
+        sine = float(drive_sine(state.position, bar))
+        q = float(y[0] if bar == 2 else y[1])
+        return _Reading(case, float(case.path.sign(q, math.copysign(1.0, sine))))
 
-    def _make_state(self, reading: _Reading, q: Any, rate: Any) -> State:
-        """Make the state at angles and speeds of the bar that is read."""
-        position, k = reading.close(q)
-        return State(
-            self.lengths,
-            self.linkage.ground_angle,
-            q if reading.path.bar == 2 else angle(position.u2),
-            position,
-            k,
-            rate,
-            rates(k, rate, 0.0),
-        )
-
-    def _compute_generalized_force(self, state: State) -> Any:
-        return Actions(state, self.bodies).add(self.terms).generalized_forces()[0]
-
-    def _compute_rates(self, reading: _Reading, y: Any, side: float) -> list[Any]:
-        """Compute the rates of angle, speed and work, at one instant or at (n,).
-
-        Friction keeps its side beyond a standstill, at which the step is then cut.
-        """
-        q, rate, _ = y
-        moving = side * np.maximum(side * rate, VANISHING_SPEED) if side else rate
-        state = self._make_state(reading, q, moving)
-        Q = self._compute_generalized_force(state)
-        slope = half_slope(self.lengths.a, self.bodies, state.position, state.k)
-        equivalent_inertia = self._compute_inertia(state.position, state.k)
-        # NumPy's division raises no error where the inertia vanishes
-        growth = np.divide(Q - slope * rate * rate, equivalent_inertia)
-        return [rate, growth, Q * rate]
-
-    def _change_over(
-        self,
-        reading: _Reading,
-        angles: Mapping[int, float],
-        y: Array,
-    ) -> tuple[_Reading, Array]:
-        """Read the motion in the angle of the other bar; from bar 3, the better one.
-
-        Position, velocity and work are kept.
-        """
-        position, k = reading.close(float(y[0]))
-        sines = {bar: float(drive_sine(position, bar)) for bar in (2, 4)}
-        bar = reading.other
-        if bar == 3:
-            bar = max(sines, key=lambda number: abs(sines[number]))
-        _, speed, work = y
-        rate = speed and float(speed * (k.h2 if bar == 2 else k.h4))
-        other = _Reading.of(self.linkage, bar, 1.0)
-        sign = other.path.sign(angles[bar], math.copysign(1.0, sines[bar]))
-        return other._replace(branch=float(sign)), np.array([angles[bar], rate, work])
-
-    def _find_side(self, reading: _Reading, y: Array) -> tuple[float, bool]:
-        """Return the side of dry friction, and True if the linkage moves on.
-
-        At a standstill dry friction holds the linkage against any weaker force, with a
-        fraction of its torque in place of the side.
-        """
-        q, rate, _ = map(float, y)
-        if not self.is_dry or rate:
-            return (math.copysign(1.0, rate) if self.is_dry else 0.0), True
-        ahead, back = (
-            float(self._compute_generalized_force(self._make_state(reading, q, slow)))
-            for slow in (VANISHING_SPEED, -VANISHING_SPEED)
-        )
-        if ahead <= 0.0 <= back:
-            return ((ahead + back) / (back - ahead) if ahead < back else 0.0), False
-        return (1.0 if ahead > 0.0 else -1.0), True
-
-    def _follow(self, reading: _Reading, angles: dict[int, float], y: Array) -> None:
+    def follow(self, reading: _Reading, y: Array) -> None:
         """Follow the motion stretch by stretch to its end.
 
         A stretch ends at a standstill, or where another angle is read.
         """
         start = 0.0
-        end = float(self.times[-1])
         while True:
-            side, moves = self._find_side(reading, y)
-            if not moves or start == end:
-                here = np.empty(0), np.array([start])
-                self._keep(reading, angles, here, partial(_stand_at, y), side, moves)
-                break
-            solved = self._integrate(reading, start, y, side)
-            extremes = self._find_extremes(reading, solved)
-            times = extremes, solved.t
-            angles = self._keep(reading, angles, times, solved.sol, side, moves)
+            reading = reading.on_its_side(y)
+            if reading.stands or start == self.end:
+                stop = math.inf if reading.stands else start
+                stands = _Stretch(reading, stop, partial(_stand_at, y), [])
+                self.stretches.append(stands)
+                return
+            solved = self._integrate(reading, start, y)
             start = float(solved.t[-1])
-            if start == end:
-                break
+            turns_back = self._find_turns(reading, solved)
+            stretch = _Stretch(reading, start, solved.sol, turns_back)
+            self.stretches.append(stretch)
+            if start == self.end:
+                return
             y = np.array(solved.y[:, -1])
-            if not solved.t_events[0].size:
-                y[1] = 0.0
+            if solved.t_events[0].size:
+                state = reading.state(y.tolist())
+                y[0] = _count_turns(state.direction(2), y[0])
+                y[1] = _count_turns(state.direction(4), y[1])
+                reading = self._read_in(6 - reading.bar, state, y)
+                y[2] = state.omega(reading.bar)
             else:
-                reading, y = self._change_over(reading, angles, y)
+                y[2] = 0.0
 
-    def _integrate(self, reading: _Reading, start: float, y: Array, side: float) -> Any:
+    def _integrate(self, reading: _Reading, start: float, y: Array) -> Any:
         """Integrate one stretch, to the end of the motion at most."""
         with needing("SciPy is needed for free motion", "studies"):
             from scipy.integrate import DOP853, solve_ivp
         run = self
-        end = float(self.times[-1])
 
         class Solver(DOP853):  # type: ignore[misc]  # SciPy has no types
             """SciPy's, with a smaller tolerance and a largest number of steps."""
@@ -411,25 +370,22 @@ class _Run:
                         f"this motion is followed for {MOST_INTEGRATION_STEPS} steps,"
                         f" here to {self.t:.6g} s; make it shorter"
                     )
-                    raise InputError("motion.free.duration", end, allowed)
+                    raise InputError("motion.free.duration", run.end, allowed)
                 return super().step()
 
-        def compute_rates(_: float, y: Array) -> list[Any]:
-            return self._compute_rates(reading, y.tolist(), side)
-
         def has_room(_: float, y: Array) -> float:
-            return reading.measure_room(reading.close(float(y[0]))[0])
+            return reading.measure_room(reading.state(y.tolist()))
 
         def moves(_: float, y: Array) -> float:
-            return side * float(y[1])
+            return reading.side * float(y[2])
 
-        events: list[Any] = [has_room, moves] if side else [has_room]
+        events: list[Any] = [has_room, moves] if reading.side else [has_room]
         for event in events:
             event.terminal = True
             event.direction = -1.0
         solved = solve_ivp(
-            compute_rates,
-            (start, end),
+            lambda _, y: reading.compute_rates(y.tolist()),
+            (start, self.end),
             y,
             method=Solver,
             dense_output=True,
@@ -437,123 +393,87 @@ class _Run:
             atol=ABSOLUTE,
         )
         if not solved.success:
-            reached = np.degrees(solved.y[0, -1])
+            reached = np.degrees(reading.angle(solved.y[:, -1]))
             raise FourBarError(
                 f"the free motion cannot be continued beyond {solved.t[-1]:.9g} s,"
-                f" theta_{reading.path.bar} = {reached:.6g} deg: its steps vanish"
+                f" theta_{reading.bar} = {reached:.6g} deg: its steps vanish"
                 " there, as where no bar that moves has a mass; give each bar its mass"
             )
-        self._note_change_points(reading.path, solved)
         return solved
 
-    def _find_extremes(self, reading: _Reading, solved: Any) -> Array:
-        """Find the times in a stretch at which an angle or sin(mu) turns back."""
-        from scipy.optimize import brentq
+    def _find_turns(self, reading: _Reading, solved: Any) -> list[float]:
+        """Find the times in a stretch at which an angle or sin(mu) turns back.
 
-        def compute_slopes(y: Array) -> Array:
-            position, k = reading.close(y[0])
-            cosine = (position.u4 * np.conj(position.u3)).real
-            by_angle = (k.h2, k.h3, k.h4, cosine * (k.h4 - k.h3))
-            slopes = np.array(np.broadcast_arrays(y[1], *by_angle), dtype=float)
-            sizes = np.abs(slopes[1:])
-            slopes[1:][sizes <= _STANDS * sizes.max(axis=0)] = 0.0
-            return slopes
-
-        slopes = compute_slopes(solved.sol(solved.t))
-        times = [time for event in solved.t_events[1:] for time in event]
-        rows, steps = np.nonzero(slopes[:, 1:] * slopes[:, :-1] < 0.0)
-        for row, step in zip(rows.tolist(), steps.tolist(), strict=True):
-
-            def find_slope(time: float, row: int = row) -> float:
-                return float(compute_slopes(solved.sol(time))[row])
-
-            ends = solved.t[step : step + 2]
-            if find_slope(ends[0]) * find_slope(ends[1]) < 0.0:
-                times.append(brentq(find_slope, *ends, xtol=1e-15))
-        return np.array(times)
-
-    def _note_change_points(self, path: LoopPath, solved: Any) -> None:
-        """Note the times at which all bars are collinear: another motion is possible.
-
-        A step may be several turns long.
+        The times at which all bars are collinear are noted: another motion is possible
+        there.
         """
         from scipy.optimize import brentq
 
+        path = reading.case.path
         beginning = path.theta_1 + (math.pi if path.bar == 4 else 0.0)
-        for passes, psi in ((path.passing.inner, 0.0), (path.passing.outer, math.pi)):
-            if not passes:
+        points = [beginning] * bool(path.passing.inner)
+        points += [beginning + math.pi] * bool(path.passing.outer)
+
+        def watch(times: Array) -> Array:
+            """Return the speeds, and what vanishes at change points, (k, n)."""
+            y = solved.sol(times)
+            state = reading.state(y)
+            k = state.k
+            u3 = state.direction(3)
+            cosine = (state.direction(4) * np.conj(u3)).real
+            coefficients = np.broadcast_arrays(k.h2, k.h3, k.h4, cosine * k.h43, y[2])
+            slopes = np.array(coefficients, dtype=float)
+            sizes = np.abs(slopes[:4])
+            slopes[:4][sizes <= _STANDS * sizes.max(axis=0)] = 0.0
+            collinear = [np.sin(0.5 * (reading.angle(y) - point)) for point in points]
+            return np.array([*slopes, *collinear])
+
+        # a step may be several turns long
+        turned = np.abs(np.diff(reading.angle(solved.y)))
+        parts = math.ceil(turned.max() / _LONGEST_TURN)
+        rows = np.arange(parts * turned.size + 1) / parts
+        times = np.interp(rows, np.arange(solved.t.size), solved.t)
+        values = watch(times)
+        found = [float(time) for event in solved.t_events[1:] for time in event]
+        for row, step in np.argwhere(values[:, 1:] * values[:, :-1] <= 0.0):
+            low = values[row, step]
+            high = values[row, step + 1]
+            if row < 5 and not low * high:
                 continue
-
-            def count(time: float, point: float = beginning + psi) -> float:
-                return float(solved.sol(time)[0] - point) / TURN
-
-            for low, high in pairwise(solved.t):
-                first, last = sorted((count(low), count(high)))
-                for turn in range(math.ceil(first), math.floor(last) + 1):
-                    time = brentq(lambda t, n, f: f(t) - n, low, high, (turn, count))
-                    self.change_points.append(time)
-
-    def _keep(
-        self,
-        reading: _Reading,
-        angles: Mapping[int, float],
-        times: tuple[Array, Array],
-        solve: Callable[[Array], Array],
-        side: float,
-        moves: bool,
-    ) -> dict[int, float]:
-        """Keep a stretch, and return the angles of bars 2 and 4 at its end.
-
-        Parameters
-        ----------
-        angles : of both bars at its beginning.
-        times : those at which an angle or sin(mu) turns back, and its steps, s.
-        solve : angle, speed and work at times, (3, n).
-        """
-        extremes, steps = times
-        stop = float(steps[-1]) if moves else np.inf
-        due = self.times[(self.times >= steps[0]) & (self.times <= stop)]
-        instants = np.unique(np.concatenate([extremes, steps, due]))
-        q, rate, work = solve(instants)
-        position, k = reading.close(q)
-        energy = 0.5 * self._compute_inertia(position, k) * rate * rate
-        turned = {}
-        for bar, u in ((2, position.u2), (4, position.u4)):
-            phase = np.unwrap(np.broadcast_to(angle(u), q.shape))
-            turned[bar] = phase + TURN * round((angles[bar] - phase[0]) / TURN)
-        turned[reading.path.bar] = q
-        energies = np.array([energy, work])
-        stretch = _Stretch(
-            reading, stop, extremes, instants, turned, energies, solve, side, moves
-        )
-        self.stretches.append(stretch)
-        return {bar: float(values[-1]) for bar, values in turned.items()}
+            time = brentq(
+                lambda time, row: float(watch(np.array([time]))[row, 0]),
+                times[step],
+                times[step + 1],
+                (row,),
+                xtol=1e-15,
+            )
+            (found if row < 5 else self.change_points).append(time)
+        return found
 
     def _read(self, stretch: _Stretch, times: Array) -> Array:
-        """Read instants of a stretch, (n, 10), as `report` needs them."""
+        """Read instants of a stretch, (n, 12), as `report` needs them."""
         reading = stretch.reading
-        q, rate, _ = motion = stretch.solve(times)
-        position, k = reading.close(q)
-        theta_2 = q
-        if reading.path.bar != 2:
-            theta_2 = np.broadcast_to(angle(position.u2), q.shape)
-            near = np.interp(times, stretch.instants, stretch.angles[2])
-            theta_2 = theta_2 + TURN * np.round((near - theta_2) / TURN)
-        growth = 0.0 * q
-        if stretch.moves:
-            growth = self._compute_rates(reading, motion, stretch.side)[1]
-        moving = rates(k, rate, growth)
+        y = stretch.solve(times)
+        state = reading.state(y)
+        q = reading.angle(y)
+        theta_2, _, rate, work = y
+        if reading.bar != 2:
+            theta_2 = _count_turns(state.direction(2), theta_2)
+        growth = 0.0 if reading.stands else reading.compute_rates(y)[2]
+        moving = rates(state.k, rate, growth)
         columns = (
             theta_2,
             moving.omega_2,
             moving.alpha_2,
-            drive_sine(position, 2),
-            reading.path.bar,
+            drive_sine(state.position, 2),
+            0.5 * reading.inertia(state) * rate * rate,
+            work,
+            reading.bar,
             q,
             rate,
             growth,
             reading.branch,
-            np.where(rate == 0.0, stretch.side, 0.0),
+            np.where(rate == 0.0, reading.side, 0.0),
         )
         return np.stack(np.broadcast_arrays(*columns), axis=1)
 
@@ -566,7 +486,8 @@ class _Run:
             for stretch in self.stretches:
                 now = due[due <= stretch.stop]
                 due = due[now.size :]
-                now = np.union1d(now, stretch.extremes[stretch.extremes <= times[-1]])
+                extremes = [time for time in stretch.extremes if time <= times[-1]]
+                now = np.union1d(now, extremes)
                 if now.size:
                     reported.append(now)
                     rows.append(self._read(stretch, now))
@@ -592,14 +513,16 @@ class _Run:
 
     def _conclude(self, times: Array, reported: Array, rows: Array) -> Released:
         """Put the reported instants together; the branch is that of the start."""
-        theta_2, omega_2, alpha_2, sine, bar, *independent = rows.T
-        path = _Reading.of(self.linkage, 2, self.branch).path
+        theta_2, omega_2, alpha_2, sine, energy, work, bar, *independent = rows.T
+        linkage = self.scene.linkage
+        path = prepare_path(linkage.lengths, linkage.ground_angle)
         signs = np.array(path.sign(theta_2, np.copysign(1.0, sine)))
         # at a limit of theta_2 both branches meet, and the last one goes on
         is_sure = np.abs(sine) > NO_DIGIT_LEFT
         last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
-        signs = np.where(last < 0, self.branch, signs[last])
-        command = Command(
+        branch = command(self.scene).branch[0]
+        signs = np.where(last < 0, branch, signs[last])
+        whole = Command(
             theta_2,
             signs.astype(np.int8),
             omega_2,
@@ -607,16 +530,14 @@ class _Run:
             time=reported,
             origin=ReleaseOrigin(bar.astype(np.int8), *independent),
         )
-        energies = [stretch.energies for stretch in self.stretches]
-        energy, work = np.concatenate(energies, axis=1)
         largest = float(np.max(np.abs([energy, work])))
         drift = float(np.max(np.abs(energy - energy[0] - work)))
         released = Released(
-            command.part(np.isin(reported, times)),
+            whole.part(np.isin(reported, times)),
             drift / largest if largest else 0.0,
             # two may lie within one step
             tuple(sorted({time for time in self.change_points if time <= times[-1]})),
-            command,
+            whole,
         )
         released._run = self
         return released

@@ -14,7 +14,6 @@ All three vanish at change points alone.
 
 import math
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,7 +69,7 @@ class _Sizes(Actions):
     def __init__(self, state: State, bodies: Any) -> None:
         super().__init__(state, bodies)
         self.size: Any = 0.0
-        self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
+        self.fastest = np.max(np.abs(state.k[:3]), axis=0)
 
     def force(
         self,
@@ -145,11 +144,29 @@ class CircuitCurve:
         self.positions = turns * POSITIONS_OF_A_BRANCH
         """Number of positions of the row."""
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
+        self.centre = 0.5 * (self.low + self.high)
+        self.swing = 0.5 * (self.high - self.low)
+        """Half width of the range of psi, rad."""
         self.at = at
-        stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
-        self.sweep = (
-            (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
-        )
+        self.sweep: tuple[float, float] | None = None
+        """Least and greatest theta_2 of a sweep or a law, rad."""
+        self.middle = self.low + math.pi
+        """Place of psi within half a period of which theta_2 is counted, rad."""
+        self.half = math.inf
+        """Distance from there to the ends of the sweep; inf: it has none."""
+        if isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None:
+            first = float(at.theta_2.min())
+            last = float(at.theta_2.max())
+            self.sweep = (first, last)
+            extent = last - first
+            self.middle = first + 0.5 * min(extent, self.period) - self.theta_1
+            if extent < self.period:
+                self.half = 0.5 * extent
+        elif self.full:
+            self.middle = 0.5 * self.period - self.theta_1
+        self.grid = np.linspace(0.0, self.period, self.positions, endpoint=False)
+        """Places of the samples in the row: limits and change points lie between."""
+        self.grid += 0.5 * self.period / self.positions
         points = [
             (point - self.theta_1 + turn, 0.0 if point == self.theta_1 else math.pi)
             for turn in np.arange(0.0, self.period, TURN).tolist()
@@ -161,12 +178,8 @@ class CircuitCurve:
 
     def inside(self, psi: Array) -> NDArray[np.bool_]:
         """Mark where psi lies in the sweep, if one is stated."""
-        if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
-            return np.ones(psi.shape, dtype=bool)
-        middle = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1
-        half = 0.5 * (self.sweep[1] - self.sweep[0])
-        apart = np.abs(_measure_apart(psi, middle, self.period))
-        return apart <= half + AT_END_OF_SWEEP
+        apart = np.abs(_measure_apart(psi, self.middle, self.period))
+        return np.asarray(apart <= self.half + AT_END_OF_SWEEP)
 
     def reached(self, points: Array) -> NDArray[np.bool_]:
         """Mark the points that the sweep passes, all of them without a sweep.
@@ -179,13 +192,9 @@ class CircuitCurve:
         sines = np.sin(points[:, 1])
         passed = np.zeros(len(points), dtype=bool)
         for low, high, sign in self._runs:
-            middle = 0.5 * (low + high)
-            half = 0.5 * (high - low)
-            apart = np.abs(_measure_apart(points[:, 0], middle, TURN))
-            here = (apart <= half + AT_END_OF_SWEEP) & (
-                sign * sines >= -AT_END_OF_SWEEP
-            )
-            passed |= here
+            apart = _measure_apart(points[:, 0], 0.5 * (low + high), TURN)
+            within = np.abs(apart) <= 0.5 * (high - low) + AT_END_OF_SWEEP
+            passed |= within & (sign * sines >= -AT_END_OF_SWEEP)
         return passed
 
     @cached_property
@@ -198,17 +207,13 @@ class CircuitCurve:
         signs = find_signs(self.scene.linkage, self.at.angle, self.at.branch)
         between = np.array([self.low, self.high, *self.singular[:, 0]])
         changes = np.flatnonzero(np.diff(signs)) + 1
-        bounds = [0, *changes.tolist(), len(signs)]
-        runs = list[tuple[float, float, int]]()
-        for first, stop in pairwise(bounds):
-            psi = places[first:stop].tolist()
-            inner = [first] if first > 0 else []
-            if stop < len(signs):
-                inner.append(stop - 1)
-            for place in places[inner].tolist():
-                away = _measure_apart(between, place, TURN)
-                psi.append(place + float(away[np.argmin(np.abs(away))]))
-            runs.append((min(psi), max(psi), int(signs[first])))
+        runs = []
+        for run in np.split(np.arange(len(signs)), changes):
+            psi = places[run].tolist()
+            for end in {run[0], run[-1]} - {0, len(signs) - 1}:
+                away = _measure_apart(between, places[end], TURN)
+                psi.append(places[end] + away[np.argmin(np.abs(away))])
+            runs.append((min(psi), max(psi), int(signs[run[0]])))
         return runs
 
     def points(self, tau: Array) -> Array:
@@ -218,9 +223,7 @@ class CircuitCurve:
             psi = self.low + tau
             sign = self.sign(psi)
         else:
-            psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(
-                tau
-            )
+            psi = self.centre - self.swing * np.cos(tau)
             sign = np.where(tau <= math.pi, 1.0, -1.0)
         return np.stack([psi, sign * transmission_angle(self.ratios, psi)], axis=1)
 
@@ -229,13 +232,9 @@ class CircuitCurve:
         psi = self.low + np.remainder(points[:, 0] - self.low, self.period)
         if self.full:
             return np.asarray(psi - self.low)
-        part = np.clip(
-            (0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)),
-            -1.0,
-            1.0,
-        )
-        opens = np.sin(points[:, 1]) >= 0.0
-        return np.asarray(np.where(opens, np.arccos(part), TURN - np.arccos(part)))
+        part = np.arccos(np.clip((self.centre - psi) / self.swing, -1.0, 1.0))
+        is_open = np.sin(points[:, 1]) >= 0.0
+        return np.asarray(np.where(is_open, part, TURN - part))
 
     def sign(self, psi: Array) -> Array:
         """Return the sign of sin mu in a row without limits, (n,)."""
@@ -243,24 +242,11 @@ class CircuitCurve:
         return np.full(psi.shape, self.branch * root_sign)
 
     def samples(self) -> Array:
-        """Sample the row at even places within the sweep and at its ends, (n, 2).
-
-        Limits and change points are left out.
-        """
-        tau = (
-            np.linspace(0.0, self.period, self.positions, endpoint=False)
-            + 0.5 * self.period / self.positions
-        )
-        points = self.points(tau)
-        return np.concatenate([points[self.inside(points[:, 0])], self.ends()])
-
-    def ends(self) -> Array:
-        """Return the ends of the sweep on each branch, (n, 2).
-
-        The array is empty without a sweep, or if the sweep is a whole row.
-        """
-        if self.sweep is None or self.sweep[1] - self.sweep[0] >= self.period:
-            return np.empty((0, 2))
+        """Sample the row within the sweep and at its ends on each branch, (n, 2)."""
+        points = self.points(self.grid)
+        within = points[self.inside(points[:, 0])]
+        if self.sweep is None or self.half == math.inf:
+            return within
         psi = np.array(self.sweep) - self.theta_1
         mu = transmission_angle(self.ratios, psi)
         on_circuit = np.remainder(psi - self.low, TURN) < self.high - self.low
@@ -268,7 +254,8 @@ class CircuitCurve:
         psi = psi[on_circuit]
         mu = mu[on_circuit]
         signs = [self.sign(psi)] if self.full else [1.0, -1.0]
-        return np.concatenate([np.stack([psi, sign * mu], axis=1) for sign in signs])
+        ends = [np.stack([psi, sign * mu], axis=1) for sign in signs]
+        return np.concatenate([within, *ends])
 
     def order(self, points: Array) -> NDArray[np.intp]:
         """Return the indices of the points in the sweep, in order along the row.
@@ -294,9 +281,8 @@ class CircuitCurve:
     def slope(self, points: Array) -> Array:
         """Compute dQ/ds along the curve."""
         k = self.state(points).k
-        psi, mu = (
-            Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True)
-        )
+        psi = Sloped(points[:, 0], k.h2[None])
+        mu = Sloped(points[:, 1], k.h43[None])
         Q = self._force_of(on_curve(self.lengths, self.theta_1, psi, mu))
         return np.broadcast_to(np.ravel(take_slopes(Q)), len(points))
 
@@ -317,27 +303,19 @@ class CircuitCurve:
         Without a sweep theta_2 is counted from 0 where the input turns fully, otherwise
         from the circuit's range.
         """
-        if self.sweep is not None:
-            first, last = self.sweep
-            middle = first + 0.5 * min(last - first, self.period) - self.theta_1
-        elif self.full:
-            middle = 0.5 * self.period - self.theta_1
-        else:
-            middle = self.low + math.pi
         # an end may lie beyond the sweep by a rounding
-        return middle + _measure_apart(psi, middle, self.period)
+        apart: Array = _measure_apart(psi, self.middle, self.period)
+        return np.asarray(self.middle + apart)
 
     def place(self, point: Array) -> RestPosition:
         """Describe a point by theta_2 as it is counted."""
-        position = self.state(point[None]).position
-        theta_2 = self.theta_1 + self.count(point[0])
-        theta_3, theta_4 = (float(np.angle(u)[0]) for u in (position.u3, position.u4))
+        _, _, u3, u4 = self.state(point[None]).position[:4]
         sine = math.sin(point[1])
         return RestPosition(
-            float(theta_2),
-            theta_3,
-            theta_4,
-            0 if abs(sine) < AT_END_OF_SWEEP else int(math.copysign(1.0, sine)),
+            float(self.theta_1 + self.count(point[0])),
+            float(np.angle(u3)[0]),
+            float(np.angle(u4)[0]),
+            0 if abs(sine) < AT_END_OF_SWEEP else int(np.sign(sine)),
         )
 
 

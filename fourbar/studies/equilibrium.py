@@ -78,8 +78,8 @@ class _CircuitRange(NamedTuple):
     low: float
     """Start and extent of the range, rad of the row's own angle."""
     width: float
-    samples: int
-    """Number of samples in the range."""
+    is_reached: bool
+    """True if the scene's sweep passes an end or the middle of the range."""
 
 
 class Equilibrium(NamedTuple):
@@ -159,43 +159,26 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = [
-            part
-            for part in _list_ranges(curve, curve.level, np.empty((0, 2)))
-            if part.samples > _A_RANGE
-        ]
+        level = _list_ranges(curve, curve.level)
         samples = curve.samples()
-        zeros = _find_zeros(curve, samples)
-        order = curve.order(zeros.points)
-        order = order[~_mark_wound(curve, zeros.points[order])]
-        points = zeros.points[order]
-        sizes = zeros.size[order]
+        points, sizes = _find_zeros(curve, samples)
+        order = curve.order(points)
+        order = order[~_mark_wound(curve, points[order])]
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
-            held = _list_ranges(curve, partial(_holds, curve), points)
-        equilibria = []
-        for point, size in zip(points, sizes.tolist(), strict=True):
-            around = next(
-                (part.ends for part in held if _is_inside(curve, point, part)), None
-            )
-            equilibria.append(_describe_equilibrium(curve, point, size, around))
-        singular = tuple(map(curve.place, curve.singular))
+            held = _list_ranges(curve, partial(_holds, curve), points[order])
+        found = []
+        for point, size in zip(points[order], sizes[order], strict=True):
+            found.append(_describe_equilibrium(curve, point, float(size), held))
         positions = _solve_at_rest(curve)
-        psi = positions.theta_2 - curve.theta_1
-        sense = _moves(
-            curve,
-            np.stack(
-                [psi, positions.branch * transmission_angle(curve.ratios, psi)], axis=1
-            ),
-        )
-        undecided = (NOT_ASSEMBLED, SINGULAR, WOUND, CHANGE_POINT)
-        sense[np.isin(positions.status_code, undecided)] = 0
-        flat, ends = (
-            tuple(part.ends for part in ranges if _is_reached(curve, part))
-            for ranges in (level, held)
-        )
         return Equilibria(
-            tuple(equilibria), flat, len(samples), singular, ends, positions, sense
+            tuple(found),
+            tuple(part.ends for part in level if part.is_reached),
+            len(samples),
+            tuple(map(curve.place, curve.singular)),
+            tuple(part.ends for part in held if part.is_reached),
+            positions,
+            _find_moves(curve, positions),
         )
 
 
@@ -265,11 +248,11 @@ def _describe_equilibrium(
     curve: CircuitCurve,
     point: Array,
     size: float,
-    held: tuple[RestPosition, RestPosition] | None,
+    held: list[_CircuitRange],
 ) -> Equilibrium:
     """Describe an equilibrium by theta_2, at a limit by theta_4.
 
-    `size`: of the terms of Q about there.
+    `size`: of the terms of Q about there. `held`: the ranges that friction holds.
     """
     state = curve.state(point[None])
     bar = 4 if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]) else 2
@@ -285,10 +268,20 @@ def _describe_equilibrium(
     frequency = None
     if stability == "stable" and J > 0.0:
         frequency = math.sqrt(-slope / J) / TURN
-    reached = bool(curve.reached(point[None])[0])
-    place = curve.place(point)
+    ends = None
+    tau = curve.tau(point[None])[0]
+    for part in reversed(held):
+        if np.remainder(tau - part.low, curve.period) <= part.width:
+            ends = part.ends
     return Equilibrium(
-        place, stability, f"theta_{bar}", slope, J, frequency, held, reached
+        curve.place(point),
+        stability,
+        f"theta_{bar}",
+        slope,
+        J,
+        frequency,
+        ends,
+        bool(curve.reached(point[None])[0]),
     )
 
 
@@ -304,15 +297,6 @@ def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
     lost_by = np.maximum(sines[0], SINE_AT_A_LIMIT)
     h[sines * lost_by < ROUNDING_OF_A_SINE] = 0.0
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
-
-
-class _Zeros(NamedTuple):
-    """Zeros of Q as psi and mu, rad."""
-
-    points: Array
-    """(n, 2)."""
-    size: Array
-    """Sum of the absolute terms of Q about each, (n,)."""
 
 
 class _Grid(NamedTuple):
@@ -344,10 +328,10 @@ class _Grid(NamedTuple):
         near = gap < 2.5 * curve.period / curve.positions
         first = first[near]
         second = second[near]
-        size = np.array(curve.size(points))
+        size = curve.size(points)
         around = size.copy()
-        around[first] = np.maximum(around[first], size[second])
-        around[second] = np.maximum(around[second], size[first])
+        np.maximum.at(around, first, size[second])
+        np.maximum.at(around, second, size[first])
         Q = curve.generalized_force(points)
         idle = np.abs(Q) <= ROUND_OFF_OF_Q * around
         return cls(curve, points, Q, around, idle, first, second, tau[first], gap[near])
@@ -356,11 +340,11 @@ class _Grid(NamedTuple):
         self,
         values: Array,
         compute: Callable[[Array], Array],
-        among: NDArray[np.bool_],
-    ) -> tuple[Array, NDArray[np.intp]]:
+        among: NDArray[np.bool_] | bool = True,
+    ) -> tuple[Array, Array, Array]:
         """Locate where a function changes its sign between neighbours.
 
-        Return the points, (k, 2), and the index of the first neighbour of each, (k,).
+        Return the points, (k, 2), and Q and its size at the first neighbour, (k,).
 
         Parameters
         ----------
@@ -377,61 +361,46 @@ class _Grid(NamedTuple):
             return np.asarray(compute(self.curve.points(tau)) * values[first] > 0.0)
 
         _, after = bisect(has_sign_of_start, tau, tau + self.gap[chosen])
-        return self.curve.points(after), first
+        return self.curve.points(after), self.Q[first], self.size[first]
 
 
-def _find_zeros(curve: CircuitCurve, points: Array) -> _Zeros:
+def _find_zeros(curve: CircuitCurve, points: Array) -> tuple[Array, Array]:
     """Find the zeros of Q between samples: where its sign changes or its size is least.
 
     A sample without Q may itself be a zero; with another one beside it, it is in a
-    range where Q is nothing.
+    range where Q is nothing. Returned are psi and mu, (n, 2), and the sum of the
+    absolute terms of Q about each, (n,).
     """
     grid = _Grid.of(curve, points)
-    idle_beside = np.zeros(len(points), dtype=bool)
-    idle_beside[grid.first] = grid.idle[grid.second]
-    idle_beside[grid.second] |= grid.idle[grid.first]
-    alone = grid.idle & ~idle_beside
-    paired = np.bincount(
-        np.concatenate([grid.first, grid.second]),
-        minlength=len(points),
-    )
-    ending = alone & (paired == 1)  # the sweep: nothing beyond shows a sign
-    at_end = _Zeros(points[ending], grid.size[ending])
-    touching, passed = _find_least_sizes(_Grid.of(curve, points[~alone]))
-    refined = np.concatenate([points[~alone], passed])
-    crossing = _find_sign_changes(_Grid.of(curve, refined))
-    zeros = np.concatenate([at_end.points, touching.points, crossing.points])
-    size = np.concatenate([at_end.size, touching.size, crossing.size])
+    pairs = np.stack([grid.first, grid.second])
+    alone = grid.idle.copy()
+    alone[pairs[:, grid.idle[pairs].all(axis=0)]] = False
+    # at an end of the sweep nothing beyond shows a sign
+    ending = alone & (np.bincount(pairs.ravel(), minlength=len(points)) == 1)
+    zeros = points[ending]
+    sizes = grid.size[ending]
+
+    points = points[~alone]
+    grid = _Grid.of(curve, points)
+    one_sign = grid.Q[grid.first] * grid.Q[grid.second] > 0.0
+    least, Q_beside, size = grid.locate(curve.slope(points), curve.slope, one_sign)
+    Q = curve.generalized_force(least)
+    touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
+    zeros = np.concatenate([zeros, least[touches]])
+    sizes = np.concatenate([sizes, size[touches]])
+
+    points = np.concatenate([points, least[(Q * Q_beside < 0.0) & ~touches]])
+    grid = _Grid.of(curve, points)
+    crossed, _, size = grid.locate(grid.Q, curve.generalized_force)
+    continuous = np.abs(curve.generalized_force(crossed)) <= _A_JUMP * size
+    zeros = np.concatenate([zeros, crossed[continuous]])
+    sizes = np.concatenate([sizes, size[continuous]])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
         near = np.abs(np.sin(0.5 * (zeros - point))) < _AT_CHANGE_POINT
         apart = ~near.all(axis=1)
         zeros = zeros[apart]
-        size = size[apart]
-    return _Zeros(zeros, size)
-
-
-def _find_least_sizes(grid: _Grid) -> tuple[_Zeros, Array]:
-    """Find where dQ/ds changes its sign between two points at which Q has one sign.
-
-    Returns the places where Q touches zero, and those where it has the other sign.
-    """
-    curve = grid.curve
-    one_sign = grid.Q[grid.first] * grid.Q[grid.second] > 0.0
-    least, first = grid.locate(curve.slope(grid.points), curve.slope, one_sign)
-    Q = curve.generalized_force(least)
-    size = grid.size[first]
-    touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
-    passed = Q * grid.Q[first] < 0.0
-    return _Zeros(least[touches], size[touches]), least[passed & ~touches]
-
-
-def _find_sign_changes(grid: _Grid) -> _Zeros:
-    """Find the zeros between points at which Q has two signs; a jump is none."""
-    everywhere = np.ones(len(grid.first), dtype=bool)
-    zeros, first = grid.locate(grid.Q, grid.curve.generalized_force, everywhere)
-    size = grid.size[first]
-    continuous = np.abs(grid.curve.generalized_force(zeros)) <= _A_JUMP * size
-    return _Zeros(zeros[continuous], size[continuous])
+        sizes = sizes[apart]
+    return zeros, sizes
 
 
 def _add_friction(curve: CircuitCurve, points: Array, impending: int) -> Array:
@@ -439,49 +408,49 @@ def _add_friction(curve: CircuitCurve, points: Array, impending: int) -> Array:
 
     Positions where friction jams have an infinite Q.
     """
-    state = curve.state(points)
+    k = curve.state(points).k
     force = np.empty(len(points))
-    along = np.abs(state.k.h2) >= np.abs(
-        state.k.h4
-    )  # the torque that balances Q, on the bar that turns faster
+    # the torque that balances Q, on the bar that turns faster
+    along = np.abs(k.h2) >= np.abs(k.h4)
     for bar, chosen in ((2, along), (4, ~along)):
         if chosen.any():
             part = curve.state(points[chosen])
             case = curve.case._replace(drive_bar=bar, drive=None)
             dynamics = case.dynamics(part, 0.0, impending)
             Q = -dynamics.effort * part.k[bar - 2]
-            force[chosen] = (
-                Q
-                if dynamics.status is None
-                else np.where(dynamics.status == JAMMED, -impending * np.inf, Q)
-            )
+            is_jammed = dynamics.status == JAMMED
+            force[chosen] = np.where(is_jammed, -impending * np.inf, Q)
     return force
 
 
 def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
-    return (_add_friction(curve, points, 1) <= 0.0) & (
-        _add_friction(curve, points, -1) >= 0.0
-    )
-
-
-def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
-    """Return the sign of the change of theta_2 at each released position, 0 at rest."""
-    state = curve.state(points)
     ahead = _add_friction(curve, points, 1)
-    back = _add_friction(curve, points, -1)
+    return (ahead <= 0.0) & (_add_friction(curve, points, -1) >= 0.0)
+
+
+def _find_moves(curve: CircuitCurve, positions: Solution) -> NDArray[np.int8]:
+    """Return the sign of the change of theta_2 at each released position, 0 at rest."""
+    psi = positions.theta_2 - curve.theta_1
+    mu = positions.branch * transmission_angle(curve.ratios, psi)
+    points = np.stack([psi, mu], axis=1)
     level = ROUND_OFF_OF_Q * curve.size(points)
-    sense = np.where(ahead > level, 1, np.where(back < -level, -1, 0))
-    return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
+    ahead = _add_friction(curve, points, 1) > level
+    back = _add_friction(curve, points, -1) < -level
+    sense = np.where(ahead, 1, -1 * back) * np.sign(curve.state(points).k.h2)
+    undecided = (NOT_ASSEMBLED, SINGULAR, WOUND, CHANGE_POINT)
+    sense[np.isin(positions.status_code, undecided)] = 0
+    return np.asarray(sense, dtype=np.int8)
 
 
 def _list_ranges(
     curve: CircuitCurve,
     holds: Callable[[Array], NDArray[np.bool_]],
-    points_held: Array,
+    points_held: Array | None = None,
 ) -> list[_CircuitRange]:
     """List the ranges within the sweep in which a condition holds, along the row.
 
-    `points_held`: points at which the condition is known to hold.
+    `points_held`: points at which the condition is known to hold; None: it is that Q
+    is nothing, and a few samples are no range.
     """
 
     def there(tau: Array) -> NDArray[np.bool_]:
@@ -490,10 +459,13 @@ def _list_ranges(
         inside[inside] = holds(points[inside])  # a load may have no value beyond
         return inside
 
-    grid = (np.arange(curve.positions) + 0.5) * (curve.period / curve.positions)
-    tau = np.concatenate([grid, curve.tau(points_held)])
+    tau = curve.grid
     inside = there(tau)
-    inside[curve.positions :] = True
+    least = _A_RANGE + 1
+    if points_held is not None:
+        least = 1
+        tau = np.concatenate([tau, curve.tau(points_held)])
+        inside = np.concatenate([inside, np.ones(len(points_held), dtype=bool)])
     order = np.argsort(tau)
     tau = tau[order]
     inside = inside[order]
@@ -501,52 +473,28 @@ def _list_ranges(
         first = last = curve.place(curve.points(np.zeros(1))[0])
         if curve.full:
             last = first._replace(theta_2=first.theta_2 + curve.period)
-        return [_CircuitRange((first, last), 0.0, curve.period, curve.positions)]
-    starts, stops = (np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1))
-    if len(starts) and stops[0] < starts[0]:
-        stops = np.roll(stops, -1)
-    following = tau[(stops + 1) % len(tau)]
-    before = np.remainder(tau[starts] - tau[starts - 1], curve.period)
-    after = np.remainder(following - tau[stops], curve.period)
-    begin = _find_edge(there, tau[starts], -before) % curve.period
-    end = _find_edge(there, tau[stops], after) % curve.period
+        return [_CircuitRange((first, last), 0.0, curve.period, True)]
+    # once round, from a place outside
+    begin = int(np.argmin(inside))
+    tau = np.concatenate([tau[begin:], tau[: begin + 1] + curve.period])
+    inside = np.concatenate([inside[begin:], inside[: begin + 1]])
+    starts = np.flatnonzero(inside[1:] & ~inside[:-1]) + 1
+    stops = np.flatnonzero(inside[:-1] & ~inside[1:])
+    is_range = stops - starts + 1 >= least
+    starts = starts[is_range]
+    stops = stops[is_range]
+    lows, _ = bisect(there, tau[starts], tau[starts - 1])
+    highs, _ = bisect(there, tau[stops], tau[stops + 1])
     ranges = []
-    for low, high, count in zip(
-        begin.tolist(),
-        end.tolist(),
-        ((stops - starts) % len(tau) + 1).tolist(),
-        strict=True,
-    ):
-        one, stop = map(curve.place, curve.points(np.array([low, high])))
+    for low, high in zip(lows, highs, strict=True):
+        points = curve.points(low + np.array([0.0, 0.5, 1.0]) * (high - low))
+        one = curve.place(points[0])
+        stop = curve.place(points[2])
         if curve.full and stop.theta_2 < one.theta_2:
             stop = stop._replace(theta_2=stop.theta_2 + curve.period)
         ends = (one, stop)
         if not curve.full and one.branch == stop.branch == -1:
             ends = (stop, one)
-        width = float(np.remainder(high - low, curve.period))
-        ranges.append(_CircuitRange(ends, low, width, count))
+        is_reached = bool(curve.reached(points).any())
+        ranges.append(_CircuitRange(ends, low, high - low, is_reached))
     return ranges
-
-
-def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
-    beyond = np.remainder(curve.tau(point[None])[0] - part.low, curve.period)
-    return bool(beyond <= part.width)
-
-
-def _is_reached(curve: CircuitCurve, part: _CircuitRange) -> bool:
-    """Return True if the scene's sweep passes an end or the middle of a range."""
-    tau = part.low + np.array([0.0, 0.5, 1.0]) * part.width
-    return bool(curve.reached(curve.points(tau)).any())
-
-
-def _find_edge(
-    held: Callable[[Array], NDArray[np.bool_]],
-    tau: Array,
-    gap: Array,
-) -> Array:
-    """Find where a range ends between a place that is held and a free one.
-
-    The places are neighbours; `gap` leads from the first to the second.
-    """
-    inside, _ = bisect(lambda away: held(tau + away), np.zeros(tau.shape), gap)
-    return tau + inside

@@ -229,13 +229,13 @@ def test_the_drift_is_a_part_of_the_largest_energy_or_work(
     monkeypatch, omega, moment, gain, power, drift
 ):
     """Work is counted wrongly by a known part, which the drift then is."""
-    true = free_motion._Run._compute_rates
+    true = free_motion._Reading.compute_rates
 
     def count_wrongly(*arguments):
-        rate, growth, of_work = true(*arguments)
-        return [rate, growth, gain * of_work + power]
+        theta_2, theta_4, growth, of_work = true(*arguments)
+        return [theta_2, theta_4, growth, gain * of_work + power]
 
-    monkeypatch.setattr(free_motion._Run, "_compute_rates", count_wrongly)
+    monkeypatch.setattr(free_motion._Reading, "compute_rates", count_wrongly)
     linkage, times = bare(0.1, 0.25, 0.3, 0.28), np.linspace(0.0, 0.5, 6)
     couple = Load(2, moment=moment)
     released = integrate(linkage, [Flywheel(0.3)], 0.9, omega, times, [couple])
