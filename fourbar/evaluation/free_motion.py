@@ -213,8 +213,9 @@ class _Reading(NamedTuple):
         Q = self.generalized_force(state)
         bodies = self.case.bodies
         slope = half_slope(self.case.lengths.a, bodies, state.position, state.k)
+        equivalent_inertia = self.inertia(state)
         # NumPy's division raises no error where the inertia vanishes
-        growth = np.divide(Q - slope * rate * rate, self.inertia(state))
+        growth = np.divide(Q - slope * rate * rate, equivalent_inertia)
         return [state.k.h2 * rate, state.k.h4 * rate, growth, Q * rate]
 
     def measure_room(self, state: State) -> float:
