@@ -4,6 +4,7 @@ from collections import Counter
 
 from fourbar_validation.engines import workers
 from fourbar_validation.report.run_summary import Summary
+from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Progress
 
 
@@ -27,6 +28,12 @@ def summary_of(records):
     for record in records:
         summary.add(record)
     return summary
+
+
+def judge_by(engine, scene, **how):
+    """The rows of one engine on a scene, by quantity."""
+    rows = judge("scene", scene, [engine], **how).rows
+    return {row.quantity: row for row in rows if row.engine == engine.name}
 
 
 def judge_here(monkeypatch):

@@ -9,7 +9,6 @@ from pytest import approx
 
 import fourbar
 from fourbar.mjcf import Settings
-from fourbar.scene import command
 from fourbar_validation.advise import advise
 from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.worst_errors import (
@@ -23,7 +22,7 @@ from fourbar_validation.engines.mujoco.trial import Trial
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 5.9, 39), 10.0))
-COMMAND = command(SCENE)
+COMMAND = fourbar.command(SCENE)
 
 
 def answer(**off):

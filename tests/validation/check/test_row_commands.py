@@ -14,7 +14,6 @@ from pytest import raises
 import fourbar
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Rise
 from fourbar_validation.check.check import judge_table
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands, find_steady
@@ -248,7 +247,7 @@ step torque | needs a column theta_2
 """Columns of a table, and why it is refused if it is."""
 
 
-RISE = Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
+RISE = fourbar.Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
 SERVO = crank_rocker(motion=fourbar.Motion(law=RISE), title="Servo")
 
 

@@ -191,3 +191,17 @@ def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold():
     rows = {row.quantity: row for row in compared}
     assert rows["F12"].verdict == UNDECIDED
     assert rows["undecided"].failed and rows["undecided"].allowed == 0.5
+
+
+def test_an_error_within_the_rounding_of_theta_2_is_taken_again():
+    """Where it is larger than predicted; the answer nearby is that of the formulas."""
+    answer = make_answer(torque=FORMULAS.torque * (1.0 + 1e-9))
+
+    def judge(**held):
+        held["predicted"] = lambda quantity, mask: np.zeros(POSITIONS)
+        return compare(answer, SCENE, FORMULAS, ("torque",), **held)["torque"]
+
+    assert judge().failed
+    again = judge(answer_nearby=lambda mask: {"torque": FORMULAS.torque})
+    assert again.verdict == AGREES and "within the rounding of theta_2" in again.reason
+    assert K * EPS <= again.allowed < 1e-6

@@ -16,23 +16,18 @@ from fourbar_validation.engines.guests import GuestClient, Hello, Program
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
+from tests.support.here import judge_by
 from tests.support.scenes import crank_rocker
 from tests.validation.engines.test_engines import driven
 
 EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time]
 
 
-def judge_by(engine, scene):
-    """Return the rows of an engine by quantity."""
-    if missing := engine.missing():
-        pytest.skip(missing)
-    rows = judge("", scene, [engine]).rows
-    return {row.quantity: row for row in rows if row.engine == engine.name}
-
-
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, gap):
+    if missing := engine.missing():
+        pytest.skip(missing)
     at = crank_rocker(motion=fourbar.Motion(1.0))
     linkage, (theta_4,) = at.linkage, fourbar.solve(at, "position").theta_4
     on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))

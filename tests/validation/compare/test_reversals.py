@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Friction
-from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
@@ -24,7 +21,9 @@ LINKAGE = fourbar.FourBar(
 
 def scene(pin, start=0.1):
     motion = Motion(Sweep(start, start + 2 * math.pi, 36), 10.0)
-    return Scene(LINKAGE, motion, effects=(Friction.at(**{pin: FRICTION}),))
+    return fourbar.Scene(
+        LINKAGE, motion, effects=(fourbar.Friction.at(**{pin: FRICTION}),)
+    )
 
 
 @pytest.mark.parametrize("start", [0.1, 0.0])
@@ -45,7 +44,7 @@ def test_only_a_pin_that_hardly_slips_reverses():
     slip = 1e-6
     x = np.array([0.0, 5.9e-6, 6.1e-6, 1e-3, 1.0])
     dry = replace(scene("A"), motion=Motion(Sweep(0.1, 0.5, 4), 2.0))
-    solved, ones = solve(dry), np.ones(5)
+    solved, ones = fourbar.solve(dry), np.ones(5)
 
     def mark(omega_2, omega_3, omega_4, **how):
         speeds = {"omega_2": omega_2, "omega_3": omega_3, "omega_4": omega_4}

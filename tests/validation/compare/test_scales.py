@@ -14,11 +14,7 @@ from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
-from fourbar_validation.compare.scales import (
-    Scale,
-    scale_of,
-    size_answer,
-)
+from fourbar_validation.compare.scales import Scale, scale_of, size_answer
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED, magnitude
 from tests.support.scenes import balance
 

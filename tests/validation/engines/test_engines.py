@@ -27,16 +27,15 @@ from fourbar.effects import (
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
-from fourbar.solving import solve
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import loop, tree
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
 from fourbar_validation.engines.registry import ENGINES, load_further
-from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
+from tests.support.here import judge_by
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
 from tests.validation.engines.test_applied_effects import ACTING, scene
@@ -147,7 +146,7 @@ def failures(name, case, every=1):
     answer = answered(name, case, commanded)
     if answer.refusal is not None:
         return [("refusal", answer.refusal)]
-    right = solve(case, "force", at=commanded)
+    right = fourbar.solve(case, "force", at=commanded)
     demands = Demands(EQUIVALENCE, COMPARED_QUANTITIES)
     comparison = Comparison(
         "scene",
@@ -416,22 +415,17 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
     name, what, branch, monkeypatch
 ):
     case = commanded(what, branch)
-
-    def rows():
-        judged = judge("", case, [ENGINE[name]]).rows
-        return [row for row in judged if row.engine == name]
-
     if name == "opensim-constraints" and what == "theta_3":
-        (row,) = rows()
+        (row,) = judge_by(ENGINE[name], case).values()
         assert row.verdict == REFUSES and "theta_3 is commanded" in row.reason
         return
-    right = rows()
+    right = judge_by(ENGINE[name], case).values()
     assert not [row for row in right if row.failed]
     drive = "torque" if case.drive is None else "drive_force"
     agreeing = {row.quantity for row in right if row.verdict == AGREES}
     assert {*MOVED, drive} <= agreeing
     monkeypatch.setattr(loop.Assembler, "find", find_other_branch)
-    assert any(row.failed for row in rows())
+    assert any(row.failed for row in judge_by(ENGINE[name], case).values())
 
 
 @each_engine

@@ -13,10 +13,6 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects.place import Place
-from fourbar.errors import InputError
-from fourbar.files import save
-from fourbar.scene.motion import Free
 from fourbar_validation.compare.answer import explain_refusal
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, programs
@@ -80,7 +76,7 @@ def mark(tmp_path, monkeypatch):
 
 @pytest.fixture
 def suite(tmp_path):
-    save(SCENE, tmp_path / "scene.toml")
+    fourbar.save(SCENE, tmp_path / "scene.toml")
     return read_scene_files([tmp_path / "scene.toml"])
 
 
@@ -383,7 +379,7 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
     """Its hello names springs alone: those that act both ways it is asked as before."""
     hello = guests.Hello("sprung", effects=("springs",))
     client = guests.GuestClient("sprung", guests.Program(("none",)), hello)
-    ends = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
+    ends = fourbar.Place(1, (0.1, 0.5)), fourbar.Place(2, (0.1, 0.0))
     springs = fourbar.Springs(
         (
             fourbar.Spring(
@@ -405,7 +401,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     pytest.importorskip("mujoco")
     longest = "fourbar_validation.run.released.LONGEST_TIMESTEP"
     monkeypatch.setattr(longest, 1e-3)  # MuJoCo's here
-    motion = fourbar.Motion(1.0, 2.0, free=Free(0.2, 10))
+    motion = fourbar.Motion(1.0, 2.0, free=fourbar.Free(0.2, 10))
     by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
     released, right = by_engine["releases"], by_engine["right"]
     assert verdicts(released) | verdicts(right) <= {AGREES, DEGRADED}
@@ -464,7 +460,7 @@ def test_names_stand_apart():
     ],
 )
 def test_what_is_not_there_is_refused_in_one_line(entry, part):
-    with pytest.raises(InputError) as error:
+    with pytest.raises(fourbar.InputError) as error:
         select_engines(Request(guest=(entry,)))
     said = str(error.value)
     assert said.startswith("--guest = ") and part in said and "\n" not in said

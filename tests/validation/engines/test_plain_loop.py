@@ -7,7 +7,6 @@ import pytest
 
 import fourbar
 from fourbar.errors import LimitError
-from fourbar.scene import command
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
 from fourbar_validation.engines.pinocchio import PinocchioTree
@@ -31,7 +30,7 @@ def test_it_answers_to_round_off(kind):
     Loads are placed from any origin.
     """
     for scene in SCENES:
-        rows = command(scene)
+        rows = fourbar.command(scene)
         assert (
             compute_errors(scene, rows, PlainLoop(kind, scene).answer(rows)).worst
             < 1e-11

@@ -14,7 +14,6 @@ from pytest import raises
 
 import fourbar
 from fourbar.errors import FourBarError, InputError
-from fourbar.files import dump
 from fourbar.scene import StrokeOrigin
 from fourbar.scene import command as list_positions
 from fourbar_validation.compare.answer import Answer, EngineError
@@ -133,7 +132,7 @@ def test_nothing_travels_that_the_formulas_computed():
     """
     acting = (fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),)))
     scene = crank_rocker(effects=acting)
-    data, text = protocol.scene_to_json(scene), dump(scene)
+    data, text = protocol.scene_to_json(scene), fourbar.dump(scene)
     for number in numbers_of(data):
         assert repr(number).strip("'") in text, number
     assert data["bars"]["input"] == {"mass": 0.2}

@@ -14,7 +14,6 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.places import MODELS
@@ -279,7 +278,7 @@ def test_limits_that_the_errata_state():
     for bar, title in ((4, "limits"), (2, "dead centres")):
         angles = {
             f"{np.degrees(limit.theta_2) % 360.0:.4f}"
-            for limit in limit_positions(linkage, bar)
+            for limit in fourbar.limit_positions(linkage, bar)
         }
         stated = ERRATA["16"].right.split(title)[1].split(" deg")[0]
         assert angles == {part.strip() for part in stated.split(" and ")}

@@ -6,13 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fourbar_validation.compare.rows import (
-    AGREES,
-    DEGRADED,
-    FAILS,
-    REFUSES,
-    UNDECIDED,
-)
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.overview import Overview
 from fourbar_validation.report.run_summary import Summary, compute_shares

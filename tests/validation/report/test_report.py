@@ -22,7 +22,6 @@ import pytest
 import fourbar
 from fourbar import Free, Motion, Sweep
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import NO_POSITION, NO_VALUE
 from fourbar_validation.compare.rows import (
@@ -639,7 +638,7 @@ def test_the_picture_shows_the_pin_force_that_fails():
     answer = Answer(
         "free-body",
         "exact",
-        command(SCENE),
+        fourbar.command(SCENE),
         quantities=numbers,
     )
     record = Record(

@@ -23,7 +23,6 @@ from fourbar.effects import Friction, Gravity, Place, Spring, Springs, Torsion
 from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
-from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.results_file import read_columns
@@ -48,9 +47,7 @@ from fourbar_validation.robots.differences import (
     order,
     price,
 )
-from fourbar_validation.robots.judge_loop import (
-    _EXAMINE as EXAMINE,
-)
+from fourbar_validation.robots.judge_loop import _EXAMINE as EXAMINE
 from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
@@ -71,7 +68,7 @@ GENERATED = write_mjcf(CRANK_ROCKER)
 MINE_XML = Path("mine.xml")
 NO_FILE = RobotFile(MINE_XML, "")
 MINE = {"input": "crank", "coupler": "rod", "output": "rocker"}
-FEW = Scene(
+FEW = fourbar.Scene(
     CRANK_ROCKER.linkage,
     fourbar.Motion(np.linspace(0.3, 2.3, 7), 10.0),
     effects=CRANK_ROCKER.effects,
@@ -372,11 +369,7 @@ def test_a_cause_is_named_and_nothing_else(what):
     assert {d.key for d in find_differences(described(text, scene), theirs)} == expected
 
 
-def other_plane(
-    closure='site1="r" site2="q"',
-    axis="0 -1 0",
-    option="",
-):
+def other_plane(closure='site1="r" site2="q"', axis="0 -1 0", option=""):
     """The crank-rocker by another hand.
 
     x-z plane, away from the origin, other names, default closure.
@@ -799,11 +792,7 @@ def test_ctrl_c_does_not_wait_for_the_file():
         pytest.param(devour, "memory", marks=pytest.mark.linux),
     ],
 )
-def test_a_file_that_breaks_the_engine_is_one_line(
-    what,
-    word,
-    monkeypatch,
-):
+def test_a_file_that_breaks_the_engine_is_one_line(what, word, monkeypatch):
     monkeypatch.setattr(
         guard, "ROBOT_SECONDS", 4.0 if what is hang else 60.0
     )  # a busy machine starts a process slowly

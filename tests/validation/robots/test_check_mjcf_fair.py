@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 from pytest import approx
+from scipy.optimize import bisect
 
 import fourbar
 from fourbar.effects import Flywheel, Friction
@@ -113,16 +114,13 @@ def bisect_on_the_couple(text, theta_2, alpha_2):
         data.qpos[1:] -= np.linalg.solve(jacobian[:, 1:], gap)
     data.qvel[0] = speed
     data.qvel[1:] = np.linalg.solve(jacobian[:, 1:], -jacobian[:, 0] * speed)
-    low, high = -100.0, 100.0
-    for _ in range(200):
-        couple = 0.5 * (low + high)
+
+    def miss(couple):
         data.qfrc_applied[0] = couple
         mujoco.mj_forward(model, data)
-        if data.qacc[0] < alpha_2:
-            low = couple
-        else:
-            high = couple
-    return couple
+        return data.qacc[0] - alpha_2
+
+    return bisect(miss, -100.0, 100.0, xtol=1e-15)
 
 
 def list_keys(scene, examined, *parts):
@@ -155,9 +153,7 @@ def written(text, folder):
 
 
 @pytest.mark.slow
-def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(
-    tmp_path,
-):
+def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(tmp_path):
     """Its pin forces are 4.6e-5 off, which is what MuJoCo's stiffest constraint leaves.
 
     More of it is an error.
@@ -356,11 +352,7 @@ def report_of(spoil, folder):
     "spoil, key",
     [(colliding, "contacts"), (stopped, "pins.O4.range")],
 )
-def test_the_cause_that_explains_the_error_stands_first(
-    spoil,
-    key,
-    tmp_path,
-):
+def test_the_cause_that_explains_the_error_stands_first(spoil, key, tmp_path):
     report = report_of(spoil, tmp_path)
     assert report.differences[0].key == key
     cost = report.differences[0].cost
@@ -430,10 +422,7 @@ def default_constraint(scene):
     "name, off",
     [("crank_rocker", 0.037), ("drag_link", 0.10), ("gallery/landing_gear", 0.88)],
 )
-def test_how_wrong_the_default_constraint_is_as_the_pages_say(
-    name,
-    off,
-):
+def test_how_wrong_the_default_constraint_is_as_the_pages_say(name, off):
     scene = fourbar.load(MODELS / f"{name}.toml")
     examined = examine(scene, default_constraint(scene), {})
     assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == approx(

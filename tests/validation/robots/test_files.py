@@ -48,10 +48,7 @@ def make(
 
 
 @pytest.mark.parametrize("where", ["beside", "assets"])
-def test_meshes_beside_it_and_of_the_option_are_read(
-    tmp_path,
-    where,
-):
+def test_meshes_beside_it_and_of_the_option_are_read(tmp_path, where):
     path = make(tmp_path / "robot", meshdir="../meshes" if where == "beside" else "")
     elsewhere = tmp_path / ("meshes" if where == "beside" else "far/away")
     elsewhere.mkdir(parents=True)

@@ -161,10 +161,7 @@ def test_what_the_file_loses_through_its_own_zero(tmp_path):
     assert report.file.angle == approx(off, rel=1e-9)
 
 
-def test_each_error_stands_with_its_name(
-    tmp_path,
-    capsys,
-):
+def test_each_error_stands_with_its_name(tmp_path, capsys):
     show_mimic(measure_mimic(write(tmp_path), "s", KNEE))
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
@@ -361,11 +358,7 @@ def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
         ("(L)(C(F))", (3, 4)),
     ],
 )
-def test_the_tree_tells_which_bars_a_follower_joins(
-    tmp_path,
-    tree,
-    bars,
-):
+def test_the_tree_tells_which_bars_a_follower_joins(tmp_path, tree, bars):
     body = '<body pos=".1 0 0"><joint name="{}" axis="0 0 1"/><geom size=".01"/>'
     bodies = tree.replace("(", "<").replace(")", "</body>")
     for name in "LCF":

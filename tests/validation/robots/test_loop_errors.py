@@ -24,9 +24,7 @@ def join_lines(result):
 
 
 @pytest.mark.slow
-def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(
-    tmp_path,
-):
+def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(tmp_path):
     asked = ("--loop", "rod", "--speed", "2", "--torque", "5", "-o", str(tmp_path))
     checked = call(check_mjcf, FOOT, *asked)
     assert checked.return_value == 0, checked.output
@@ -51,9 +49,7 @@ def test_a_scene_and_a_robot_need_no_name_of_a_loop(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(
-    tmp_path,
-):
+def test_a_loop_too_slow_to_simulate_is_measured_at_single_states(tmp_path):
     asked = ("--loop", "rod", "--speed", "0.0001", "-o", str(tmp_path))
     checked = call(check_mjcf, FOOT, *asked)
     held = join_lines(checked)

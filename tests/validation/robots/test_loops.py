@@ -7,7 +7,6 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-from fourbar.errors import InputError
 from fourbar_validation.robots.loops import loops_command
 from fourbar_validation.robots.options import read_pose
 from tests.whole.test_imports import ROOT
@@ -57,7 +56,7 @@ def test_a_pose_is_read_from_pairs():
     assert options.joints == {"knee": "20deg", "hip": "1rad", "slide": "3mm"}
     assert options.held == ("a", "b")
     assert (options.key, options.drive) == ("home", "c")
-    with pytest.raises(InputError, match="must be like JOINT=20deg"):
+    with pytest.raises(fourbar.InputError, match="must be like JOINT=20deg"):
         read_pose({**stated, "pose": ("knee",)})
 
 

@@ -133,10 +133,7 @@ def test_an_element_to_paste_is_folded_between_attributes(capsys):
 
 
 @pytest.mark.slow
-def test_the_report_is_printed_and_written(
-    tmp_path,
-    capsys,
-):
+def test_the_report_is_printed_and_written(tmp_path, capsys):
     blocks = list(describe_measurement(measured()))
     rows = list_measured_rows(measured())
     out = tmp_path / "new"

@@ -10,9 +10,6 @@ from pytest import approx, raises
 from scipy.spatial.transform import Rotation
 
 import fourbar
-from fourbar.errors import InputError
-from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
@@ -53,11 +50,11 @@ ROCKER = math.atan2(PIN_B.imag, PIN_B.real - D)
 def make_bar(length):
     """Return a bar that is a box of WIDTH in the plane."""
     mass = DENSITY * length * WIDTH * DEPTH
-    return Bar(length, mass, inertia=mass * (length**2 + WIDTH**2) / 12.0)
+    return fourbar.Bar(length, mass, inertia=mass * (length**2 + WIDTH**2) / 12.0)
 
 
-SCENE = Scene(
-    FourBar(D, make_bar(A), make_bar(B), make_bar(C)),
+SCENE = fourbar.Scene(
+    fourbar.FourBar(D, make_bar(A), make_bar(B), make_bar(C)),
     fourbar.Motion(np.radians(np.arange(0.0, 360.0, 30.0)), 10.0),
     effects=(fourbar.effects.Gravity(9.81, -0.5 * math.pi),),
 )
@@ -630,7 +627,7 @@ def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, tmp_p
     if message is None:
         assert compile_text(tmp_path, text)[0].nbody == 1
         return
-    with raises(InputError, match=message):
+    with raises(fourbar.InputError, match=message):
         compile_text(tmp_path, text)
 
 

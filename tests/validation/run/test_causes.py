@@ -30,7 +30,6 @@ from fourbar import (
     Torsion,
     Viscous,
 )
-from fourbar.effects.load import Table
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.check.calculated import Calculation
 from fourbar_validation.check.mistakes import Explanation
@@ -593,7 +592,7 @@ def with_forces(angle, moment, **table):
 
 
 PLACE = (0.05, 1.0)
-TABLE = {"table": Table((0.0, 2.0, 2.0 * math.pi), (1.0, 3.0, 1.0))}
+TABLE = {"table": fourbar.Table((0.0, 2.0, 2.0 * math.pi), (1.0, 3.0, 1.0))}
 PULLING, PUSHING = (replace(SLACK, acts=acts) for acts in ("pull", "push"))
 SLIDING = replace(SCENE, motion=Motion(Sweep(3.5, 5.0, 12), 10.0, 5.0))
 (SLIP,) = {

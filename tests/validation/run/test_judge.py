@@ -8,7 +8,6 @@ import pytest
 
 import fourbar
 from fourbar import Bar, FourBar, Friction, Motion, uniform
-from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCE_NAMES, SINGULAR
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -22,16 +21,13 @@ from fourbar_validation.compare.rows import (
     Counts,
     Row,
 )
-from fourbar_validation.compare.tolerance import (
-    EQUIVALENCE,
-    FULL_ACCURACY,
-    ErrorBound,
-)
+from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
+from tests.support.here import judge_by
 from tests.support.scenes import crank_rocker
 
 
@@ -101,8 +97,7 @@ def rows_of(adapter, scene=None, tolerance=EQUIVALENCE, **held):
         tolerance,
         **held,
     )
-    record = judge("scene", scene or crank_rocker(), [engine])
-    return {row.quantity: row for row in record.rows if row.engine == "echo"}
+    return judge_by(engine, scene or crank_rocker())
 
 
 def test_a_refusal_or_a_breakdown_is_one_row():
@@ -193,7 +188,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
 
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
-LIMIT = limit_positions(ROCKER)[0].theta_2
+LIMIT = fourbar.limit_positions(ROCKER)[0].theta_2
 
 
 NEAR_ITS_LIMIT = next(

@@ -146,9 +146,7 @@ def answering(monkeypatch, change):
 
 
 @pytest.mark.slow
-def test_an_engine_that_stops_is_nan_or_drifts_unpredicted_fails(
-    monkeypatch,
-):
+def test_an_engine_that_stops_is_nan_or_drifts_unpredicted_fails(monkeypatch):
     def cut(answer):
         names = ("theta_2", "omega_2", "energy")
         return replace(answer, **{name: getattr(answer, name)[:20] for name in names})

@@ -2,6 +2,7 @@
 there.
 """
 
+import html
 from dataclasses import replace
 
 import pytest
@@ -11,10 +12,7 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression.record import (
-    describe_run,
-    open_run,
-)
+from fourbar_validation.regression.record import describe_run, open_run
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.jobs import Job, _judge_by_engine
 from fourbar_validation.run.plan import Plan, RunOptions
@@ -29,90 +27,76 @@ MINE = describe_run([OF_MINE], "suite")
 FAILED = replace(ROW, error=1e-3, verdict=FAILS)
 
 
-def save(folder, rows):
-    return open_run(save_run(folder, rows, about=MINE))
+DECLARED = ErrorBound(
+    STATED_BY_THE_ENGINE, "0.01 of the scale: fewer digits", 1e-2, False
+)
 
 
-def test_a_rule_that_is_weaker_than_before_stands_first(tmp_path, monkeypatch):
-    """Everything holds by the wider tolerance: the run is not green."""
+@pytest.fixture
+def run_against(tmp_path, monkeypatch):
+    """Runs scenes with these records against a run with these rows, and returns the
+    summary and how the earlier run is named.
+    """
     judge_here(monkeypatch)
-    before = save(tmp_path / "before", [ROW])
-    stated = ErrorBound(
-        STATED_BY_THE_ENGINE, "0.01 of the scale: fewer digits", 1e-2, False
-    )
-    monkeypatch.setattr(
-        "fourbar_validation.run.jobs.judge_job",
-        lambda job: Record(job.name, rows=[replace(ROW, allowed=1e-2)]),
-    )
-    options = RunOptions(drawn=False, against=before.table.parent)
-    engine = Engine("mine", FreeBody, stated)
-    summary = run(Plan(Few(("a",)), (engine,), options), tmp_path / "now")
-    assert summary.headline.startswith("WEAKER RULE: mine: factor 1.11")
-    assert f"against {before.describe()}. All 1 comparison" in summary.headline
-    assert not summary.good
-    page = (tmp_path / "now" / "report.html").read_text("utf-8")
-    assert '<h1 class="bad">WEAKER RULE: mine' in page
+
+    def run_records(before, *records, engine=OF_MINE, **suite):
+        by_name = {record.name: record for record in records}
+        monkeypatch.setattr(
+            "fourbar_validation.run.jobs.judge_job", lambda job: by_name[job.name]
+        )
+        same_suite = replace(MINE, settings=MINE.settings | {"scenes of": "few"})
+        saved = open_run(save_run(tmp_path / "before", before, about=same_suite))
+        options = RunOptions(drawn=False, against=saved.table.parent)
+        plan = Plan(Few(tuple(by_name)), (engine,), options, suite_name="few")
+        return run(plan, tmp_path / "now"), saved.describe()
+
+    return run_records
+
+
+WIDER = Engine("mine", FreeBody, DECLARED)
 
 
 @pytest.mark.parametrize(
-    "before, error, words",
+    "before, engine, error, words",
     [
-        ([ROW, replace(ROW, scene="b")], 1e-15, "GONE: scene b is gone (1 row), "),
-        ([replace(ROW, quantity="F12"), ROW], 1e-15, "GONE: a / mine / exact / F12: "),
-        ([ROW], 8e-13, "WORSE: a / mine / exact / F32: error 1.00e-15 -> 8.00e-13; "),
-        ([ROW], 1.0, "FAILS: mine is wrong"),
+        ([ROW], WIDER, 1e-15, "WEAKER RULE: mine: factor 1.11"),
+        ([ROW, replace(ROW, scene="b")], OF_MINE, 1e-15, "GONE: scene b is gone (1 "),
+        ([replace(ROW, quantity="F12"), ROW], OF_MINE, 1e-15, "GONE: a / mine / exa"),
+        ([ROW], OF_MINE, 8e-13, "WORSE: a / mine / exact / F32: error 1.00e-15 -> 8"),
+        ([ROW], OF_MINE, 1.0, "FAILS: mine is wrong"),
     ],
 )
 def test_what_got_worse_stands_before_comparisons_that_hold(
-    before, error, words, tmp_path, monkeypatch
+    before, engine, error, words, tmp_path, run_against
 ):
-    judge_here(monkeypatch)
+    """Everything else holds, by a wider tolerance at first: the run is not green."""
     row = replace(ROW, error=error, allowed=1e-2) if error < 1.0 else FAILED
-    monkeypatch.setattr(
-        "fourbar_validation.run.jobs.judge_job",
-        lambda job: Record(job.name, rows=[row]),
-    )
-    same_suite = replace(MINE, settings=MINE.settings | {"scenes of": "few"})
-    saved = open_run(save_run(tmp_path / "before", before, about=same_suite))
-    options = RunOptions(drawn=False, against=saved.table.parent)
-    plan = Plan(Few(("a",)), (OF_MINE,), options, suite_name="few")
-    summary = run(plan, tmp_path / "now")
+    summary, baseline = run_against(before, Record("a", rows=[row]), engine=engine)
     assert summary.headline.startswith(words) and not summary.good
-    held = f"against {saved.describe()}. All 1 comparison"
+    held = f"against {baseline}. All 1 comparison"
     assert (held in summary.headline) == (row is not FAILED)
+    page = html.unescape((tmp_path / "now" / "report.html").read_text("utf-8"))
+    assert f'<h1 class="bad">{words}' in page
 
 
 def test_the_verdict_says_since_when_of_the_failure_that_it_names(
-    tmp_path, monkeypatch
+    tmp_path, run_against
 ):
     """The cause of most scenes is named.
 
     The first scene that fails does not have it.
     """
-    judge_here(monkeypatch)
-    rows = {
-        "a": [replace(FAILED, quantity="torque")],
-        "b": [replace(FAILED, scene="b")],
-        "c": [replace(FAILED, scene="c", error=1e-2)],
-    }
-    monkeypatch.setattr(
-        "fourbar_validation.run.jobs.judge_job",
-        lambda job: Record(
-            job.name,
-            rows=rows[job.name],
-            causes={} if job.name == "a" else {"mine": ["F32 and F43 are exchanged"]},
-        ),
+    first = replace(FAILED, quantity="torque")
+    swapped = {"mine": ["F32 and F43 are exchanged"]}
+    summary, baseline = run_against(
+        [first, *(replace(ROW, scene=name) for name in "bc")],
+        Record("a", rows=[first]),
+        Record("b", rows=[replace(FAILED, scene="b")], causes=swapped),
+        Record("c", rows=[replace(FAILED, scene="c", error=1e-2)], causes=swapped),
     )
-    before = save(
-        tmp_path / "before",
-        [rows["a"][0], replace(ROW, scene="b"), replace(ROW, scene="c")],
-    )
-    options = RunOptions(drawn=False, against=before.table.parent)
-    engine = Engine("mine", FreeBody, EQUIVALENCE)
-    summary = run(Plan(Few(("a", "b", "c")), (engine,), options), tmp_path / "now")
     assert "mine is wrong: F32 and F43 are exchanged" in summary.headline
     assert "worst F32 of c" in summary.headline
-    assert summary.headline.endswith(f" It held in {before.describe()}.")
+    assert summary.headline.endswith(f" It held in {baseline}.")
     assert "It held in" in (tmp_path / "now" / "report.md").read_text("utf-8")
 
 

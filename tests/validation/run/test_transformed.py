@@ -24,13 +24,9 @@ from fourbar import (
     Viscous,
 )
 from fourbar.effects import Place
-from fourbar.linkage import FourBar
 from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import make_question
-from fourbar_validation.run.transformed import (
-    TRANSFORMATIONS,
-    check_transformed,
-)
+from fourbar_validation.run.transformed import TRANSFORMATIONS, check_transformed
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
@@ -137,7 +133,7 @@ CHANGE_POINTS = {
 
 def make_linkage(d, *lengths):
     bars = [Bar(length, 0.8, centre=(0.3 * length, 0.2)) for length in lengths]
-    return FourBar(d, *bars, ground_angle=0.4)
+    return fourbar.FourBar(d, *bars, ground_angle=0.4)
 
 
 @pytest.mark.parametrize("command", [2, 3, 4])

@@ -15,8 +15,6 @@ import fourbar_validation.run.question
 from fourbar import Motion, Sweep, uniform
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -35,11 +33,7 @@ from fourbar_validation.engines.prediction import (
     predict_from_data,
     predict_in_world_axes,
 )
-from fourbar_validation.engines.registry import (
-    HARD_ENGINES,
-    Engine,
-    make_answer_nearby,
-)
+from fourbar_validation.engines.registry import HARD_ENGINES, make_answer_nearby
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.released import make_pendulum
 from fourbar_validation.scenes import hard_families as families
@@ -55,7 +49,9 @@ from fourbar_validation.scenes.hard_families import (
 )
 from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED
+from tests.support.here import judge_by
 from tests.support.scenes import crank_rocker
+from tests.validation.run.test_judge import Echo, rows_of
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
 AT_CHANGE_POINTS = dict(families.approach_change_point(distances=(1e-2, 1e-8)))
@@ -133,12 +129,8 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     (balls,) = [engine for engine in HARD_ENGINES if engine.answers_nearby]
     true = fourbar_validation.run.question.solve
 
-    def judge_balls(engine=balls):
-        rows = judge("", near, [engine]).rows
-        return {row.quantity: row for row in rows if row.engine == engine.name}
-
-    assert {row.verdict for row in judge_balls().values()} == {AGREES}
-    torque = judge_balls(replace(balls, answers_nearby=False))["torque"]
+    assert {row.verdict for row in judge_by(balls, near).values()} == {AGREES}
+    torque = judge_by(replace(balls, answers_nearby=False), near)["torque"]
     assert torque.verdict == DEGRADED and torque.allowed > 1e-6
 
     def spoiled(*arguments, **keywords):
@@ -147,7 +139,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
         return solution
 
     monkeypatch.setattr(fourbar_validation.run.question, "solve", spoiled)
-    assert judge_balls()["torque"].verdict == FAILS
+    assert judge_by(balls, near)["torque"].verdict == FAILS
 
 
 def ask_nearby(scene, solution, command=None):
@@ -235,30 +227,12 @@ def judge_spoiled(scene, part, predictor):
     of itself.
     """
 
-    class Spoiled:
-        name = "spoiled"
-
-        def answer(self, scene, command):
-            s = fourbar.solve(scene, at=command)
-            numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
-            numbers["F32"] *= 1.0 + part
-            return Answer(
-                self.name,
-                "exact",
-                command,
-                s.assembled,
-                numbers,
-            )
+    class Spoiled(Echo):
+        def spoil(self, answer):
+            answer.quantities["F32"] *= 1.0 + part
 
     tolerance = FULL_ACCURACY if predictor else EQUIVALENCE
-    engine = Engine(
-        "spoiled",
-        Spoiled,
-        tolerance,
-        predictor=predictor,
-    )
-    rows = judge("scene", scene, [engine]).rows
-    (row,) = [row for row in rows if (row.engine, row.quantity) == ("spoiled", "F32")]
+    row = rows_of(Spoiled, scene, tolerance, predictor=predictor)["F32"]
     return row.verdict, row.allowed
 
 

@@ -13,12 +13,7 @@ from fourbar.effects import Place
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Demands
-from fourbar_validation.compare.rows import (
-    AGREES,
-    FAILS,
-    REFUSES,
-    UNDECIDED,
-)
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor

@@ -7,7 +7,6 @@ import pytest
 
 import fourbar
 from fourbar.mjcf import Settings, size_flywheel
-from fourbar.scene import command
 from fourbar_validation.advise.worst_errors import ERROR_NAMES, compute_errors
 from fourbar_validation.cost.series import BEST, WITHOUT_PADS
 from fourbar_validation.engines.mujoco.defaults import restore_defaults
@@ -85,7 +84,7 @@ def make_scene(drive):
 def test_the_plotted_error_is_that_of_a_second_loop(drive, name):
     case = CASES[name]
     scene = make_scene(drive)
-    setup = TrialSetup(scene, command(scene))
+    setup = TrialSetup(scene, fourbar.command(scene))
     settings = replace(case.settings, steps_per_revolution=float(case.steps))
     trial = setup.try_out(settings, case.edit)
     assert not trial.broken

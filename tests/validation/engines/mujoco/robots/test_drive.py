@@ -14,9 +14,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.mujoco.robots.answers import (
-    MeasureOptions,
-)
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import examine_file
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene

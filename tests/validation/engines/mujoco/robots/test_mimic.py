@@ -6,7 +6,6 @@ import pytest
 
 import fourbar
 from fourbar.linkage import Bar, FourBar
-from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import list_followers
 from fourbar_validation.engines.mujoco.robots.mimic import read_joint_equality
 from fourbar_validation.robots.files import read_robot
@@ -20,7 +19,7 @@ FILE = """<mujoco><worldbody>
 </equality></mujoco>"""
 
 
-LOOP = Scene(
+LOOP = fourbar.Scene(
     FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.1), Bar(0.1, 0.1)), fourbar.Motion(1.0, 1.0)
 )
 

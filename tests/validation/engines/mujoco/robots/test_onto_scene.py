@@ -8,17 +8,12 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
-from fourbar_validation.engines.mujoco.robots.answers import (
-    MeasureOptions,
-)
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.judge_loop import FILE_THROUGH_TIME
-from fourbar_validation.robots.loop_errors import (
-    find_left_out,
-    find_worst_of_loop,
-)
+from fourbar_validation.robots.loop_errors import find_left_out, find_worst_of_loop
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
 from tests.support.robots import answer_of, examine_text, file_of, measure, notes_of
 

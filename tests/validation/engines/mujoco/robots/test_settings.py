@@ -11,10 +11,7 @@ from pytest import approx, raises
 from scipy.optimize import brentq
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.answers import (
-    LoopMotion,
-    MeasureOptions,
-)
+from fourbar_validation.engines.mujoco.robots.answers import LoopMotion, MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
