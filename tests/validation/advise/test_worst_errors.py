@@ -14,7 +14,6 @@ from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.worst_errors import (
     ERROR_NAMES,
     INFINITE_ERRORS,
-    WorstErrors,
     compute_errors,
     find_greatest,
 )
@@ -61,11 +60,10 @@ def test_what_is_no_number_is_no_small_error():
     assert compute_errors(SCENE, lost, answer()) == INFINITE_ERRORS
 
 
-@pytest.mark.parametrize("steps", [250.0, 1000.0])
-def test_a_run_is_read_at_every_step_and_judged_between_them(steps):
+def test_a_run_is_read_at_every_step_and_judged_between_them():
     """The scene's own 40 positions, and 180 more, are fewer than the steps."""
     setup = JudgedSetup(SCENE)
-    trial = setup.try_out(Settings(steps_per_revolution=steps))
+    trial = setup.try_out(Settings(steps_per_revolution=250.0))
     assert trial.steps > 200
     assert trial.readings == trial.steps + 1
 
@@ -115,4 +113,3 @@ def test_the_greatest_deviation_of_the_speed_is_said():
     trial = SimpleNamespace(at=COMMAND._replace(speed=speed))
     found = advise._find_speed_error(Pretended(), trial)  # type: ignore[arg-type]
     assert found == approx(0.05)
-    assert isinstance(INFINITE_ERRORS, WorstErrors)

@@ -12,7 +12,7 @@ import pytest
 from pytest import approx, raises
 
 import fourbar
-from fourbar import Friction, Load, Motion, Sweep, Torsion
+from fourbar import Bar, Friction, Load, Motion, Sweep, Torsion
 from fourbar.cli import status as fourbar_status
 from fourbar.effects.load import Table
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
@@ -1052,9 +1052,7 @@ def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
 
 
 def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(read):
-    parallelogram = fourbar.FourBar(
-        0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2)
-    )
+    parallelogram = fourbar.FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.2))
     scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0))
     solution = fourbar.solve(scene)
     assert {*solution.branch.tolist()} == {1, -1}
@@ -1227,18 +1225,18 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     input_mass, output_mass = (7850.0 * 0.05 * 0.025 * x for x in (1.0, 2.33))
     linkage = fourbar.FourBar(
         2.22,
-        fourbar.Bar(
+        Bar(
             1.0,
             input_mass,
             0.82,
         ),
-        fourbar.Bar(
+        Bar(
             2.06,
             219.95674411,
             10.35,
             (1.6476, math.radians(-18.7352)),
         ),
-        fourbar.Bar(
+        Bar(
             2.33,
             output_mass,
             50.13,

@@ -12,6 +12,7 @@ import pytest
 from pytest import raises
 
 import fourbar
+from fourbar import Motion, Sweep
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import judge_table
@@ -71,9 +72,9 @@ def judged(read):
 
 def commanding(bar, first, last, steps=8):
     """A crank-rocker whose bar `bar` is commanded and driven over a range in deg."""
-    sweep = fourbar.Sweep(math.radians(first), math.radians(last), steps)
+    sweep = Sweep(math.radians(first), math.radians(last), steps)
     names = (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
-    motion = fourbar.Motion(**dict(zip(names, (sweep, 2.0, -1.0), strict=True)))
+    motion = Motion(**dict(zip(names, (sweep, 2.0, -1.0), strict=True)))
     return replace(crank_rocker(motion=motion), drive_bar=bar)
 
 
@@ -120,7 +121,7 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
 
 def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
     """The angles of the output are printed to a hundredth of a degree, twice a turn."""
-    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 24), 10.0))
+    scene = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 24), 10.0))
     right = fourbar.solve(scene)
     off = right.torque * (1.0 + 1e-9 * (np.arange(25) == 7))
     for torque, lines in ((right.torque, []), (off, [9])):
@@ -136,7 +137,7 @@ def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
 
 def test_rows_that_round_to_the_scenes_own_positions_are_at_them(read):
     """A sweep of steps of 20/3 deg, printed to two decimals; 47 deg is none of it."""
-    motion = fourbar.Motion(fourbar.Sweep(0.0, math.radians(120.0), 18), 10.0)
+    motion = Motion(Sweep(0.0, math.radians(120.0), 18), 10.0)
     scene = crank_rocker(motion=motion)
     right = fourbar.solve(scene)
     degrees, torque = np.degrees(right.theta_2)[1::4], right.torque[1::4]
@@ -210,7 +211,7 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
 
 def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    motion = fourbar.Motion(fourbar.Sweep(0.1, 6.1, 20), 5.0)
+    motion = Motion(Sweep(0.1, 6.1, 20), 5.0)
     scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
     angles = np.radians([20.0, 100.0, 200.0, 250.0, 340.0])
     expected = (0.1 + 0.3) * 9.81 * 0.1 * np.cos(angles)
@@ -248,7 +249,7 @@ step torque | needs a column theta_2
 
 
 RISE = fourbar.Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
-SERVO = crank_rocker(motion=fourbar.Motion(law=RISE), title="Servo")
+SERVO = crank_rocker(motion=Motion(law=RISE), title="Servo")
 
 
 def follow_rise(time):
@@ -313,7 +314,7 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read
 @pytest.mark.parametrize("speed, start", [(3.0, 20.0), (-2.0, 80.0)])
 def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
-    scene = crank_rocker(motion=fourbar.Motion(theta.tolist(), speed))
+    scene = crank_rocker(motion=Motion(theta.tolist(), speed))
     time = (theta - math.radians(start)) / speed
     rows = np.transpose([time, fourbar.solve(scene).torque]).tolist()
     text = "\n".join(["time,torque", *(f"{t!r},{number!r}" for t, number in rows)])
@@ -333,7 +334,7 @@ def test_times_that_nobody_rounded_leave_all_digits(times, read):
 
 def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged):
     """The angle by the triangle of O2 and both ends of the cylinder."""
-    motion = fourbar.Motion(stroke=fourbar.Sweep(0.22, 0.28, 4), side="left")
+    motion = Motion(stroke=Sweep(0.22, 0.28, 4), side="left")
     scene = crank_rocker(motion=motion, drive=CYLINDER)
     far, near = (end.distance for _, end in CYLINDER.ends)
     stroke = np.array([0.28, 0.223, 0.25])

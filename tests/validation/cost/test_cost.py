@@ -219,11 +219,6 @@ def test_fit_floor_and_warning():
         "9.0e-07 from 640 steps a revolution on, but for 1.0e-08 at 320, "
         "where two errors cancel"
     )
-    wrong = laws.fit_laws(
-        {"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]}
-    )
-    assert [law.quantity for law in wrong] == list(ERROR_NAMES)
-    assert all(not law.holds and law.decided and "FAILS" in str(law) for law in wrong)
 
 
 JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
@@ -427,23 +422,19 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut():
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
 
 
-def drive_by(drive):
-    """Return the turning crank-rocker driven on a bar, or by a cylinder."""
-    if isinstance(drive, int):
-        return replace(turning(), drive_bar=drive)
-    return replace(turning(), drive=CYLINDER, drive_bar=None)
-
-
-@pytest.mark.parametrize("drive", slow_but({3}, [2, 3, 4, "cylinder"]))
+@pytest.mark.parametrize("drive", slow_but({3}, [2, 3, 4, None]))
 def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
-    """More steps than positions of the scene are judged between the steps as well."""
+    """More steps than positions of the scene are judged between the steps as well.
+
+    The last is driven by a cylinder.
+    """
     step, reading = 2e-6, 3e-5
     monkeypatch.setattr(
         JudgedSetup,
         "make_clocks",
         lambda *_: (lambda count: step * count, lambda count: reading * count),
     )
-    scene = drive_by(drive)
+    scene = replace(turning(), drive_bar=drive, drive=None if drive else CYLINDER)
     settings = replace(BEST, steps_per_revolution=200.0)
     made = work_precision.CostStudy("s", scene, tmp_path)
     (cost_point,) = made._try_spots("c", (Spot("s", settings),), made.setup())
@@ -453,7 +444,6 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     # a torque with poles bends where 200 steps a turn see it too seldom
     ratio = cost_point.errors.worst / cost_point.at_steps.worst
     assert (ratio > 10.0) == (drive != 2)
-    assert trial.readings == trial.steps + 1
     seconds = step * trial.steps + reading * trial.readings
     assert cost_point.seconds_per_revolution == approx(seconds, rel=1e-12)
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Sweep
 from fourbar_validation.compare.answer import explain_refusal
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, programs
@@ -41,15 +42,11 @@ FILE = ROOT / "tests" / "support" / "hostile_class.py"
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 OFF = (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))')
 SCRIPT = ROOT / "tests" / "support" / "plain_engine.mjs"
-TURN = fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0)
+TURN = Motion(Sweep(0.1, 6.38, 8), 10.0)
 SCENE = crank_rocker(motion=TURN, loads=())
-ROCKING = crank_rocker(
-    motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
-)
+ROCKING = crank_rocker(motion=Motion(theta_4=Sweep(1.8, 2.5, 8), omega_4=3.0))
 STROKE = crank_rocker(
-    motion=fourbar.Motion(
-        stroke=fourbar.Sweep(0.2, 0.3, 8), stroke_speed=0.2, side="left"
-    ),
+    motion=Motion(stroke=Sweep(0.2, 0.3, 8), stroke_speed=0.2, side="left"),
     drive=CYLINDER,
 )
 
@@ -169,12 +166,6 @@ PROGRAMS = {
         say("text = text.replace('0.33', '1e400')", SAY),
         "answers.torque, entry ",
     ),
-    "texts": (
-        (TORQUE, '"torque": "1.0"'),
-        "answers.torque, entry 0 = '1.0': must be a finite number or null",
-    ),
-    "booleans": ((TORQUE, '"torque": theta > 2'), "answers.torque, entry 0 = False"),
-    "long integers": ((TORQUE, '"torque": 10**400'), "answers.torque, entry 0 = 1000"),
     "a text in the third pair": (
         ("force.imag)", "force.imag if theta < 1.2 else 'y')"),
         "answers.F12, entry 2 = 'y': must be a finite number or null",
@@ -366,7 +357,7 @@ def test_a_guest_is_asked_for_the_commands_that_its_hello_names(scene):
 
 @pytest.mark.usefixtures("hosted")
 def test_a_guest_is_not_asked_for_what_its_hello_leaves_out(tmp_path):
-    motion = fourbar.Motion(theta_3=fourbar.Sweep(0.4, 0.8, 8), omega_3=3.0)
+    motion = Motion(theta_3=Sweep(0.4, 0.8, 8), omega_3=3.0)
     rows = judged(crank_rocker(motion=motion), "OfAnyBar")["of any bar"]
     assert rows["all"][0] == REFUSES
     loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
@@ -401,7 +392,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     pytest.importorskip("mujoco")
     longest = "fourbar_validation.run.released.LONGEST_TIMESTEP"
     monkeypatch.setattr(longest, 1e-3)  # MuJoCo's here
-    motion = fourbar.Motion(1.0, 2.0, free=fourbar.Free(0.2, 10))
+    motion = Motion(1.0, 2.0, free=fourbar.Free(0.2, 10))
     by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
     released, right = by_engine["releases"], by_engine["right"]
     assert verdicts(released) | verdicts(right) <= {AGREES, DEGRADED}

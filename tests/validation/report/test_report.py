@@ -409,12 +409,6 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     assert "F43 " not in drawn and "allowed to mine" not in drawn
 
 
-def find_cause(*rows, **parts):
-    """Return what is wrong in a scene with these rows, as the report puts it."""
-    (cause,) = summary_of([record_of("a", rows, **parts)]).overview.causes
-    return cause.text
-
-
 RIGHT = [replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")]
 OPEN = replace(
     OF_MINE,
@@ -468,7 +462,9 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
 ):
     """Missing digits are no missing term, and a number beside no answer no reason."""
     right = RIGHT if "agree" in words else []
-    assert find_cause(*wrong, *right, causes={"mine": []}) == words
+    record = record_of("a", [*wrong, *right], causes={"mine": []})
+    (cause,) = summary_of([record]).overview.causes
+    assert cause.text == words
 
 
 def test_what_differs_from_two_engines_is_listed_and_shown_first():

@@ -560,15 +560,6 @@ def with_bars(**bars):
     return replace(SCENE, linkage=replace(SCENE.linkage, **bars))
 
 
-def weigh(name, of_mass, of_inertia):
-    """Return a bar with the mass and the moment of inertia of other ones."""
-    bar, mass, inertia = (
-        getattr(SCENE.linkage, one) for one in (name, of_mass, of_inertia)
-    )
-    stated = {"inertia": inertia.moment_of_inertia, "centre": bar.mass_centre}
-    return replace(bar, mass=mass.mass, **stated)
-
-
 def with_load(*from_pin):
     load = Load(3, (3.0, 0.7), from_pin=from_pin)
     return replace(SCENE, loads=(load,))
@@ -611,17 +602,6 @@ WEIGHTS = tuple(
 RUBBING = Viscous((("A", 0.2),))
 DAMPED = replace(SCENE, effects=(Gravity(), Viscous((("O4", 0.2),))))
 OTHER_SCENES = {
-    "coupler: mass of the input": (
-        SCENE,
-        with_bars(coupler=weigh("coupler", "input", "coupler")),
-    ),
-    "input and output: mass and inertia are exchanged": (
-        SCENE,
-        with_bars(
-            input=weigh("input", "output", "output"),
-            output=weigh("output", "input", "input"),
-        ),
-    ),
     "load 1 (bar 3): its force acts at the second pin of the bar": (
         with_load(0.05, 1.0),
         with_load(SCENE.linkage.coupler.length, 0.0),

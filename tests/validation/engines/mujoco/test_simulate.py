@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Bar, Motion, Sweep
 from fourbar.effects import Place
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
@@ -29,19 +30,19 @@ from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
 from tests.validation.engines.test_engines import commanded
 
-TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
+TURN = Sweep(0.1, 0.1 + 2 * math.pi, 90)
 
 
 DRAG_LINK, DOUBLE_ROCKER, TRIPLE_ROCKER = (
     fourbar.load(MODELS / f"{name}.toml")
     for name in ("drag_link", "double_rocker", "triple_rocker")
 )
-RANGE = fourbar.Sweep(math.radians(86.618), math.radians(363.382), 180)
+RANGE = Sweep(math.radians(86.618), math.radians(363.382), 180)
 SCENES = {
-    "crank-rocker": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0)),
-    "backwards": crank_rocker(motion=fourbar.Motion(TURN, -10.0)),
-    "crossed": crank_rocker(motion=fourbar.Motion(TURN, 10.0, branch=-1)),
-    "drive on bar 4": crank_rocker(motion=fourbar.Motion(TURN, 10.0, 3.0), drive_bar=4),
+    "crank-rocker": crank_rocker(motion=Motion(TURN, 10.0, 5.0)),
+    "backwards": crank_rocker(motion=Motion(TURN, -10.0)),
+    "crossed": crank_rocker(motion=Motion(TURN, 10.0, branch=-1)),
+    "drive on bar 4": crank_rocker(motion=Motion(TURN, 10.0, 3.0), drive_bar=4),
     "drag link": DRAG_LINK,
     "drag link, drive on bar 3": replace(DRAG_LINK, drive_bar=3),
     "double rocker": DOUBLE_ROCKER,
@@ -118,10 +119,10 @@ def test_it_is_run_near_the_requested_positions_and_a_wrong_load_is_seen():
 @pytest.mark.parametrize(
     "motion, reason",
     [
-        (fourbar.Motion(TURN, 0.0), "nothing to simulate"),
-        (fourbar.Motion(TURN), "nothing to simulate"),
-        (fourbar.Motion(1.0, 10.0), "nothing to run through"),
-        (fourbar.Motion(TURN, 1.0, -5.0), "to rest"),
+        (Motion(TURN, 0.0), "nothing to simulate"),
+        (Motion(TURN), "nothing to simulate"),
+        (Motion(1.0, 10.0), "nothing to run through"),
+        (Motion(TURN, 1.0, -5.0), "to rest"),
     ],
 )
 def test_refusals_state_their_reason(motion, reason):
@@ -131,7 +132,7 @@ def test_refusals_state_their_reason(motion, reason):
 
 
 def test_a_change_point_is_a_declared_limit():
-    motion = fourbar.Motion(TURN, 10.0)
+    motion = Motion(TURN, 10.0)
     for lengths, refused in (
         ((0.3, 0.1, 0.3, 0.1), True),
         ((0.1, 0.1, 0.25, 0.25), True),
@@ -149,7 +150,7 @@ def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch):
     evidence = {"force_gap": math.nan}
     monkeypatch.setattr(ResidualMonitor, "evidence", lambda self: evidence)
     monkeypatch.setattr(ClosedLoop, "gap", gap)
-    posed = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.4, 3), 10.0))
+    posed = crank_rocker(motion=Motion(Sweep(0.1, 0.4, 3), 10.0))
     alarms = {alarm.partition(" = ")[0] for alarm in simulate(posed).alarms}
     assert alarms == {"force_gap", "closure_gap"}
 
@@ -164,16 +165,16 @@ def hood(links, output=None):
     """14.5 kg that reach far out on light links, slowly."""
     linkage = fourbar.FourBar(
         0.11,
-        fourbar.Bar(0.10, links),
-        fourbar.Bar(
+        Bar(0.10, links),
+        Bar(
             0.08,
             14.5,
             5.0,
             (1.0, 0.2),
         ),
-        fourbar.Bar(0.12, links if output is None else output),
+        Bar(0.12, links if output is None else output),
     )
-    motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
+    motion = Motion(Sweep(0.8, 1.8, 12), 0.5)
     return fourbar.Scene(
         linkage,
         motion,
@@ -224,7 +225,7 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
 ):
     drive = fourbar.LinearDrive(Place(one, (0.17, -1.1)), Place(other, (0.09, 0.7)))
     scene = crank_rocker(
-        motion=fourbar.Motion(TURN, 10.0, 5.0),
+        motion=Motion(TURN, 10.0, 5.0),
         drive=drive,
         effects=(fourbar.Gravity(),),
     )
@@ -293,7 +294,7 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(
 def test_an_input_that_must_hurry_is_not_led():
     near = fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0]
     angles = float(near) + np.linspace(0.3, 1e-6, 20)
-    motion = fourbar.Motion(theta_4=angles, omega_4=-1.0)
+    motion = Motion(theta_4=angles, omega_4=-1.0)
     refused = [row for row in judged(crank_rocker(motion=motion)) if not row.compared]
     assert any("as fast as on the mean" in row.reason for row in refused)
 
@@ -314,7 +315,7 @@ def test_error_falls_with_the_fourth_power_of_the_timestep():
 
     The softness stays what it is.
     """
-    posed = crank_rocker(motion=fourbar.Motion(TURN, 10.0))
+    posed = crank_rocker(motion=Motion(TURN, 10.0))
 
     def error(answer):
         right = fourbar.solve(posed, at=answer.at).F43

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from pytest import approx
+from scipy.optimize import bisect
 
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
@@ -110,14 +111,12 @@ def ask_again(inside, theta_2, alpha_2):
             more[column] += 1e-3
             slopes[:, column] = (accelerate(more) - wanted + left) / 1e-3
         forces += np.linalg.solve(slopes, left)
-    low, high = forces[0] - 0.1, forces[0] + 0.1
-    for _ in range(60):
-        forces[0] = 0.5 * (low + high)
-        if accelerate(forces)[0] < wanted[0]:
-            low = forces[0]
-        else:
-            high = forces[0]
-    return float(sense * forces[0])
+
+    def miss(couple):
+        forces[0] = couple
+        return accelerate(forces)[0] - wanted[0]
+
+    return sense * bisect(miss, forces[0] - 0.1, forces[0] + 0.1, xtol=1e-15)
 
 
 @pytest.mark.slow
