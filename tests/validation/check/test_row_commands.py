@@ -220,11 +220,11 @@ def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
 
 @pytest.mark.parametrize(
     "name, commanded, angle",
-    [
-        ("Angle", "theta_4", "theta_4"),
-        ("Angle", "theta_2", "theta_2"),
-        ("output angle", "theta_2", "theta_4"),
-    ],
+    read_rows("""
+Angle | theta_4 | theta_4
+Angle | theta_2 | theta_2
+output angle | theta_2 | theta_4
+"""),
 )
 def test_the_word_angle_means_what_the_scene_commands(name, commanded, angle, read):
     assert read(f"{name} [deg],torque\n100,1.0\n", commanded).found_by == angle

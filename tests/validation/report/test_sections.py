@@ -22,6 +22,7 @@ from fourbar_validation.report.sections import (
 from fourbar_validation.report.templating import count_or_size
 from fourbar_validation.scenes.hard_families import HARD_FAMILIES, Hard
 from tests.support.here import summary_of
+from tests.support.rows import read_rows
 from tests.support.runs import changed
 from tests.validation.report.test_report import demo, report
 
@@ -101,13 +102,13 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path):
 
 @pytest.mark.parametrize(
     "value, text",
-    [
-        (628.0, "628"),
-        (0.0, "0"),
-        (0.125, "0.125"),
-        (3.1e-9, "3.10e-09"),
-        (1.5e7, "1.50e+07"),
-    ],
+    read_rows("""
+628 | 628
+0 | 0
+0.125 | 0.125
+3.1e-09 | 3.10e-09
+1.5e7 | 1.50e+07
+"""),
 )
 def test_what_is_counted_is_written_for_people(value, text):
-    assert count_or_size(value) == text
+    assert count_or_size(float(value)) == text

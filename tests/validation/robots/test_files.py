@@ -223,22 +223,22 @@ def test_a_plugin_is_left_out_and_said(tmp_path, inertial):
 
 @pytest.mark.parametrize(
     "before, text",
-    [
-        ("", '<geom type="sphere"size=".1"/>'),
-        ("", "<geom type='sphere'size='.1'/>"),
-        ("", '<geom type="sphere" size=".1" name="a & b"/>'),
-        ("", '<geom type="sphere" size=".1" name="a&foo;b"/>'),
-        ("", '<geom type="sphere" size=".1" name="a<b"/>'),
-        ("", '<geom type="sphere" size=".1"/>\x01'),
-        ("", '<!-- a -- b --><geom type="sphere" size=".1"/>'),
-        ("  <?xml version='1.0'?>\n", '<geom size=".1"/>'),
-        ("<?xml version=1.0?><?xml version='1.0'?>", '<geom size=".1"/>'),
-        ("a robot ", '<geom size=".1"/>'),
-    ],
+    read_rows(r"""
+ | <geom type="sphere"size=".1"/>
+ | <geom type='sphere'size='.1'/>
+ | <geom type="sphere" size=".1" name="a & b"/>
+ | <geom type="sphere" size=".1" name="a&foo;b"/>
+ | <geom type="sphere" size=".1" name="a<b"/>
+ | <geom type="sphere" size=".1"/>\x01
+ | <!-- a -- b --><geom type="sphere" size=".1"/>
+\x20\x20<?xml version='1.0'?>\n | <geom size=".1"/>
+<?xml version=1.0?><?xml version='1.0'?> | <geom size=".1"/>
+a robot\x20 | <geom size=".1"/>
+"""),
 )
 def test_what_mujoco_reads_is_read(tmp_path, before, text):
     inside = f"<worldbody><body><joint/>{text}</body></worldbody>"
-    written = f"{before}<mujoco>{inside}</mujoco>"
+    written = f"{before}<mujoco>{inside}</mujoco>".encode().decode("unicode_escape")
     of_mujoco = mujoco.MjModel.from_xml_string(written)
     path = tmp_path / "robot.xml"
     path.write_text(written)

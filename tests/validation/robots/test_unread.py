@@ -3,19 +3,16 @@
 import fourbar
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.robots.unread import list_unread
+from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
 GENERATED = write_mjcf(fourbar.load(ROOT / "models" / "crank_rocker.toml"))
-UNREAD = [
-    (
-        'joint name="O4"',
-        'joint name="O4" actuatorfrcrange="-1 1"',
-        "joint actuatorfrcrange",
-    ),
-    ('island="disable"', 'island="disable" eulerdamp="disable"', "flag eulerdamp"),
-    ("<statistic ", '<statistic meaninertia="2" ', "statistic meaninertia"),
-    ("</worldbody>", "</worldbody><deformable/>", "deformable"),
-]
+UNREAD = read_rows("""
+joint name="O4" | joint name="O4" actuatorfrcrange="-1 1" | joint actuatorfrcrange
+island="disable" | island="disable" eulerdamp="disable" | flag eulerdamp
+<statistic | <statistic meaninertia="2" | statistic meaninertia
+</worldbody> | </worldbody><deformable/> | deformable
+""")
 
 
 def test_what_the_check_does_not_know_is_named_as_not_looked_at():

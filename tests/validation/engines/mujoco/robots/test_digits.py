@@ -21,6 +21,7 @@ from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
 from tests.support.robots import FOOT_PARALLELOGRAM, file_of, measure, rotation
+from tests.support.rows import read_rows
 from tests.support.shares import slow_but
 
 ANCHOR = 'anchor="-0.06 0 0"'
@@ -71,20 +72,20 @@ def list_equal(made):
 
 
 @pytest.mark.parametrize(
-    "vector, rounding",
-    [
-        ((-0.055821, 0.0, 0.022), 5e-7 * math.sqrt(2.0)),
-        ((0.982434, 0.0, 0.18661, 0.0), 5e-7 * math.sqrt(2.0)),
-        ((12.3456,), 5e-5),
-        ((1.23456e-05,), 5e-11),
-        ((0.0, 0.0, 0.15), 5e-3),
-        ((0.0, 0.0, 0.0), 0.0),
-    ],
+    "text, half",
+    read_rows("""
+-0.055821 0 0.022 | 5e-7
+0.982434 0 0.18661 0 | 5e-7
+12.3456 | 5e-5
+1.23456e-05 | 5e-11
+0 0 0.15 | 5e-3
+0 0 0 | 5e-1
+"""),
 )
-def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(
-    vector, rounding
-):
-    assert find_rounding(vector) == approx(rounding, rel=1e-12)
+def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(text, half):
+    vector = [float(number) for number in text.split()]
+    rounding = float(half) * math.sqrt(np.count_nonzero(vector))
+    assert find_rounding(tuple(vector)) == approx(rounding, rel=1e-12)
 
 
 @pytest.mark.parametrize(

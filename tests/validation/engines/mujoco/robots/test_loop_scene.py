@@ -22,6 +22,7 @@ from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from tests.support.robots import Planar, file_of
+from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
 MODELS = ROOT / "models" / "robots"
@@ -264,21 +265,13 @@ def test_armature_between_moving_bars_is_named_with_its_size():
 
 @pytest.mark.parametrize(
     "tendon, actuator, named",
-    [
-        ('armature="0.02"', "", "the tendon T (armature 0.02)"),
-        (
-            'stiffness="3" damping="0 1 2"',
-            "",
-            "the tendon T (stiffness 3, damping 0 1 2)",
-        ),
-        (
-            "",
-            '<general name="pull" tendon="T" biastype="affine" biasprm="5 0 0"'
-            ' gainprm="0"/>',
-            "the actuator pull",
-        ),
-        ("", '<motor name="pull" tendon="T"/>', ""),
-    ],
+    read_rows("""
+armature="0.02" |  | the tendon T (armature 0.02)
+stiffness="3" damping="0 1 2" |  | the tendon T (stiffness 3, damping 0 1 2)
+ | <general name="pull" tendon="T" biastype="affine" biasprm="5 0 0" gainprm="0"/> | \
+the actuator pull
+ | <motor name="pull" tendon="T"/> |
+"""),
 )
 def test_what_acts_along_a_tendon_is_named(tendon, actuator, named):
     over = '<joint joint="O2" coef="1"/><joint joint="O4" coef="-1"/>'
