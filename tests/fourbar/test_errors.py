@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from fourbar.errors import InputError
+from fourbar import InputError
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 from pytest import raises
 
 import fourbar
-from fourbar import Point, solve
-from fourbar.errors import InputError
+from fourbar import InputError, Point, solve
 from fourbar.solution import unwrap
 from tests.support.scenes import crank_rocker
 

@@ -3,10 +3,10 @@
 Where the status is ok every requested quantity is a number.
 """
 
-import math
 import warnings
 from dataclasses import replace
 from functools import partial
+from math import isfinite, pi
 
 import numpy as np
 import pytest
@@ -14,28 +14,31 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pytest import approx, raises
 
-from fourbar import Bar, FourBar, uniform
-from fourbar.effects import (
+from fourbar import (
+    Bar,
+    FourBar,
     Friction,
     Gravity,
+    InputError,
     LinearDrive,
     Load,
+    Motion,
     PinFriction,
     Place,
+    Point,
+    Scene,
     Spring,
     Springs,
+    Sweep,
     Torsion,
     Viscous,
+    solve,
+    uniform,
 )
-from fourbar.errors import InputError
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
-from fourbar.scene import Scene
-from fourbar.scene.motion import Motion, Sweep
-from fourbar.scene.numbers import Point
 from fourbar.show.plot import draw
-from fourbar.solving import solve
 from tests.support.scenes import bare, crank_rocker
 
 EXAMPLES = settings(
@@ -80,7 +83,7 @@ numbers = st.builds(
     lambda sign, size: sign * size, st.sampled_from([1.0, -1.0]), magnitudes
 ) | st.floats(-10.0, 10.0)
 sizes = magnitudes | st.floats(0.0, 10.0)
-angles = st.floats(-7.0, 7.0) | st.sampled_from([0.0, math.pi, math.pi / 2]) | numbers
+angles = st.floats(-7.0, 7.0) | st.sampled_from([0.0, pi, pi / 2]) | numbers
 pairs = st.tuples(numbers, angles)
 per_pin = st.dictionaries(st.sampled_from(list(PINS)), sizes, min_size=1)
 
@@ -110,9 +113,7 @@ def linkages(draw):
     bars = []
     for length in lengths[1:]:
         mass, inertia = draw(sizes), draw(st.none() | sizes)
-        if inertia is None and not math.isfinite(
-            mass * scale * length * scale * length
-        ):
+        if inertia is None and not isfinite(mass * scale * length * scale * length):
             inertia = 0.0
         bars.append(Bar(scale * length, mass, inertia, draw(st.none() | pairs)))
     return FourBar(scale * lengths[0], *bars, draw(st.just(0.0) | st.floats(-7.0, 7.0)))
@@ -164,7 +165,7 @@ def scenes(draw):
     theta_2 = linkage.ground_angle + np.array(
         draw(st.lists(angles, min_size=1, max_size=4))
     )
-    omega_2 = draw(numbers.filter(lambda omega: math.isfinite(omega * omega)))
+    omega_2 = draw(numbers.filter(lambda omega: isfinite(omega * omega)))
     motion = Motion(theta_2, omega_2, draw(numbers), draw(st.sampled_from([1, -1])))
     return Scene(
         linkage,

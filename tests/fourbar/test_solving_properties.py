@@ -3,16 +3,29 @@
 Thirteen equations and a loop closed by a quadratic share nothing with the formulas.
 """
 
-import math
 from dataclasses import replace
 from itertools import combinations, cycle, product
+from math import tau
 
 import numpy as np
 import pytest
 
-import fourbar
-from fourbar import Load, Motion, Spring, solve
-from fourbar.effects import Place, Table
+from fourbar import (
+    Flywheel,
+    Friction,
+    Gravity,
+    LinearDrive,
+    Load,
+    Motion,
+    Place,
+    PointDrive,
+    Scene,
+    Spring,
+    Springs,
+    Table,
+    Viscous,
+    solve,
+)
 from fourbar.formulas.mobility import choose_range, limit_positions
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import (
@@ -74,7 +87,7 @@ BODIES = [
 ]
 """Mass, inertia and centre of bars 2, 3 and 4."""
 ON_3 = Place(3, (0.08, 0.2))
-FACTORS = Table((0.0, 2.0, 5.0, math.tau), (1.0, 3.0, -1.0, 1.0))
+FACTORS = Table((0.0, 2.0, 5.0, tau), (1.0, 3.0, -1.0, 1.0))
 ACTING = [
     ((), ()),
     (
@@ -83,16 +96,16 @@ ACTING = [
             Load(3, (2.0, 0.3), from_centre=(0.1, 2.0), moment=0.4, frame="bar"),
             Load(4, (1.0, 0.9), moment=-0.3),
         ),
-        (fourbar.Gravity(), fourbar.Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1)),
+        (Gravity(), Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1)),
     ),
     (
         (Load(3, (2.0, 0.3), arm=(0.1, 2.0), moment=0.4, table=FACTORS),),
-        (fourbar.Friction.at(O2=0.1, B=0.3), fourbar.Flywheel(0.02, 4)),
+        (Friction.at(O2=0.1, B=0.3), Flywheel(0.02, 4)),
     ),
     (
         (Load(4, (2.0, 0.3), from_pin=(0.1, 2.0), frame="bar"),),
         (
-            fourbar.Springs(
+            Springs(
                 (
                     Spring(Place(1, (0.2, 0.3)), Place(4, (0.15, 0.2)), 300.0, 0.05),
                     Spring(Place(1, (0.1, -1.5)), ON_3, 200.0, 0.05, 3.0),
@@ -102,15 +115,15 @@ ACTING = [
             ),
         ),
     ),
-    ((), (fourbar.Gravity(9.81, 0.4), fourbar.Flywheel(0.02, 2))),
+    ((), (Gravity(9.81, 0.4), Flywheel(0.02, 2))),
 ]
 """Loads and effects."""
 LINES = [
-    fourbar.LinearDrive(Place(i, (0.17, -1.1)), Place(j, (0.09, 0.7)))
+    LinearDrive(Place(i, (0.17, -1.1)), Place(j, (0.09, 0.7)))
     for i, j in combinations((1, 2, 3, 4), 2)
 ]
 PUSHES = [
-    fourbar.PointDrive(Place(bar, (0.15, 0.3)), 1.1, frame)
+    PointDrive(Place(bar, (0.15, 0.3)), 1.1, frame)
     for bar, frame in product(MOVING_BARS, ("world", "bar"))
 ]
 
@@ -134,7 +147,7 @@ def make_scenes():
         driven = {"drive_bar": drive} if isinstance(drive, int) else {"drive": drive}
         yield (
             f"{name}, bar {bar}, {branch}",
-            fourbar.Scene(
+            Scene(
                 FourBar(linkage.ground, *moving, linkage.ground_angle),
                 Motion(**{f"theta_{bar}": angles}, **rates),
                 loads=loads,
@@ -154,7 +167,7 @@ SCENES = dict(make_scenes()) | {
 }
 STROKE = FAULT_SCENES["stroke"]
 SCENES["a stroke from the bar"] = replace(
-    STROKE, drive=fourbar.LinearDrive(STROKE.drive.end, STROKE.drive.start)
+    STROKE, drive=LinearDrive(STROKE.drive.end, STROKE.drive.start)
 )
 
 
@@ -192,7 +205,7 @@ def test_every_quantity_is_that_of_balls(name):
     for quantity in compared:
         apart = s[quantity] - exact[quantity]
         if quantity.startswith("theta"):  # balls have no whole turns
-            apart = np.remainder(apart + np.pi, math.tau) - np.pi
+            apart = np.remainder(apart + np.pi, tau) - np.pi
         apart, size = (
             np.hypot(*values.T) if values.ndim > 1 else np.abs(values)
             for values in (apart, exact[quantity])

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import math
 import os
 import re
 import shlex
@@ -20,11 +19,10 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Motion, solve
+from fourbar import Motion, load, save, solve
 from fourbar.cli import group, status
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.evaluation.case import Case
-from fourbar.files import load, save
 from fourbar.mjcf import list_defaults, make_scene
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.document import write_mjcf_for
@@ -273,7 +271,7 @@ def test_classify_says_what_turns_and_how_far(run):
 
     def angle(opposite, first, second):
         cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
-        return math.degrees(math.acos(cosine))
+        return degrees(acos(cosine))
 
     d, a, b, c = map(float, LENGTHS)
     text = run("classify", *LENGTHS)[1]
@@ -654,7 +652,7 @@ def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
     _, out, _ = run("analyze", "scene.toml", "--at", "theta_4=max")
     assert re.search(rf"bar 4 +{limit:.4f} ", out)
     _, out, _ = run("analyze", CRANK_ROCKER, "--at", "t=0.1 s")
-    assert f"at theta_2 = {math.degrees(1.0):.6g} deg" in out
+    assert f"at theta_2 = {degrees(1.0):.6g} deg" in out
 
 
 def test_a_value_that_no_position_has_leaves_the_others(run):

@@ -20,6 +20,8 @@ from pathlib import Path
 import pytest
 from pytest import raises
 
+from fourbar import InputError
+
 pytest.importorskip(
     "tornado",
     reason="the workbench is served by tornado: pip install tornado",
@@ -39,7 +41,6 @@ from fourbar.edit.server import (
     Workbench,
 )
 from fourbar.edit.session import Session
-from fourbar.errors import InputError
 from tests.support.rows import read_rows
 
 CRANK_ROCKER = Path(__file__).parents[3] / "models" / "crank_rocker.toml"

@@ -4,11 +4,10 @@ From an empty scene to a saved file, numbers equal to `analyze`'s.
 """
 
 import json
-import math
 import subprocess
 import sys
 import time
-from math import hypot
+from math import acos, cos, degrees, hypot, remainder, sin
 from pathlib import Path
 
 import numpy as np
@@ -228,7 +227,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(page, path):
     cells = page.all("#positions tbody tr:nth-child(4) td")
     cells[2].click()
     assert page.value("row") == 30
-    assert page.text("theta-text") == f"{math.degrees(solution.theta_2[30]):.2f}°"
+    assert page.text("theta-text") == f"{degrees(solution.theta_2[30]):.2f}°"
     page.is_quiet()
 
 
@@ -252,7 +251,7 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, 
         "const {pixels} = gridOf(), [x, y] = snapped({clientX: 300, clientY: 300});"
         " return [x - sketch.origin[0], y - sketch.origin[1], pixels]"
     )
-    assert abs(math.remainder(x, pixel)) + abs(math.remainder(y, pixel)) < 1e-6
+    assert abs(remainder(x, pixel)) + abs(remainder(y, pixel)) < 1e-6
     pixels = {"O2": (120, 300), "A": (170, 220), "B": (400, 120), "O4": (380, 330)}
     page.click_pins("50 in", *pixels.values())
     scale = 50.0 / page.element("picture").size["width"]
@@ -591,8 +590,8 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(page, path):
         d, a, b, c = page.value("data.lengths")
         middles = []
         for reach, along in ((b + a, a + 0.5 * b), (b - a, 0.5 * b - a)):
-            angle = math.acos((d * d + reach * reach - c * c) / (2.0 * d * reach))
-            middles.append((along * math.cos(angle), along * math.sin(angle)))
+            angle = acos((d * d + reach * reach - c * c) / (2.0 * d * reach))
+            middles.append((along * cos(angle), along * sin(angle)))
         return sorted(middles)
 
     before = find_dead_centres()

@@ -1,22 +1,24 @@
 """The effects' formulas against potentials, exact arithmetic and limiting cases."""
 
-import math
-from math import pi, tau
+from math import acos, pi, tau
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar.effects import (
+from fourbar import (
     Flywheel,
+    Free,
     Friction,
     Load,
+    Motion,
     PinFriction,
     Place,
     Spring,
     Table,
     Torsion,
+    solve,
+    uniform,
 )
 from fourbar.effects.pin_friction import (
     MANY,
@@ -28,8 +30,6 @@ from fourbar.effects.pin_friction import (
 from fourbar.errors import InputError, LimitError
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Motion
-from fourbar.solving import solve
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
@@ -101,7 +101,7 @@ def test_jamming_is_a_status_and_leaves_no_force():
 
 
 def test_pin_load_friction_needs_the_pin_forces():
-    motion = Motion(1.0, 0.0, free=fourbar.Free(1.0, 10))
+    motion = Motion(1.0, 0.0, free=Free(1.0, 10))
     friction = PinFriction.at(A=(0.1, 0.01))
     with raises(LimitError, match="pin forces"):
         solve(crank_rocker(motion=motion, effects=(friction,)))
@@ -126,11 +126,11 @@ def test_breaks_change_their_sign_where_forces_jump_or_bend():
     lengths = 0.3, 0.1, 0.25, 0.22
     d, a, b, c = lengths
     places["O4"] = [
-        turned + math.acos((r * r + d * d - c * c) / (2.0 * r * d))
+        turned + acos((r * r + d * d - c * c) / (2.0 * r * d))
         for r, turned in ((b + a, 0.0), (b - a, pi))
     ]
     friction = Friction.at(O4=0.1)
-    scene = Scene(fourbar.uniform(*lengths), loads=(load,), effects=(friction,))
+    scene = Scene(uniform(*lengths), loads=(load,), effects=(friction,))
     angles = np.linspace(0.0, 2.0 * tau, 1009)
     branch = np.ones(len(angles), dtype=np.int8)
     for speed in (3.0, -3.0):

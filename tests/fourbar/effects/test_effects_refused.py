@@ -3,7 +3,7 @@
 import pytest
 from pytest import raises
 
-from fourbar.errors import InputError
+from fourbar import InputError
 from fourbar.files import loads
 from tests.support.rows import read_rows
 from tests.support.texts import EVERY_PLACE, HELD, LINE_DRIVEN

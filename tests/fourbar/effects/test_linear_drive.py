@@ -12,11 +12,21 @@ import pytest
 from numpy.testing import assert_allclose
 from pytest import approx, raises
 
-import fourbar
-from fourbar import InputError, LinearDrive, Motion, Scene, solve, uniform
-from fourbar.effects import Place
+from fourbar import (
+    Friction,
+    FromLimit,
+    Gravity,
+    InputError,
+    LinearDrive,
+    Motion,
+    Place,
+    Scene,
+    dump,
+    solve,
+    uniform,
+    vary,
+)
 from fourbar.files.scene_file import loads
-from fourbar.files.scene_text import dump
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
@@ -60,8 +70,8 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar, end_bar
 ):
     """At rest forces grow without end only for a line to bar 2, without lever there."""
-    link, near = uniform(0.2, 0.48, 0.55, 0.2), fourbar.FromLimit(1, 1e-10)
-    drive, gravity = ends(start_bar, end_bar), (fourbar.Gravity(),)
+    link, near = uniform(0.2, 0.48, 0.55, 0.2), FromLimit(1, 1e-10)
+    drive, gravity = ends(start_bar, end_bar), (Gravity(),)
     scene = Scene(link, Motion(near, 0.0), effects=gravity, drive=drive)
     s = solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
@@ -148,7 +158,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
         InputError,
         match=r"drive\.from\.bar = .*same for every member",
     ):
-        fourbar.vary(scene, {"drive.from.bar": [2]})
+        vary(scene, {"drive.from.bar": [2]})
 
 
 @pytest.mark.parametrize("start_bar, end_bar", PAIRS)
@@ -156,7 +166,7 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     motion = Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
     scene = driven(start_bar, end_bar, motion=motion)
     speeds = solve(scene).stroke_speed / 10.0
-    held = (*scene.effects, fourbar.Friction.at(O2=0.05))
+    held = (*scene.effects, Friction.at(O2=0.05))
     rest = solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))
     width = rest.drive_force_high - rest.drive_force_low
     assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)

@@ -7,9 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pytest import approx, raises
 
-from fourbar import Point, Spring, solve
-from fourbar.effects import Load, Place
-from fourbar.errors import InputError
+from fourbar import InputError, Load, Place, Point, Spring, solve
 from fourbar.files import loads
 from tests.support.scenes import crank_rocker
 from tests.support.texts import HUNG, PULL

@@ -1,14 +1,12 @@
 """A force at a point as the drive: its size, its pin forces, how a file states it."""
 
-import math
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 from pytest import approx
 
-import fourbar
-from fourbar import Motion, Point, solve
-from fourbar.effects import Place, PointDrive
+from fourbar import Motion, Place, Point, PointDrive, solve, vary
 from fourbar.files import dump, loads
 from tests.support.scenes import crank_rocker
 from tests.support.texts import HELD
@@ -33,10 +31,10 @@ def test_where_the_point_moves_across_the_direction_there_is_no_lever():
 def test_a_study_and_a_file_carry_it():
     scene = loads(HELD)
     assert loads(dump(scene)) == scene
-    keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
-    varied = solve(fourbar.vary(scene, keys))
+    keys = {"drive.direction": [pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
+    varied = solve(vary(scene, keys))
     handle = Point("handle", 2, (0.1, 0.0))
-    for k, direction in enumerate((math.pi / 2, 1.2)):
+    for k, direction in enumerate((pi / 2, 1.2)):
         one = replace(
             scene,
             drive=replace(scene.drive, direction=direction),

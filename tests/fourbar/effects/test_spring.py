@@ -9,14 +9,20 @@ from math import pi
 import numpy as np
 import pytest
 
-from fourbar import uniform
-from fourbar.effects import PinFriction, Place, Spring, Springs, Torsion
+from fourbar import (
+    Motion,
+    PinFriction,
+    Place,
+    Scene,
+    Spring,
+    Springs,
+    Torsion,
+    solve,
+    uniform,
+)
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
 from fourbar.quantities import CHANGE_POINT, WOUND
-from fourbar.scene import Scene
-from fourbar.scene.motion import Motion
-from fourbar.solving import solve
 from fourbar_validation.run.judge import judge
 from tests.support.rows import read_rows
 from tests.support.shares import slow_but

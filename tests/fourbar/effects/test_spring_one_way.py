@@ -4,9 +4,8 @@ The torque is the slope of the energy over the angle, and a released motion cons
 it: nothing of the formulas is used.
 """
 
-import math
 from dataclasses import replace
-from math import radians, sqrt
+from math import degrees, isnan, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -14,10 +13,16 @@ from numpy.testing import assert_allclose
 from pytest import approx
 from scipy.integrate import quad
 
-import fourbar
-from fourbar import Motion, Springs, equilibrium, solve
-from fourbar.effects import Place, Spring
-from fourbar.errors import InputError
+from fourbar import (
+    InputError,
+    Motion,
+    Place,
+    Spring,
+    Springs,
+    equilibrium,
+    sensitivity,
+    solve,
+)
 from fourbar.files import loads
 from tests.support.scenes import crank_rocker
 
@@ -120,9 +125,7 @@ def test_a_door_without_other_forces_is_free_beyond_the_springs_length():
 def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
     found = equilibrium(make_door(sweep, "")).found
-    assert [math.degrees(one.place.theta_2) for one in found] == approx(
-        [80.88], abs=5e-3
-    )
+    assert [degrees(one.place.theta_2) for one in found] == approx([80.88], abs=5e-3)
     assert equilibrium(make_door(sweep)).found == ()
 
 
@@ -160,15 +163,15 @@ def test_where_its_ends_meet_a_spring_that_only_pulls_is_off():
 
 def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
     """The distance of the ends is 2 r sin(half the angle between them)."""
-    off = 0.2 * math.sin(0.5)
+    off = 0.2 * sin(0.5)
     scene = crank_rocker(
         motion=Motion([1.4, 1.7, 2.0], 0.0),
         effects=(Springs((Spring(*ENDS, 200.0, off, acts="pull"),)),),
     )
-    slopes = fourbar.sensitivity(scene)
+    slopes = sensitivity(scene)
     assert slopes.status == ["ok", "at_free_length", "ok"]
     by_length = slopes.of("torque", "effects.springs.0.length")
-    assert by_length[0] == 0.0 and math.isnan(by_length[1]) and by_length[2] != 0.0
+    assert by_length[0] == 0.0 and isnan(by_length[1]) and by_length[2] != 0.0
 
 
 @pytest.mark.parametrize(

@@ -7,22 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fourbar
-from fourbar import solve, uniform
-from fourbar.effects import (
+from fourbar import (
+    Bar,
+    FourBar,
     Gravity,
     Load,
+    Motion,
     Place,
+    Scene,
     Spring,
     Springs,
     Table,
     Torsion,
+    command,
+    limit_positions,
+    solve,
+    uniform,
 )
 from fourbar.formulas import longer
-from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Scene, command
-from fourbar.scene.motion import Motion
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_lab.stability import judge_samples
@@ -68,7 +71,7 @@ def near_a_limit(effect):
     directions of bars 3 and 4, which are nearly in line.
     """
     linkage = FourBar(0.3, Bar(0.25), Bar(0.1), Bar(0.22))
-    limit = fourbar.limit_positions(linkage)[0].theta_2
+    limit = limit_positions(linkage)[0].theta_2
     angles = limit + np.sign(1.0 - limit) * 10.0 ** -np.arange(2.0, 9.0)
     return Scene(linkage, Motion(angles, 1.0), effects=(effect,))
 

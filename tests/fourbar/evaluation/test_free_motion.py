@@ -1,35 +1,38 @@
 """Free motion against exact solutions and free bodies."""
 
-import math
 import pickle
 import re
 from dataclasses import replace
-from math import pi
+from math import acos, pi, radians
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 from scipy.optimize import brentq
 
-import fourbar
 from fourbar import (
     Bar,
     Flywheel,
     FourBar,
+    FourBarError,
+    Free,
     Friction,
     Gravity,
+    InputError,
     Load,
     Motion,
     Place,
     Scene,
+    Spring,
     Springs,
+    Torsion,
     release,
+    solve,
 )
 from fourbar.errors import LimitError
 from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import release_at
 from fourbar.scene import Command
-from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from tests.support.scenes import bare
 
@@ -43,7 +46,7 @@ DOWN = Gravity()
 
 
 def let_go(theta_2, omega_2, duration, steps, *effects, linkage=HANGING):
-    motion = Motion(theta_2, omega_2, free=fourbar.Free(duration, steps))
+    motion = Motion(theta_2, omega_2, free=Free(duration, steps))
     return Scene(linkage, motion, effects=effects)
 
 
@@ -77,7 +80,7 @@ ROCKER = FourBar(0.3, Bar(0.25, 0.7), Bar(0.1, 1.3), Bar(0.22, 0.9))
 """A double rocker; released at rest at 50 deg, open, it swings through limit positions
 of its input.
 """
-SWING = let_go(math.radians(50.0), 0.0, 1.2, 120, DOWN, linkage=ROCKER)
+SWING = let_go(radians(50.0), 0.0, 1.2, 120, DOWN, linkage=ROCKER)
 PINS = ("F12", "F32", "F43", "F14")
 BY_FREE_BODIES = 1e-12
 """Of the largest force, at one metre of a torque: an angle of bar 4 in doubles, and a
@@ -93,7 +96,7 @@ system of 13 equations whose condition is below 1e4.
     ],
 )
 def test_what_is_not_released_is_refused(motion, says):
-    with raises(fourbar.InputError, match=says):
+    with raises(InputError, match=says):
         release(replace(SWING, motion=motion))
 
 
@@ -103,12 +106,12 @@ def test_what_has_no_inertia_at_a_dead_centre_is_named_with_its_place():
     Bars 2 and 3 are in line, and B is at 0.25 m - 0.1 m from O2.
     """
     linkage = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22, 2.0))
-    dead = pi + math.acos((0.3**2 + 0.15**2 - 0.22**2) / (2.0 * 0.3 * 0.15))
-    falling = let_go(math.radians(100.0), 0.0, 0.5, 100, DOWN, linkage=linkage)
-    with raises(fourbar.FourBarError, match="give each bar its mass") as stopped:
+    dead = pi + acos((0.3**2 + 0.15**2 - 0.22**2) / (2.0 * 0.3 * 0.15))
+    falling = let_go(radians(100.0), 0.0, 0.5, 100, DOWN, linkage=linkage)
+    with raises(FourBarError, match="give each bar its mass") as stopped:
         release(falling)
     angle = float(re.search(r"theta_2 = ([0-9.]+) deg", str(stopped.value))[1])
-    assert math.radians(angle) == approx(dead, abs=1e-3)
+    assert radians(angle) == approx(dead, abs=1e-3)
 
 
 LEAST_SINE = 1e-2
@@ -180,7 +183,7 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
     The integration would never end.
     """
     ends = Place(3, (0.25, 0.0)), Place(4, (0.22, 0.0))
-    on_B = fourbar.Spring(*ends, 200.0, 0.05, preload)
+    on_B = Spring(*ends, 200.0, 0.05, preload)
     with raises(LimitError, match="springs: two points coincide"):
         release(let_go(0.5, 0.0, 1.0, 50, DOWN, Springs((on_B,))))
     proportional = replace(on_B, length=0.0, preload=0.0)  # pulls with 0 there
@@ -209,7 +212,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
 
 @pytest.mark.slow
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
-    spring = fourbar.Torsion.at(O2=(0.01, 0.5, 0.0))
+    spring = Torsion.at(O2=(0.01, 0.5, 0.0))
     still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)
     assert len(release(still).command.time) == 5
     wound = r"effects\.torsion: at 0.*more than half a turn"

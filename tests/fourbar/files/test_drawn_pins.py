@@ -1,16 +1,22 @@
 """A scene as it is drawn: lengths and back, places, words, and what is refused."""
 
-import math
 import os
-from math import hypot, pi
+from math import atan2, hypot, pi, remainder, tau
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import Motion, Scene, from_pins, solve
-from fourbar.errors import InputError
+from fourbar import (
+    InputError,
+    Motion,
+    Scene,
+    circuits,
+    command,
+    from_pins,
+    solve,
+    uniform,
+)
 from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
@@ -197,8 +203,8 @@ def test_the_default_sweep_holds_the_drawn_position():
 
     The one in which it is drawn.
     """
-    linkage = fourbar.uniform(3.0, 2.5, 2.0, 1.0)
-    assert len(fourbar.circuits(linkage)) == 2
+    linkage = uniform(3.0, 2.5, 2.0, 1.0)
+    assert len(circuits(linkage)) == 2
     for theta_4 in (0.5 * pi, -0.5 * pi):
         here = solve(Scene(linkage, Motion(theta_4=theta_4)))
         A, B = (tuple(pin[0].tolist()) for pin in (here.A, here.B))
@@ -208,9 +214,9 @@ def test_the_default_sweep_holds_the_drawn_position():
             Motion(branch=scene.motion.branch),
             drawing=scene.drawing,
         )
-        angles = fourbar.command(sweep).angle
+        angles = command(sweep).angle
         middle = 0.5 * (angles[0] + angles[-1])
-        away = math.remainder(scene.motion.theta_2 - middle, math.tau)
+        away = remainder(scene.motion.theta_2 - middle, tau)
         assert abs(away) < 0.5 * (angles[-1] - angles[0])
 
 
@@ -267,7 +273,7 @@ def test_a_ground_by_coordinates_and_a_place_drawn_on_it():
     assert here.drive_force == approx(50e3 / ratio, rel=1e-8)
     assert loads(dump(scene)) == scene
     assert scene.linkage.lengths == (hypot(0.12, 0.07), 0.455, 0.124, 0.57)
-    assert scene.linkage.ground_angle == math.atan2(-0.07, -0.12)
+    assert scene.linkage.ground_angle == atan2(-0.07, -0.12)
 
 
 @pytest.mark.parametrize(

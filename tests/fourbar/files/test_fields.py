@@ -7,11 +7,9 @@ from dataclasses import replace
 import pytest
 from pytest import approx
 
-import fourbar
-from fourbar import Place, effects, solve
+from fourbar import InputError, Place, effects, solve, vary
 from fourbar.edit.dragging import list_handles
 from fourbar.edit.scene_entries import list_offers
-from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.scene.numbers import find_unit_of_key
 from fourbar.show.plot.symbols import list_acting
@@ -164,7 +162,7 @@ def test_its_numbers_vary_by_their_keys(scene):
         assert read_number(scene, of_magnets[key]) == approx(float(value), rel=1e-15)
         assert of_magnets[key].unit == find_unit_of_key(key) == unit
     key = "effects.magnets.rows.1.pull"
-    study = fourbar.vary(scene, {key: [3.0, 4.0, 6.0]})
+    study = vary(scene, {key: [3.0, 4.0, 6.0]})
     three, four, six = solve(study).torque.ravel()
     assert three == solve(scene).torque != four
     assert six - four == approx(2.0 * (four - three), rel=1e-12)

@@ -3,7 +3,6 @@
 The models say what their sources say.
 """
 
-import math
 import re
 from dataclasses import replace
 from math import pi, tau
@@ -15,19 +14,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pytest import approx, raises
 
-import fourbar
 from fourbar import (
     Bar,
     FourBar,
     Free,
     FromLimit,
     Gravity,
+    InputError,
+    Motion,
+    Place,
     Spring,
     Sweep,
     Tolerance,
+    solve,
 )
-from fourbar.effects import Place
-from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.files.scene_text import write_new_scene
 from tests.fourbar.test_solving import scenes
@@ -59,13 +59,13 @@ def test_models_read_back_and_assemble_everywhere(path):
     scene = load(path)
     assert facts(loads(dump(scene))) == facts(scene)
     assert scene.title and scene.source
-    assert set(fourbar.solve(scene).status) == {"ok"}
+    assert set(solve(scene).status) == {"ok"}
 
 
 def test_defaults_are_those_of_the_contract():
     scene = loads(LENGTHS)
     assert scene.linkage == FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.0)
-    assert scene.motion == fourbar.Motion(None, None, 0.0, 1) and scene.drive_bar == 2
+    assert scene.motion == Motion(None, None, 0.0, 1) and scene.drive_bar == 2
     assert (scene.loads, scene.effects, scene.title, scene.source) == ((), (), "", "")
     bar = loads(LENGTHS + '[bars.coupler]\nmass = "6 kg"\n').linkage.coupler
     assert bar.moment_of_inertia == approx(
@@ -108,7 +108,7 @@ def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
     """Beside listed angles: none at all, a sweep, a limit, and a release."""
     motion = scene.motion
     if isinstance(stated, Free):
-        motion = fourbar.Motion(0.1, motion.omega_2, free=stated)
+        motion = Motion(0.1, motion.omega_2, free=stated)
     elif title:
         motion = motion.replace(angle=stated)
     scene = replace(scene, motion=motion, title=title, source=source)
@@ -200,7 +200,7 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     scene = loads(comment.sub("", text))
     assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
     assert scene.effects[0].magnitude == approx(float(gravity))
-    assert scene.motion.omega_2 == approx(2.0 * math.pi)
+    assert scene.motion.omega_2 == approx(2.0 * pi)
     for entry in ("mass", "centre", "inertia", "force", "moment"):
         stated = re.search(rf'^(?:# )?{entry} = \[?"[-\d.]+ ([^"]*)"', text, re.M)
         assert stated is not None and stated[1] in units.split(", "), entry

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import solve
+from fourbar import dump, solve
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import load, loads
@@ -267,7 +266,7 @@ gravity = { x = "1.5 m/s^2", y = "-9.81 m/s^2" }
     assert scene.loads[0].force == approx((5.0, np.arctan2(-4.0, 3.0)))
     (gravity,) = scene.effects
     assert gravity.magnitude == approx(np.hypot(1.5, 9.81))
-    written = fourbar.dump(scene)
+    written = dump(scene)
     assert 'force = { x = "3.0 N", y = "-4.0 N" }' in written
     assert loads(written).loads == scene.loads
 

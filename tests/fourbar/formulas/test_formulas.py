@@ -1,9 +1,8 @@
 """The formulas as they stand: exact sums, the half angle in many digits, shapes."""
 
-import math
 import os
 from fractions import Fraction
-from math import pi
+from math import pi, sin, tau
 
 import mpmath as mp
 import numpy as np
@@ -175,7 +174,7 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
     """
     near = 10.0 ** -np.arange(1.0, 17.0)
     few = np.array([1e-9, 0.7, pi + 1e-9])
-    turns = [math.tau * count + few for count in (3.0, 800.0, -800.0)]
+    turns = [tau * count + few for count in (3.0, 800.0, -800.0)]
     plain = np.append(np.linspace(-7.0, 7.0, 40), pi)
     psi = np.concatenate([near, -near, pi - near, near - pi, plain, *turns])
     with mp.workdps(200):
@@ -234,7 +233,7 @@ def test_the_factor_that_changes_less_gives_the_other_its_digits(psi, lengths):
     half = half_angle(loop(*lengths), psi)
     with mp.workdps(50):
         exact = five(uniform(*lengths), mp.mpf(psi))[3:]
-    changes = 4 * a * d * abs(math.sin(psi)) * psi  # with the last digit of psi
+    changes = 4 * a * d * abs(sin(psi)) * psi  # with the last digit of psi
     for ours, factor in zip((half.outer, half.inner), exact, strict=True):
         assert abs(factor - float(ours)) <= PRODUCTS * (4 * b * c + changes)
 

@@ -1,15 +1,13 @@
 """Assemblies through change points close the loop and go on smoothly."""
 
 import itertools
-import math
-from math import pi
+from math import pi, radians, sin
 
 import numpy as np
 import pytest
 
-import fourbar
+from fourbar import FourBar, Motion, Scene, solve, uniform
 from fourbar.formulas.mobility import turns_fully
-from fourbar.linkage import uniform
 from tests.support.rows import read_rows
 
 LINKAGES = read_rows("""
@@ -23,7 +21,7 @@ change-point drag link | 1 2 4 3
 equal coupler and output | 3 1 2 2
 of roots | 3.1780497164141406 1.3152946437965907 3.1780497164141406 1.3152946437965907
 """)
-STEP = math.radians(1.5)
+STEP = radians(1.5)
 TURNS = 3
 GROUND_ANGLE = -7.0
 CLOSED = 1e-14
@@ -32,7 +30,7 @@ CLOSED = 1e-14
 
 def list_angles(linkage, bar):
     """Angles over three turns from the first quarter, between all change points."""
-    first = linkage.ground_angle + (pi if bar == 4 else 0.0) + math.radians(45.7)
+    first = linkage.ground_angle + (pi if bar == 4 else 0.0) + radians(45.7)
     return first + STEP * np.arange(round(TURNS * 2 * pi / STEP))
 
 
@@ -40,27 +38,25 @@ def list_angles(linkage, bar):
 @pytest.mark.parametrize("name, lengths", LINKAGES)
 def test_an_assembly_goes_on_smoothly_through_change_points(name, lengths, bar):
     bars = uniform(*map(float, lengths.split()))
-    linkage = fourbar.FourBar(
-        bars.ground, bars.input, bars.coupler, bars.output, GROUND_ANGLE
-    )
+    linkage = FourBar(bars.ground, bars.input, bars.coupler, bars.output, GROUND_ANGLE)
     if not turns_fully(linkage, bar):
         pytest.skip("the bar has limits")
     compared = 0
     for backwards, branch in itertools.product((False, True), (1, -1)):
         q = list_angles(linkage, bar)
         q = 2 * q[0] - q if backwards else q
-        motion = fourbar.Motion(
+        motion = Motion(
             **{f"theta_{bar}": q, f"omega_{bar}": 1.0},
             branch=branch,
         )
-        ours = fourbar.solve(fourbar.Scene(linkage, motion), "velocity")
+        ours = solve(Scene(linkage, motion), "velocity")
         d, a, b, c = linkage.lengths
         u2, u3, u4 = (np.exp(1j * ours[f"theta_{number}"]) for number in (2, 3, 4))
         gap = a * u2 + b * u3 - d * np.exp(1j * GROUND_ANGLE) - c * u4
         assert np.abs(gap).max() <= CLOSED * sum(linkage.lengths)
         # the sine's sign in the first half turn is the assembly's name
         first, second = (ours[f"theta_{k}"][0] for k in (2, 3, 4) if k != bar)
-        assert math.sin(second - first) * branch > 0.0
+        assert sin(second - first) * branch > 0.0
         for number in (2, 3, 4):
             # speeds run on: a corner would be a jump of the size of the speed
             speed = ours[f"omega_{number}"]

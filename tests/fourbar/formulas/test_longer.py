@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from mpmath import mp
 
+from fourbar import Bar
 from fourbar.formulas.longer import Pair, change_numbers
-from fourbar.linkage import Bar
 
 DIGITS = 2.0**-98
 """Relative: a few roundings of pairs, 2^-104 each, and what a complex product cancels.

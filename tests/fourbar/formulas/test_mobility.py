@@ -1,8 +1,7 @@
 """Limits, ranges, circuits and types against scans and 50 digits."""
 
 import itertools
-import math
-from math import pi, tau
+from math import copysign, cos, pi, radians, sin, sqrt, tau
 
 import mpmath as mp
 import numpy as np
@@ -11,7 +10,7 @@ from pytest import approx, raises
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fourbar.errors import InputError
+from fourbar import InputError
 from fourbar.formulas.mobility import (
     change_points,
     choose_range,
@@ -79,7 +78,7 @@ def inside(angle, ranges):
     return np.any(within, axis=0)
 
 
-THESIS = bare(0.2, 0.48, 0.55, 0.2, math.radians(45.0))
+THESIS = bare(0.2, 0.48, 0.55, 0.2, radians(45.0))
 """The linkage of Linares Mendoza's thesis."""
 
 
@@ -199,10 +198,10 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
             # bars 2, 3 lie along each other where stretched; the output runs from
             # its far end
             between = angles[first] - angles[second]
-            assert abs(math.sin(between)) <= ANGLE * tau
-            assert (math.cos(between) > 0.0) == (limit.stretched == (bar == 4))
-            sine = math.sin(angles[4] - angles[3])
-            assert limit.branch == (0 if bar == 2 else math.copysign(1.0, sine))
+            assert abs(sin(between)) <= ANGLE * tau
+            assert (cos(between) > 0.0) == (limit.stretched == (bar == 4))
+            sine = sin(angles[4] - angles[3])
+            assert limit.branch == (0 if bar == 2 else copysign(1.0, sine))
     assert checked > 300
 
 
@@ -214,7 +213,7 @@ def test_time_ratio_is_the_time_of_both_strokes():
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     # both ends are counted to one step
     assert time_ratio(bars) == approx(ratio, rel=8.0 / n)
-    central = uniform(math.sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)
+    central = uniform(sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)
     assert time_ratio(central) == approx(1.0, abs=1e-14)
     # limits of the output alone are not enough: there are change points
     assert len(limit_positions(uniform(3, 1, 2, 2), 4)) == 2

@@ -3,8 +3,7 @@
 What is exact or has no value near limits and change points is tested too.
 """
 
-import math
-from math import pi
+from math import copysign, pi
 
 import numpy as np
 import pytest
@@ -54,7 +53,7 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1)
     for psi in (0.0, *((1e-170, -1e-170) if theta_1 == 0.0 else ())):
         on, near = (
             compute_state(link, theta_1 + np.array([at, 0.5]), branch, 2.0, 3.0)
-            for at in (psi, math.copysign(step, psi))
+            for at in (psi, copysign(step, psi))
         )
         assert find_singular(on.position).tolist() == [True, False]
         for bar in (3, 4):

@@ -10,8 +10,22 @@ import numpy as np
 import pytest
 from pytest import approx
 
-import fourbar
-from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene, solve, vary
+from fourbar import (
+    Bar,
+    FourBar,
+    Friction,
+    Gravity,
+    InputError,
+    Load,
+    Motion,
+    PinFriction,
+    Scene,
+    Viscous,
+    command,
+    solve,
+    uniform,
+    vary,
+)
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import Wrenches, pin_forces
@@ -37,8 +51,8 @@ def scene(drive_bar):
     )
     effects = (
         Gravity(),
-        fourbar.Viscous.at(O2=0.1, A=0.05, B=0.02),
-        fourbar.Friction.at(O4=0.03),
+        Viscous.at(O2=0.1, A=0.05, B=0.02),
+        Friction.at(O4=0.03),
     )
     link = FourBar(0.3, *bars, 0.3)
     motion = Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0)
@@ -53,7 +67,7 @@ def test_written_into_given_arrays():
     for name, array in out.items():
         assert np.array_equal(array, getattr(solution, name))
     for wrong, words in (("torque", r"out\.torque"), ("T2", "T2")):
-        with pytest.raises(fourbar.InputError, match=words):
+        with pytest.raises(InputError, match=words):
             solve(scene(2), out={wrong: np.empty(30)})
 
 
@@ -84,8 +98,8 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     b, c = 1.0, ratio
     theta_4 = math.pi - 0.3 / max(1.0, c)
     motion = Motion(theta_4=[theta_4], omega_4=2.0)
-    case = Scene(fourbar.uniform(1.5 + c, 1.2, b, c), motion)
-    state = compute_shown_state(case, fourbar.command(case))
+    case = Scene(uniform(1.5 + c, 1.2, b, c), motion)
+    state = compute_shown_state(case, command(case))
     assert abs(state.position.sin_mu) > 0.1
     position, lengths = state.position, state.lengths
     w = Wrenches(R3=0.7 - 0.2j, M3=0.9, M4=0.3 * c, C=couple)
@@ -98,7 +112,7 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
 
 
 def test_what_friction_of_pins_misses_is_a_rounding():
-    friction = fourbar.PinFriction.at(O2=(0.1, 0.02), A=(0.1, 0.02), B=(0.1, 0.02))
+    friction = PinFriction.at(O2=(0.1, 0.02), A=(0.1, 0.02), B=(0.1, 0.02))
     s = solve(replace(scene(2), effects=(Gravity(), friction)))
     forces = [np.hypot(*s[name].T).max() for name in ("F12", "F32", "F43")]
     assert 0.0 < s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * max(forces)
@@ -117,7 +131,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     pins, drive_bar
 ):
     """With the couples mu r |F| as loads the forces are the same."""
-    friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
+    friction = PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
     motion = Motion(ANGLES, 10.0)
     case = replace(scene(drive_bar), motion=motion, loads=())
     s = solve(replace(case, effects=(Gravity(), friction)))

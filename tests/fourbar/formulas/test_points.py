@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 from pytest import approx, raises
 
-from fourbar import coupler_curve, instant_centres
-from fourbar.errors import InputError
+from fourbar import (
+    FourBar,
+    InputError,
+    coupler_curve,
+    instant_centres,
+    point_coefficients,
+)
 from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
 from fourbar.formulas.path import compute_state
-from fourbar.formulas.points import point_coefficients
-from fourbar.linkage import FourBar
 from tests.support.balls import move_in_balls
 from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage

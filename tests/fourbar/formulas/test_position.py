@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from pytest import approx
 
+from fourbar import uniform
 from fourbar.formulas.motion import coefficients, take_sines_of_rates
 from fourbar.formulas.path import (
     compute_state,
     drive_sine_of_triangle,
 )
 from fourbar.formulas.position import close_loop, direction, half_angle, loop
-from fourbar.linkage import uniform
 from tests.support.balls import move_in_balls
 from tests.support.scenes import bare
 

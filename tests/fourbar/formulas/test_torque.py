@@ -4,10 +4,19 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-import fourbar
-from fourbar import Bar, FourBar, Gravity, Load, Motion, Scene
-from fourbar.formulas.mobility import limit_positions
-from fourbar.solving import solve
+from fourbar import (
+    Bar,
+    FourBar,
+    FromLimit,
+    Gravity,
+    Load,
+    Motion,
+    Scene,
+    Viscous,
+    equilibrium,
+    limit_positions,
+    solve,
+)
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import draw_linkage
 
@@ -40,7 +49,7 @@ def random_case(seed):
         Load(3, (2.0, 0.3), from_centre=(0.1, 2.0), moment=0.4, frame="bar"),
         Load(4, (1.0, 0.9), arm=(0.2, -1.0), moment=-0.3),
     )
-    viscous = fourbar.Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1)
+    viscous = Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1)
     return linkage, loads, (Gravity(), viscous)
 
 
@@ -53,7 +62,7 @@ def test_digits_are_kept_at_a_stated_distance_from_a_limit(seed, offset):
         drive, branch = 2 + number % 3, 1 - 2 * (number // 2 % 2)
         assembled = []
         for side in (offset, -offset):
-            limit = fourbar.FromLimit(number, side)
+            limit = FromLimit(number, side)
             motion = Motion(limit, 1.3, 0.7, branch=branch)
             scene = Scene(linkage, motion, drive, loads, effects)
             s = solve(scene, "force")
@@ -90,7 +99,7 @@ def test_statics_of_motiongenesis():
     linkage = FourBar(1.0, *bars, ground_angle=np.pi / 2)
     pull = Load(3, (200.0, np.pi / 2), from_pin=(2.0, 0.0))
     effects = (Gravity(9.81, 0.0),)
-    found = fourbar.equilibrium(Scene(linkage, loads=(pull,), effects=effects)).found
+    found = equilibrium(Scene(linkage, loads=(pull,), effects=effects)).found
     angles = [np.degrees(rest.place[:3]) for rest in found]
     printed = [19.98690555, 71.66202052, 38.32488502]
     assert any(np.abs(angle - printed).max() <= 0.5e-8 for angle in angles)

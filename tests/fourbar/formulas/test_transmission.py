@@ -1,18 +1,14 @@
 """Transmission angle against the cosine law in many digits, the rest against a scan."""
 
-import math
-from math import pi, sin
+from math import cos, pi, sin, sqrt
 
 import mpmath as mp
 import numpy as np
 from pytest import approx
 
+from fourbar import Motion, Scene, solve, transmission_extremes
 from fourbar.formulas.mobility import find_intervals, limit_positions
-from fourbar.formulas.transmission import transmission_extremes
-from fourbar.scene import Scene
-from fourbar.scene.motion import Motion
 from fourbar.show.derived import derive
-from fourbar.solving import solve
 from tests.fourbar.formulas.test_points import random_positions
 from tests.support.scenes import bare, draw_linkage
 
@@ -67,13 +63,13 @@ def test_extremes_are_those_of_a_scan():
             # mu^2/2 = steep sin psi delta at a limit;
             # else mu'' = steep/sin mu, a whole step away at most
             if end in (0.0, pi):
-                miss = math.sqrt(2.0 * steep * step)
+                miss = sqrt(2.0 * steep * step)
             else:
                 miss = 0.5 * steep / sin(end) * step**2
             assert end == approx(scanned, abs=HIGHER_ORDER * miss)
             assert 0.0 <= theta_2 - theta_1 <= pi * (1.0 + EPS) + 2.0 * EPS
             e = abs(a * np.exp(1j * theta_2) - d * np.exp(1j * theta_1))
-            by_cosines = b * b + c * c - 2 * b * c * math.cos(end)
+            by_cosines = b * b + c * c - 2 * b * c * cos(end)
             assert e**2 == approx(by_cosines, abs=64 * EPS)
         assert extremes.worst == min(extremes.least, pi - extremes.greatest)
     assert len(kinds) == 4

@@ -12,8 +12,7 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Friction, Gravity, Motion, Viscous, solve
-from fourbar.effects import Torsion
+from fourbar import Friction, Gravity, Motion, Torsion, Viscous, solve
 from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd

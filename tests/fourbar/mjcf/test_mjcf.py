@@ -3,18 +3,29 @@
 Exact numbers, clear refusals, and a file that runs in plain MuJoCo.
 """
 
-import math
 from dataclasses import replace
-from math import pi, tau
+from math import dist, log10, pi, radians, sqrt, tau
 
 import mujoco
 import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep
-from fourbar.effects import Torsion
+from fourbar import (
+    Bar,
+    FourBar,
+    Free,
+    Gravity,
+    InputError,
+    Load,
+    Motion,
+    Scene,
+    Sweep,
+    Torsion,
+    load,
+    solve,
+    uniform,
+)
 from fourbar.formulas.mobility import choose_range, turns_fully
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import SETTLING, choose_run
@@ -32,7 +43,7 @@ from tests.support.shares import slow_but
 
 GAP = 1e-4
 """The promise of the file: the loop closed within this part of the longest bar."""
-SHORT_OF_LIMIT = math.radians(2.0)
+SHORT_OF_LIMIT = radians(2.0)
 SEED = 20261121
 ANY_SIZE = replace(
     MACHINES,
@@ -47,7 +58,7 @@ def random_scene(rng, kind):
 
     Bars are ten times lighter or heavier.
     """
-    size = 10.0 ** rng.uniform(math.log10(0.05), 2.0)
+    size = 10.0 ** rng.uniform(log10(0.05), 2.0)
     scene = draw_scene(rng, [size * x for x in draw_lengths(rng, kind)], ANY_SIZE)
     start, stop = choose_range(scene.linkage)
     short = (
@@ -63,7 +74,7 @@ def random_scene(rng, kind):
 
 
 def gap(data):
-    return math.dist(data.site("B3").xpos, data.site("B4").xpos)
+    return dist(data.site("B3").xpos, data.site("B4").xpos)
 
 
 OPEN = 1e-9
@@ -96,7 +107,7 @@ def test_the_file_opens_in_the_assembly_beyond_change_points(lengths, points, br
     half, and changes its side at each change point that the input passes, and
     nowhere else.
     """
-    linkage = replace(fourbar.uniform(*lengths), ground_angle=0.3)
+    linkage = replace(uniform(*lengths), ground_angle=0.3)
     for psi in (-2.5, -0.5, 0.5, 2.5, 3.8, 6.0, 6.8):
         turns = [point + tau * k for point in points for k in (-1, 0, 1)]
         passed = sum((at > 0.5) != (at > psi) for at in turns)
@@ -134,7 +145,7 @@ def test_the_joints_count_the_turns_of_every_spring():
 @pytest.mark.slow
 def test_opens_assembled_and_moves_without_keyframe_or_control():
     rng = np.random.default_rng(SEED)
-    scenes = [fourbar.load(file) for file in list_model_files()] + [sprung()]
+    scenes = [load(file) for file in list_model_files()] + [sprung()]
     for scene in [*scenes, *(random_scene(rng, kind) for kind in [*DrawnType] * 3)]:
         model, data = opened(scene)
         assert gap(data) < OPEN and (model.qpos0 == model.key_qpos[0]).all()
@@ -173,11 +184,11 @@ def test_a_released_linkage_falls_by_itself(scale):
         for length, mass in ((0.1, 0.2), (0.25, 0.5), (0.22, 0.4))
     ]
     linkage = FourBar(scale * 0.3, *bars, ground_angle=0.2)
-    motion = Motion(0.5, 0.0, free=fourbar.Free(0.5 * math.sqrt(scale), 10))
-    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    motion = Motion(0.5, 0.0, free=Free(0.5 * sqrt(scale), 10))
+    scene = Scene(linkage, motion, effects=(Gravity(),))
     model, data = opened(scene)
     assert gap(data) < OPEN and model.nu == 0 and model.dof_armature[0] == 0.0
-    expected = fourbar.solve(scene)
+    expected = solve(scene)
     assert np.ptp(expected.theta_2) > 0.5
     for time, theta_2 in zip(expected.time[1:], expected.theta_2[1:], strict=True):
         mujoco.mj_step(model, data, round((time - data.time) / model.opt.timestep))
@@ -200,7 +211,7 @@ def test_massless_bar_is_refused_in_one_line(mass, inertia):
 
 
 def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line():
-    scene = crank_rocker(loads=(fourbar.Load(3, (1e308, 0.4)),))
+    scene = crank_rocker(loads=(Load(3, (1e308, 0.4)),))
     with raises(InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
         write_mjcf(scene)
 

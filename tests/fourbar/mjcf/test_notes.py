@@ -4,10 +4,9 @@ With loads, effects, and a drive on bar 4.
 """
 
 import csv
-import math
 import re
 from dataclasses import replace
-from math import tau
+from math import atan2, cos, dist, remainder, sin, tau
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -17,10 +16,23 @@ import pytest
 from numpy.testing import assert_allclose
 from pytest import approx
 
-import fourbar
-from fourbar import Load, Motion, Spring, Springs, Sweep, solve
-from fourbar.effects import Friction
-from fourbar.effects.place import Place
+from fourbar import (
+    Flywheel,
+    Free,
+    Friction,
+    Gravity,
+    InputError,
+    LinearDrive,
+    Load,
+    Motion,
+    Place,
+    Spring,
+    Springs,
+    Sweep,
+    Torsion,
+    Viscous,
+    solve,
+)
 from fourbar.linkage import BAR_NAMES
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.document import SETTLING
@@ -53,12 +65,12 @@ def acted_on(**changes):
     """
     spring = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02)
     effects = (
-        fourbar.Gravity(),
-        fourbar.Viscous.at(O2=0.02, B=0.03),
+        Gravity(),
+        Viscous.at(O2=0.02, B=0.03),
         Friction.at(A=0.01),
-        fourbar.Torsion.at(O4=(0.5, 0.2, 0.1)),
+        Torsion.at(O4=(0.5, 0.2, 0.1)),
         Springs((spring,)),
-        fourbar.Flywheel(0.02, 4),
+        Flywheel(0.02, 4),
     )
     loads = (
         Load(2, (2.0, 0.4), arm=(0.03, 2.0), moment=0.1),
@@ -155,8 +167,8 @@ class Opened:
                     size, angle = load.force
                     if load.frame == "bar":
                         x = d.site(f"load_{index}").xmat
-                        angle += math.atan2(x[3], x[0])
-                    forces[name] -= size * np.array([math.cos(angle), math.sin(angle)])
+                        angle += atan2(x[3], x[0])
+                    forces[name] -= size * np.array([cos(angle), sin(angle)])
         return {
             "F12": forces["input"],
             "F32": -forces["coupler"],
@@ -168,7 +180,7 @@ def opens_assembled(file):
     m, d = file.model, file.data
     mujoco.mj_resetData(m, d)
     file.forward()
-    gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
+    gap = dist(d.site("B3").xpos, d.site("B4").xpos)
     s = solve(
         file.scene,
         "position",
@@ -179,7 +191,7 @@ def opens_assembled(file):
         (d.qpos[0] + d.qpos[1], s.theta_3[0]),
         (d.qpos[2], s.theta_4[0]),
     ):
-        assert math.remainder(angle - theta, tau) == approx(0.0, abs=1e-12)
+        assert remainder(angle - theta, tau) == approx(0.0, abs=1e-12)
 
 
 def is_driven(file):
@@ -211,7 +223,7 @@ def starts_anew(file):
     for _ in range(round(tau / 0.2244 / file.model.opt.timestep)):
         file.step(1)
         if d.time < last:
-            gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
+            gap = dist(d.site("B3").xpos, d.site("B4").xpos)
             assert gap < 1e-4 and abs(d.qpos[0] - file.model.qpos0[0]) < 0.01
             return
         last = d.time
@@ -411,7 +423,7 @@ SAID = {
     "MuJoCo before 3.7": was_wrong_before_3_7,
 }
 """By how a sentence begins, what it promises."""
-CYLINDER = fourbar.LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7)))
+CYLINDER = LinearDrive(Place(1, (0.17, -1.1)), Place(3, (0.09, 0.7)))
 PRELOADED = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02, 30.0)
 """A spring that pulls even where its ends meet: a tendon's rest length cannot express
 it.
@@ -434,7 +446,7 @@ FILES = {
     "motor along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "motor"),
     "no drive along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "none"),
     "released": (
-        acted_on(motion=Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))),
+        acted_on(motion=Motion(0.4, 10.0, free=Free(0.1, 2))),
         "flywheel",
     ),
 }
@@ -471,5 +483,5 @@ def test_a_motor_for_one_that_takes_none_is_refused():
         {"drive": "servo"},
         {"simulator": "ode"},
     ):
-        with pytest.raises(fourbar.InputError, match=r"^[^\n]+$"):
+        with pytest.raises(InputError, match=r"^[^\n]+$"):
             write_mjcf_for(crank_rocker(), **wrong)

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
-import fourbar
-from fourbar.errors import InputError
+from fourbar import InputError, load
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar_validation.engines.mujoco.closed_loop import open_model
@@ -23,7 +22,7 @@ ORIGIN = (1.0, -2.0, 0.5)
 
 
 def scene():
-    return fourbar.load(ROOT / "models" / "crank_rocker.toml")
+    return load(ROOT / "models" / "crank_rocker.toml")
 
 
 @pytest.mark.parametrize("axis", AXES)

@@ -10,43 +10,56 @@ import numpy as np
 import pytest
 from pytest import raises
 
-import fourbar
-from fourbar import Motion, PinFriction, Spring, uniform
-from fourbar.effects import Place, Table
-from fourbar.errors import InputError
+from fourbar import (
+    Bar,
+    Free,
+    FromLimit,
+    Gravity,
+    InputError,
+    Law,
+    Load,
+    Motion,
+    PinFriction,
+    Place,
+    Point,
+    Spring,
+    Sweep,
+    Table,
+    Torsion,
+    Viscous,
+    uniform,
+)
 from fourbar.quantities.units import UnitError, half_unit_of_text, to_si
 from tests.support.rows import read_rows
 
 ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
 SAME = [
     (
-        fourbar.Bar,
+        Bar,
         ("10 cm", "200 g", "2 kg cm^2", ("5 cm", "180 deg")),
         (0.1, 0.2, 2e-4, (0.05, np.pi)),
     ),
     (uniform, ("6 in", 0.05, "127 mm", "4 in"), (0.1524, 0.05, 0.127, 0.1016)),
-    (fourbar.Sweep, ("180 deg", "2 rad", 4), (np.pi, 2.0, 4)),
-    (fourbar.FromLimit, (1, "180 deg"), (1, np.pi)),
-    (fourbar.Free, ("0.5 min", 4), (30.0, 4)),
+    (Sweep, ("180 deg", "2 rad", 4), (np.pi, 2.0, 4)),
+    (FromLimit, (1, "180 deg"), (1, np.pi)),
+    (Free, ("0.5 min", 4), (30.0, 4)),
     (
-        fourbar.Law,
+        Law,
         (("0 s", "0.5 min"), ("0 deg", 2.0), 4, "rest"),
         ((0.0, 30.0), (0.0, 2.0), 4, "rest"),
     ),
-    (fourbar.Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
+    (Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
     (
-        lambda bar, force, at, moment: fourbar.Load(
-            bar, force, from_pin=at, moment=moment
-        ),
+        lambda bar, force, at, moment: Load(bar, force, from_pin=at, moment=moment),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
         (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
     ),
     (Table, (("0 deg", "180 deg"), (1.0, 2.0)), ((0.0, np.pi), (1.0, 2.0))),
-    (fourbar.Gravity, ("1 g_0", "180 deg"), (9.80665, np.pi)),
-    (fourbar.Viscous, ((("A", "2 N mm s/rad"),),), ((("A", 0.002),),)),
+    (Gravity, ("1 g_0", "180 deg"), (9.80665, np.pi)),
+    (Viscous, ((("A", "2 N mm s/rad"),),), ((("A", 0.002),),)),
     (PinFriction, ((("A", 0.1, "8 mm"),),), ((("A", 0.1, 0.008),),)),
     (
-        fourbar.Torsion,
+        Torsion,
         ((("A", "2 N m/rad", "180 deg", "1 N cm"),),),
         ((("A", 2.0, np.pi, 0.01),),),
     ),

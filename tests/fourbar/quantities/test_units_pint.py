@@ -10,9 +10,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from pytest import raises
 
-import fourbar
-from fourbar import Bar, Motion
-from fourbar.errors import InputError
+from fourbar import Bar, FourBar, InputError, Motion
 from fourbar.quantities.units import PARSED_UNITS, ask_library
 
 ureg = pytest.importorskip("pint").UnitRegistry()
@@ -24,7 +22,7 @@ def test_lengths_and_masses_are_converted_exactly():
     assert bar.length == 0.00254
     assert bar.mass == 0.25
     assert bar.centre == (0.003, math.radians(5))
-    assert fourbar.FourBar(3 * MM, bar, bar, bar, 15.0 * DEG).ground == 0.003
+    assert FourBar(3 * MM, bar, bar, bar, 15.0 * DEG).ground == 0.003
 
 
 def test_arrays_of_angles_are_converted():

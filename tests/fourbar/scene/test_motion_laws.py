@@ -1,15 +1,13 @@
 """Laws against exact polynomials, differences, a sine's energy and the books."""
 
-import math
+from math import degrees, pi, sin, sqrt, tau
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from pytest import approx, raises
 
-import fourbar
-from fourbar import Scene, solve, uniform
-from fourbar.errors import InputError
+from fourbar import Gravity, InputError, Scene, solve, uniform
 from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import COMMAND_NAMES, Law, Motion, Rise, Sine
@@ -47,7 +45,7 @@ def test_a_sine_is_followed_to_all_digits():
     assert loads(dump(scene)) == scene
     s = solve(scene)
     assert s.torque[-1] == approx(7.6736e-5, rel=1e-5)
-    assert s.theta_2[100] == approx(1.0 + math.sin(0.5 * s.time[100]))
+    assert s.theta_2[100] == approx(1.0 + sin(0.5 * s.time[100]))
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
@@ -76,9 +74,9 @@ def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     assert (f"omega_{bar} = [" in text) == (rates > 0)
 
 
-POINTS = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, math.tau)
+POINTS = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, tau)
 CAM = {"rise": (1.0, 0.5), "dwell": 0.2, "fall": 0.4, "rest": 0.1}
-LATE = (10.0, 11.0, 12.5, 14.0), (0.3, 2.0, 4.0, 0.3 + math.tau)
+LATE = (10.0, 11.0, 12.5, 14.0), (0.3, 2.0, 4.0, 0.3 + tau)
 LAWS = {
     "free": Law(*POINTS, 10, "free"),
     "rest": Law(*POINTS, 10, "rest"),
@@ -86,7 +84,7 @@ LAWS = {
     "periodic, from 10 s on": Law(*LATE, 8, "periodic"),
     "cycloidal": Rise("cycloidal", theta_2=-0.4, **CAM),
     "345": Rise("345", theta_4=-0.4, **CAM),
-    "sine": Sine(1.0, 1.0, 0.5, 4.0 * math.pi, -0.5 * math.pi, 40),
+    "sine": Sine(1.0, 1.0, 0.5, 4.0 * pi, -0.5 * pi, 40),
     "345 that does not fall": Rise("345", (-1.0, 0.5), 2.0, dwell=0.3),
 }
 
@@ -120,7 +118,7 @@ def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name):
 
 @pytest.mark.parametrize(
     "kind, speed, acceleration",
-    [("cycloidal", 2.0, 2.0 * math.pi), ("345", 1.875, 10.0 / math.sqrt(3.0))],
+    [("cycloidal", 2.0, 2.0 * pi), ("345", 1.875, 10.0 / sqrt(3.0))],
 )
 def test_a_cam_has_the_factors_of_the_books(kind, speed, acceleration):
     """C_v = 2 and C_a = 2 pi of the cycloidal law, 1.875 and 5.7735 of 3-4-5."""
@@ -194,18 +192,18 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     law, changed = (Law(times, angles, ends=name) for name in (ends, other))
     at_ends = np.array([*np.linspace(0.0, 0.2, 2001), *np.linspace(0.7, 1.0, 2001)])
     bare = uniform(0.3, 0.1, 0.25, 0.22)
-    scene = Scene(bare, Motion(law=law), effects=(fourbar.Gravity(),))
+    scene = Scene(bare, Motion(law=law), effects=(Gravity(),))
     printed = write_note(scene)
     assert f'ends = "{ends}"' in printed and f'"{other}" changes' in printed
     rates = (one.at(at_ends) for one in (law, changed))
     changes = [np.abs(a - b).max() for a, b in zip(*rates, strict=True)]
     said = printed.partition("by up to ")[2].split()
-    assert float(said[0]) == approx(math.degrees(changes[0]), rel=2e-3)
+    assert float(said[0]) == approx(degrees(changes[0]), rel=2e-3)
     assert float(said[3]) == approx(changes[2], rel=2e-3)
 
 
 def test_a_table_that_leaves_no_choice_says_nothing_of_its_ends():
-    times, angles = (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * math.pi)
+    times, angles = (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * pi)
     rates = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 0.0))
     for law in (Law(times, angles, ends="periodic"), rates):
         scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law))

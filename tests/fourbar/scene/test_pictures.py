@@ -9,9 +9,8 @@ from dataclasses import replace
 import pytest
 from pytest import raises
 
-import fourbar
+from fourbar import InputError, solve
 from fourbar.cli import status
-from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
 from fourbar.scene.pictures import LARGEST_PICTURE, Picture, TracedPicture
 from fourbar.show import animate
@@ -104,7 +103,7 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path):
         ("missing.png", "file not found"),
     ):
         scene = load(scene_file(inner, name))
-        fourbar.solve(scene)  # nobody has to see it to compute
+        solve(scene)  # nobody has to see it to compute
         with raises(
             InputError,
             match=rf"^bars\.coupler\.picture[^\n]*{word}[^\n]*$",

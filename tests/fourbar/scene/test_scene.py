@@ -16,17 +16,18 @@ from fourbar import (
     FourBar,
     Free,
     FromLimit,
+    Gravity,
     Law,
     Load,
     Motion,
     Scene,
     Sweep,
+    Viscous,
     command,
     dump,
     solve,
     uniform,
 )
-from fourbar.effects import Gravity, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS

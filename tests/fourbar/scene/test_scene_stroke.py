@@ -10,12 +10,18 @@ import pytest
 from pytest import approx, raises
 
 import fourbar
-from fourbar import Motion, solve, vary
-from fourbar.effects import LinearDrive, Place
-from fourbar.errors import FourBarError, InputError
-from fourbar.files import dump
+from fourbar import (
+    FourBarError,
+    InputError,
+    LinearDrive,
+    Motion,
+    Place,
+    Sweep,
+    dump,
+    solve,
+    vary,
+)
 from fourbar.mjcf import write_mjcf
-from fourbar.scene.motion import Sweep
 from fourbar_validation.engines.prediction import compute_reference
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker

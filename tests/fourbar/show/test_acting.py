@@ -1,14 +1,23 @@
 """Where gas springs are beyond their stroke, by the geometry of a parallelogram."""
 
 import json
-import math
 import re
-from math import sqrt
+from math import acos, asin, cos, degrees, pi, radians, sin, sqrt, tan, tau
 
 import pytest
 
-import fourbar
-from fourbar import Motion, Place, Scene, Spring, Springs, solve
+from fourbar import (
+    Flywheel,
+    Free,
+    Motion,
+    Place,
+    Scene,
+    Spring,
+    Springs,
+    Sweep,
+    Torsion,
+    solve,
+)
 from fourbar.cli import status
 from fourbar.files import loads
 from fourbar.show.acting import list_drawn_notes, list_spring_notes
@@ -42,7 +51,7 @@ distance^2 = 0.2^2 + 0.3^2 + 2 0.2 0.3 sin(theta_2)."""
 def reach(distance):
     """Return the angle at which the ends are so far apart, as it is printed."""
     sine = (distance**2 - 0.2**2 - 0.3**2) / (2.0 * 0.2 * 0.3)
-    return f"{math.degrees(math.asin(sine)):.4g} deg"
+    return f"{degrees(asin(sine)):.4g} deg"
 
 
 def torsion(line, motion, **rests):
@@ -88,7 +97,7 @@ def load(stated):
 COUPLE = 'moment = "1 N m"'
 FORCE = 'force = ["1 N", "0 deg"]'
 ARM = 'arm = ["1 mm", "0 deg"]'
-LONGEST = f"{1000.0 * sqrt(0.13 + 0.12 * math.sin(math.radians(80.0)))!r} mm"
+LONGEST = f"{1000.0 * sqrt(0.13 + 0.12 * sin(radians(80.0)))!r} mm"
 AT_80 = 'theta_2 = "80 deg"\nomega_2 = "0 rad/s"\n'
 LISTED = 'theta_2 = ["10 deg", "80 deg", "12 deg", "50 deg"]\n'
 SLOWLY = 'theta_2 = ["10 deg", "20 deg", "80 deg"]\n'
@@ -218,23 +227,23 @@ drawn | 530 deg |
 def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told):
     """The input is drawn at 170 deg, or at -190 deg, to a ground at 180 deg."""
     text = DRAWN.replace("FROM", start).replace("TO", stop)
-    across = 98.0 * math.tan(math.radians(10.0))
+    across = 98.0 * tan(radians(10.0))
     scene = loads(text.replace("ACROSS", repr(across)))
     (note,) = list_drawn_notes(scene, DEGREES) or [""]
     assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
 
-@pytest.mark.parametrize("start, stop", [(2.0, 2.0 + math.tau), (8.0, 2.0)])
+@pytest.mark.parametrize("start, stop", [(2.0, 2.0 + tau), (8.0, 2.0)])
 def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
     ends = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
-    length = sqrt(0.1 - 0.06 * math.cos(math.pi - 0.2))
+    length = sqrt(0.1 - 0.06 * cos(pi - 0.2))
     springs = Springs((Spring(*ends, 1.0, length),))
-    motion = Motion(fourbar.Sweep(start, stop, 1), 1.0)
+    motion = Motion(Sweep(start, stop, 1), 1.0)
     linkage = bare(0.3, 0.1, 0.25, 0.22)
     scene = Scene(linkage, motion, effects=(springs,))
     (note,) = list_spring_notes(scene, solve(scene), DEGREES)
-    places = [f"theta_2 = {math.degrees(math.pi + x):.4g} deg" for x in (-0.2, 0.2)]
+    places = [f"theta_2 = {degrees(pi + x):.4g} deg" for x in (-0.2, 0.2)]
     if stop < start:
         places = places[::-1]
     assert f"pulls from {places[0]} to {places[1]} and" in note
@@ -245,14 +254,14 @@ def test_a_spring_pulls_in_a_release_from_between_its_instants():
     """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
     linkage = bare(0.3, 0.1, 0.25, 0.22)
     ends = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
-    length = sqrt(0.1 - 0.06 * math.cos(1.1))  # at 1.1 rad
+    length = sqrt(0.1 - 0.06 * cos(1.1))  # at 1.1 rad
     effects = (
-        fourbar.Flywheel(0.01, 2),
-        fourbar.Torsion((("O2", 1.0, 1.0, 0.0),)),
+        Flywheel(0.01, 2),
+        Torsion((("O2", 1.0, 1.0, 0.0),)),
         Springs((Spring(*ends, 1e-12, length),)),
     )
-    motion = Motion(0.5, 0.0, free=fourbar.Free(0.3, 3))
+    motion = Motion(0.5, 0.0, free=Free(0.3, 3))
     scene = Scene(linkage, motion, effects=effects)
-    time = 1e3 * math.acos(-0.2) / 10.0
+    time = 1e3 * acos(-0.2) / 10.0
     (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     assert f"pulls from t = {time:.4g} ms on" in note

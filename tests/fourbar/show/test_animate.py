@@ -6,7 +6,6 @@ What is embedded, that nothing foreign gets in or out, and the films.
 import base64
 import hashlib
 import json
-import math
 import re
 import shutil
 import sys
@@ -14,18 +13,24 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from itertools import pairwise
-from math import pi, radians
+from math import nan, pi, radians
 
 import numpy as np
 import pytest
 from numpy.testing import assert_equal
 from pytest import approx, raises
 
-import fourbar
-from fourbar import Motion, Sweep, solve
-from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar import (
+    DependencyError,
+    Free,
+    InputError,
+    Law,
+    Motion,
+    NotAssembledError,
+    Sweep,
+    solve,
+)
 from fourbar.files import loads
-from fourbar.scene.motion import Law
 from fourbar.scene.pictures import LARGEST_PICTURE
 from fourbar.show import animate
 from fourbar.show.plot import film as films
@@ -84,9 +89,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
     assert torque == solve(thesis(theta_2)).torque[0]
 
 
-RELEASED = crank_rocker(
-    motion=Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2
-)
+RELEASED = crank_rocker(motion=Motion(0.5, 0.0, free=Free(1.8, 90)), drive_bar=2)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +162,7 @@ ROCKING = thesis(Sweep(radians(40), radians(50), 5))
     "name, options, words",
     [
         ("a.avi", {}, r"\.html, \.gif, \.mp4"),
-        ("a.gif", {"seconds": math.nan}, "seconds"),
+        ("a.gif", {"seconds": nan}, "seconds"),
         ("a.gif", {"pictures": {"input": "x.png"}}, "html page"),
     ],
 )

@@ -1,32 +1,41 @@
 """The summary of `analyze`: its numbers by geometry and finer steps, and its words."""
 
-import math
 import re
 import tomllib
 from dataclasses import replace
-from math import pi, radians, sqrt, tau
+from math import acos, degrees, floor, log10, pi, radians, sqrt, tau
 
 import numpy as np
 import pytest
 from pytest import approx
 
-import fourbar
 from fourbar import (
     Bar,
     FourBar,
     Friction,
     Gravity,
+    Law,
+    LinearDrive,
     Load,
     Motion,
+    PinFriction,
     Place,
+    Rise,
     Scene,
+    Sine,
+    Spring,
+    Springs,
     Sweep,
+    Table,
+    dump,
+    equilibrium,
+    limit_positions,
     solve,
     uniform,
+    units,
 )
 from fourbar.files.scene_file import read_tables
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene.motion import Law
 from fourbar.show.block import write_block
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.plot.figures import draw_figure
@@ -58,17 +67,17 @@ def turn(steps=36, turns=1, **motion):
 
 
 def write(angle):
-    return f"{math.degrees(angle):.4g} deg"
+    return f"{degrees(angle):.4g} deg"
 
 
 def opposite(side, first, second):
-    return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
+    return acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 LIMITED = (0.3, 0.4, 0.2, 0.25)
 LIMIT = opposite(0.45, 0.3, 0.4)
-OF_THESIS = fourbar.limit_positions(thesis().linkage)
+OF_THESIS = limit_positions(thesis().linkage)
 FIRST, SECOND = (write(x) for x in sorted(x.theta_2 % tau for x in OF_THESIS))
 FILES = tomllib.loads("""
 ["positions alone"]
@@ -336,7 +345,7 @@ never = 'e-|-0\\.0000'
 """Scene files, words of their blocks, and a pattern of what must not be said. What
 states no linkage is of the crank-rocker.
 """
-CRANK_ROCKER_FILE = tomllib.loads(fourbar.dump(crank_rocker()))
+CRANK_ROCKER_FILE = tomllib.loads(dump(crank_rocker()))
 SAID = {
     "three rockers": (
         thesis(Sweep(0.0, tau, 90)),
@@ -470,7 +479,7 @@ def test_each_position_at_rest_has_its_own_range():
     scene = Scene(
         FourBar(0.3, Bar(0.04), Bar(0.29), Bar(0.065)),
         Motion(Sweep(0.0, tau, 72), tau),
-        effects=(Friction.at(O4=20.0), fourbar.PinFriction.at(**pins)),
+        effects=(Friction.at(O4=20.0), PinFriction.at(**pins)),
     )
     ranges = []
     for place, name in ((0.0, "0"), (pi, "180")):
@@ -485,7 +494,7 @@ def test_each_position_at_rest_has_its_own_range():
 
 def test_a_reversal_of_a_motion_law_is_named_by_its_time():
     """A sine of 0.5 Hz that begins at 30 deg of its turn turns back at 1/3 s."""
-    law = fourbar.Sine(1.0, 0.7, pi, 0.6, pi / 6.0, steps=30)
+    law = Sine(1.0, 0.7, pi, 0.6, pi / 6.0, steps=30)
     scene = crank_rocker(motion=Motion(law=law), effects=(Friction.at(O2=0.05),))
     said = "reverses, and torque or pin forces jump, at t = "
     assert f"{said}0.3333 s (O2)" in block(scene)
@@ -496,7 +505,7 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_time():
 def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero():
     """Friction of 5 N m at O2 holds; the law comes to rest at 0.3 and 0.8 rad."""
     torques = solve(crank_rocker(motion=Motion([0.3, 0.8], 0.0))).torque
-    law = fourbar.Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, fall=0.1, steps=40)
+    law = Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, fall=0.1, steps=40)
     effects = (*WEIGHT, Friction.at(O2=5.0))
     text = block(crank_rocker(motion=Motion(law=law), effects=effects))
     first, last = (f"{x - 5.0:.4g} N m to {x + 5.0:.4g} N m" for x in torques)
@@ -510,7 +519,7 @@ def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero(
 
 
 CORNERS = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))
-SPIKE = Load(2, moment=-1.0, table=fourbar.Table(CORNERS, (1.0, 1.0, 50.0, 1.0, 1.0)))
+SPIKE = Load(2, moment=-1.0, table=Table(CORNERS, (1.0, 1.0, 50.0, 1.0, 1.0)))
 """A couple on the crank that is largest between two positions."""
 
 
@@ -527,7 +536,7 @@ def test_a_bore_at_rest_moves_the_linkage_against_its_friction():
 @pytest.mark.parametrize("angle", (Sweep(1.0, 2.6, 8), 1.7))
 def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     """The peaks of the motion either way, slow enough for its inertia not to show."""
-    effects = (*WEIGHT, fourbar.PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
+    effects = (*WEIGHT, PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
     rubbing = {"loads": (SPIKE,), "effects": effects, "drive": CYLINDER}
     ways = [
         Facts(solve(scene))
@@ -535,7 +544,7 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
         for scene in [crank_rocker(motion=Motion(angle, speed), **rubbing)]
     ]
     scene = crank_rocker(motion=Motion(angle, 0.0), **rubbing)
-    lines = write_block(solve(scene), fourbar.units("N N.m"))
+    lines = write_block(solve(scene), units("N N.m"))
     rows = [line for line in lines if line.startswith("  to move")]
     names = [*PIN_FORCES], ["bending_2", "bending_3", "bending_4"]
     for row, group in zip(rows, names, strict=True):
@@ -568,7 +577,7 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
         met = solve(replace(scene, motion=Motion(radians(40.0))))
         z = 0.1 * np.exp(1j * met.theta_2[0]) + 0.1 * np.exp(1j * met.theta_3[0])
         ground = Place(1, (abs(z), np.angle(z)))
-    drive = fourbar.LinearDrive(ground, Place(bar, (0.1, 0.0)))
+    drive = LinearDrive(ground, Place(bar, (0.1, 0.0)))
     pushed = replace(scene, drive_bar=None, drive=drive)
     low, high = Facts(solve(pushed)).stroke_limits
     assert low == 0.0 and "assembles from 0 mm to" in block(pushed)
@@ -582,7 +591,7 @@ def test_digits_left_are_those_that_the_error_bar_leaves(away):
     motion = {"theta_2": stretched + away, "omega_2": 3.0}
     scene = replace(move((0.3, 0.1, 0.25, 0.22), WEIGHT, **motion), drive_bar=4)
     s = solve(scene, "error")
-    digits = math.floor(math.log10(abs(s.torque[0]) / s.torque_error[0]))
+    digits = floor(log10(abs(s.torque[0]) / s.torque_error[0]))
     assert (digits < 8) == (away < 1e-8)
     said = f"{digits} digits left of T4 at" in block(scene)
     assert said == (digits < 8)
@@ -590,8 +599,8 @@ def test_digits_left_are_those_that_the_error_bar_leaves(away):
 
 def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
     """Massless bars, and both ends in common: what is left at the pins is rounding."""
-    spring = fourbar.Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5)
-    effects = (fourbar.Springs((spring,)),)
+    spring = Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5)
+    effects = (Springs((spring,)),)
     scene = Scene(
         MASSLESS, Motion([0.1, 0.4, 0.7], 1.0), drive=CYLINDER, effects=effects
     )
@@ -617,7 +626,7 @@ def test_equilibria_are_named_as_a_scene_states_their_assembly(name, branch):
     Angles are printed with four decimals of a degree.
     """
     scene = move(PARALLELOGRAM, WEIGHT, branch=branch)
-    rows = write_equilibria("", fourbar.equilibrium(scene)).splitlines()
+    rows = write_equilibria("", equilibrium(scene)).splitlines()
     rests = [row.split() for row in rows if re.search(r"\b(un)?stable\b", row)]
     rests = [row for row in rests if len(row) > 5 and row[2] in ("open", "crossed")]
     assert len(rests) > 1

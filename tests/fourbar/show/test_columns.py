@@ -1,16 +1,25 @@
 """Columns by name: sizes, components and ratios."""
 
-import math
 from dataclasses import replace
+from math import remainder, tau
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import Motion, Sweep, solve
-from fourbar.errors import InputError
+from fourbar import (
+    Gravity,
+    InputError,
+    Motion,
+    Scene,
+    Sine,
+    Sweep,
+    instant_centres,
+    load,
+    solve,
+    uniform,
+)
 from fourbar.formulas.path import compute_state
 from fourbar.quantities import DERIVED_QUANTITIES
 from fourbar.show.columns import choose_columns
@@ -75,7 +84,7 @@ def test_a_column_that_needs_a_speed_says_so():
             columns(still, name)
     with raises(InputError, match="no one speed"):
         columns(still, "time")
-    law = Motion(law=fourbar.Sine(1.0, 0.5, 2.0, duration=3.0))
+    law = Motion(law=Sine(1.0, 0.5, 2.0, duration=3.0))
     for scene in (still, replace(TURN, motion=law)):
         with raises(InputError, match='unknown; did you mean "torque"'):
             columns(scene, "tork")
@@ -87,7 +96,7 @@ def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     growing = Motion(Sweep(0.0, 1.0, 3), 1.0, 0.5)
     with raises(InputError, match="no one speed"):
         columns(replace(TURN, motion=growing), "time")
-    cylinder = fourbar.load(MODELS / "capabilities" / "stroke_input.toml")
+    cylinder = load(MODELS / "capabilities" / "stroke_input.toml")
     steady = replace(cylinder, motion=cylinder.motion.replace(acceleration=0.0))
     with raises(InputError, match="no one speed"):
         columns(cylinder, "time")
@@ -103,14 +112,14 @@ def test_a_difference_of_angles_goes_on_from_its_first_position():
     theta_4 - theta_2 is -1.4 turns of bar 2 at first where that is commanded so.
     """
     start = 2.0 * np.pi + 5.0
-    motion = Motion(Sweep(start, start + 2.0 * math.tau, 100), 10.0)
+    motion = Motion(Sweep(start, start + 2.0 * tau, 100), 10.0)
     scene = replace(TURN, motion=motion)
     solution = solve(scene)
     (difference,) = columns(scene, "theta_2 - theta_4").values()
     assert -np.pi < difference[0] <= np.pi
     gained = solution.theta_2 - solution.theta_4
     assert np.ptp(difference - gained) < 1e-12
-    assert abs(math.remainder(difference[0] - gained[0], math.tau)) < 1e-12
+    assert abs(remainder(difference[0] - gained[0], tau)) < 1e-12
     names = ["F12-F14", "F12_x/F14-F12_y/F14"]
     assert [*columns(scene, ",".join(names))] == names
 
@@ -132,7 +141,7 @@ def test_ratios_and_centres_are_those_of_the_formulas(speed):
         "omega_3/omega_2": state.k.h3,
     }.items():
         assert derive(s, name) == approx(values, rel=ROUND_OFF), name
-    by_formula = fourbar.instant_centres(scene.linkage, s.theta_2, s.branch)
+    by_formula = instant_centres(scene.linkage, s.theta_2, s.branch)
     for bars, name in {(1, 3): "I13", (2, 4): "I24"}.items():
         centre = np.stack(by_formula[bars].point, axis=-1)
         assert derive(s, name) == approx(centre, rel=1e-11), name
@@ -141,8 +150,8 @@ def test_ratios_and_centres_are_those_of_the_formulas(speed):
 def test_what_has_no_value_is_a_dash_and_what_is_rounding_zero():
     """Bars 2 and 4 are parallel: I13 lies at infinity, and the weight pulls down."""
     motion = Motion(np.array([1.0, 2.0]), 0.0)
-    linkage = fourbar.uniform(3.0, 1.0, 3.0, 1.0)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    linkage = uniform(3.0, 1.0, 3.0, 1.0)
+    scene = Scene(linkage, motion, effects=(Gravity(),))
     s = solve(scene)
     assert np.isnan(derive(s, "I13")).all()
     assert derive(s, "omega_4/omega_2") == approx(1.0)

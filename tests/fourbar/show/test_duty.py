@@ -3,18 +3,16 @@
 The loads of the pins are tested too.
 """
 
-import math
 from dataclasses import replace
-from math import tau
+from math import copysign, radians, sin, tau
 
 import numpy as np
 import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Bar, FourBar, Gravity, Motion, Scene, Sweep, solve, vary
+from fourbar import Bar, FourBar, Gravity, Law, Motion, Scene, Sweep, solve, units, vary
 from fourbar.linkage import MOVING_BARS
-from fourbar.scene.motion import Law
 from fourbar.show.duty import (
     bearing_load,
     list_duty,
@@ -22,7 +20,6 @@ from fourbar.show.duty import (
     shaking_force,
     shaking_moment,
 )
-from fourbar.show.shown_units import units
 from tests.support.scenes import CYLINDER, crank_rocker
 
 ROUND_OFF = 1e-11
@@ -73,10 +70,10 @@ def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, sp
     couple = fourbar.Load(2, moment=-0.7)
     scene = Scene(linkage, motion, loads=(couple,), effects=(Gravity(),))
     duty = motor_duty(solve(scene))
-    sense = math.copysign(1.0, speed)
+    sense = copysign(1.0, speed)
     turned = sense * abs(stop - start)
     first, last = (start, stop) if turned * (stop - start) > 0.0 else (stop, start)
-    lifted = 2.0 * 9.81 * 0.1 * (math.sin(last) - math.sin(first))
+    lifted = 2.0 * 9.81 * 0.1 * (sin(last) - sin(first))
     given = duty.energy_in - duty.energy_out
     assert given == approx(lifted + 0.7 * turned, rel=INTEGRATED)
     assert min(duty.energy_in, duty.energy_out) >= 0.0
@@ -147,7 +144,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
 @pytest.mark.slow
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
-    torsion = fourbar.effects.Torsion((("A", 2.0, math.radians(86.0), 0.0),))
+    torsion = fourbar.effects.Torsion((("A", 2.0, radians(86.0), 0.0),))
     turn = Sweep(0.0, tau, 120)
     scene = crank_rocker(motion=Motion(turn, 1.0), effects=(torsion,))
     duty = motor_duty(solve(scene))

@@ -1,17 +1,22 @@
 """Positions at which a column has a value, against closed forms."""
 
-import math
 from dataclasses import replace
-from math import acos, pi, radians
+from math import acos, asin, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import solve
-from fourbar.effects import Spring
-from fourbar.errors import InputError, NotAssembledError
+from fourbar import (
+    InputError,
+    Motion,
+    NotAssembledError,
+    Place,
+    Point,
+    Spring,
+    Springs,
+    solve,
+)
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
@@ -71,7 +76,7 @@ def parallelogram(motion=SWEEP):
     "name, value, places",
     [
         ("B_x", "0.855 m", [acos(0.11)]),
-        ("B_y", "499.9 mm", [math.asin(0.9998), pi - math.asin(0.9998)]),
+        ("B_y", "499.9 mm", [asin(0.9998), pi - asin(0.9998)]),
         ("B_x-B_y", "80 cm", [pi / 4]),
         ("theta_2-theta_3", "-330 deg", [pi / 6]),
         ("v_B_x", "-0.25 m/s", [pi / 6, 5 * pi / 6]),
@@ -113,10 +118,10 @@ def test_the_least_and_the_greatest_value_are_located(name, value, place):
 def test_a_spring_that_seldom_pushes_has_a_least_force():
     """O4 and A come nearer than 0.31 m within 7 deg alone, and are 0.3 m apart at 0."""
     (springs,) = parallelogram().effects
-    ends = fourbar.Place(1, (0.8, 0.0)), fourbar.Place(2, (0.5, 0.0))
+    ends = Place(1, (0.8, 0.0)), Place(2, (0.5, 0.0))
     (spring,) = springs.springs
     pushing = Spring(*ends, spring.stiffness, length=0.31, acts="push")
-    scene = replace(parallelogram(), effects=(fourbar.Springs((pushing,)),))
+    scene = replace(parallelogram(), effects=(Springs((pushing,)),))
     assert locate(scene, "spring_0_force", "min").places == approx([0.0])
     with raises(NotAssembledError, match=r"goes from -0\.2 to 0 N"):
         locate(scene, "spring_0_force", "1 N")
@@ -151,7 +156,7 @@ def test_a_release_has_a_value_at_times():
         '[bars.coupler]\nmass = "1 kg"\n[effects]\n'
         'gravity = ["9.81 m/s^2", "-90 deg"]\n'
     )
-    speed = math.sqrt(2.0 * 9.81 * (math.sin(radians(50.0)) - 0.5) / 0.5)
+    speed = sqrt(2.0 * 9.81 * (sin(radians(50.0)) - 0.5) / 0.5)
     at = locate(scene, "omega_2", f"{-speed!r} rad/s")
     assert np.degrees(at.angle) == approx([-50.0, -130.0], abs=1e-6)
 
@@ -191,7 +196,7 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
 @pytest.mark.slow
 def test_a_column_with_poles_says_that_it_grows_without_bound():
     """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
-    scene = crank_rocker(motion=fourbar.Motion())
+    scene = crank_rocker(motion=Motion())
     for value, why in (("1", "jumps"), ("max", "has none")):
         with raises(NotAssembledError, match=f"{why}.*, and grows without"):
             locate(scene, "mechanical_advantage", value)
@@ -210,7 +215,7 @@ def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
     limit = acos((50**2 + 20**2 - 65**2) / (2 * 50 * 20))
     place = limit - radians(0.001)
     at = solve(loads(f'{lengths}"{place!r} rad"'))
-    found = locate(scene, "transmission", f"{float(math.asin(at.sin_mu[0]))!r} rad")
+    found = locate(scene, "transmission", f"{float(asin(at.sin_mu[0]))!r} rad")
     assert found.places == approx([place], abs=1e-9)
     for name, value in (("A_x", "min"), ("theta_2", "max")):
         assert locate(scene, name, value).places == approx([limit], abs=1e-9)
@@ -231,4 +236,4 @@ def test_springs_have_their_length_and_pull_as_columns():
     assert force.unit == "N"
     assert force.values == approx(20.0 * (distance - 0.7) - 1.0, abs=1e-12)
     with raises(InputError, match="is the name of a quantity"):
-        fourbar.Point("spring_1_force", 3, (0.1, 0.0))
+        Point("spring_1_force", 3, (0.1, 0.0))

@@ -10,10 +10,17 @@ import pytest
 from numpy.testing import assert_array_equal
 from pytest import raises
 
-import fourbar
-from fourbar import Tolerance, sensitivity, solve, tolerances, vary
+from fourbar import (
+    DependencyError,
+    InputError,
+    Motion,
+    Tolerance,
+    sensitivity,
+    solve,
+    tolerances,
+    vary,
+)
 from fourbar.cli import status
-from fourbar.errors import DependencyError, InputError
 from tests.support.scenes import crank_rocker, thesis
 
 LENGTH_NAMES = ("ground", "input", "coupler", "output")
@@ -92,7 +99,7 @@ def test_a_solution_says_its_range_and_how_many_positions_it_has():
     low, high = (f"{x:.6g}" for x in (solution.torque.min(), solution.torque.max()))
     assert f"torque: {low} to {high} N m" in repr(solution)
     assert "status: 122 ok, 61 not_assembled" in repr(solve(STUDY))
-    single = replace(LOOSE, motion=fourbar.Motion(1.0))
+    single = replace(LOOSE, motion=Motion(1.0))
     one = solve(vary(single, {"lengths.input": 0.1}))
     for shown in (repr(one), one._repr_html_()):
         assert "1 linkage, 1 position each" in shown

@@ -1,10 +1,9 @@
 """The moving page in a real browser, against the formulas in Python."""
 
 import base64
-import math
 import time
 from dataclasses import replace
-from math import atan2, pi
+from math import atan2, cos, degrees, pi, remainder, sin
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,7 @@ from numpy.testing import assert_allclose
 from pytest import approx
 
 import fourbar
-from fourbar import Motion, Scene, Sweep, Tolerance, solve, uniform, units
-from fourbar.effects import Place
+from fourbar import Motion, Place, Scene, Sweep, Tolerance, solve, uniform, units
 from fourbar.files import loads
 from fourbar.show import animate
 from fourbar.show.duty import compute_energies
@@ -93,7 +91,7 @@ class Page:
                 value = value["xy".index(axis)]
             expected = approx(value, rel=PRINTED)
             if name.startswith("theta"):
-                expected = approx(math.degrees(value), abs=PRINTED_DEG)
+                expected = approx(degrees(value), abs=PRINTED_DEG)
             assert self.numbers(name) == [expected], name
         drawn = self.pins()
         scale = np.hypot(*drawn["O4"]) / s.scene.linkage.ground
@@ -314,11 +312,11 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     """
     acting = dict(page.run(script))
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
-    along = np.array([math.cos(theta_4), math.sin(theta_4)])
+    along = np.array([cos(theta_4), sin(theta_4)])
     end = s.B[20] + (0.08 - 0.22) * along
     assert_allclose(acting["act act-spring"][-1], end, atol=1e-4)
     tail, tip = np.array(acting["act act-force"])
-    off = 0.03 * np.array([math.cos(theta_3 + 1.0), math.sin(theta_3 + 1.0)])
+    off = 0.03 * np.array([cos(theta_3 + 1.0), sin(theta_3 + 1.0)])
     assert_allclose(tail, s.G3[20] + off, atol=1e-4)
     assert atan2(*(tip - tail)[::-1]) == approx(theta_3 + 0.5, abs=0.01)
     script = f'{POINTS}return [...document.querySelectorAll("#motion path.act")]'
@@ -520,7 +518,7 @@ def test_a_picture_lies_along_its_bar(show, tmp_path):
     assert float(element.get_attribute("width")) == approx(length)
     turn = element.get_attribute("transform")
     angle = float(turn[turn.index("rotate(") + 7 : -1])
-    away = math.remainder(angle + math.degrees(solve(crank_rocker()).theta_4[9]), 360)
+    away = remainder(angle + degrees(solve(crank_rocker()).theta_4[9]), 360)
     assert away == approx(0, abs=1e-6)
 
 

@@ -1,7 +1,6 @@
 """Integrals of curves over a motion against their antiderivatives."""
 
-import math
-from math import pi
+from math import cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -39,7 +38,7 @@ def integrate_product(x):
         # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
         (
             lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1),
-            25.0 - 1.75 * math.sin(4.0),
+            25.0 - 1.75 * sin(4.0),
         ),
     ],
     ids=("number", "vector"),
@@ -65,7 +64,7 @@ def test_a_curve_is_integrated_from_zero_to_zero():
     steps = np.diff(panels.accumulate("curve"))
     # the second half wave ends at 2 pi/3, beyond the motion
     assert steps[steps > 0.0].sum() == approx(2.0 / 3.0, rel=SETTLED)
-    down = (1.0 + math.cos(6.0)) / 3.0
+    down = (1.0 + cos(6.0)) / 3.0
     assert -steps[steps < 0.0].sum() == approx(down, rel=SETTLED)
 
 
@@ -77,7 +76,7 @@ def test_the_range_of_the_integral_about_a_level():
     assert np.ptp(about_mean) == approx(2.0 / pi, rel=SETTLED)
 
 
-POLE = math.sqrt(0.5)
+POLE = sqrt(0.5)
 
 
 @pytest.mark.parametrize("power", (1.0, 2.0, 0.5))
@@ -90,7 +89,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
     panels = fit_panels(compute, EDGES, wanted)
     assert panels.growing == {"curve"} and not panels.has_value("curve")
     assert panels.list_poles("curve") == [approx(POLE, abs=1e-7)]
-    right = math.exp(2.0) - 1.0
+    right = exp(2.0) - 1.0
     assert panels.integrate("other") == approx(right, rel=SETTLED)
 
 
@@ -100,7 +99,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
         (lambda x: np.where(x < 0.7, np.nan, -x), 2.0, 2.0),
         (lambda x: np.where(x < 0.7, 1.0 + x, 0.3), 1.7, 0.7),
         (lambda x: 2.0 - np.abs(x - POLE), 2.0, POLE),
-        (lambda x: 3.0 + np.sqrt(2.0 - x), 3.0 + math.sqrt(2.0), 0.0),
+        (lambda x: 3.0 + np.sqrt(2.0 - x), 3.0 + sqrt(2.0), 0.0),
         (lambda x: 1.0 / (np.square(x - POLE) + 1e-10), 1e10, POLE),
         (lambda x: np.sin(7.0 * x), 1.0, 0.5 * pi / 7.0),
         (lambda x: 0.0 * x - 4.0, 4.0, 0.0),

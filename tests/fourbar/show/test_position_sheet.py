@@ -10,8 +10,20 @@ import numpy as np
 import pytest
 from pytest import approx
 
-import fourbar
-from fourbar import Bar, Free, Gravity, Motion, Scene, solve
+from fourbar import (
+    Bar,
+    FourBar,
+    Free,
+    Gravity,
+    Load,
+    Motion,
+    Point,
+    Rise,
+    Scene,
+    Sweep,
+    solve,
+    uniform,
+)
 from fourbar.files import loads
 from fourbar.scene import command_at
 from fourbar.show.located import locate
@@ -26,9 +38,7 @@ from tests.support.texts import PLIERS
 SIX_DIGITS = 6e-6
 
 
-ONE = crank_rocker(
-    motion=Motion(1.0, 10.0, 3.0), points=(fourbar.Point("P", 3, (0.1, 0.7)),)
-)
+ONE = crank_rocker(motion=Motion(1.0, 10.0, 3.0), points=(Point("P", 3, (0.1, 0.7)),))
 
 
 def numbers(line):
@@ -57,7 +67,7 @@ def test_what_a_scene_has_not_is_left_out(motion, rates):
 
 
 def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_word():
-    lift = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), Motion(np.pi / 2.0, 1.0))
+    lift = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.pi / 2.0, 1.0))
     text = "\n".join(
         line
         for sheet in [PositionSheet(solve(lift), COMMON)]
@@ -89,12 +99,12 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     ratio = numbers(row)[0]
     assert ratio == approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
     assert not any(row.startswith("F_handle/drive_force") for row in rows)
-    held = fourbar.Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
+    held = Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
     loaded = solve(replace(scene, loads=(held,)))
     assert 1.0 / loaded.drive_force[0] == approx(ratio, rel=SIX_DIGITS)
 
 
-PARALLELOGRAM = fourbar.FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1))
+PARALLELOGRAM = FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1))
 """Uniform bars of 1 kg/m, all in one line at theta_2 = 0 and 180 deg."""
 ALONG = Gravity(9.81, 0.0)
 ACROSS = Gravity(9.81, -0.5 * np.pi)
@@ -159,7 +169,7 @@ def test_a_release_has_the_limits_of_its_own_motion(gravity):
 RELEASED = Motion(0.0, 6.0, free=Free(1.0, 10))
 REASONS = [
     (
-        Motion(law=fourbar.Rise("cycloidal", (1.0, 1.0), theta_2=0.0)),
+        Motion(law=Rise("cycloidal", (1.0, 1.0), theta_2=0.0)),
         "the law stands still there",
     ),
     (RELEASED, "the release begins or ends there, and has one side alone"),
@@ -176,12 +186,12 @@ def test_the_reason_is_said_where_a_motion_begins(motion, why):
 
 def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     """At the limit of bar 4 its speed is zero; a whole turn later the angle is 2 pi."""
-    scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(None, 10.0))
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(None, 10.0))
     at_limit = locate(scene, "theta_4", "max")
     rows = PositionSheet(solve(scene, at=at_limit), units("N m")).write_bars()
     assert abs(solve(scene, at=at_limit).omega_4[0]) > 0.0
     assert rows[3].split()[3] == "0" and rows[2].split()[3] != "0"
-    turned = Scene(PARALLELOGRAM, Motion(fourbar.Sweep(0.0, 2.0 * np.pi, 4), 1.0))
+    turned = Scene(PARALLELOGRAM, Motion(Sweep(0.0, 2.0 * np.pi, 4), 1.0))
     one = solve(turned, at=command_at(turned, np.array([2.0 * np.pi])))
     follow(turned, one)
     rows = PositionSheet(one, units("N m")).write_bars()

@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-import math
+from math import pi, tau
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +39,8 @@ SIZES = {
     **dict.fromkeys(("in", "in/s", "in/s^2"), INCH),
     "lbf": POUND,
     "lbf in": POUND * INCH,
-    "rpm": math.tau / 60.0,
-    "deg": math.pi / 180.0,
+    "rpm": tau / 60.0,
+    "deg": pi / 180.0,
     "hp": 550.0 * 12.0 * POUND * INCH,
     **dict.fromkeys(("rad/s^2", "1", "J"), 1.0),
 }
@@ -80,7 +80,7 @@ def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
     for name, expected in {
         "|F14| [N]": np.hypot(*solution.F14.T),
         "power [kW]": solution.torque * scene.motion.omega_2 / 1000.0,
-        "time [s]": np.linspace(0.0, math.tau / scene.motion.omega_2, 361),
+        "time [s]": np.linspace(0.0, tau / scene.motion.omega_2, 361),
     }.items():
         column = [float(row[header.index(name)].replace(",", ".")) for row in rows]
         assert np.allclose(column, expected, rtol=1e-14, atol=1e-15), name

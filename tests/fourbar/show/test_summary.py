@@ -1,10 +1,9 @@
 """Facts of a motion against a dense scan of `solve`, and releases by the energy."""
 
-import math
 import time
 import tomllib
 from itertools import pairwise
-from math import pi, sin, sqrt, tau
+from math import asin, cos, pi, radians, sin, sqrt, tau
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,19 @@ from pytest import approx
 from scipy.integrate import quad
 from scipy.special import ellipk
 
-import fourbar
-from fourbar import Bar, FourBar, Load, Motion, Scene, Sweep, Viscous, solve
+from fourbar import (
+    Bar,
+    FourBar,
+    Free,
+    Gravity,
+    Load,
+    Motion,
+    Scene,
+    Sweep,
+    Viscous,
+    dump,
+    solve,
+)
 from fourbar.files import loads
 from fourbar.files.scene_file import read_tables
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
@@ -108,7 +118,7 @@ motion.theta_2 = { from = "6 deg", to = "366 deg", steps = 12 }
 motion.omega_2 = "45 rpm"
 """)
 """What the scenes state besides the crank-rocker."""
-CRANK_ROCKER = tomllib.loads(fourbar.dump(crank_rocker()))
+CRANK_ROCKER = tomllib.loads(dump(crank_rocker()))
 REVERSES = {"wiper": "O4", "law of a table": "O2", "stroke": "O4"}
 """Pin at which dry friction acts."""
 
@@ -306,7 +316,7 @@ EXTREME = 1e-9
 
 
 ARM = 0.5
-AWAY = math.radians(25.0)
+AWAY = radians(25.0)
 CRANK = 2.0
 COUPLER = 5.0
 
@@ -324,9 +334,9 @@ def release_pendulum(omega, duration, *effects):
     """
     crank = Bar(ARM, CRANK)
     linkage = FourBar(0.6, crank, Bar(0.6, COUPLER), crank)
-    free = fourbar.Free(duration, 7)
+    free = Free(duration, 7)
     motion = Motion(1.5 * pi - AWAY, omega, free=free)
-    scene = Scene(linkage, motion, effects=(fourbar.Gravity(9.8), *effects))
+    scene = Scene(linkage, motion, effects=(Gravity(9.8), *effects))
     return Facts(solve(scene))
 
 
@@ -347,10 +357,10 @@ def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes():
 
 def test_a_released_turn_has_its_period():
     """The time of a turn is the integral of 1/omega, by the energy."""
-    energy = 0.5 * INERTIA * 30.0**2 - WEIGHT * math.cos(AWAY)
+    energy = 0.5 * INERTIA * 30.0**2 - WEIGHT * cos(AWAY)
 
     def compute_slowness(theta):
-        return sqrt(0.5 * INERTIA / (energy + WEIGHT * math.cos(theta)))
+        return sqrt(0.5 * INERTIA / (energy + WEIGHT * cos(theta)))
 
     period, _ = quad(compute_slowness, 0.0, 2.0 * pi, epsabs=1e-13)
     facts = release_pendulum(30.0, 0.5)
@@ -368,5 +378,5 @@ def test_transmission_angle_is_the_least_of_all_stretches():
     sines = solve(fine).sin_mu
     assert np.nanmin(sines) < 0.0 < np.nanmax(sines)
     least = Facts(solve(scene)).transmission
-    right = math.asin(np.nanmin(np.abs(sines)))
+    right = asin(np.nanmin(np.abs(sines)))
     assert least.value == approx(right, abs=BETWEEN_STEPS)

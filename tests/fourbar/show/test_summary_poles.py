@@ -2,9 +2,8 @@
 of the sweep.
 """
 
-import math
 from dataclasses import replace
-from math import pi, radians, tau
+from math import acos, atan2, degrees, hypot, pi, radians, sin, tau
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,20 @@ import pytest
 from pytest import approx
 from scipy.optimize import brentq
 
-import fourbar
-from fourbar import Bar, Gravity, Load, Motion, Scene, Sweep, solve, uniform
-from fourbar.effects import PinFriction
+from fourbar import (
+    Bar,
+    FourBar,
+    Gravity,
+    Load,
+    Motion,
+    PinFriction,
+    Scene,
+    Sweep,
+    load,
+    solve,
+    swing,
+    uniform,
+)
 from fourbar.files import loads
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
@@ -69,7 +79,7 @@ def write(facts, **options):
 
 def find_angle(side, first, second):
     """Return the angle between two sides of a triangle, opposite to the third."""
-    return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
+    return acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 CLAMP = loads("""
@@ -98,7 +108,7 @@ def find_stroke_speed(angle):
     return float(solve(DIGGER, "velocity", at=at).stroke_speed[0])
 
 
-DIGGER = fourbar.load(
+DIGGER = load(
     Path(__file__).parents[3] / "models" / "capabilities" / "cylinder_1_4.toml"
 )
 """The cylinder has no lever at one angle of bar 2."""
@@ -108,7 +118,7 @@ LIMITS = [pi - find_angle(reach, 0.3, 0.22) for reach in (0.35, 0.15)]
 DEAD = [find_angle(0.22, 0.3, 0.35), find_angle(0.22, 0.3, 0.15) + pi]
 """Angles of the output's limits, and of bar 2 where bars 2 and 3 are in line."""
 BEYOND = CLAMP.motion.replace(angle=replace(CLAMP.motion.angle, stop=radians(-2.0)))
-CLAMPED = find_angle(0.06, 0.1, 2.0 * math.hypot(0.04, 0.002)) - math.atan2(0.06, 0.08)
+CLAMPED = find_angle(0.06, 0.1, 2.0 * hypot(0.04, 0.002)) - atan2(0.06, 0.08)
 
 RUBBING = (PinFriction.at(O4=(0.12, 0.006)), Gravity())
 
@@ -175,7 +185,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
     if drive in growing:
         poles = panels.list_poles(drive)
         assert poles == approx(places, abs=LOCATED)
-        written = [f"{math.degrees(pole):.4g} deg" for pole in poles]
+        written = [f"{degrees(pole):.4g} deg" for pole in poles]
         assert head + " and ".join(written).replace("-0 ", "0 ") in text
         sized = scene.drive is None or facts.stroke_range is not None
         assert ("none is enough, as the" in text) == sized
@@ -187,7 +197,7 @@ def test_a_torque_is_largest_where_pin_forces_have_a_pole(start, stop):
     """T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at change points."""
     facts = find_facts(sweep(PARALLELOGRAM, start, stop))
     assert abs(facts.peak.value) == approx(0.4 * 9.81 * 0.1, rel=PEAK)
-    assert abs(math.sin(facts.peak.place)) < LOCATED
+    assert abs(sin(facts.peak.place)) < LOCATED
     assert facts.motion.panels.growing == {*PIN_FORCE.values()}
 
 
@@ -213,7 +223,7 @@ def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed
     assert facts.peak is None and facts.pins["O2"].peak is None
     assert facts.pins["B"].peak is not None
     text = write(facts, pressure=1e6)
-    assert f"grows without bound at theta_2 = {math.degrees(IN_LINE):.4g} deg" in text
+    assert f"grows without bound at theta_2 = {degrees(IN_LINE):.4g} deg" in text
     assert "bore none is enough" in text and "peak unbounded" in text
 
 
@@ -240,7 +250,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
         widths.append(high.value - low.value)
     if not assembled.all():
         assert widths == approx([widths[0]] * 3, abs=LOCATED)
-        assert widths[0] <= fourbar.swing(uniform(*lengths)) + LOCATED
+        assert widths[0] <= swing(uniform(*lengths)) + LOCATED
 
 
 @pytest.mark.slow
@@ -268,7 +278,7 @@ def test_a_jump_where_pin_friction_reverses_is_no_pole(start, steps, pins):
     Pin B reverses there, at positions of some sweeps and at the ends of some turns.
     """
     scene = Scene(
-        fourbar.FourBar(0.3, Bar(0.04), Bar(0.29), Bar(0.065)),
+        FourBar(0.3, Bar(0.04), Bar(0.29), Bar(0.065)),
         Motion(Sweep(start, start + tau, steps), tau),
         loads=(Load(4, moment=-20.0),),
         effects=(PinFriction.at(**dict.fromkeys(pins, (0.15, 0.005))),),

@@ -9,15 +9,25 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pytest import raises
 
-import fourbar
-from fourbar import InputError, load, solve, uniform
+from fourbar import (
+    Free,
+    Friction,
+    FromLimit,
+    Gravity,
+    InputError,
+    Load,
+    Motion,
+    PinFriction,
+    Scene,
+    load,
+    sensitivity,
+    solve,
+    uniform,
+    vary,
+)
 from fourbar.cli import status
-from fourbar.effects import Friction, Gravity, PinFriction
-from fourbar.scene import Scene
-from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_sensitivity
-from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.keys import list_entries, read_place
 from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
 
@@ -93,7 +103,7 @@ def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
 def test_the_command_names_the_place_and_rounding_is_no_influence():
     """The coupler of a parallelogram does not turn: its load may act at any place."""
     motion = Motion(theta_4=np.array([0.5, 0.9]), omega_4=1.0)
-    load = fourbar.Load(3, (5.0, -1.0), from_pin=(0.1, 0.2))
+    load = Load(3, (5.0, -1.0), from_pin=(0.1, 0.2))
     slopes = sensitivity(Scene(uniform(*PARALLELOGRAM), motion, loads=(load,)))
     moving = {row.key for row in slopes.influences("torque")}
     assert "loads.0.force.0" in moving and "loads.0.from_pin.0" not in moving
@@ -111,7 +121,7 @@ def differ_by_a_study(nominal, key, name="theta_3"):
     step = 1e-6
     number = read_place(nominal, list_entries(nominal)[key].place)
     beside = {key: np.array([number - step, number + step])}
-    below, above = solve(fourbar.vary(nominal, beside))[name]
+    below, above = solve(vary(nominal, beside))[name]
     return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
 
 

@@ -4,10 +4,9 @@ Released motions agree, and none is missed.
 """
 
 import json
-import math
 import re
 from dataclasses import replace
-from math import pi, radians, sqrt
+from math import acos, asin, degrees, pi, radians, remainder, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx
 
-import fourbar
 from fourbar import (
     Bar,
     FourBar,
@@ -23,21 +21,25 @@ from fourbar import (
     Gravity,
     Load,
     Motion,
+    NotAssembledError,
+    Place,
     Scene,
     Spring,
     Springs,
     Sweep,
     Table,
     Torsion,
+    dump,
+    equilibrium,
+    limit_positions,
     solve,
+    uniform,
 )
 from fourbar.cli import status
-from fourbar.effects import Place
 from fourbar.files import load, loads
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
-from fourbar.studies.equilibrium import equilibrium
 from tests.support.scenes import balanced_lamp, bare
 from tests.support.shares import slow_but
 
@@ -94,7 +96,7 @@ def pendulum_under_moment(excess):
 
 def apart(excess):
     """Half the distance of its two zeros, a sixth of the grid's step at -1e-8."""
-    return math.acos(1.0 + excess)
+    return acos(1.0 + excess)
 
 
 TOP = pi / 2 + 0.1
@@ -178,7 +180,7 @@ def test_a_crank_with_mass_alone_is_a_pendulum(name):
     found = sorted(equilibria.found, key=lambda rest: rest.stability)
     assert [rest.stability for rest in found] == [row[0] for row in expected]
     for rest, (stability, theta_2, slope, inertia) in zip(found, expected, strict=True):
-        turned = math.remainder(rest.place.theta_2 - theta_2, TURN)
+        turned = remainder(rest.place.theta_2 - theta_2, TURN)
         assert turned == approx(0.0, abs=close)
         assert rest.inertia == approx(inertia, rel=CLOSE, abs=CLOSE)
         assert rest.slope == approx(slope, rel=max(CLOSE, 1e3 * close), abs=close)
@@ -198,7 +200,7 @@ def test_at_its_limits_the_output_is_a_pendulum_or_has_no_inertia():
     bars = Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0))
     linkage = FourBar(0.3, *bars, 0.5)
     own = sqrt(FALLS / J) / TURN
-    limit = fourbar.limit_positions(linkage)[0]
+    limit = limit_positions(linkage)[0]
     beside = Motion(np.array([limit.theta_2 + off for off in (0.01, -0.01)]))
     along = Scene(linkage, beside, effects=(Gravity(9.81, limit.theta_4),))
     (hanging,) = [rest for rest in equilibrium(along).found if rest.place.branch == 0]
@@ -214,10 +216,10 @@ def test_at_its_limits_the_output_is_a_pendulum_or_has_no_inertia():
 @pytest.mark.slow
 def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     f = 0.2
-    away = math.asin(f / (M * 9.81 * R))
+    away = asin(f / (M * 9.81 * R))
     equilibria = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
     for rest in equilibria.found:
-        ends = [math.remainder(end[0] - rest.place[0], TURN) for end in rest.held]
+        ends = [remainder(end[0] - rest.place[0], TURN) for end in rest.held]
         assert ends == approx([-away, away], abs=CLOSE)
     assert len(equilibria.held) == 2
     assert all(lower.theta_2 < upper.theta_2 for lower, upper in equilibria.held)
@@ -319,7 +321,7 @@ def test_what_is_balanced_is_indifferent_over_all_that_it_reaches():
         assert not equilibria.found
         first, last = (end.theta_2 for end in equilibria.indifferent[0])
         assert reached is None or last - first == approx(reached)
-    first, last = (math.degrees(end.theta_2) for end in lamp.indifferent[0])
+    first, last = (degrees(end.theta_2) for end in lamp.indifferent[0])
     assert (first, last) == approx((-40.0, 60.0), abs=1e-9)
 
 
@@ -419,7 +421,7 @@ def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
 
 
 def test_equilibria_are_printed_in_the_units_of_the_file(run):
-    text, pound, inch = fourbar.dump(crank_as_pendulum(DOWN)), 0.45359237, 0.0254
+    text, pound, inch = dump(crank_as_pendulum(DOWN)), 0.45359237, 0.0254
     assert 'ground = "0.3 m"' in text
     stated = text.replace('ground = "0.3 m"', f'ground = "{0.3 / inch!r} in"')
     Path("inches.toml").write_text(stated)
@@ -470,6 +472,6 @@ def test_the_command_prints_what_python_finds(run):
 
 
 def test_what_assembles_nowhere_is_refused():
-    scene = Scene(fourbar.uniform(1.0, 1.5, 1.0, 0.2), Motion(pi))
-    with pytest.raises(fourbar.NotAssembledError, match="assembles at none"):
+    scene = Scene(uniform(1.0, 1.5, 1.0, 0.2), Motion(pi))
+    with pytest.raises(NotAssembledError, match="assembles at none"):
         equilibrium(scene)

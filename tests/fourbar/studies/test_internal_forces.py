@@ -12,17 +12,18 @@ import pytest
 from numpy.testing import assert_allclose
 from pytest import approx, raises
 
-import fourbar
 from fourbar import (
     Bar,
+    FourBar,
     Gravity,
+    InputError,
     Load,
     Motion,
+    Point,
     Scene,
     internal_forces,
     solve,
 )
-from fourbar.errors import InputError
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
@@ -32,7 +33,7 @@ which is above 0.6 here.
 """
 
 
-BARE = fourbar.FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+BARE = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
 
 
 AT = Motion(1.0, 0.0)
@@ -65,7 +66,7 @@ def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     """
     bar, foot = int(bar), float(foot)
     load = Load(bar, moment=3.0, **json.loads(load))
-    point = fourbar.Point("P", 4, from_pin=(0.05, 0.0))
+    point = Point("P", 4, from_pin=(0.05, 0.0))
     x = np.array([0.01, 0.06, 0.12, 0.2])
     internal = load_beam(load, bar, x, points=(point,))
     length = BARE.bar(bar).length

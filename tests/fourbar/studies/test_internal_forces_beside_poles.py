@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from pytest import approx
 
-import fourbar
-from fourbar import solve
+from fourbar import internal_forces, load, solve
 from fourbar.show.summary import Facts
 
-SCENE = fourbar.load(
+SCENE = load(
     Path(__file__).parents[2]
     / "counterexamples"
     / "bar_without_drive_beside_a_pole.toml"
@@ -105,8 +104,7 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
     solution = solve_at(places)
     assert np.hypot(*solution.F12.T).max() > 1e9 and solution.assembled.all()
     input_bar, output_bar = (
-        np.abs(fourbar.internal_forces(SCENE, solution, bar).largest.moment)
-        for bar in (2, 4)
+        np.abs(internal_forces(SCENE, solution, bar).largest.moment) for bar in (2, 4)
     )
     assert input_bar == approx(bend_input(), rel=ROUNDED, abs=0.0)
     expected = [bend_output(place) for place in places]

@@ -9,11 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 from pytest import raises
 
-import fourbar
-from fourbar import InputError, Tolerance, uniform, vary
+from fourbar import InputError, Tolerance, save, tolerances, uniform, vary
 from fourbar.cli import status
 from fourbar.files import dump, loads
-from fourbar.studies.spread import tolerances
 from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
 
@@ -164,7 +162,7 @@ def test_tolerances_of_pins_are_written_and_shown(capsys, tmp_path):
     with raises(InputError, match="no number of the scene has this key"):
         dump(redrawn)  # its file states lengths
     path = str(tmp_path / "drawn.toml")
-    fourbar.save(scene, path)
+    save(scene, path)
     assert status(["tolerance", path, "--samples", "64"]) == 0
     assert "torque: 100 % pins.O2.0" in capsys.readouterr().out
     assert status(["analyze", path, "--sensitivity"]) == 0

@@ -3,18 +3,29 @@
 Solved back, of every kind of motion.
 """
 
-import math
 import re
 from dataclasses import replace
-from math import acos, pi, radians
+from math import acos, cos, pi, radians, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import Free, Motion, Scene, Sweep, solve
+from fourbar import (
+    Free,
+    Gravity,
+    Law,
+    Motion,
+    Scene,
+    Sweep,
+    equilibrium,
+    limit_positions,
+    load,
+    release,
+    solve,
+    units,
+)
 from fourbar.errors import (
     FourBarError,
     NotAssembledError,
@@ -23,7 +34,6 @@ from fourbar.errors import (
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
 from fourbar.show.block import write_block
-from fourbar.show.shown_units import units
 from fourbar.studies.passing import (
     INSIDE_LIMIT,
     find_positions,
@@ -45,21 +55,19 @@ AT_LIMIT = 10.0 * INSIDE_LIMIT
 """rad: the other bars turn by about as much as the bar from its limit, on average."""
 
 LAW = crank_rocker(
-    motion=Motion(
-        law=fourbar.Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest")
-    )
+    motion=Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest"))
 )
 BEYOND = Scene(
     bare(0.6, 0.3, 0.35, 0.25),
-    Motion(law=fourbar.Law((0.0, 1.0), (0.4, 2.0), ends="rest")),
+    Motion(law=Law((0.0, 1.0), (0.4, 2.0), ends="rest")),
 )
 """Assembles up to cos(theta_2) = 1/4."""
 SWEPT = Sweep(0.2, 1.2, 10)
 DROPPED = crank_rocker(
     motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
-    effects=(fourbar.Gravity(),),
+    effects=(Gravity(),),
 )
-STROKES = fourbar.load(
+STROKES = load(
     Path(__file__).parents[3] / "models" / "capabilities" / "stroke_input.toml"
 )
 
@@ -157,7 +165,7 @@ def test_a_law_passes_an_angle_up_and_down():
 def test_a_release_is_met_when_it_first_passes():
     """By a much finer release: the angle lies between two of its instants."""
     free = DROPPED.motion.replace(free=Free(1.0, 20000))
-    fine = fourbar.release(replace(DROPPED, motion=free)).command
+    fine = release(replace(DROPPED, motion=free)).command
     value = float(fine.theta_2[3001])
     wanted = ("time", 0.0), ("time", 0.25), ("theta_2", value)
     found = join_commands([find_positions(DROPPED, *at) for at in wanted])
@@ -174,7 +182,7 @@ def test_a_release_is_met_when_it_first_passes():
 def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     """Bar 2 has two ranges; the extent of bar 4 is that of the second, which moves."""
     linkage = bare(0.3, 0.2, 0.25, 0.1)
-    ranges = fourbar.limit_positions(linkage)
+    ranges = limit_positions(linkage)
     assert len(ranges) == 4
     low, high = sorted(2.0 * pi - limit.theta_2 for limit in ranges[:2])
     scene = Scene(linkage, Motion(Sweep(low + 0.1, high - 0.1, 20)))
@@ -211,8 +219,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     limit = acos((7.0**2 + 2.0**2 - 8.5**2) / 28.0)
     from_line = radians(60.0)
     first, last = (
-        math.sqrt(3.0**2 + 1.0 - 6.0 * math.cos(limit + away))
-        for away in (-from_line, from_line)
+        sqrt(3.0**2 + 1.0 - 6.0 * cos(limit + away)) for away in (-from_line, from_line)
     )
     scene = loads(ROCKER_WITH_RAM)
     assert not solve(scene).assembled.any()
@@ -223,7 +230,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     with state_messages_in(units("imperial")):
         assert say_nowhere(scene) == said
         with raises(NotAssembledError) as raised:
-            fourbar.equilibrium(scene)
+            equilibrium(scene)
         assert str(raised.value) == said
     other = replace(scene, motion=scene.motion.replace(side="left"))
     assert say_range(other) == "this cylinder can have 0.0508 to 0.1016 m"
@@ -238,7 +245,7 @@ def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
     linkage = crank_rocker().linkage
     (low, high), *_ = find_intervals(linkage, 4)
     for limit, outwards in ((low, -1.0), (high, 1.0)):
-        angle = limit + 4.0 * math.pi + outwards * beyond
+        angle = limit + 4.0 * pi + outwards * beyond
         kept = meet_limit(linkage, 4, angle, rounding=5e-6)
         assert abs(kept - angle) == approx(beyond if met else 0.0, rel=1e-6)
         inside = limit - outwards * beyond

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from pytest import approx
 
+from fourbar import solve, units
 from fourbar.files import loads
 from fourbar.show.path_rows import write_paths
-from fourbar.show.shown_units import units
-from fourbar.solving import solve
 from fourbar.studies.paths import measure_paths
 
 DRIVE = """\

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 from pytest import raises
 
-from fourbar import coupler_curve, instant_centres, solve
-from fourbar.errors import InputError
+from fourbar import InputError, coupler_curve, instant_centres, solve
 from tests.support.scenes import TURN
 
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from pytest import approx, raises
 
-import fourbar
-from fourbar import sensitivity
+from fourbar import Motion, equilibrium, sensitivity, solve
 from fourbar.effects.effect import Effect
 from fourbar.errors import LimitError
 from fourbar.linkage import Declared
@@ -123,9 +122,9 @@ class Drag(Effect):
 @pytest.mark.parametrize("speed", [-2.0, 2.0])
 def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
     def torques(form, speed):
-        motion = fourbar.Motion(1.0, speed)
+        motion = Motion(1.0, speed)
         scene = crank_rocker(motion=motion, effects=(Drag(0.5, form),))
-        return scene, fourbar.solve(scene).torque
+        return scene, solve(scene).torque
 
     scene, torque = torques("copysign", speed)
     by_speed = sensitivity(scene).of("torque", "motion.omega_2")
@@ -140,7 +139,7 @@ def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
     with raises(LimitError, match=r"cannot follow numpy\.maximum"):
         sensitivity(refused)
     with raises(LimitError, match=r"cannot follow numpy\.maximum"):
-        fourbar.equilibrium(refused)
+        equilibrium(refused)
 
 
 def test_a_number_is_zero_only_where_its_slopes_are_too():

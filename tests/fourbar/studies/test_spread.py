@@ -4,8 +4,8 @@ What a file may not state.
 """
 
 import json
-import math
 import re
+from math import copysign, sqrt
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,16 +15,26 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx, raises
 from scipy.stats import norm
 
-from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
+from fourbar import (
+    Bar,
+    FourBar,
+    Friction,
+    Gravity,
+    InputError,
+    Motion,
+    Scene,
+    Sweep,
+    Tolerance,
+    tolerances,
+    uniform,
+)
 from fourbar.cli import status
-from fourbar.effects import Friction, Gravity
 from fourbar.files import loads
 from fourbar.formulas.mobility import choose_range, limit_positions
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.tolerances import describe_parted, write_spreads
 from fourbar.solution import DEGREES
 from fourbar.studies import spread as studied
-from fourbar.studies.spread import tolerances
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
@@ -64,7 +74,7 @@ def test_a_number_that_the_torque_is_proportional_to():
         np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4
     )
     assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
-    assert_allclose(torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12)
+    assert_allclose(torque.first_order, 2 * 0.03 / sqrt(3) * size, rtol=1e-12)
     assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
     assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
@@ -78,7 +88,7 @@ def test_friction_at_rest_moves_what_it_holds_and_no_torque():
     for name, width in (("torque", 0.0), ("torque_low", 0.01), ("torque_high", 0.01)):
         assert_allclose(study.spreads[name].worst, width, rtol=1e-9, atol=1e-12)
         sigma = study.spreads[name].deviation
-        assert_allclose(sigma, width / math.sqrt(3), rtol=QUASI, atol=1e-12)
+        assert_allclose(sigma, width / sqrt(3), rtol=QUASI, atol=1e-12)
     lines = write_spreads(study, DEGREES, None).split("\n")
     assert "  torque_high: 100 % effects.friction.O2" in lines
     assert max(map(len, lines)) <= BLOCK_WIDTH
@@ -110,7 +120,7 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch)
 def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there():
     linkage = uniform(0.2, 0.48, 0.55, 0.2)
     edge = limit_positions(linkage)[0].theta_2
-    beside = edge + math.copysign(2e-4, choose_range(linkage)[0] - edge)
+    beside = edge + copysign(2e-4, choose_range(linkage)[0] - edge)
     loose = (Tolerance("lengths.output", 2e-4),)
     motion = Motion(np.array([beside, beside + 0.3]), 1.0)
     study = tolerances(Scene(linkage, motion, tolerances=loose), 256)

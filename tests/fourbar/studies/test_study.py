@@ -12,23 +12,22 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pytest import raises
 
 from fourbar import (
+    Free,
+    FromLimit,
+    Gravity,
     InputError,
     Motion,
+    PinFriction,
     Scene,
     Sweep,
     Tolerance,
+    command,
     solve,
     uniform,
-)
-from fourbar.effects import (
-    Gravity,
-    PinFriction,
+    vary,
 )
 from fourbar.files import loads
-from fourbar.scene import command
-from fourbar.scene.motion import Free, FromLimit
 from fourbar.studies.keys import list_entries, read_place, replace_place
-from fourbar.studies.study import vary
 from tests.support.rows import read_rows
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])

@@ -4,12 +4,11 @@ Nothing may overlap, and they must reach the file atomically.
 """
 
 import json
-import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from itertools import combinations, cycle
-from math import radians
+from math import acos, atan2, degrees, hypot, pi, radians, tau
 from pathlib import Path
 
 import matplotlib
@@ -22,11 +21,15 @@ from pytest import approx, raises
 
 import fourbar
 from fourbar import (
+    Flywheel,
+    FourBarError,
     Free,
     Friction,
     Gravity,
+    Law,
     LinearDrive,
     Motion,
+    Place,
     Point,
     Sweep,
     Torsion,
@@ -34,11 +37,8 @@ from fourbar import (
     load,
     solve,
 )
-from fourbar.effects import Flywheel, Place
-from fourbar.errors import FourBarError
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
-from fourbar.scene.motion import Law
 from fourbar.show import plot
 from fourbar.show.duty import compute_energies
 from fourbar.show.motion_curves import describe_motion
@@ -73,7 +73,7 @@ TOUCH = 1.0
 
 GALLERY = Path(__file__).parents[4] / "models" / "gallery"
 
-FULL_TURN = Sweep(0.0, 2 * math.pi, 360)
+FULL_TURN = Sweep(0.0, 2 * pi, 360)
 CRANK_ROCKER = crank_rocker()
 THREE_ROCKERS = thesis(FULL_TURN)
 
@@ -320,9 +320,9 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
         for line in axes.lines
         if line.get_linewidth() == 4.5
     ]
-    lengths = [math.hypot(*bar) for bar in bars]
+    lengths = [hypot(*bar) for bar in bars]
     assert lengths == approx([100.0, 250.0, 220.0])  # mm
-    assert math.atan2(*bars[0][::-1]) == approx(1.3)
+    assert atan2(*bars[0][::-1]) == approx(1.3)
     assert axes.get_aspect() == 1.0
 
 
@@ -378,7 +378,7 @@ def test_transmission_angle_marks_limits_and_dead_centres(branch):
 
     def angle(first, second, opposite):
         cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
-        return math.degrees(math.acos(cosine))
+        return degrees(acos(cosine))
 
     marks = find_marks(composed(set_branch(thesis(FULL_TURN), branch), "transmission"))
     # bars 3 and 4 folded: |b - c| between A and O4
@@ -472,7 +472,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     assert ring.get_ydata()[0] == approx(peak)
     words = [text.get_text() for text in figure.findobj(Text)]
     assert f"{write_number(peak)} mN m" in words
-    place = f"{math.degrees(make_view(scene).here.theta_2[0]):.4g}°"
+    place = f"{degrees(make_view(scene).here.theta_2[0]):.4g}°"
     assert any(f"Dashed upright line: θ₂\u00a0=\u00a0{place}" in word for word in words)
 
 
@@ -597,7 +597,7 @@ def test_one_position_of_another_command_stands_in_its_range():
     shown = make_view(commanding(Motion(theta_4=2.0, omega_4=1.0)))
     assert shown.at == "θ₄ = 114.6°"
     limits = find_intervals(CRANK_ROCKER.linkage, 4)
-    low, high = next(ends for ends in limits if ends[0] < 2.0 + math.tau < ends[1])
+    low, high = next(ends for ends in limits if ends[0] < 2.0 + tau < ends[1])
     assert low < shown.sweep.theta_4.min() < shown.sweep.theta_4.max() < high
 
 

@@ -4,17 +4,16 @@ A symbol for everything a scene file can name, where and in the direction it act
 """
 
 import cmath
-import math
 from dataclasses import replace
+from math import copysign, cos, pi, sin, tau
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 import fourbar
-from fourbar import Point, solve
+from fourbar import Motion, Point, Table, solve
 from fourbar.effects import Load, list_kinds
-from fourbar.effects.load import Table
 from fourbar.files import loads
 from fourbar.show.animate import collect_page_data
 from fourbar.show.motion_curves import describe_motion
@@ -30,7 +29,7 @@ from tests.support.texts import LENGTHS
 TURNING = Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
 
 
-TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1.0)))
+TABLED = Load(4, (5.0, 0.2), table=Table((0.0, pi, tau), (1.0, -1.0, 1.0)))
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +48,8 @@ def test_everything_that_acts_has_a_symbol(everything):
     for key in list_kinds():
         assert {"springs": "spring"}.get(key, key) in kinds
     assert kinds.count("force") == 2 and kinds[0] == "drive"
-    released = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
-    unasked = crank_rocker(motion=fourbar.Motion(0.5))
+    released = crank_rocker(motion=Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
+    unasked = crank_rocker(motion=Motion(0.5))
     for scene in (released, unasked):
         assert "drive" not in [symbol.kind for symbol in list_acting(scene)]
 
@@ -75,7 +74,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     theta_3 = solution.theta_3[index]
     theta_4 = solution.theta_4[index]
     G3, G4 = (complex(*solution[name][index]) for name in ("G3", "G4"))
-    sign = math.copysign(1.0, TABLED.table.at(solution.theta_2[index]))
+    sign = copysign(1.0, TABLED.table.at(solution.theta_2[index]))
     for name, tail, direction in (
         ("load 1", G3 + cmath.rect(0.03, 1.0 + theta_3), cmath.rect(1, 0.5 + theta_3)),
         ("load 2", G4, cmath.rect(sign, 0.2)),
@@ -86,7 +85,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     start, stop = ends("spring")
     theta_1 = everything.linkage.ground_angle
     O4 = cmath.rect(everything.linkage.ground, theta_1)
-    assert abs(start - cmath.rect(0.1, theta_1 - 0.5 * math.pi)) < 1e-15
+    assert abs(start - cmath.rect(0.1, theta_1 - 0.5 * pi)) < 1e-15
     assert abs(stop - O4 - cmath.rect(0.08, theta_4)) < 1e-15
 
 
@@ -128,7 +127,7 @@ def test_what_lies_off_a_bar_is_joined_to_it(crowded):
         if patch.get_linestyle() in (":", "dotted")
     ]
     angle = 1.0 + here.theta_3[0]
-    load = here.G3[0] + 0.03 * np.array([math.cos(angle), math.sin(angle)])
+    load = here.G3[0] + 0.03 * np.array([cos(angle), sin(angle)])
     for point in (here.points["P"][0], load):
         corners = factor * np.array([here.A[0], point, here.B[0]])
         assert any(np.allclose(plate, corners) for plate in plates)
