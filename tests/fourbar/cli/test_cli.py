@@ -19,14 +19,11 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Motion, load, save, solve
-from fourbar.cli import group, status
+from fourbar import Motion, cli, load, mjcf, quantities, save, solve
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.evaluation.case import Case
-from fourbar.mjcf import list_defaults, make_scene
-from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar.mjcf import assembly
 from fourbar.mjcf.document import write_mjcf_for
-from fourbar.quantities import VECTORS
 from fourbar.show import tables
 from tests.support.rows import read_rows
 from tests.support.scenes import balance, crank_rocker
@@ -61,7 +58,7 @@ LENGTHS = ("0.3", "0.1", "0.25", "0.22")
 BARE = ("--lengths", "300 mm", "10 cm", "0.25", "0.22", "--omega", "60 rpm")
 
 
-MADE = make_scene(0.3, 0.1, 0.25, 0.22, omega=tau)
+MADE = mjcf.make_scene(0.3, 0.1, 0.25, 0.22, omega=tau)
 
 
 @pytest.fixture
@@ -70,7 +67,7 @@ def run(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments):
-        code = status([str(argument) for argument in arguments])
+        code = cli.status([str(argument) for argument in arguments])
         printed = capsys.readouterr()
         return code, printed.out, printed.err
 
@@ -103,7 +100,7 @@ def test_json_and_csv_have_every_key_and_every_digit(name, run):
         expected = np.where(np.isfinite(array), array, np.nan)  # null for NaN
         printed = np.array(document[quantity], dtype=float)
         assert np.array_equal(printed, expected, equal_nan=True), quantity
-        ends = ("_x", "_y") if quantity in VECTORS else ("",)
+        ends = ("_x", "_y") if quantity in quantities.VECTORS else ("",)
         cells = [[float(row[quantity + end]) for end in ends] for row in rows]
         assert np.array_equal(np.reshape(cells, array.shape), array), quantity
     assert document["status"] == solution.status == [row["status"] for row in rows]
@@ -132,7 +129,9 @@ def test_a_free_motion_has_time_and_no_drive(run):
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
 
 
-@pytest.mark.parametrize("command, write", [("sdf", write_sdf), ("usd", write_usd)])
+@pytest.mark.parametrize(
+    "command, write", [("sdf", assembly.write_sdf), ("usd", assembly.write_usd)]
+)
 def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     command, write, run
 ):
@@ -150,7 +149,7 @@ def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     "asked, printed, text",
     [
         ((CRANK_ROCKER,), [], write_mjcf_for(load(CRANK_ROCKER))),
-        (BARE, list_defaults(MADE), write_mjcf_for(MADE)),
+        (BARE, mjcf.list_defaults(MADE), write_mjcf_for(MADE)),
         ((THESIS, "--drive", "motor"), [], write_mjcf_for(load(THESIS), drive="motor")),
     ],
     ids=["scene", "lengths", "motor"],
@@ -229,7 +228,7 @@ def test_no_command_is_a_question_for_help(run, capsys):
     code, out, err = run()
     assert (code, err) == (HOLDS, "") and out == run("-h")[1]
     described = " ".join(out.split())
-    for command in group.commands.values():
+    for command in cli.group.commands.values():
         line = f"{command.name} {command.get_short_help_str(limit=1000)}"
         assert " ".join(line.split()) in described
     assert max(map(len, out.splitlines())) <= 80

@@ -26,9 +26,7 @@ from fourbar import (
 )
 from fourbar.formulas import longer
 from fourbar.quantities import PIN_FORCES
-from fourbar_lab.families import FAMILY_DRAWERS
-from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_lab.stability import judge_samples
+from fourbar_lab import families, fault_scenes, stability
 from fourbar_lab.tally import TOO_SMALL
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
@@ -112,7 +110,7 @@ SCENES |= {
     for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))
 }
 SCENES |= {
-    name: FAULT_SCENES[name]
+    name: fault_scenes.FAULT_SCENES[name]
     for name in (
         "crank-rocker",
         "near a limit",
@@ -149,11 +147,11 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("family", FAMILY_DRAWERS)
+@pytest.mark.parametrize("family", families.FAMILY_DRAWERS)
 def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
-    tally = judge_samples(family, range(3))
+    tally = stability.judge_samples(family, range(3))
     assert tally.too_small and max(tally.too_small.values()) <= TOO_SMALL
     assert not any(tally.too_large.values()) and not tally.warned
 

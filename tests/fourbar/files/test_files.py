@@ -28,8 +28,7 @@ from fourbar import (
     Tolerance,
     solve,
 )
-from fourbar.files import dump, load, loads, save
-from fourbar.files.scene_text import write_new_scene
+from fourbar.files import dump, load, loads, save, scene_text
 from tests.fourbar.test_solving import scenes
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
@@ -196,7 +195,7 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     length, units, gravity
 ):
     comment = re.compile(r"^# (?=\w+ = |\[)", re.MULTILINE)
-    text = write_new_scene([length] * 4)
+    text = scene_text.write_new_scene([length] * 4)
     scene = loads(comment.sub("", text))
     assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
     assert scene.effects[0].magnitude == approx(float(gravity))

@@ -34,8 +34,7 @@ from fourbar import (
     solve,
 )
 from fourbar.linkage import BAR_NAMES
-from fourbar.mjcf import write_mjcf_for
-from fourbar.mjcf.document import SETTLING
+from fourbar.mjcf import document, write_mjcf_for
 from fourbar.scene import Command
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 from tests.support.scenes import crank_rocker, thesis
@@ -197,7 +196,7 @@ def opens_assembled(file):
 def is_driven(file):
     m, d = file.model, file.data
     mujoco.mj_resetData(m, d)
-    file.step(round(8 * SETTLING))
+    file.step(round(8 * document.SETTLING))
     assert d.qvel[0] == approx(10.0, rel=1e-3)
     m.actuator("drive").gainprm[:] = m.actuator("drive").biasprm[:] = 0.0
     file.step(300)

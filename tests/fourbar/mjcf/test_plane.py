@@ -11,8 +11,7 @@ import pytest
 from pytest import approx
 
 from fourbar import InputError, load
-from fourbar.mjcf import Plane, write_mjcf
-from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar.mjcf import Plane, assembly, write_mjcf
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 from tests.support.robots import rotation
 from tests.whole.test_imports import ROOT
@@ -103,7 +102,7 @@ def test_only_a_plane_that_is_tilted_is_called_so():
         ("tilted", Plane((0.3, 0.0, 1.0), ORIGIN)),
     ):
         texts[name] = [
-            write_sdf(scene(), without_loads=True, plane=plane),
+            assembly.write_sdf(scene(), without_loads=True, plane=plane),
             write_mjcf(scene(), plane=plane),
         ]
     for name, written in texts.items():
@@ -116,7 +115,7 @@ def test_only_a_plane_that_is_tilted_is_called_so():
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
 def test_the_joints_of_a_usd_meet_wherever_the_plane_is(axis):
     plane = Plane(axis, ORIGIN)
-    text = write_usd(scene(), without_loads=True, plane=plane)
+    text = assembly.write_usd(scene(), without_loads=True, plane=plane)
 
     def read(name, block):
         found = re.search(rf"{name} = \(([^)]*)\)", block)

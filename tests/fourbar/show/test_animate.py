@@ -34,8 +34,7 @@ from fourbar.files import loads
 from fourbar.scene.pictures import LARGEST_PICTURE
 from fourbar.show import animate
 from fourbar.show.plot import film as films
-from fourbar.show.plot.style import apply_style
-from fourbar.show.plot.view import make_view
+from fourbar.show.plot import style, view
 from tests.support.scenes import crank_rocker, thesis
 
 HOSTILE = (
@@ -232,8 +231,8 @@ def test_a_frame_is_the_whole_figure_though_what_stands_still_is_drawn_once(
     monkeypatch.setattr(
         FigureCanvasAgg, "draw", lambda canvas: (drawn.append(1), draw(canvas))
     )
-    with apply_style():
-        shown = make_view(crank_rocker())
+    with style.apply_style():
+        shown = view.make_view(crank_rocker())
         film = films._draw_frames(shown, [0, 20, 45], moving, None)
         frames = [next(film)]
         drawn.clear()

@@ -29,8 +29,7 @@ from fourbar.scene import command_at
 from fourbar.show.located import locate
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import COMMON, units
-from fourbar.studies.course import follow
-from fourbar.studies.passing import find_positions
+from fourbar.studies import course, passing
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
 from tests.support.texts import PLIERS
@@ -114,7 +113,7 @@ LIMITS = "on the change point: the limits from both sides"
 def write_forces(motion, gravity=ALONG, at=None, **parts):
     """Return the rows of pin forces, by position or where a quantity has a value."""
     scene = Scene(PARALLELOGRAM, motion, effects=(gravity,), **parts)
-    places = None if at is None else find_positions(scene, *at)
+    places = None if at is None else passing.find_positions(scene, *at)
     solution = solve(scene, at=places)
     assert solution.status == ["change_point"]
     return PositionSheet(solution, units("N m")).write_pin_forces(), solution
@@ -193,6 +192,6 @@ def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     assert rows[3].split()[3] == "0" and rows[2].split()[3] != "0"
     turned = Scene(PARALLELOGRAM, Motion(Sweep(0.0, 2.0 * np.pi, 4), 1.0))
     one = solve(turned, at=command_at(turned, np.array([2.0 * np.pi])))
-    follow(turned, one)
+    course.follow(turned, one)
     rows = PositionSheet(one, units("N m")).write_bars()
     assert rows[3].split()[2] == "6.2832"

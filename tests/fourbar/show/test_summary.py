@@ -26,8 +26,7 @@ from fourbar import (
     dump,
     solve,
 )
-from fourbar.files import loads
-from fourbar.files.scene_file import read_tables
+from fourbar.files import loads, scene_file
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command_at
 from fourbar.show.duty import list_duty
@@ -128,7 +127,7 @@ def take_scene(name):
         whole = tomllib.loads(WIPER.read_text(encoding="utf-8"))
     else:
         whole = {} if name == "nothing acts" else CRANK_ROCKER
-    return read_tables({**whole, **SCENES[name]})
+    return scene_file.read_tables({**whole, **SCENES[name]})
 
 
 def list_sizes(scene, s):

@@ -28,10 +28,8 @@ from fourbar import (
 from fourbar.files import loads
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
-from fourbar.show.block import write_block
+from fourbar.show import block, motion_curves, summary
 from fourbar.show.duty import list_duty
-from fourbar.show.motion_curves import describe_motion
-from fourbar.show.summary import Facts
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.scenes import CYLINDER, crank_rocker
 from tests.support.shares import slow_but
@@ -69,11 +67,11 @@ def sweep(lengths, start, stop, bar=2, **parts):
 
 
 def find_facts(scene):
-    return Facts(solve(scene))
+    return summary.Facts(solve(scene))
 
 
 def write(facts, **options):
-    lines = write_block(facts.solution, **options)
+    lines = block.write_block(facts.solution, **options)
     return " ".join(" ".join(lines).split())
 
 
@@ -283,7 +281,7 @@ def test_a_jump_where_pin_friction_reverses_is_no_pole(start, steps, pins):
         loads=(Load(4, moment=-20.0),),
         effects=(PinFriction.at(**dict.fromkeys(pins, (0.15, 0.005))),),
     )
-    motion = describe_motion(solve(scene))
+    motion = motion_curves.describe_motion(solve(scene))
     assert not motion.panels.growing
     at_B = [place for place, pin in motion.reversals if pin == "B"]
     assert np.abs(np.sin(at_B)).max() < LOCATED and len(at_B) == 2

@@ -39,20 +39,9 @@ from fourbar import (
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
-from fourbar.show import plot
-from fourbar.show.duty import compute_energies
-from fourbar.show.motion_curves import describe_motion
-from fourbar.show.plot.curves import (
-    break_at_poles,
-    choose_limit,
-    find_poles,
-)
+from fourbar.show import duty, motion_curves, plot
+from fourbar.show.plot import curves, film, freebody, labels, linkage_figure, style
 from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
-from fourbar.show.plot.film import choose_frames
-from fourbar.show.plot.freebody import FreedBar
-from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage_figure import draw_mechanism
-from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker, thesis
@@ -126,7 +115,7 @@ def composed(scene, name, units="SI", **options):
 
 def solved(scene):
     """At the positions of a scene, and those that a figure shows between them."""
-    return describe_motion(solve(scene)).solve_with_peaks()
+    return motion_curves.describe_motion(solve(scene)).solve_with_peaks()
 
 
 def texts_shown(figure):
@@ -197,7 +186,7 @@ def test_a_file_has_a_dark_form_and_a_hostile_title_is_text(tmp_path):
     assert "@media (prefers-color-scheme: dark)" in written
     assert "<script" not in written
     assert "prefers-color-scheme" not in drawing._repr_svg_()
-    assert len(shorten_text(title, 50)) == 50
+    assert len(style.shorten_text(title, 50)) == 50
 
 
 @pytest.mark.slow
@@ -337,10 +326,10 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     closed = np.degrees(sweep.theta_2[~sweep.assembled])
     assert closed.size > 30
     assert np.all(np.isnan(y[np.isin(x, closed)]))
-    (pole,) = find_poles(shown)
+    (pole,) = curves.find_poles(shown)
     for values in (sweep.omega_4, sweep.torque):
         assert values[pole] * values[pole + 1] < 0
-    assert np.isnan(break_at_poles(sweep.torque, np.array([pole]))[pole + 1])
+    assert np.isnan(curves.break_at_poles(sweep.torque, np.array([pole]))[pole + 1])
     assert panel.get_ylim()[1] < np.nanmax(np.abs(sweep.torque))
     words = " ".join(text.get_text() for text in figure.findobj(Text))
     assert "Torque clipped at" in words.replace("\n", " ")
@@ -355,9 +344,9 @@ def test_the_largest_of_what_is_clipped_may_be_commanded():
 
 
 def test_an_ordinary_curve_is_not_clipped():
-    assert choose_limit([np.sin(np.linspace(0, 6, 100))]) is None
-    assert choose_limit([1.0 / np.linspace(-1, 1, 100)]) is not None
-    assert choose_limit([np.full(3, np.nan)]) is None
+    assert curves.choose_limit([np.sin(np.linspace(0, 6, 100))]) is None
+    assert curves.choose_limit([1.0 / np.linspace(-1, 1, 100)]) is not None
+    assert curves.choose_limit([np.full(3, np.nan)]) is None
 
 
 def find_marks(figure):
@@ -396,7 +385,7 @@ def test_free_bodies_balance(drive):
         crank_rocker(drive_bar=drive_bar, drive=line, effects=loads(EVERYTHING).effects)
     )
     for bar in (2, 3, 4):
-        freed = FreedBar(shown, bar)
+        freed = freebody.FreedBar(shown, bar)
         arrows = freed.arrows
         couples = freed.turns
         forces = np.array([arrow.force for arrow in arrows])
@@ -453,7 +442,7 @@ def test_a_label_keeps_off_the_arrow_of_gravity_and_the_outline_of_a_path(from_p
 def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
     shown = make_view(crank_rocker(drive=CYLINDER))
     stands = np.flatnonzero(np.diff(np.sign(shown.sweep.stroke_speed)))
-    assert len(stands) and np.array_equal(find_poles(shown), stands)
+    assert len(stands) and np.array_equal(curves.find_poles(shown), stands)
 
 
 @pytest.mark.slow
@@ -471,7 +460,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     (ring,) = (line for line in panel.lines if line.get_marker() == "o")
     assert ring.get_ydata()[0] == approx(peak)
     words = [text.get_text() for text in figure.findobj(Text)]
-    assert f"{write_number(peak)} mN m" in words
+    assert f"{style.write_number(peak)} mN m" in words
     place = f"{degrees(make_view(scene).here.theta_2[0]):.4g}°"
     assert any(f"Dashed upright line: θ₂\u00a0=\u00a0{place}" in word for word in words)
 
@@ -534,7 +523,7 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     damped = Viscous.at(O2=0.002, B=0.001)
     scene = released(effects=(Gravity(), damped, Flywheel(0.01, 4)))
     motion = solve(scene)
-    energies = compute_energies(scene, motion)
+    energies = duty.compute_energies(scene, motion)
     assert set(energies.work) == {"loads", "gravity", "viscous"}
     largest = energies.kinetic.max()
     assert largest > 0.1
@@ -562,7 +551,7 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     ],
 )
 def test_numbers_have_three_digits(value, shown):
-    assert write_number(value) == shown
+    assert style.write_number(value) == shown
 
 
 def longest_line(axes):
@@ -574,7 +563,7 @@ def longest_line(axes):
 )
 def test_a_film_of_what_swings_goes_there_and_back(scene):
     sweep = make_view(scene).sweep
-    order = choose_frames(make_view(scene), 40)
+    order = film.choose_frames(make_view(scene), 40)
     closes = np.flatnonzero(sweep.assembled)
     assert (np.diff(sweep.at.places) > 0.0).all() and sweep.assembled[order].all()
     assert len(order) == 38 and order[-1] > order[0]
@@ -583,7 +572,7 @@ def test_a_film_of_what_swings_goes_there_and_back(scene):
 
 
 def test_a_film_of_what_turns_goes_round():
-    assert np.all(np.diff(choose_frames(make_view(CRANK_ROCKER), 30)) == 2)
+    assert np.all(np.diff(film.choose_frames(make_view(CRANK_ROCKER), 30)) == 2)
 
 
 def test_one_position_of_another_command_stands_in_its_range():
@@ -606,11 +595,11 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
     lengths = []
     for index in (0, 20, 40):
         axes = Figure().subplots()
-        draw_mechanism(axes, shown, shown.sweep, index, Labels())
+        linkage_figure.draw_mechanism(axes, shown, shown.sweep, index, labels.Labels())
         (barrel,) = (
             line
             for line in axes.lines
-            if line.get_linewidth() == 4.5 and line.get_color() == INK
+            if line.get_linewidth() == 4.5 and line.get_color() == style.INK
         )
         lengths.append(np.hypot(*np.ptp(np.array(barrel.get_data()), axis=1)))
     assert np.ptp(lengths) < 1e-9 * lengths[0]

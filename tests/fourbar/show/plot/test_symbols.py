@@ -15,14 +15,10 @@ import fourbar
 from fourbar import Motion, Point, Table, solve
 from fourbar.effects import Load, list_kinds
 from fourbar.files import loads
-from fourbar.show.animate import collect_page_data
-from fourbar.show.motion_curves import describe_motion
-from fourbar.show.plot import symbols
-from fourbar.show.plot.figures import draw_figure
+from fourbar.show import animate, motion_curves
+from fourbar.show.plot import figures, linkage_figure, symbols, view
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage_figure import choose_drawing_scale, draw_mechanism
 from fourbar.show.plot.symbols import list_acting
-from fourbar.show.plot.view import make_view
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
@@ -96,10 +92,10 @@ def crowded(everything):
     crank = replace(linkage.input, length=0.02)
     short = replace(linkage, input=crank, coupler=replace(linkage.coupler, length=0.25))
     points = (Point("P", 3, (0.15, 0.7)),)
-    shown = make_view(replace(everything, linkage=short, points=points))
+    shown = view.make_view(replace(everything, linkage=short, points=points))
     axes = Figure().subplots()
-    draw_mechanism(axes, shown, shown.here, 0, Labels())
-    return axes, shown.here, choose_drawing_scale(shown)[0]
+    linkage_figure.draw_mechanism(axes, shown, shown.here, 0, Labels())
+    return axes, shown.here, linkage_figure.choose_drawing_scale(shown)[0]
 
 
 def test_nothing_at_a_pin_hides_a_bar(crowded):
@@ -137,9 +133,9 @@ def test_what_lies_off_a_bar_is_joined_to_it(crowded):
 def test_the_points_of_a_scene_are_drawn_where_they_are():
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(Point("P", 3, (0.15, 0.7)),))
-    solution = describe_motion(solve(scene)).solve_with_peaks()
+    solution = motion_curves.describe_motion(solve(scene)).solve_with_peaks()
     units = fourbar.units("m m/s m/s^2")
-    figure = draw_figure(scene, "points", units=units).figure
+    figure = figures.draw_figure(scene, "points", units=units).figure
     paths, speeds, accelerations = (
         {line.get_label(): line.get_xydata() for line in panel.lines}
         for panel in figure.subfigs[0].axes
@@ -150,6 +146,6 @@ def test_the_points_of_a_scene_are_drawn_where_they_are():
         (accelerations, solution.acceleration["P"]),
     ):
         assert np.allclose(lines["P"][:, 1], np.hypot(*values.T), rtol=1e-15)
-    (point,) = collect_page_data(scene, {})["points"]
+    (point,) = animate.collect_page_data(scene, {})["points"]
     assert point["name"] == "P"
     assert abs(complex(*point["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
