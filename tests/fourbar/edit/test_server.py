@@ -36,11 +36,6 @@ from tornado.websocket import websocket_connect
 
 from fourbar.edit import exports, server, session
 from fourbar.edit.redirect import REDIRECT_ENDING, REDIRECT_PAGE, Redirect
-from fourbar.edit.server import (
-    LARGEST_REQUEST,
-    Workbench,
-)
-from fourbar.edit.session import Session
 from tests.support.rows import read_rows
 
 CRANK_ROCKER = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
@@ -48,6 +43,8 @@ HUGE = 100_000_000
 """Bytes of a request that is not taken."""
 OPEN = []
 """Pages to be closed when a test ends."""
+LEFT = REDIRECT_PAGE.format(address="http://127.0.0.1:4000/token/")
+"""The page of a server that was killed."""
 
 
 @pytest.fixture
@@ -78,10 +75,10 @@ def bench(path, monkeypatch, capsys):
     monkeypatch.setattr(server, "GONE", 0.3)
 
     def run(what):
-        session = Session(path, path.parent / "exports")
+        edited = session.Session(path, path.parent / "exports")
 
         async def both():
-            made = Workbench(session)
+            made = server.Workbench(edited)
             serving = asyncio.create_task(made.serve(0))
             try:
                 await what(made, await made.address)
@@ -92,13 +89,11 @@ def bench(path, monkeypatch, capsys):
                     OPEN.pop().close()
                 await asyncio.sleep(0.05)
 
-        with (
-            warnings.catch_warnings()
-        ):  # tornado's client keeps the sockets of lines that the server has closed
-            warnings.simplefilter("ignore", ResourceWarning)
-            asyncio.run(both())
-            gc.collect()
-        return session
+        # tornado's client keeps the sockets of lines that the server has closed
+        warnings.simplefilter("ignore", ResourceWarning)
+        asyncio.run(both())
+        gc.collect()
+        return edited
 
     return run
 
@@ -112,23 +107,20 @@ def port_of(address):
     return address.split("/")[2].rpartition(":")[2]
 
 
+def fetch(address, **options):
+    request = HTTPRequest(address, **options)
+    return AsyncHTTPClient(force_instance=True).fetch(request, raise_error=False)
+
+
 async def status(address, **options):
-    answer = await AsyncHTTPClient(force_instance=True).fetch(
-        HTTPRequest(address, **options),
-        raise_error=False,
-    )
-    return answer.code
+    return (await fetch(address, **options)).code
 
 
 async def page(address):
     origin = "/".join(address.split("/")[:3])
     line = address.replace("http:", "ws:") + "live"
-    OPEN.append(
-        await websocket_connect(
-            HTTPRequest(line, headers={"Origin": origin}),
-            max_message_size=HUGE,
-        )
-    )
+    request = HTTPRequest(line, headers={"Origin": origin})
+    OPEN.append(await websocket_connect(request, max_message_size=HUGE))
     return OPEN[-1]
 
 
@@ -145,10 +137,9 @@ async def settled(line):
     return await heard(line, lambda about: about.get("settled"))
 
 
-async def told(line, request=None):
+async def told(line, request):
     """The answer to a request."""
-    if request is not None:
-        await line.write_message(json.dumps({"id": "mine"} | request))
+    await line.write_message(json.dumps({"id": "mine"} | request))
     return await heard(line, lambda about: about.get("for") == "mine")
 
 
@@ -186,7 +177,7 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
     async def ask(made, address):
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[A-Za-z0-9_-]{32,}/", address)
         root, port = address[: address.rindex("/", 0, -1) + 1], int(port_of(address))
-        fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
+        fetched = await fetch(address)
         assert fetched.code == 200 and b"Crank-rocker" in fetched.body
         assert fetched.headers["Referrer-Policy"] == "no-referrer"
         assert fetched.headers["Cache-Control"] == "no-store"
@@ -215,16 +206,13 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
             f"POST {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Length:"
             f" {HUGE}\r\n\r\n".encode()
         )
-        assert (await asyncio.wait_for(reader.read(), 5.0)).startswith(
-            (b"HTTP/1.1 400", b"HTTP/1.1 413")
-        )
+        answer = await asyncio.wait_for(reader.read(), 5.0)
+        assert answer.startswith((b"HTTP/1.1 400", b"HTTP/1.1 413"))
         writer.close()
-        line = await page(address)
-        await line.write_message("[" * (LARGEST_REQUEST + 1))
-        assert await asyncio.wait_for(line.read_message(), 5.0) is None  # closed
-        line = await page(address)
-        await line.write_message("[" * 100_000)  # nested too deeply
-        assert await asyncio.wait_for(line.read_message(), 5.0) is None
+        for depth in (server.LARGEST_REQUEST + 1, 100_000):  # nested too deeply
+            line = await page(address)
+            await line.write_message("[" * depth)
+            assert await asyncio.wait_for(line.read_message(), 5.0) is None  # closed
         line = await page(address)
         assert (await told(line, {"do": "hello"}))["file"] == "scene.toml"
 
@@ -309,15 +297,18 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench, monkeypatch
 ):
-    program = "import sys, time, pathlib; out = pathlib.Path(sys.argv[-1]); "
     # the report first: a line is what the test waits for before it stops the check
-    program += "(out / 'report.html').write_text('<p>report'); "
-    program += "print('agrees', flush=True); "
-    program += "time.sleep(float(out.parent.joinpath('wait').read_text()))"
-    monkeypatch.setattr(
-        exports, "find_harness", lambda: [sys.executable, "-c", program]
+    program = (
+        "import sys, time, pathlib; out = pathlib.Path(sys.argv[-1]); "
+        "(out / 'report.html').write_text('<p>report'); print('agrees', flush=True); "
+        "time.sleep(float(out.parent.joinpath('wait').read_text()))"
     )
+    harness = [sys.executable, "-c", program]
+    monkeypatch.setattr(exports, "find_harness", lambda: harness)
     monkeypatch.setattr(exports, "TICK", 0.05)
+
+    def has_ended(about):
+        return not about.get("check", {"running": True})["running"]
 
     async def ask(made, address):
         folder = made.session.exports.folder
@@ -329,16 +320,10 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
             if stopped:
                 await heard(line, lambda about: about.get("check", {}).get("lines"))
                 await line.write_message(json.dumps({"do": "stop"}))
-            check = (
-                await heard(
-                    line,
-                    lambda about: "check" in about and not about["check"]["running"],
-                )
-            )["check"]
-            assert check["lines"] == ["agrees"]
-            assert check["report"]
+            check = (await heard(line, has_ended))["check"]
+            assert check["lines"] == ["agrees"] and check["report"]
             assert check["stopped"] is stopped
-        answer = await AsyncHTTPClient(force_instance=True).fetch(address + "report")
+        answer = await fetch(address + "report")
         assert answer.body == b"<p>report"
         assert "sandbox" in answer.headers["Content-Security-Policy"]
         assert (folder / "check" / "scene.toml").read_text() == CRANK_ROCKER.read_text()
@@ -363,21 +348,17 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
     async def ask(made, address):
         line = await page(address)
         await told(line, {"do": "hello"})
-        await asyncio.to_thread(
-            asked_for.wait, 20
-        )  # the summary of the first state is under way
+        # the summary of the first state is under way
+        await asyncio.to_thread(asked_for.wait, 20)
         for size in range(101, 111):
             about = await told(line, set_input(f"{size} mm"))
             assert f'"{size} mm"' in about["text"] and not about["settled"]
-            await asyncio.sleep(
-                server.ERROR_BAR_DELAY * 1.2
-            )  # each asks for a summary of its own
+            # each asks for a summary of its own
+            await asyncio.sleep(server.ERROR_BAR_DELAY * 1.2)
         released.set()
         about = await settled(line)
-        assert '"110 mm"' in about["text"] and summaries == [
-            0.1,
-            0.11,
-        ]  # the one of each state between was given up
+        # the one of each state between was given up
+        assert '"110 mm"' in about["text"] and summaries == [0.1, 0.11]
 
     monkeypatch.setattr(session, "evaluate_scene", slow)
     bench(ask)
@@ -420,7 +401,7 @@ def test_the_picture_is_served_as_an_image_alone(bench, path):
         await told(line, {"do": "text", "text": path.read_text()})
         assert await status(address + "picture") == 404
         path.with_name("a.svg").write_text("<svg><script/></svg>")
-        answer = await AsyncHTTPClient(force_instance=True).fetch(address + "picture")
+        answer = await fetch(address + "picture")
         assert answer.body == b"<svg><script/></svg>"
         assert answer.headers["Content-Type"] == "image/svg+xml"
         policy = answer.headers["Content-Security-Policy"]
@@ -464,9 +445,8 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path):
     assert (guest.returncode, guest.communicate(), host.poll()) == (0, ("", ""), None)
     host.kill()
     host.communicate()
-    with start(
-        path, "--no-browser"
-    ) as third:  # the page of a server that was killed leads nobody astray
+    # the page of a server that was killed leads nobody astray
+    with start(path, "--no-browser") as third:
         assert third.stdout.readline() not in addresses
         third.send_signal(2)
         assert third.communicate(timeout=20) == ("", "")
@@ -477,9 +457,7 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path):
 def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
     tmp_path, monkeypatch
 ):
-    from fourbar.edit import redirect
-
-    monkeypatch.setattr(redirect, "PATIENCE", 0.1)
+    monkeypatch.setattr("fourbar.edit.redirect.PATIENCE", 0.1)
     first, second = Redirect(tmp_path / "a.toml"), Redirect(tmp_path / "a.toml")
     assert first.claim() and not second.claim()
     with raises(InputError, match="has no address"):
@@ -490,12 +468,10 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
 
 
 @pytest.mark.posix
-@pytest.mark.parametrize("how", ["written by hand", "longer"])
+@pytest.mark.parametrize("content", ["<html>", LEFT + "<p>"], ids=["other", "longer"])
 def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
-    tmp_path, how
+    tmp_path, content
 ):
-    ours = REDIRECT_PAGE.format(address="http://127.0.0.1:4000/token/")
-    content = {"written by hand": "<html>", "longer": ours + "<p>"}[how]
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
     page.write_text(content)
     page.chmod(0o644)
@@ -505,16 +481,15 @@ def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
 
 
 @pytest.mark.posix
-@pytest.mark.parametrize("left", ["", REDIRECT_PAGE.format(address="http://x/")])
+@pytest.mark.parametrize("left", ["", LEFT])
 def test_an_empty_page_and_one_of_a_killed_server_are_written_over(tmp_path, left):
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
     page.write_text(left)
     redirect = Redirect(tmp_path / "a.toml")
     assert redirect.claim()
-    redirect.write("http://127.0.0.1:5000/other/")
-    assert page.read_text() == REDIRECT_PAGE.format(
-        address="http://127.0.0.1:5000/other/"
-    )
+    address = "http://127.0.0.1:5000/other/"
+    redirect.write(address)
+    assert page.read_text() == REDIRECT_PAGE.format(address=address)
     redirect.remove()
 
 
