@@ -7,7 +7,7 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
-from itertools import combinations, cycle
+from itertools import combinations, cycle, product
 from math import acos, atan2, degrees, hypot, pi, radians, tau
 from pathlib import Path
 
@@ -44,7 +44,7 @@ from fourbar.show.plot import curves, film, freebody, labels, linkage_figure, st
 from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import CYLINDER, crank_rocker, thesis
 from tests.support.shares import slow_but
 from tests.support.texts import EVERYTHING
 
@@ -66,13 +66,7 @@ FULL_TURN = Sweep(0.0, 2 * pi, 360)
 CRANK_ROCKER = crank_rocker()
 THREE_ROCKERS = thesis(FULL_TURN)
 
-CYLINDER = LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
-
-
-BETWEEN_NEIGHBOURS = LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09, 0.7)))
-
-BOTTOM = Place(1, (0.25, radians(-160.0)))
-SIDE = Place(2, (0.09, 0.17))
+BETWEEN_CRANKS = LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
 
 COMMANDS = {
     r"$\theta_3$ (°)": Motion(theta_3=Sweep(1.25, 0.67, 40), omega_3=-2.0),
@@ -83,22 +77,14 @@ COMMANDS = {
 
 
 def commanding(motion):
-    return crank_rocker(
-        motion=motion,
-        drive=LinearDrive(BOTTOM, SIDE),
-        effects=(Gravity(),),
-    )
+    return crank_rocker(motion=motion, drive=CYLINDER, effects=(Gravity(),))
 
 
 def released(steps=300, duration=0.6, **changes):
     """The crank-rocker let go from rest under gravity, a load and damping."""
     motion = Motion(0.5, 0.0, free=Free(duration, steps))
-    parts = {
-        "motion": motion,
-        "effects": (Gravity(), Viscous.at(O2=0.002, B=0.001)),
-        **changes,
-    }
-    return crank_rocker(**parts)
+    damped = Gravity(), Viscous.at(O2=0.002, B=0.001)
+    return crank_rocker(**{"motion": motion, "effects": damped} | changes)
 
 
 def by_law():
@@ -151,17 +137,6 @@ def clashes(figure):
     ]
 
 
-def require_clear_texts(figure):
-    """No text covers another one or leaves the page."""
-    texts = texts_shown(figure)
-    page = figure.bbox
-    assert len(texts) > 5
-    for text, box in texts:
-        assert page.x0 <= box.x0 and box.x1 <= page.x1, text
-        assert page.y0 <= box.y0 and box.y1 <= page.y1, text
-    assert not clashes(figure)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("file_format", plot.FORMATS)
 def test_the_same_scene_gives_the_same_bytes_in_every_thread(tmp_path, file_format):
@@ -192,25 +167,30 @@ def test_a_file_has_a_dark_form_and_a_hostile_title_is_text(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
 def test_every_figure_shows_what_it_takes_and_no_texts_overlap(name):
-    """A position shows, dimensions where they are taken; panels share scales."""
-    taken = {"position": radians(77.7), "dimensions": name in WITH_DIMENSIONS}
+    """A position shows, dimensions where they are taken; panels share scales.
+
+    No text leaves the page.
+    """
+    dimensions = name in WITH_DIMENSIONS
+    taken = {"position": radians(77.7), "dimensions": dimensions}
     figure = composed(CRANK_ROCKER, name, "mm", **taken)
-    words = " ".join(text for text, _ in texts_shown(figure))
-    assert "77.7°" in words
-    assert ("2: 100 mm" in words) == (name in WITH_DIMENSIONS)
-    require_clear_texts(figure)
+    texts = texts_shown(figure)
+    words = " ".join(text for text, _ in texts)
+    assert "77.7°" in words and ("2: 100 mm" in words) == dimensions
+    page = figure.bbox
+    for text, box in texts:
+        assert page.x0 <= box.x0 and box.x1 <= page.x1, text
+        assert page.y0 <= box.y0 and box.y1 <= page.y1, text
+    assert len(texts) > 5 and not clashes(figure)
     for panel in figure.axes:
         if name == "overview" and panel.name != "polar":
             assert panel.get_xlabel().endswith(")") and panel.get_ylabel().endswith(")")
 
 
 CLEAR_FIGURES = [
-    *((thesis(), name) for name in ("overview", "coupler", "freebody")),
-    *(
-        (crank_rocker(drive=CYLINDER, loads=()), name)
-        for name in ("torque", "freebody")
-    ),
-    *((released(20, 1.2), name) for name in ("overview", "energy")),
+    *product([thesis()], ["overview", "coupler", "freebody"]),
+    *product([crank_rocker(drive=BETWEEN_CRANKS, loads=())], ["torque", "freebody"]),
+    *product([released(20, 1.2)], ["overview", "energy"]),
     (by_law(), "torque"),
     *zip(
         map(commanding, cycle(COMMANDS.values())),
@@ -252,12 +232,16 @@ def test_a_leader_crosses_no_text_and_no_leader_and_no_text_stands_on_a_bar(
     bars = [path for line, path in paths if line.get_linewidth() > 4.0]
     leaders = [path for line, path in paths if line.get_zorder() == 8.5]
     boxes = [text.get_window_extent() for text in axes.texts]
-    assert not any(leader.intersects_bbox(box) for leader in leaders for box in boxes)
+    assert not any(
+        leader.intersects_bbox(box) for leader, box in product(leaders, boxes)
+    )
     assert not any(one.intersects_path(two) for one, two in combinations(leaders, 2))
     if name == "hoecken":
         wide = [box.padded(2.25 * figure.dpi / 72.0) for box in boxes]
         assert len(bars) == 3 and len(wide) > 8
-        assert not any(bar.intersects_bbox(box, False) for bar in bars for box in wide)
+        assert not any(
+            bar.intersects_bbox(box, False) for bar, box in product(bars, wide)
+        )
     else:
         assert len(leaders) > 1
 
@@ -282,10 +266,7 @@ def test_drawn_curves_are_those_of_the_solution(scene, label):
     solution = solved(scene)
     over = solution.at.places
     order = np.argsort(over, kind="stable")
-    if label.endswith("°)"):
-        over = np.degrees(over)
-    elif label.endswith("mm)"):
-        over = 1000.0 * over
+    over = over * {"°)": degrees(1.0), "m)": 1000.0, "s)": 1.0}[label[-2:]]
     panels = composed(scene, "kinematics").axes
     lines = {line.get_label(): line for panel in panels for line in panel.lines}
     for name, values in (
@@ -349,16 +330,6 @@ def test_an_ordinary_curve_is_not_clipped():
     assert curves.choose_limit([np.full(3, np.nan)]) is None
 
 
-def find_marks(figure):
-    """Where a curve has marks, by the first word of their label."""
-    (axes,) = figure.axes
-    return {
-        line.get_label().split(":")[0]: np.sort(line.get_xdata())
-        for line in axes.lines
-        if line.get_marker() in "sD"
-    }
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("branch", [1, -1])
 def test_transmission_angle_marks_limits_and_dead_centres(branch):
@@ -369,7 +340,12 @@ def test_transmission_angle_marks_limits_and_dead_centres(branch):
         cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
         return degrees(acos(cosine))
 
-    marks = find_marks(composed(set_branch(thesis(FULL_TURN), branch), "transmission"))
+    (axes,) = composed(set_branch(THREE_ROCKERS, branch), "transmission").axes
+    marks = {
+        line.get_label().split(":")[0]: np.sort(line.get_xdata())
+        for line in axes.lines
+        if line.get_marker() in "sD"
+    }
     # bars 3 and 4 folded: |b - c| between A and O4
     limit = angle(a, d, b - c)
     assert marks["limit"] == approx(np.sort([45 - limit, 45 + limit]), abs=1e-9)
@@ -378,24 +354,29 @@ def test_transmission_angle_marks_limits_and_dead_centres(branch):
     assert marks["dead centre"] % 360 == approx([dead_centre % 360], abs=1e-9)
 
 
-@pytest.mark.parametrize("drive", (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS))
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"drive_bar": 2},
+        {"drive_bar": 3},
+        {"drive_bar": 4},
+        {"drive": BETWEEN_CRANKS},
+        {"drive": LinearDrive(Place(2, (0.17, -1.1)), Place(3, (0.09, 0.7)))},
+    ],
+)
 def test_free_bodies_balance(drive):
-    drive_bar, line = (drive, None) if isinstance(drive, int) else (None, drive)
-    shown = make_view(
-        crank_rocker(drive_bar=drive_bar, drive=line, effects=loads(EVERYTHING).effects)
-    )
+    shown = make_view(crank_rocker(effects=loads(EVERYTHING).effects, **drive))
     for bar in (2, 3, 4):
         freed = freebody.FreedBar(shown, bar)
-        arrows = freed.arrows
-        couples = freed.turns
-        forces = np.array([arrow.force for arrow in arrows])
+        forces = np.array([arrow.force for arrow in freed.arrows])
         assert np.abs(forces.sum()) <= BALANCE * np.abs(forces).max()
-        moments = [(arrow.at.conjugate() * arrow.force).imag for arrow in arrows]
-        moments += [couple.moment for couple in couples]
+        moments = [(arrow.at.conjugate() * arrow.force).imag for arrow in freed.arrows]
+        moments += [couple.moment for couple in freed.turns]
         assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
-        assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
+        texts = [couple.text for couple in freed.turns]
+        assert (f"$T_{bar}$" in texts) == (bar == drive.get("drive_bar"))
         at_pins = ("viscous", "friction", "pin friction", "torsion")
-        named = [couple.text for couple in couples if couple.text.startswith(at_pins)]
+        named = [text for text in texts if text.startswith(at_pins)]
         assert named and all(" at $" in text for text in named)
 
 
@@ -440,7 +421,7 @@ def test_a_label_keeps_off_the_arrow_of_gravity_and_the_outline_of_a_path(from_p
 
 
 def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
-    shown = make_view(crank_rocker(drive=CYLINDER))
+    shown = make_view(crank_rocker(drive=BETWEEN_CRANKS))
     stands = np.flatnonzero(np.diff(np.sign(shown.sweep.stroke_speed)))
     assert len(stands) and np.array_equal(curves.find_poles(shown), stands)
 
@@ -478,11 +459,10 @@ def test_the_position_drawn_is_clear_of_poles_of_its_own_branch():
     assert quality(-1, of_open) < CLEAR
 
 
-WITHOUT_SPEED = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 30)))
 OTHERS = {
     "crank-rocker": CRANK_ROCKER,
     "cylinder": commanding(COMMANDS["stroke (mm)"]),
-    "without speed": WITHOUT_SPEED,
+    "without speed": crank_rocker(motion=Motion(Sweep(0.0, 6.0, 30))),
     "law": by_law(),
     "release": released(),
     "three rockers": thesis(),
@@ -541,21 +521,17 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
 
 @pytest.mark.parametrize(
     "value, shown",
-    [
-        (0.0, "0"),
-        (-1234.6, "−1235"),
-        (0.012345, "0.0123"),
-        (3.09312, "3.09"),
-        (2.5e7, "2.50·10⁷"),
-        (-3.12e-14, "−3.12·10⁻¹⁴"),
-    ],
+    read_rows("""
+0.0 | 0
+-1234.6 | −1235
+0.012345 | 0.0123
+3.09312 | 3.09
+2.5e7 | 2.50·10⁷
+-3.12e-14 | −3.12·10⁻¹⁴
+"""),
 )
 def test_numbers_have_three_digits(value, shown):
-    assert style.write_number(value) == shown
-
-
-def longest_line(axes):
-    return max(axes.lines, key=lambda line: len(line.get_xdata()))
+    assert style.write_number(float(value)) == shown
 
 
 @pytest.mark.parametrize(
@@ -597,11 +573,11 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
         axes = Figure().subplots()
         linkage_figure.draw_mechanism(axes, shown, shown.sweep, index, labels.Labels())
         (barrel,) = (
-            line
+            np.ptp(line.get_xydata(), axis=0)
             for line in axes.lines
             if line.get_linewidth() == 4.5 and line.get_color() == style.INK
         )
-        lengths.append(np.hypot(*np.ptp(np.array(barrel.get_data()), axis=1)))
+        lengths.append(np.hypot(*barrel))
     assert np.ptp(lengths) < 1e-9 * lengths[0]
     assert lengths[0] < 1000.0 * shown.sweep.stroke.min()
 
@@ -610,6 +586,7 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
 def test_the_stroke_is_a_figure_where_it_is_not_the_axis():
     scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
     (axes,) = composed(scene, "stroke").axes
+    curve = max(axes.lines, key=lambda line: len(line.get_xdata()))
     s = solve(scene)
-    drawn = np.interp(np.degrees(s.theta_4), *longest_line(axes).get_data())
+    drawn = np.interp(np.degrees(s.theta_4), *curve.get_data())
     assert_allclose(drawn, 1000.0 * s.stroke, rtol=1e-14)
