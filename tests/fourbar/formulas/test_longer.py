@@ -22,10 +22,8 @@ def draw(seed, size=3.0):
 
 
 def exact(pair):
-    return [
-        mp.mpmathify(complex(h)) + mp.mpmathify(complex(low))
-        for h, low in zip(pair.high, pair.low, strict=True)
-    ]
+    parts = zip(pair.high, pair.low, strict=True)
+    return [mp.mpc(high) + mp.mpc(low) for high, low in parts]
 
 
 ALIKE = [
@@ -63,10 +61,7 @@ ALIKE = [
 def test_a_function_keeps_the_digits_of_a_pair(function, reference):
     with mp.workdps(60):
         x, y = draw(1), draw(2)
-        expected = [
-            reference(mp.mpc(a), mp.mpc(b))
-            for a, b in zip(exact(x), exact(y), strict=True)
-        ]
+        expected = map(reference, exact(x), exact(y))
         for ours, wanted in zip(exact(function(x, y)), expected, strict=True):
             assert abs(ours - wanted) <= DIGITS * max(abs(wanted), 0.1)
 

@@ -65,19 +65,6 @@ def closes(bars, theta_2):
     return np.minimum(b + c - distance, distance - abs(b - c))
 
 
-def scan(bars):
-    return bars.ground_angle + (np.arange(GRID) + 0.5) * (tau / GRID)
-
-
-def angle(bars, theta_2, branch, bar):
-    return np.angle(compute_state(bars, theta_2, branch).direction(bar))
-
-
-def inside(angle, ranges):
-    within = [(angle - start) % tau <= stop - start for start, stop in ranges]
-    return np.any(within, axis=0)
-
-
 THESIS = bare(0.2, 0.48, 0.55, 0.2, radians(45.0))
 """The linkage of Linares Mendoza's thesis."""
 
@@ -104,14 +91,14 @@ THESIS = bare(0.2, 0.48, 0.55, 0.2, radians(45.0))
 """),
 )
 def test_barker_classes(stated, barker, code, name):
-    lengths, barker = [float(length) for length in stated.split()], int(barker)
+    lengths, barker = np.array(stated.split(), dtype=float), int(barker)
     for scale in (1.0, 1e-9, 1e9, 1e300):
-        kind = classify(uniform(*(scale * length for length in lengths)))
+        kind = classify(uniform(*scale * lengths))
         assert (kind.barker, kind.code) == (barker, code)
     assert (kind.surplus == 0.0) == (barker >= 9)
     assert name in kind.name
     if barker <= 4:  # the shortest bar turns against all others
-        shortest = 1 + lengths.index(min(lengths))
+        shortest = 1 + lengths.argmin()
         turning = {2, 3, 4} if shortest == 1 else {shortest}
         bars = uniform(*lengths)
         assert {bar for bar in MOVING_BARS if turns_fully(bars, bar)} == turning
@@ -135,10 +122,11 @@ def test_circuits_agree_with_a_scan(bars):
     Neighbours on a branch are joined, and both branches next to a gap or across a
     change point.
     """
-    theta_2 = scan(bars)
+    theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (tau / GRID)
     margin = closes(bars, theta_2)
     sure = np.abs(margin) > 16.0 * EPS * sum(bars.lengths)
-    assert (inside(theta_2, find_intervals(bars))[sure] == (margin >= 0.0)[sure]).all()
+    ranges = [(theta_2 - a) % tau <= b - a for a, b in find_intervals(bars)]
+    assert (np.any(ranges, axis=0)[sure] == (margin >= 0.0)[sure]).all()
     assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
     assert turns_fully(bars) or time_ratio(bars) is None
 
@@ -162,16 +150,9 @@ def test_circuits_agree_with_a_scan(bars):
         assert len(set(partition)) == len(circuits(bars))
 
 
-def exact_psi(bars, bar, stretched):
-    """The limit's angle from the ground by the law of cosines in 50 digits."""
-    d, *moving = (mp.mpf(length) for length in bars.lengths)
-    own = moving.pop(bar - 2)
-    e = moving[0] + moving[1] if stretched else moving[0] - moving[1]
-    return mp.acos((d * d + own * own - e * e) / (2 * d * own))
-
-
 @pytest.mark.parametrize("bar", MOVING_BARS)
 def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
+    """Against the law of cosines in 50 digits."""
     checked, (first, second) = 0, OTHERS[bar]
     for bars in nearly_special(3, 100) + random_linkages(4, 80):
         d, a, b, c = bars.lengths
@@ -182,7 +163,10 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
             angles = dict(zip(MOVING_BARS, limit, strict=False))
             value = limit[bar - 2] + (pi if bar == 4 else 0.0)
             with mp.workdps(50):
-                psi = exact_psi(bars, bar, limit.stretched)
+                ground, *moving = map(mp.mpf, bars.lengths)
+                own = moving.pop(bar - 2)
+                e = moving[0] + (1 if limit.stretched else -1) * moving[1]
+                psi = mp.acos((ground**2 + own**2 - e**2) / (2 * ground * own))
                 turned = mp.mpf(value) - theta_1
                 error = min(
                     abs(mp.fmod(turned - sign * psi + 9 * mp.pi, 2 * mp.pi) - mp.pi)
