@@ -54,9 +54,8 @@ def scene(drive_bar):
         Viscous.at(O2=0.1, A=0.05, B=0.02),
         Friction.at(O4=0.03),
     )
-    link = FourBar(0.3, *bars, 0.3)
     motion = Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0)
-    return Scene(link, motion, drive_bar, loads, effects)
+    return Scene(FourBar(0.3, *bars, 0.3), motion, drive_bar, loads, effects)
 
 
 def test_written_into_given_arrays():
@@ -96,29 +95,18 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     Bar 4 is commanded: a long input says little of the angle of a short bar.
     """
     b, c = 1.0, ratio
-    theta_4 = math.pi - 0.3 / max(1.0, c)
-    motion = Motion(theta_4=[theta_4], omega_4=2.0)
+    motion = Motion(theta_4=[math.pi - 0.3 / max(1.0, c)], omega_4=2.0)
     case = Scene(uniform(1.5 + c, 1.2, b, c), motion)
     state = compute_shown_state(case, command(case))
-    assert abs(state.position.sin_mu) > 0.1
-    position, lengths = state.position, state.lengths
+    position = state.position
+    assert abs(position.sin_mu) > 0.1
     w = Wrenches(R3=0.7 - 0.2j, M3=0.9, M4=0.3 * c, C=couple)
-    forces = pin_forces(lengths, position, 2, position.sin_mu, w, 0j, 0.0)
+    forces = pin_forces(state.lengths, position, 2, position.sin_mu, w, 0j, 0.0)
     size = abs(forces.F43)
     of_3 = b * cross(position.u3, forces.F43) + w.M3 - couple
     of_4 = -c * cross(position.u4, forces.F43) + w.M4 + couple
     assert np.all(abs(of_3) <= 16.0 * EPS * (b * size + w.M3 + couple))
     assert np.all(abs(of_4) <= 16.0 * EPS * (c * size + w.M4 + couple))
-
-
-def test_what_friction_of_pins_misses_is_a_rounding():
-    friction = PinFriction.at(O2=(0.1, 0.02), A=(0.1, 0.02), B=(0.1, 0.02))
-    s = solve(replace(scene(2), effects=(Gravity(), friction)))
-    forces = [np.hypot(*s[name].T).max() for name in ("F12", "F32", "F43")]
-    assert 0.0 < s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * max(forces)
-
-
-ANGLES = np.linspace(0.1, 6.0, 13)
 
 
 @pytest.mark.parametrize(
@@ -132,8 +120,8 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
 ):
     """With the couples mu r |F| as loads the forces are the same."""
     friction = PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
-    motion = Motion(ANGLES, 10.0)
-    case = replace(scene(drive_bar), motion=motion, loads=())
+    angles = np.linspace(0.1, 6.0, 13)
+    case = replace(scene(drive_bar), motion=Motion(angles, 10.0), loads=())
     s = solve(replace(case, effects=(Gravity(), friction)))
     largest = max(np.hypot(*s[name].T).max() for name in PIN_FORCE.values())
     assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest
@@ -142,15 +130,15 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     moments, loads = {}, []
     for pin in pins:
         i, j = PINS[pin]
-        couple = 0.1 * 0.02 * np.hypot(*s[PIN_FORCE[pin]].T)
-        couple = couple * np.sign(rate[j] - rate[i])
+        size = 0.1 * 0.02 * np.hypot(*s[PIN_FORCE[pin]].T)
+        couple = size * np.sign(rate[j] - rate[i])
         for bar, moment in ((i, couple), (j, -couple)):
             if bar > 1:
                 moments[f"loads.{len(loads)}.moment"] = moment
                 loads.append(Load(bar, moment=1.0))
     one = replace(case, loads=tuple(loads), effects=(Gravity(),))
-    given = solve(vary(one, {**moments, "motion.theta_2": ANGLES[:, None]}))
+    given = solve(vary(one, {**moments, "motion.theta_2": angles[:, None]}))
+    allowed = GROWN * largest / s.drive_condition
     for name in (*PIN_FORCE.values(), "torque"):
-        apart = np.abs(s[name] - given[name][:, 0]).reshape(len(ANGLES), -1)
-        allowed = GROWN * largest / s.drive_condition
-        assert (apart.max(axis=1) <= allowed).all(), name
+        apart = np.abs(s[name] - given[name][:, 0])
+        assert (allowed >= apart.T).all(), name

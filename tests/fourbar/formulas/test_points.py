@@ -26,11 +26,6 @@ from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage
 
 EPS = 2.0**-52
-FIRST, SECOND = 32.0, 128.0
-"""Roundings in a first and a second coefficient; each is magnified by 1/sin^2 mu and
-1/sin^4 mu at most: one power of 1/sin^2 mu from the angles, one from the division by
-the root of the area.
-"""
 
 
 class Drawn(NamedTuple):
@@ -61,7 +56,12 @@ def random_positions(seed, count, least_sine=0.05):
 
 @pytest.mark.parametrize("drawn", random_positions(12, 15))
 def test_point_coefficients_are_derivatives(drawn):
-    """Balls move the mass centre of the coupler, put at the point."""
+    """Balls move the mass centre of the coupler, put at the point.
+
+    The roundings of a first and a second coefficient are magnified by 1/sin^2 mu and
+    1/sin^4 mu at most: one power of 1/sin^2 mu from the angles, one from the division
+    by the root of the area.
+    """
     z, sine, theta_2 = 0.3 - 0.2j, drawn.sine, float(drawn.theta_2[0])
     coefficients = point_coefficients(*drawn, 3, z)
     size = 1.0 + drawn.bars.input.length / min(drawn.bars.lengths)
@@ -69,8 +69,8 @@ def test_point_coefficients_are_derivatives(drawn):
     moved = replace(drawn.bars, coupler=coupler)
     exact = move_in_balls(moved, 2, theta_2, drawn.branch)
     for n, name, value, roundings in (
-        (1, "v_G3", coefficients.first, FIRST),
-        (2, "a_G3", coefficients.second, SECOND),
+        (1, "v_G3", coefficients.first, 32.0),
+        (2, "a_G3", coefficients.second, 128.0),
     ):
         right = complex(float(exact[f"{name}_x"]), float(exact[f"{name}_y"]))
         allowed = roundings * EPS * size ** (n + 1) / sine ** (2 * n)
@@ -102,11 +102,17 @@ rhombus | 1 1 1 1
 
 @pytest.mark.parametrize("name, lengths", CURVES)
 def test_coupler_curves_are_closed_and_lie_on_the_sextic(name, lengths):
-    lengths = [float(length) for length in lengths.split()]
+    """The coupler curve's own equation is free of theta_2.
+
+    A lies on the circle a about O2 and at the distance |(along, across)| of the point
+    P; B follows from A and P alone and must lie on the circle c about O4: one of the
+    two possible A fulfils it.
+    """
+    d, a, b, c = lengths = [float(length) for length in lengths.split()]
     bars = bare(*lengths, 0.3)
-    along, across = 0.4 * lengths[2], 0.3 * lengths[2]
+    arm = (0.4 + 0.3j) * b
     for circuit in range(len(circuits(bars))):
-        curve = coupler_curve(bars, along, across, circuit, steps=720)
+        curve = coupler_curve(bars, arm.real, arm.imag, circuit, steps=720)
         assert curve.theta_2.shape == curve.x.shape == curve.branch.shape == (721,)
         point = curve.x + 1j * curve.y
         assert np.isfinite(point).all()
@@ -116,26 +122,14 @@ def test_coupler_curves_are_closed_and_lie_on_the_sextic(name, lengths):
         # is not
         assert steps.max() < 0.1 * min(lengths)
         assert (curve.branch == 1).any() == (1 in circuits(bars)[circuit].branches)
-        assert _off_sextic(bars, point, along, across) < 1e-9
-
-
-def _off_sextic(bars, point, along, across):
-    """How far the points are from the coupler curve's own equation, free of theta_2.
-
-    A lies on the circle a about O2 and at the distance |(along, across)| of the point
-    P; B follows from A and P alone and must lie on the circle c about O4: one of the
-    two possible A fulfils it.
-    """
-    d, a, b, c = bars.lengths
-    arm = complex(along, across)
-    feet = (np.abs(point) ** 2 + a * a - abs(arm) ** 2) / (2 * np.abs(point))
-    height = np.sqrt(np.maximum(a * a - feet**2, 0.0))
-    off = []
-    for side in (1, -1):
-        pin_a = point / np.abs(point) * (feet + 1j * side * height)
-        pin_b = pin_a + (point - pin_a) / arm * b
-        off.append(np.abs(np.abs(pin_b - d * np.exp(1j * bars.ground_angle)) - c))
-    return float(np.minimum(*off)[height > 1e-3 * a].max())
+        feet = (np.abs(point) ** 2 + a * a - abs(arm) ** 2) / (2 * np.abs(point))
+        height = np.sqrt(np.maximum(a * a - feet**2, 0.0))
+        off = []
+        for side in (1, -1):
+            pin_a = point / np.abs(point) * (feet + 1j * side * height)
+            pin_b = pin_a + (point - pin_a) / arm * b
+            off.append(np.abs(np.abs(pin_b - d * np.exp(0.3j)) - c))
+        assert np.minimum(*off)[height > 1e-3 * a].max() < 1e-9
 
 
 def test_symmetric_circuits_draw_mirror_images():
