@@ -3,6 +3,7 @@
 The same numbers as SI gives, and one line for a mistake.
 """
 
+import json
 import re
 from fractions import Fraction
 
@@ -10,58 +11,40 @@ import numpy as np
 import pytest
 from pytest import raises
 
-from fourbar import (
-    Bar,
-    Free,
-    FromLimit,
-    Gravity,
-    InputError,
-    Law,
-    Load,
-    Motion,
-    PinFriction,
-    Place,
-    Point,
-    Spring,
-    Sweep,
-    Table,
-    Torsion,
-    Viscous,
-    uniform,
-)
+import fourbar
+from fourbar import InputError, Load, Place, Spring
 from fourbar.quantities.units import UnitError, half_unit_of_text, to_si
 from tests.support.rows import read_rows
 
 ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
+STATED = read_rows("""
+Bar | ["9 cm", "2 g", "2 g m^2", ["5 cm", "180 deg"]] | [0.09, 0.002, 0.002, [0.05, PI]]
+uniform | ["6 in", 0.05, "127 mm", "4 in"] | [0.1524, 0.05, 0.127, 0.1016]
+Sweep | ["180 deg", "2 rad", 4] | [PI, 2.0, 4]
+FromLimit | [1, "180 deg"] | [1, PI]
+Free | ["0.5 min", 4] | [30.0, 4]
+Law | [["0 s", "0.5 min"], ["0 deg", 2], 4, "rest"] | [[0, 30], [0, 2], 4, "rest"]
+Point | ["P", 3, ["5 cm", "180 deg"]] | ["P", 3, [0.05, PI]]
+Table | [["0 deg", "180 deg"], [1.0, 2.0]] | [[0.0, PI], [1.0, 2.0]]
+Gravity | ["1 g_0", "180 deg"] | [9.80665, PI]
+Viscous | [[["A", "2 N mm s/rad"]]] | [[["A", 0.002]]]
+PinFriction | [[["A", 0.1, "8 mm"]]] | [[["A", 0.1, 0.008]]]
+Torsion | [[["A", "2 N m/rad", "180 deg", "1 N cm"]]] | [[["A", 2.0, PI, 0.01]]]
+""")
+"""Names, and the numbers with and without their units."""
+
+
+def read(cell):
+    """Read a list of JSON, in which PI is a number."""
+    return json.loads(cell.replace("PI", repr(np.pi)))
+
+
 SAME = [
-    (
-        Bar,
-        ("10 cm", "200 g", "2 kg cm^2", ("5 cm", "180 deg")),
-        (0.1, 0.2, 2e-4, (0.05, np.pi)),
-    ),
-    (uniform, ("6 in", 0.05, "127 mm", "4 in"), (0.1524, 0.05, 0.127, 0.1016)),
-    (Sweep, ("180 deg", "2 rad", 4), (np.pi, 2.0, 4)),
-    (FromLimit, (1, "180 deg"), (1, np.pi)),
-    (Free, ("0.5 min", 4), (30.0, 4)),
-    (
-        Law,
-        (("0 s", "0.5 min"), ("0 deg", 2.0), 4, "rest"),
-        ((0.0, 30.0), (0.0, 2.0), 4, "rest"),
-    ),
-    (Point, ("P", 3, ("5 cm", "180 deg")), ("P", 3, (0.05, np.pi))),
+    *((getattr(fourbar, name), read(a), read(b)) for name, a, b in STATED),
     (
         lambda bar, force, at, moment: Load(bar, force, from_pin=at, moment=moment),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
         (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
-    ),
-    (Table, (("0 deg", "180 deg"), (1.0, 2.0)), ((0.0, np.pi), (1.0, 2.0))),
-    (Gravity, ("1 g_0", "180 deg"), (9.80665, np.pi)),
-    (Viscous, ((("A", "2 N mm s/rad"),),), ((("A", 0.002),),)),
-    (PinFriction, ((("A", 0.1, "8 mm"),),), ((("A", 0.1, 0.008),),)),
-    (
-        Torsion,
-        ((("A", "2 N m/rad", "180 deg", "1 N cm"),),),
-        ((("A", 2.0, np.pi, 0.01),),),
     ),
     (
         Spring,
@@ -88,37 +71,19 @@ def test_a_text_with_a_unit_is_its_number(make, texts, numbers):
 
 
 @pytest.mark.parametrize(
-    "make, words",
-    [
-        (
-            lambda: uniform("6", 1, 1, 1),
-            r"lengths.ground = '6': the unit is missing.*like \"1 m\"",
-        ),
-        (
-            lambda: uniform(1, "6 kg", 1, 1),
-            "lengths.input = '6 kg'.*does not convert to m",
-        ),
-        (
-            lambda: uniform(1, "-6 in", 1, 1),
-            "lengths.input = '-6 in': must be a finite number > 0",
-        ),
-        (
-            lambda: Motion("60", 1.0),
-            r"motion.theta_2 = '60': the unit is missing",
-        ),
-        (
-            lambda: Motion(1.0, branch="opne"),
-            r"motion.branch = 'opne': must be \+1 \(open\)",
-        ),
-        (
-            lambda: PinFriction.at(A=("0.1", 1)),
-            "coefficient = '0.1': must be a finite number",
-        ),
-    ],
+    "name, stated, words",
+    read_rows(r"""
+uniform | ["6", 1, 1, 1] | lengths.ground = '6': the unit is missing.*like \"1 m\"
+uniform | [1, "6 kg", 1, 1] | lengths.input = '6 kg'.*does not convert to m
+uniform | [1, "-6 in", 1, 1] | lengths.input = '-6 in': must be a finite number > 0
+Motion | ["60", 1.0] | motion.theta_2 = '60': the unit is missing
+Motion | [1.0, 0.0, 0.0, "opne"] | motion.branch = 'opne': must be \+1 \(open\)
+PinFriction | [[["A", "0.1", 1]]] | coefficient = '0.1': must be a finite number
+"""),
 )
-def test_a_mistake_is_one_line(make, words):
+def test_a_mistake_is_one_line(name, stated, words):
     with raises(InputError, match=words):
-        make()
+        getattr(fourbar, name)(*read(stated))
 
 
 PI = Fraction(314159265358979323846264338327950288419716939937510582097494459, 10**62)
