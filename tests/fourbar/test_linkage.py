@@ -1,3 +1,4 @@
+import json
 import math
 
 import numpy as np
@@ -6,18 +7,14 @@ from pytest import approx, raises
 
 from fourbar import Bar, InputError
 from fourbar.files.scene_file import loads
-
-STEEL = 7850.0
-
-
-ROD = {"density": STEEL, "diameter": 0.02}
-PER_LENGTH = {"mass_per_length": 4.2}
+from tests.support.rows import read_rows
+from tests.support.texts import LENGTHS
 
 
 def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
     round_bar = Bar("0.4 m", density="7850 kg/m^3", diameter="20 mm")
     flat = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
-    assert round_bar.mass == approx(STEEL * math.pi * 0.01**2 * 0.4, rel=1e-15)
+    assert round_bar.mass == approx(7850.0 * math.pi * 0.01**2 * 0.4, rel=1e-15)
     assert flat.mass == approx(0.314, rel=1e-15)
     assert Bar("0.66 m", mass_per_length="4.2 kg/m").mass == approx(2.772)
     assert flat.moment_of_inertia == approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
@@ -43,39 +40,31 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area():
 
 @pytest.mark.parametrize(
     "stated, key",
-    [
-        ({"density": STEEL}, "density"),
-        (ROD | {"mass": 1.0}, "mass"),
-        (PER_LENGTH | {"mass": 1.0}, "mass"),
-        (PER_LENGTH | ROD, "density"),
-        ({"mass_per_length": 0.0}, "mass_per_length"),
-        (ROD | {"section": (0.02, 0.01)}, "diameter"),
-        ({"section": (0.02, 0.0)}, "section"),
-        ({"section": "20 mm"}, "section"),
-        ({"section": (1e-150, 1e-150)}, "section"),
-        ({"diameter": 1e-150}, "diameter"),
-        ({"diameter": 1e150}, "diameter"),
-        ({"density": "7850 kg/m^2", "diameter": 0.02}, "density"),
-    ],
+    read_rows("""
+{"density": 7850} | density
+{"density": 7850, "diameter": 0.02, "mass": 1} | mass
+{"mass_per_length": 4.2, "mass": 1} | mass
+{"mass_per_length": 4.2, "density": 7850, "diameter": 0.02} | density
+{"mass_per_length": 0} | mass_per_length
+{"density": 7850, "diameter": 0.02, "section": [0.02, 0.01]} | diameter
+{"section": [0.02, 0]} | section
+{"section": "20 mm"} | section
+{"section": [1e-150, 1e-150]} | section
+{"diameter": 1e-150} | diameter
+{"diameter": 1e150} | diameter
+{"density": "7850 kg/m^2", "diameter": 0.02} | density
+"""),
 )
 def test_a_material_that_states_no_mass_is_refused(stated, key):
     with raises(InputError) as error:
-        Bar(0.4, **stated)
+        Bar(0.4, **json.loads(stated))
     assert error.value.key == key
 
 
 def test_a_scene_file_names_the_bar_whose_material_is_wrong():
-    text = """\
-[lengths]
-ground = "1 m"
-input = "0.4 m"
-coupler = "1 m"
-output = "0.8 m"
-[bars.coupler]
-density = "7850 kg/m^3"
-"""
-    with raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
-        loads(text)
-    per_length = text.replace('density = "7850 kg/m^3"', 'mass = "0.25 lb/in"')
-    with raises(InputError, match=r'mass_per_length = "0\.25 lb'):
-        loads(per_length)
+    for stated, words in (
+        ('density = "7850 kg/m^3"', r"bars\.coupler\.density = '7850 kg/m"),
+        ('mass = "0.25 lb/in"', r'mass_per_length = "0\.25 lb'),
+    ):
+        with raises(InputError, match=words):
+            loads(f"{LENGTHS}[bars.coupler]\n{stated}\n")
