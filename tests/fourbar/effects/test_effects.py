@@ -1,13 +1,14 @@
 """The effects' formulas against potentials, exact arithmetic and limiting cases."""
 
+import json
 from math import acos, pi, tau
 
 import numpy as np
 import pytest
 from pytest import approx, raises
 
+import fourbar
 from fourbar import (
-    Flywheel,
     Free,
     Friction,
     Load,
@@ -16,7 +17,6 @@ from fourbar import (
     Place,
     Spring,
     Table,
-    Torsion,
     solve,
     uniform,
 )
@@ -150,31 +150,31 @@ def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
     assert Spring.gas(*HERE, 0.5, 0.3, 40.0) == Spring(*HERE, 0.0, 0.5, -40.0)
 
 
-SAME_BAR = Place(2, (0.1, 0.0)), Place(2, (0.2, 0.0))
-
-
 @pytest.mark.parametrize(
-    "make, key",
+    "make, numbers, key",
     [
-        (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
-        (lambda: Spring(*SAME_BAR, 1.0), "effects.springs.to.bar"),
-        (lambda: Spring.gas(*HERE, 0.3, 0.3, 1.0), "effects.springs.gas.stroke"),
+        (Spring, (*[Place(2, (0.1, 0.0))] * 2, 1.0), "effects.springs.to.bar"),
+        (Spring.gas, (*HERE, 0.3, 0.3, 1.0), "effects.springs.gas.stroke"),
         (
-            lambda: Spring.gas(*HERE, 0.3, 0.1, 2.0, 1.0),
+            Spring.gas,
+            (*HERE, 0.3, 0.1, 2.0, 1.0),
             "effects.springs.gas.compressed_force",
         ),
-        (
-            lambda: Spring.gas(*HERE, 0.3, 0.1, -2.0),
-            "effects.springs.gas.extended_force",
+        (Spring.gas, (*HERE, 0.3, 0.1, -2.0), "effects.springs.gas.extended_force"),
+        *(
+            (getattr(fourbar, name), json.loads(numbers), key)
+            for name, numbers, key in read_rows("""
+Flywheel | [1, 3] | effects.flywheel.bar
+Torsion | [[["A", 0, 1, 0]]] | effects.torsion.A.stiffness
+PinFriction | [[["C", 0.1, 0.1]]] | effects.pin_friction.C
+PinFriction | [[["A", -0.1, 0.1]]] | effects.pin_friction.A.coefficient
+Table | [[0, 1, 7], [1, 1, 1]] | loads.table.theta_2
+Table | [[0, 1, 1], [1, 1, 2]] | loads.table.theta_2
+""")
         ),
-        (lambda: Torsion.at(A=(0.0, 1.0, 0.0)), "effects.torsion.A.stiffness"),
-        (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
-        (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),
-        (lambda: Table((0.0, 1.0, 7.0), (1.0, 1.0, 1.0)), "loads.table.theta_2"),
-        (lambda: Table((0.0, 1.0, 1.0), (1.0, 1.0, 2.0)), "loads.table.theta_2"),
     ],
 )
-def test_bad_input_names_its_key(make, key):
+def test_bad_input_names_its_key(make, numbers, key):
     with raises(InputError) as error:
-        make()
+        make(*numbers)
     assert error.value.key == key
