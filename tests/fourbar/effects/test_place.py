@@ -3,13 +3,16 @@
 Places of bars in every form, loads at them, and the cases that people brought.
 """
 
+import json
+
 import pytest
 from numpy.testing import assert_allclose
 from pytest import approx, raises
 
-from fourbar import InputError, Load, Place, Point, Spring, solve
+import fourbar
+from fourbar import InputError, Place, Spring, solve
 from fourbar.files import loads
-from tests.support.scenes import crank_rocker
+from tests.support.rows import read_rows
 from tests.support.texts import HUNG, PULL
 
 PRINTED = 6e-7
@@ -29,22 +32,24 @@ def test_a_pull_at_the_tip_of_massless_bars():
 
 
 @pytest.mark.parametrize(
-    "make",
+    "make, stated",
     [
-        lambda: Load(3, (1.0, 0.0), from_pin=(0.1, 0.0), arm=(0.1, 0.0)),
-        lambda: Load(3, None, arm=(0.1, 0.0), moment=1.0),
-        lambda: Load(3, (1.0, 0.0), arm=(0.1, 0.0), frame="bar"),
-        lambda: crank_rocker(loads=(Load(3, (1.0, 0.0), point="P"),)),
-        lambda: crank_rocker(
-            loads=(Load(3, (1.0, 0.0), point="P"),),
-            points=(Point("P", 4, (0.1, 0.0)),),
+        *(
+            (getattr(fourbar, name), json.loads(stated))
+            for name, stated in read_rows("""
+Load | {"bar": 3, "force": [1, 0], "from_pin": [0.1, 0], "arm": [0.1, 0]}
+Load | {"bar": 3, "arm": [0.1, 0], "moment": 1}
+Load | {"bar": 3, "force": [1, 0], "arm": [0.1, 0], "frame": "bar"}
+Point | {"name": "P", "bar": 1, "from_centre": [0.1, 0]}
+Point | {"name": "P", "bar": 3}
+""")
         ),
-        lambda: Point("P", 1, from_centre=(0.1, 0.0)),
-        lambda: Point("P", 3),
-        lambda: Spring(Place(1), Place(4, (0.1, 0.0)), 1.0),
-        lambda: Spring(Place(1, from_centre=(0.1, 0.0)), Place(4, (0.1, 0.0)), 1.0),
+        *(
+            (Spring, {"start": start, "end": Place(4, (0.1, 0.0)), "stiffness": 1.0})
+            for start in (Place(1), Place(1, from_centre=(0.1, 0.0)))
+        ),
     ],
 )
-def test_python_refuses_what_is_no_place(make):
+def test_python_refuses_what_is_no_place(make, stated):
     with raises(InputError):
-        make()
+        make(**stated)

@@ -10,7 +10,7 @@ from math import degrees, isnan, radians, sin, sqrt
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pytest import approx
+from pytest import approx, raises
 from scipy.integrate import quad
 
 from fourbar import (
@@ -24,6 +24,7 @@ from fourbar import (
     solve,
 )
 from fourbar.files import loads
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 SLOPES = 1e-7
@@ -82,22 +83,20 @@ def energy_of_door(theta):
     lifted = 0.02 * A.imag / 2.0 + 0.06 * G3.imag + 0.04 * B.imag / 2.0
     pushed = min(abs(A + 0.05 * line) - 0.06, 0.0)
     turned = theta - radians(20.0)
-    return float(
-        9.81 * lifted + 0.2 * B.imag + 0.025 * turned**2 + 0.5 * 500.0 * pushed**2
-    )
+    return 9.81 * lifted + 0.2 * B.imag + 0.025 * turned**2 + 250.0 * pushed**2
 
 
 def inertia_of_door(theta):
     """Return the equivalent inertia at bar 2, kg m^2, by differences of positions."""
     step = 1e-5
-    (A, B), (A_1, B_1) = close(theta - step), close(theta + step)
-    lines = [((one - A_0) / 0.07) for A_0, one in ((A, B), (A_1, B_1))]
-    G = [A_0 + (0.04 + 0.005j) * u for A_0, u in ((A, lines[0]), (A_1, lines[1]))]
+    A, B = np.transpose([close(theta - step), close(theta + step)])
+    lines = (B - A) / 0.07
+    G = A + (0.04 + 0.005j) * lines
     turn = np.angle(lines[1] / lines[0]) / (2.0 * step)
-    swing = np.angle((B_1 - 0.06) / (B - 0.06)) / (2.0 * step)
+    swing = np.angle((B[1] - 0.06) / (B[0] - 0.06)) / (2.0 * step)
     speed = abs(G[1] - G[0]) / (2.0 * step)
     slender = 0.02 * 0.025**2 / 3.0 + 0.04 * 0.055**2 / 3.0 * swing**2
-    return float(slender + 0.06 * speed**2 + 35e-6 * turn**2)
+    return slender + 0.06 * speed**2 + 35e-6 * turn**2
 
 
 def test_the_door_is_held_by_what_its_energy_asks():
@@ -105,10 +104,8 @@ def test_the_door_is_held_by_what_its_energy_asks():
     scene = make_door('theta_2 = ["40 deg", "100 deg", "120 deg"]\nomega_2 = "0 rad/s"')
     s = solve(scene)
     step = 1e-5
-    right = [
-        (energy_of_door(t + step) - energy_of_door(t - step)) / (2.0 * step)
-        for t in s.theta_2
-    ]
+    ahead, behind = ([*map(energy_of_door, s.theta_2 + h)] for h in (step, -step))
+    right = np.subtract(ahead, behind) / (2.0 * step)
     assert_allclose(s.torque, right, rtol=SLOPES)
     fastened = solve(make_door('theta_2 = "40 deg"\nomega_2 = "0 rad/s"', ""))
     assert s.torque[0] - fastened.torque[0] == approx(0.0265373, abs=6e-8)
@@ -175,16 +172,15 @@ def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
 
 
 @pytest.mark.parametrize(
-    "acts, numbers, words",
-    [
-        ("both", {}, '"push" or "pull"'),
-        ("push", {"stiffness": 0.0, "preload": -3.0}, "constant"),
-        ("push", {"preload": 10.0}, "10 N"),
-        ("pull", {"length": 0.0}, "0 N"),
-    ],
+    "numbers, acts, words",
+    read_rows("""
+200 0.05 0 | both | "push" or "pull"
+0 0.05 -3 | push | constant
+200 0.05 10 | push | 10 N
+200 0 0 | pull | 0 N
+"""),
 )
-def test_a_spring_that_never_comes_off_is_refused(acts, numbers, words):
-    stated = {"stiffness": 200.0, "length": 0.05} | numbers
-    with pytest.raises(InputError) as refused:
-        Spring(*ENDS, **stated, acts=acts)
-    assert "springs.acts" in str(refused.value) and words in str(refused.value)
+def test_a_spring_that_never_comes_off_is_refused(numbers, acts, words):
+    """Stiffness, length and preload."""
+    with raises(InputError, match=rf"springs\.acts .*{words}"):
+        Spring(*ENDS, *map(float, numbers.split()), acts=acts)
