@@ -10,9 +10,10 @@ from numpy.testing import assert_allclose
 from pytest import approx, raises
 
 import fourbar
-from fourbar import InputError, Place, Spring, solve
+from fourbar import InputError, Load, Place, Point, Spring, solve
 from fourbar.files import loads
 from tests.support.rows import read_rows
+from tests.support.scenes import crank_rocker
 from tests.support.texts import HUNG, PULL
 
 PRINTED = 6e-7
@@ -53,3 +54,9 @@ Point | {"name": "P", "bar": 3}
 def test_python_refuses_what_is_no_place(make, stated):
     with raises(InputError):
         make(**stated)
+
+
+@pytest.mark.parametrize("points", [(), (Point("P", 4, (0.1, 0.0)),)])
+def test_python_refuses_a_load_at_a_point_that_its_bar_has_not(points):
+    with raises(InputError):
+        crank_rocker(loads=(Load(3, (1.0, 0.0), point="P"),), points=points)

@@ -14,6 +14,7 @@ from fourbar.formulas.many_digits import decide_half_angles, exact_half_angle
 from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import half_angle, loop
 from fourbar.linkage import MOVING_BARS, uniform
+from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage
 
 QUADRUPLES = int(os.environ.get("DRAWINGS", "300"))
@@ -87,29 +88,30 @@ def test_the_constants_of_the_loop_vanish_within_rounding_alone():
 
 
 @pytest.mark.parametrize(
-    "lengths, touches",
-    [
-        # of a sum of 1.875, where d - a = b - c, those touch that miss by 7.5 U
-        ((0.6875, 0.3125, 0.625 + 6.0 * U, 0.25), True),
-        ((0.6875, 0.3125, 0.625 + 10.0 * U, 0.25), False),
-        # d - a = 1e-15 is no rounding of a ground of 3e-15
-        ((3e-15, 2e-15, 1.0, 1.0), False),
-        # one pair of equal bars alone makes no other bars equal
-        ((0.3, 0.1, 0.25, 0.1), False),
-        ((0.3, 0.1, 0.1, 0.25), False),
-        ((0.3, 0.3, 0.2, 0.25), False),
-        ((3e-6, 3.0000001e-6, 1.0, 1.0), False),
-        # 0.1 + 0.7 = 0.2 + 0.6 of the lengths meant, and not of the doubles
-        ((0.6, 0.7, 0.1, 0.2), True),
-        ((0.7, 0.6, 0.2, 0.1), True),
-        # within the rounding of their own lengths become equal
-        ((0.3, 0.3 * (1.0 + 2.0 * U), 0.2, 0.2), True),
-    ],
+    "stated, touches",
+    read_rows("""
+# of a sum of 1.875, where d - a = b - c, those touch that miss by 7.5 U: 6 U and 10 U
+0.6875 0.3125 0.6250000000000007 0.25 | yes
+0.6875 0.3125 0.6250000000000011 0.25 | no
+# d - a = 1e-15 is no rounding of a ground of 3e-15
+3e-15 2e-15 1 1 | no
+# one pair of equal bars alone makes no other bars equal
+0.3 0.1 0.25 0.1 | no
+0.3 0.1 0.1 0.25 | no
+0.3 0.3 0.2 0.25 | no
+3e-6 3.0000001e-6 1 1 | no
+# 0.1 + 0.7 = 0.2 + 0.6 of the lengths meant, and not of the doubles
+0.6 0.7 0.1 0.2 | yes
+0.7 0.6 0.2 0.1 | yes
+# within the rounding of their own lengths, 2 U, become equal
+0.3 0.30000000000000004 0.2 0.2 | yes
+"""),
 )
-def test_what_touches_is_up_to_the_rounding_of_the_lengths(lengths, touches):
+def test_what_touches_is_up_to_the_rounding_of_the_lengths(stated, touches):
+    lengths = tuple(map(float, stated.split()))
     bars = loop(*lengths)
-    assert (bars.E2 == 0.0) == touches
-    assert touches or bars[:4] == lengths
+    assert (bars.E2 == 0.0) == (touches == "yes")
+    assert touches == "yes" or bars[:4] == lengths
     assert bars[:4] == approx(lengths, rel=4.0 * U)
 
 

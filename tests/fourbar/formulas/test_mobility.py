@@ -206,21 +206,22 @@ def test_time_ratio_is_the_time_of_both_strokes():
 
 
 @pytest.mark.parametrize(
-    "lengths, turns",
-    [
-        ((2, 1, 2, 1), (0.0, pi)),
-        ((1, 2, 4, 3), (0.0,)),
-        ((3, 1, 2, 2), (pi,)),
-        ((3, 1, 2.5, 2.2), ()),
-        # of lengths whose sum is 2 those touch that miss by 8 U = 4 EPS
-        ((0.5, 0.5 + 4 * EPS, 0.5, 0.5), (0.0, pi)),
-        ((0.5, 0.5 + 5 * EPS, 0.5, 0.5), ()),
-    ],
+    "stated, turns",
+    read_rows("""
+2 1 2 1 | 0 1
+1 2 4 3 | 0
+3 1 2 2 | 1
+3 1 2.5 2.2 |
+# of lengths whose sum is 2 those touch that miss by 8 U: 8 U and 10 U
+0.5 0.5000000000000009 0.5 0.5 | 0 1
+0.5 0.5000000000000011 0.5 0.5 |
+"""),
 )
-def test_change_points_lie_along_the_ground_and_opposite(lengths, turns):
-    bars = bare(*lengths, 0.4)
-    assert change_points(bars) == tuple(0.4 + turn for turn in turns)
-    assert turns_fully(bars) == (lengths[1] != 0.5 + 5 * EPS)
+def test_change_points_lie_along_the_ground_and_opposite(stated, turns):
+    bars = bare(*map(float, stated.split()), 0.4)
+    places = [0.4 + pi * float(turn) for turn in turns.split()]
+    assert list(change_points(bars)) == places
+    assert turns_fully(bars) == (bars.input.length != 0.5 + 5 * EPS)
 
 
 def test_a_bar_that_does_not_move_is_refused_and_so_is_what_is_no_linkage():

@@ -9,6 +9,7 @@ from fourbar.formulas.motion import coefficients, take_sines_of_rates
 from fourbar.formulas.path import compute_state, drive_sine_of_triangle
 from fourbar.formulas.position import close_loop, direction, half_angle, loop
 from tests.support.balls import move_in_balls
+from tests.support.rows import read_rows
 from tests.support.scenes import bare
 
 EPS = 2.0**-52
@@ -20,24 +21,26 @@ DRIVEN = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 """The two bars whose sine a drive on a bar is divided by."""
 
 
-SHORT = (
-    # (d, a, b, c), psi, sign of the root: d - a = +-(b - c) exactly, so the diagonal
-    # turns fast and the bars do not
-    ((0.859375, 0.853515625, 0.58984375, 0.583984375), -0.0018, -1),
-    ((0.859375, 0.853515625, 0.58984375, 0.583984375), 0.0018, 1),
-    ((0.859375, 0.853515625, 0.583984375, 0.58984375), 0.0018, -1),
-    ((0.859375, 0.853515625, 0.583984375, 0.58984375), 0.0018, 1),
-    ((0.853515625, 0.859375, 0.58984375, 0.583984375), 0.0018, -1),
-    ((0.853515625, 0.859375, 0.58984375, 0.583984375), 0.0018, 1),
-    ((0.853515625, 0.859375, 0.583984375, 0.58984375), -0.0005, -1),
-    ((0.8125, 0.810546875, 0.140625, 0.138671875), 0.0008, 1),
-    ((0.75, 0.71875, 0.53125, 0.5), 0.01, 1),
+@pytest.mark.parametrize(
+    "stated, psi, sign",
+    read_rows("""
+# d, a, b, c, psi and the sign of the root: d - a = +-(b - c) exactly, so the diagonal
+# turns fast and the bars do not
+0.859375 0.853515625 0.58984375 0.583984375 | -0.0018 | -1
+0.859375 0.853515625 0.58984375 0.583984375 | 0.0018 | 1
+0.859375 0.853515625 0.583984375 0.58984375 | 0.0018 | -1
+0.859375 0.853515625 0.583984375 0.58984375 | 0.0018 | 1
+0.853515625 0.859375 0.58984375 0.583984375 | 0.0018 | -1
+0.853515625 0.859375 0.58984375 0.583984375 | 0.0018 | 1
+0.853515625 0.859375 0.583984375 0.58984375 | -0.0005 | -1
+0.8125 0.810546875 0.140625 0.138671875 | 0.0008 | 1
+0.75 0.71875 0.53125 0.5 | 0.01 | 1
+"""),
 )
-
-
-@pytest.mark.parametrize("lengths, psi, sign", SHORT)
-def test_digits_are_kept_where_the_diagonal_is_short(lengths, psi, sign):
+def test_digits_are_kept_where_the_diagonal_is_short(stated, psi, sign):
     """With E2 = 0 the assembly of this sign of the root changes at psi = 0."""
+    lengths = [float(length) for length in stated.split()]
+    psi, sign = float(psi), int(sign)
     assembly = sign if psi > 0.0 else -sign
     k = compute_state(uniform(*lengths), psi, assembly).k
     exact = move_in_balls(uniform(*lengths), 2, psi, sign)

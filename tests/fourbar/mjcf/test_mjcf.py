@@ -38,6 +38,7 @@ from fourbar_validation.scenes.random import (
     draw_uniform,
 )
 from fourbar_validation.scenes.suites import list_model_files
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
 
@@ -95,21 +96,21 @@ def opened(scene):
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize(
     "lengths, points",
-    [
-        ((0.3, 0.1, 0.3, 0.1), (0.0, pi)),
-        ((0.3, 0.1, 0.1, 0.3), (0.0, pi)),
-        ((0.1, 0.1, 0.3, 0.3), (0.0,)),
-        ((0.4, 0.1, 0.27, 0.23), (pi,)),
-    ],
+    read_rows("""
+0.3 0.1 0.3 0.1 | 0 1
+0.3 0.1 0.1 0.3 | 0 1
+0.1 0.1 0.3 0.3 | 0
+0.4 0.1 0.27 0.23 | 1
+"""),
 )
 def test_the_file_opens_in_the_assembly_beyond_change_points(lengths, points, branch):
     """Pin B lies left of the diagonal from A to O4 in the open assembly's first
     half, and changes its side at each change point that the input passes, and
     nowhere else.
     """
-    linkage = replace(uniform(*lengths), ground_angle=0.3)
+    linkage = replace(uniform(*map(float, lengths.split())), ground_angle=0.3)
+    turns = pi * np.add.outer(np.array(points.split(), float), [-2, 0, 2]).ravel()
     for psi in (-2.5, -0.5, 0.5, 2.5, 3.8, 6.0, 6.8):
-        turns = [point + tau * k for point in points for k in (-1, 0, 1)]
         passed = sum((at > 0.5) != (at > psi) for at in turns)
         motion = Motion(0.3 + psi, 5.0, branch=branch)
         _, data = opened(Scene(linkage, motion))

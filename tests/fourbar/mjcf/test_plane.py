@@ -14,6 +14,7 @@ from fourbar import InputError, load
 from fourbar.mjcf import Plane, assembly, write_mjcf
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 from tests.support.robots import rotation
+from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
 AXES = [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -3.0)]
@@ -49,17 +50,19 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
 
 @pytest.mark.parametrize(
     "axis, at, expected",
-    [
-        ((0, -1, 0), (0, -9.81), [0, 0, -9.81]),  # x-z, gravity down
-        ((1, 0, 0), (9.81, 0), [0, 0, -9.81]),  # x points down, y stays
-        ((-1, 1, 0), (5, 5), [5, 5, 0]),
-        ((1e-5, 0, -1), (1, 0), [-1, 0, -1e-5]),
-    ],
+    read_rows("""
+# x-z, gravity down
+0 -1 0 | 0 -9.81 | 0 0 -9.81
+# x points down, y stays
+1 0 0 | 9.81 0 | 0 0 -9.81
+-1 1 0 | 5 5 | 5 5 0
+1e-5 0 -1 | 1 0 | -1 0 -1e-5
+"""),
 )
 def test_a_turned_vector_has_zeros_where_it_has_no_component(axis, at, expected):
-    plane = Plane(axis)
-    turned = plane.turn(*at)
-    assert turned == approx(expected, rel=1e-10, abs=0.0)
+    axis, at, expected = (np.array(x.split(), float) for x in (axis, at, expected))
+    plane = Plane(tuple(axis.tolist()))
+    assert plane.turn(*at) == approx(expected, rel=1e-10, abs=0.0)
     assert np.linalg.norm(plane.quaternion) == approx(1.0, abs=1e-15)
 
 

@@ -134,23 +134,21 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
 
 
 @pytest.mark.parametrize(
-    "length, names",
-    [
-        ("12 in", ["in", "in/s", "lbf in"]),
-        ("1 foot", ["ft", "ft/s", "lbf ft"]),
-        ("1 yd", ["ft", "ft/s", "lbf ft"]),
-        ("1 km", ["km", "km/s", "N m"]),
-    ],
+    "length, names, of_length, of_torque",
+    read_rows("""
+12 in | in, in/s, lbf in | 12 | 12
+1 foot | ft, ft/s, lbf ft | 1 | 1
+1 yd | ft, ft/s, lbf ft | 1 | 1
+1 km | km, km/s, N m | 0.3048e-3 | 1.3558179483314004
+"""),
 )
-def test_lengths_have_results_in_their_unit(length, names):
+def test_lengths_have_results_in_their_unit(length, names, of_length, of_torque):
     """12 in and 1 ft are 0.3048 m; 1 lbf ft is 1.35581795 N m."""
     shown = units_of_scene({"lengths": {"ground": length}})
-    units_shown = [shown.get(unit, (unit, 1.0)) for unit in ("m", "m/s", "N m")]
-    assert [name for name, _ in units_shown] == names
-    foot_pound = 1.3558179483314004
-    expected = {"in": (12.0, 12.0), "ft": (1.0, 1.0), "km": (0.3048e-3, foot_pound)}
-    of_length, _, of_torque = (factor for _, factor in units_shown)
-    assert expected[names[0]] == approx((0.3048 * of_length, foot_pound * of_torque))
+    of = [shown.get(unit, (unit, 1.0)) for unit in ("m", "m/s", "N m")]
+    assert ", ".join(name for name, _ in of) == names
+    assert 0.3048 * of[0][1] == approx(float(of_length))
+    assert 1.3558179483314004 * of[2][1] == approx(float(of_torque))
 
 
 def test_a_ground_by_coordinates_has_their_unit():
