@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, PinRows, SolvedFriction
-from fourbar.formulas.arithmetic import is_any, make_like
+from fourbar.formulas.arithmetic import cross, dot, is_any, make_like
 from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
@@ -88,39 +88,55 @@ class PinFriction(PinRows):
     ) -> SolvedFriction:
         """Add the couples that fulfil x_p = mu_p r_p |F_p(x)|.
 
-        The pin forces are F_p = F0_p + sum over q of C_pq x_q.
+        The pin forces are F_p = F0_p + sum over q of C_pq x_q. From couples in doubles
+        two of Newton's steps follow in numbers of the forces' kind,
+
+            (1 - J) dx = mu r |F + C x| - x,
+
+        J the slope of the right-hand side by x: of numbers that carry their derivatives
+        the same steps are the theorem of the implicit function.
         """
         loaded_pins = self.loaded_pins
         arms = {pin: mu * r for pin, mu, r in self.pins if pin in loaded_pins}
-        senses = {pin: actions.sense(pin) for pin in loaded_pins}
+        senses = {pin: actions.sense(pin) for pin in arms}
         per_unit = {}  # under a couple of 1 N m at a pin, against its rotation
         for pin, sense in senses.items():
             single = Actions(actions.state, actions.bodies)
             single.pin_couple(pin, -sense)
             per_unit[pin] = solve_pin_forces(single, with_inertia=False)
         shape = np.shape(pins.F12)
+        forces = _list_forces(pins, arms)
+        per_couple = [_list_forces(per_unit[pin], arms) for pin in arms]
 
-        F = _stack_forces(pins, arms, shape)
-        per_couple = [_stack_forces(per_unit[pin], arms, shape) for pin in arms]
-        C = np.stack(per_couple, axis=2)
-        k = np.stack([_broadcast(arm, shape) for arm in arms.values()], axis=1)
-        sliding = solve_sliding(F, C, k)
-
-        couples = {}
-        for column, pin in enumerate(arms):
-            couple = sliding.x[:, column].reshape(shape)
-            couples[pin] = make_like(couple, pins.F12.real)
+        C = np.stack([_stack(row, shape) for row in per_couple], axis=2)
+        sliding = solve_sliding(_stack(forces, shape), C, _stack(arms.values(), shape))
+        couples = []
+        for column in sliding.x.T:
+            couples.append(make_like(column.reshape(shape), pins.F12.real))
         slope = sliding.slope.reshape(*shape, len(arms), len(arms))
-        couples = _refine(couples, arms, pins, per_unit, slope)
-        for pin, couple in couples.items():
-            actions.pin_couple(pin, -senses[pin] * couple)
+        # in numbers of the forces' kind
+        inverse = _invert(slope)
+        for _ in range(2):
+            gaps = []
+            for row, arm in enumerate(arms.values()):
+                force = forces[row]
+                for of_one, couple in zip(per_couple, couples, strict=True):
+                    force = force + of_one[row] * couple
+                gaps.append(arm * np.abs(force) - couples[row])
+            for row in range(len(arms)):
+                for column, gap in enumerate(gaps):
+                    rate = inverse[..., row, column]
+                    if isinstance(gap, np.ndarray):  # of single precision, for one
+                        rate = rate.astype(gap.dtype)
+                    couples[row] = couples[row] + rate * gap
 
+        for pin, couple in zip(arms, couples, strict=True):
+            actions.pin_couple(pin, -senses[pin] * couple)
         loaded = solve_pin_forces(actions)
         residuals = []
-        for pin, couple in couples.items():
-            force = getattr(loaded, PIN_FORCE[pin])
-            residual = couple - arms[pin] * np.abs(force)
-            residuals.append(np.abs(take_doubles(residual)))
+        loads = _list_forces(loaded, arms)
+        for arm, couple, load in zip(arms.values(), couples, loads, strict=True):
+            residuals.append(np.abs(take_doubles(couple - arm * np.abs(load))))
         return SolvedFriction(
             loaded,
             find_least_stretch(sliding.slope).reshape(shape),
@@ -137,60 +153,27 @@ class PinFriction(PinRows):
             actions.pin_couple(pin, -actions.sense(pin) * couple)
 
 
-def _broadcast(number: Any, shape: tuple[int, ...]) -> Any:
-    """Return the doubles of a number over all positions, (n,)."""
-    return np.broadcast_to(take_doubles(number), shape).ravel()
+def _list_forces(forces: PinForces, pins: Iterable[str]) -> list[Any]:
+    """List the forces at some pins, complex, N."""
+    return [getattr(forces, PIN_FORCE[pin]) for pin in pins]
 
 
-def _stack_forces(
-    forces: PinForces,
-    pins: Iterable[str],
-    shape: tuple[int, ...],
-) -> Array:
-    """Return pin forces over all positions, (n, p), complex, N."""
-    columns = [_broadcast(getattr(forces, PIN_FORCE[pin]), shape) for pin in pins]
+def _stack(numbers: Iterable[Any], shape: tuple[int, ...]) -> Array:
+    """Return the doubles of p numbers over all positions, (n, p)."""
+    columns = []
+    for number in numbers:
+        columns.append(np.broadcast_to(take_doubles(number), shape).ravel())
     return np.stack(columns, axis=1)
 
 
-def _refine(
-    couples: dict[str, Any],
-    arms: dict[str, Any],
-    pins: PinForces,
-    per_unit: dict[str, PinForces],
-    slope: Array,
-) -> dict[str, Any]:
-    """Take Newton's steps from couples in doubles, in numbers of the forces' kind.
-
-    (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of
-    numbers that carry their derivatives the same steps are the theorem of the
-    implicit function.
-    """
-    matrix = np.eye(len(arms)) - slope
-    regular = _find_regular(matrix)
-    inverse = np.zeros_like(matrix)
-    inverse[regular] = np.linalg.inv(matrix[regular])
-    for _ in range(2):
-        gaps = []
-        for pin, arm in arms.items():
-            name = PIN_FORCE[pin]
-            force = getattr(pins, name)
-            for other, couple in couples.items():
-                force = force + getattr(per_unit[other], name) * couple
-            gaps.append(arm * np.abs(force) - couples[pin])
-        for row, pin in enumerate(arms):
-            for column, gap in enumerate(gaps):
-                rate = inverse[..., row, column]
-                if isinstance(gap, np.ndarray):  # of single precision, for one
-                    rate = rate.astype(gap.dtype)
-                couples[pin] = couples[pin] + rate * gap
-    return couples
-
-
-def _find_regular(matrix: Array) -> NDArray[np.bool_]:
-    """Mark the matrices that are finite and can be inverted."""
+def _invert(slope: Array) -> Array:
+    """Return the inverse of 1 - slope, zero where there is none, (..., p, p)."""
+    matrix = np.eye(slope.shape[-1]) - slope
     regular = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
     regular[regular] = np.linalg.det(matrix[regular]) != 0.0
-    return regular
+    inverse = np.zeros_like(matrix)
+    inverse[regular] = np.linalg.inv(matrix[regular])
+    return inverse
 
 
 class _Problems(NamedTuple):
@@ -226,6 +209,22 @@ class _Problems(NamedTuple):
         gap = np.abs(right - x).max(axis=-1)
         return np.asarray(gap <= SOLVED * largest)
 
+    def follow_newton(self, x: Array) -> Array:
+        """Take Newton's steps from starts, (n, p), each until it stands still."""
+        most = 1e12 * self.size()[:, None]
+        moving = np.arange(len(x))
+        for _ in range(NEWTON_STEPS):
+            last = x[moving]
+            right, slope = self.part(moving).right_side(last)
+            step = _invert(slope) @ (right - last)[..., None]
+            new = np.clip(last + step[..., 0], 0.0, most[moving])
+            x[moving] = new
+            change = np.abs(new - last).max(axis=1)
+            moving = moving[change > SETTLED * new.max(axis=1)]
+            if not moving.size:
+                break
+        return x
+
 
 class _Sliding(NamedTuple):
     """Solutions of n independent problems."""
@@ -243,10 +242,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
 
     F (n, p), complex, is in N, C (n, p, p), complex, in 1/m, k (n, p) in m.
     """
-    finite: NDArray[np.bool_] = np.logical_and(
-        np.isfinite(F).all(axis=1),
-        np.isfinite(C).all(axis=(1, 2)),
-    )
+    finite = np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
     problems = _Problems(F, C, k)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         if k.shape[1] == 1:
@@ -265,8 +261,8 @@ def find_least_stretch(slope: Array) -> Array:
     """
     matrix = np.eye(slope.shape[1]) - slope
     finite = np.isfinite(matrix).all(axis=(1, 2))
-    singular_values = np.linalg.svd(matrix[finite], compute_uv=False)
     least = np.ones(len(slope))
+    singular_values = np.linalg.svd(matrix[finite], compute_uv=False)
     least[finite] = np.minimum(singular_values[:, -1], 1.0)
     return least
 
@@ -284,11 +280,9 @@ def _solve_coupled(
 
     contract = rows[radius < 1.0]
     contractions = problems.part(contract)
-    x[contract] = _follow_newton(contractions, np.zeros_like(contractions.k))
-    is_solved = np.zeros(len(k), dtype=bool)
-    is_solved[contract] = contractions.are_solved(x[contract])
-
-    searched = rows[~is_solved[rows]]
+    x[contract] = contractions.follow_newton(np.zeros_like(contractions.k))
+    solved = contract[contractions.are_solved(x[contract])]
+    searched = np.setdiff1d(rows, solved)
     for start in range(0, len(searched), SEARCHED_AT_ONCE):
         block = searched[start : start + SEARCHED_AT_ONCE]
         x[block], number[block] = _search(problems.part(block))
@@ -297,18 +291,14 @@ def _solve_coupled(
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Solve (k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
-    Fx = F.real
-    Fy = F.imag
-    Cx = C.real
-    Cy = C.imag
     kC = k * np.abs(C)
     k2 = k * k
     a = (kC - 1.0) * (kC + 1.0)
-    b = k2 * (Fx * Cx + Fy * Cy)
-    c = k2 * (Fx * Fx + Fy * Fy)
+    b = k2 * dot(F, C)
+    c = k2 * dot(F, F)
     # b^2 - a c written as k^2 |F|^2 - k^4 (F x C)^2, which cancels only near jamming
-    cross = k2 * (Fx * Cy - Fy * Cx)
-    discriminant = c - cross * cross
+    across = k2 * cross(F, C)
+    discriminant = c - across * across
     root = np.sqrt(discriminant)
     q = -(b + np.where(b < 0.0, -root, root))
     first = np.where(a == 0.0, np.inf, q / a)
@@ -326,43 +316,17 @@ def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.ui
     return x[:, None], number
 
 
-def _compute_step(gap: Array, slope: Array) -> Array:
-    """Solve (1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
-    matrix = np.eye(gap.shape[-1]) - slope
-    regular = _find_regular(matrix) & np.isfinite(gap).all(axis=-1)
-    columns = gap[regular][..., None]
-    step = np.zeros_like(gap)
-    step[regular] = np.linalg.solve(matrix[regular], columns)[..., 0]
-    return step
-
-
-def _follow_newton(problems: _Problems, x: Array) -> Array:
-    """Take Newton's steps from starts, (n, p), each until it stands still."""
-    most = 1e12 * problems.size()[:, None]
-    moving = np.arange(len(x))
-    for _ in range(NEWTON_STEPS):
-        last = x[moving]
-        right, slope = problems.part(moving).right_side(last)
-        new = np.clip(last + _compute_step(right - last, slope), 0.0, most[moving])
-        x[moving] = new
-        change = np.abs(new - last).max(axis=1)
-        moving = moving[change > SETTLED * new.max(axis=1)]
-        if not moving.size:
-            break
-    return x
-
-
 def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
     """Find the least solution of each problem from many starts, and how many it has."""
     n, p = problems.k.shape
     starts = problems.size()[:, None, None] * _list_starts(p)
     at_starts = problems.part(np.repeat(np.arange(n), starts.shape[1]))
-    ends = _follow_newton(at_starts, starts.reshape(-1, p))
+    ends = at_starts.follow_newton(starts.reshape(-1, p))
     solves = at_starts.are_solved(ends).reshape(n, -1)
     x = ends.reshape(starts.shape)
     sums = np.where(solves, x.sum(axis=2), np.inf)
     # some starts have not settled where solutions meet
-    least = _follow_newton(problems, x[np.arange(n), np.argmin(sums, axis=1)])
+    least = problems.follow_newton(x[np.arange(n), np.argmin(sums, axis=1)])
 
     distance = np.abs(x - least[:, None]).max(axis=2)
     larger = np.maximum(x.max(axis=2), least.max(axis=1)[:, None])
@@ -377,12 +341,7 @@ def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
 def _list_starts(p: int) -> Array:
     """List the starts of a search in p unknowns, over the size of the couples."""
     generator = np.random.default_rng(0)
-    directions = np.vstack(
-        [
-            np.ones(p),
-            np.eye(p) + 0.01,
-            generator.uniform(0.0, 1.0, (RANDOM_DIRECTIONS, p)),
-        ]
-    )
+    random = generator.uniform(0.0, 1.0, (RANDOM_DIRECTIONS, p))
+    directions = np.vstack([np.ones(p), np.eye(p) + 0.01, random])
     scaled = MAGNITUDES[:, None, None] * directions
-    return np.vstack([np.zeros((1, p)), scaled.reshape(-1, p)])
+    return np.vstack([np.zeros(p), scaled.reshape(-1, p)])
