@@ -242,7 +242,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
 
     F (n, p), complex, is in N, C (n, p, p), complex, in 1/m, k (n, p) in m.
     """
-    finite = np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
     problems = _Problems(F, C, k)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         if k.shape[1] == 1:

@@ -33,7 +33,7 @@ POSITIONS_OF_A_BLOCK = 8000
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache.
 Of 8192 an array of complex numbers is a little more than the C library hands out again
 without asking the system for fresh pages, and from 10 000 on OpenBLAS starts threads
-for the squares by which `is_finite` looks for what is no number.
+for the squares by which `withhold_infinite` looks for what is no number.
 """
 NEEDS_DIGITS = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many

@@ -8,7 +8,7 @@ in numbers that round at most a thousandth as much as doubles.
 """
 
 import cmath
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Iterable, Set
 from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -99,8 +99,11 @@ def evaluate(
     if "condition" in wanted:
         values["condition"] = values["condition"] * command.condition
     codes = _find_codes_of_loop(case.path, state, command)
-    if is_any(codes == NOT_ASSEMBLED):
-        _withhold_unassembled(codes, values, command)
+    missing = codes == NOT_ASSEMBLED
+    if is_any(missing):
+        # points of the commanded bar, and the stroke of a cylinder on it, would go on
+        stated = {*COMMAND_NAMES[command.bar], *command.names}
+        _blank(values, values.keys() - stated, missing)
     if last_stage < FORCE:
         return Evaluated(codes, values, state)
     dynamics = case.dynamics(state, command.acceleration, case.impending)
@@ -108,14 +111,30 @@ def evaluate(
     if last_stage == ERROR:
         forces |= _list_error_bars(case, command, state, dynamics, refined_rows)
     statuses = (*case.list_statuses(state, command.branch), dynamics.status, jammed)
-    stated = [status for status in statuses if status is not None]
-    if stated:
-        of_effects = np.max(stated, axis=0)
+    stated_codes = [status for status in statuses if status is not None]
+    if stated_codes:
+        of_effects = np.max(stated_codes, axis=0)
         codes = np.where(codes == OK, of_effects, codes).astype(np.uint8)
     if is_any(codes > SINGULAR):
-        _withhold_forces(case, codes, forces)
+        everywhere = np.isin(codes, _WITHOUT_FORCES)
+        of_pins = {*PIN_FORCES, "force_error"}
+        if any(term.loaded_pins for term in case.terms):
+            of_pins |= forces.keys()  # the drive balances friction of those forces
+        _blank(forces, forces.keys() - {"drive_condition"}, everywhere)
+        at_change_points = codes == CHANGE_POINT
+        _blank(
+            forces, (forces.keys() & of_pins) - {"drive_condition"}, at_change_points
+        )
     values |= {name: value for name, value in forces.items() if name in wanted}
     return Evaluated(codes, values, state)
+
+
+def _blank(values: dict[str, Any], names: Iterable[str], missing: Any) -> None:
+    """Put NaN in place of the named values where a mask holds."""
+    for name in names:
+        value = values[name]
+        nothing = complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan
+        values[name] = np.where(missing, nothing, value)
 
 
 def evaluate_released(
@@ -161,18 +180,6 @@ def _find_codes_of_loop(path: LoopPath, state: State, command: Command) -> Any:
     return codes
 
 
-def _withhold_unassembled(
-    codes: NDArray[np.uint8], values: dict[str, Any], command: Command
-) -> None:
-    """Put NaN where the loop does not close, for all but what is commanded.
-
-    Points of the commanded bar, and the stroke of a cylinder on it, would go on there.
-    """
-    missing = codes == NOT_ASSEMBLED
-    for name in values.keys() - {*COMMAND_NAMES[command.bar], *command.names}:
-        values[name] = np.where(missing, _make_no_value(values[name]), values[name])
-
-
 def _list_forces(
     case: Case,
     command: Command,
@@ -187,33 +194,20 @@ def _list_forces(
     """
     names = case.drive_names
     values = {**dynamics.pins._asdict(), names.value: dynamics.effort}
+    jammed = None
     if "power" in wanted:
         values["power"] = dynamics.effort * case.drive_speed(state)
     if "drive_condition" in wanted:
         values["drive_condition"] = case.drive_condition(state) * dynamics.from_jamming
     if "friction_residual" in wanted:
         values["friction_residual"] = dynamics.residual
-    jammed = None
     if names.low in wanted or names.high in wanted:
-        acceleration = command.acceleration
-        low, high, jammed = case.drive_interval(state, acceleration, dynamics.effort)
-        values |= {names.low: low, names.high: high}
+        values[names.low], values[names.high], jammed = case.drive_interval(
+            state,
+            command.acceleration,
+            dynamics.effort,
+        )
     return values, jammed
-
-
-def _withhold_forces(case: Case, codes: Any, values: dict[str, Any]) -> None:
-    """Put NaN where an effect or the drive has no value.
-
-    Pin forces are NaN at change points too.
-    """
-    everywhere = np.isin(codes, _WITHOUT_FORCES)
-    at_pins = everywhere | (codes == CHANGE_POINT)
-    of_pins = {*PIN_FORCES, "force_error"}
-    if any(term.loaded_pins for term in case.terms):
-        of_pins |= values.keys()  # the drive balances friction of those forces
-    for name in values.keys() - {"drive_condition"}:
-        missing = at_pins if name in of_pins else everywhere
-        values[name] = np.where(missing, _make_no_value(values[name]), values[name])
 
 
 def _list_error_bars(
@@ -235,6 +229,7 @@ def _list_error_bars(
     """
     longer = case.lengthened()
     lost = command.lost
+    remainder = command.remainder
     doubles = (state.q, state.speed, command.acceleration)
     q, speed, acceleration = (
         lengthen(number) + lost[..., column] for column, number in enumerate(doubles)
@@ -249,40 +244,34 @@ def _list_error_bars(
             half,
             refined_rows,
             state.q,
-            command.remainder,
+            remainder,
             case.path.bar,
-            0.0 if command.remainder is not None else lost[..., 0],
+            lost[..., 0] if remainder is None else 0.0,
         )
     motion = command._replace(angle=q, speed=speed, acceleration=acceleration)
     near = longer.assemble(motion, half)
     longer_dynamics = longer.dynamics(near, acceleration, case.impending)
-    gap, drive_gap = _compute_gaps(dynamics, longer_dynamics)
-    if longer_numbers.HAS_LONG_DOUBLES and command.remainder is None:
-        unresolved, drive_unresolved = _compute_unresolved(
-            case,
-            command,
-            state,
-            dynamics,
-        )
-        gap = np.fmax(gap, unresolved)
-        drive_gap = np.fmax(drive_gap, drive_unresolved)
-    largest_force = reduce(np.maximum, map(np.abs, dynamics.pins))
-    return {
-        case.drive_names.error: _compute_error_bar(drive_gap, np.abs(dynamics.effort)),
-        "force_error": _compute_error_bar(gap, largest_force),
-    }
+    gaps = _compute_gaps(dynamics, longer_dynamics)
+    if longer_numbers.HAS_LONG_DOUBLES and remainder is None:
+        gaps = np.fmax(gaps, _compute_unresolved(case, command, state, dynamics))
+    sizes = (reduce(np.maximum, map(np.abs, dynamics.pins)), np.abs(dynamics.effort))
+    bars = []
+    for gap, size in zip(gaps, sizes, strict=True):
+        # the value itself was rounded by as much
+        width = np.maximum(gap, U * size)
+        # where the longer number is not finite as a double no digit is left
+        bars.append(select(np.isfinite(width), width, size))
+    return {"force_error": bars[0], case.drive_names.error: bars[1]}
 
 
-def _compute_gaps(one: Dynamics, other: Dynamics) -> tuple[Any, Any]:
+def _compute_gaps(one: Dynamics, other: Dynamics) -> Any:
     """Compute the differences of two results: the largest of the pin forces, the drive.
 
     The units are N, and N m or N.
     """
-    gaps = []
-    for before, after in zip(one.pins, other.pins, strict=True):
-        gaps.append(np.abs(shorten(after - before)))
-    drive_gap = np.abs(shorten(other.effort - one.effort))
-    return reduce(np.maximum, gaps), drive_gap
+    pairs = zip((*one.pins, one.effort), (*other.pins, other.effort), strict=True)
+    *gaps, of_drive = (np.abs(shorten(after - before)) for before, after in pairs)
+    return np.array(np.broadcast_arrays(reduce(np.maximum, gaps), of_drive))
 
 
 def _compute_unresolved(
@@ -290,7 +279,7 @@ def _compute_unresolved(
     command: Command,
     state: State,
     dynamics: Dynamics,
-) -> tuple[Any, Any]:
+) -> Any:
     """Return the part of pin forces and drive that long doubles do not resolve.
 
     The units are N, and N m or N.
@@ -316,97 +305,56 @@ def _compute_unresolved(
     try:
         there = case.dynamics(shifted, command.acceleration, case.impending)
     except InputError:  # a load's table ends here
-        return np.nan, np.nan
-    with np.errstate(all="ignore"):
-        gap, drive_gap = _compute_gaps(dynamics, there)
-        most = np.where(is_zero(case.linkage.ground_angle), 2.0 * TURN, np.inf)
-        rounding = ROUNDINGS_IN_FULL * _LONG_EPS * np.fmin(size, most)
-        share = rounding / np.where(step >= _LEAST_STEP * size, step, np.nan)
-        return gap * share, drive_gap * share
-
-
-def _compute_error_bar(gap: Any, size: Any) -> Any:
-    """Compute the error bar from the distance to the longer number.
-
-    The error bar is at least U times the value, and equals the value where the longer
-    number is not finite as a double: no digit is left.
-
-    `size`: of the value.
-    """
-    width = np.maximum(gap, U * size)  # the value itself was rounded by as much
-    return select(np.isfinite(width), width, size)
-
-
-def is_finite(values: Mapping[str, Any]) -> bool:
-    """Return True if the sum of the squares of all quantities is finite.
-
-    An overflow of a square, or of the sum, gives False.
-    """
-    total: Any = 0.0
-    for value in values.values():
-        total += np.vdot(value, value) if isinstance(value, np.ndarray) else value
-    return cmath.isfinite(total)
+        return np.nan
+    most = np.where(is_zero(case.linkage.ground_angle), 2.0 * TURN, np.inf)
+    rounding = ROUNDINGS_IN_FULL * _LONG_EPS * np.fmin(size, most)
+    share = rounding / np.where(step >= _LEAST_STEP * size, step, np.nan)
+    return _compute_gaps(dynamics, there) * share
 
 
 def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
-    """Apply `_withhold` to evaluated positions if any of their values is not finite."""
-    codes, values, state = evaluated
-    if not is_finite(values):
-        in_line: Any = False
-        if case.drive is None:
-            sine = case.path.drive_sine(state.position, case.drive_bar)
-            in_line = np.abs(sine) <= NO_DIGIT_LEFT
-        _withhold(values, codes, np.broadcast_to(in_line, codes.shape))
-
-
-def _withhold(
-    values: dict[str, Any],
-    code: NDArray[np.uint8],
-    in_line: NDArray[np.bool_],
-) -> None:
     """Set the status of each position at which a promised quantity is not finite.
 
     From that stage on the quantities become NaN.
-
-    `code`: status of each position, changed in place. `in_line`: True where the two
-    bars that are not driven are in line, so that no finite forces hold them in balance.
     """
+    code, values, state = evaluated
+    # an overflow of a square, or of the sum, is looked at too
+    total: Any = 0.0
+    for value in values.values():
+        total += np.vdot(value, value) if isinstance(value, np.ndarray) else value
+    if cmath.isfinite(total):
+        return
+    # True where the two bars that are not driven are in line: no finite forces hold
+    # them in balance
+    in_line: Any = False
+    if case.drive is None:
+        sine = case.path.drive_sine(state.position, case.drive_bar)
+        in_line = np.abs(sine) <= NO_DIGIT_LEFT
+    in_line = np.broadcast_to(in_line, code.shape)
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:
-        names = [name for name in values if _find_stage(name) == stage]
         of_forces = stage in STAGES[3:]
+        promised = ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
         if of_forces:
             promised = np.isin(code, (OK, SEVERAL))
-        else:
-            promised = ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
+        names = [name for name in values if _find_stage(name) == stage]
         infinite = np.zeros_like(gone)
         for name in names:
-            value = values[name]
-            finite = np.isfinite(value)
-            infinite |= ~finite
-            values[name] = np.where(finite, value, _make_no_value(value))
+            is_infinite = ~np.isfinite(values[name])
+            infinite |= is_infinite
+            _blank(values, [name], is_infinite)
         infinite &= promised & ~gone
         code[infinite] = OVERFLOW
         if of_forces:
             code[infinite & in_line] = NO_TORQUE
         gone |= infinite
-        for name in names:
-            if name != "drive_condition":
-                value = values[name]
-                values[name] = np.where(gone, _make_no_value(value), value)
+        _blank(values, {*names} - {"drive_condition"}, gone)
 
 
 def _find_stage(name: str) -> str:
     """Return the stage of a quantity, also of the scene's points."""
     of_point = POINT_STAGES.get(name[:2], "position")
     return STAGE_OF.get(name, of_point)
-
-
-def _make_no_value(quantity: Any) -> complex:
-    """Return NaN; of a vector in both components."""
-    if np.iscomplexobj(quantity):
-        return complex(np.nan, np.nan)
-    return np.nan
 
 
 SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
