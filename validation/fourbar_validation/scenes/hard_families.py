@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -62,28 +63,17 @@ def dress(lengths: Lengths, seed: int = 0) -> Scene:
     """
     rng = np.random.default_rng([seed, 4])
     d, *moving = lengths
-    bars = draw_bars(rng, moving, HEAVY_BARS)
-    weight = 9.81 * sum(bar.mass for bar in bars)
-    direction = float(rng.uniform(-3, 3))
+    two, three, four = draw_bars(rng, moving, HEAVY_BARS)
+    weight = 9.81 * sum(bar.mass for bar in (two, three, four))
+    force = (weight, float(rng.uniform(-3, 3)))
     arm = (0.2 * moving[2], float(rng.uniform(-3, 3)))
     loads = (
-        Load(4, (weight, direction), arm=arm),
+        Load(4, force, arm=arm),
         Load(3, moment=0.1 * weight * moving[1]),
     )
-    linkage = FourBar(
-        d,
-        bars[0],
-        bars[1],
-        bars[2],
-        float(rng.uniform(-1, 1)),
-    )
-    return Scene(
-        linkage,
-        Motion(0.0, 3.0, 2.0),
-        drive_bar=2,
-        loads=loads,
-        effects=(Gravity(),),
-    )
+    linkage = FourBar(d, two, three, four, float(rng.uniform(-1, 1)))
+    motion = Motion(0.0, 3.0, 2.0)
+    return Scene(linkage, motion, loads=loads, effects=(Gravity(),))
 
 
 def set_angles(scene: Scene, psi: object, branch: int = 1, **changes: object) -> Scene:
@@ -91,6 +81,19 @@ def set_angles(scene: Scene, psi: object, branch: int = 1, **changes: object) ->
     theta_2 = scene.linkage.ground_angle + np.atleast_1d(np.asarray(psi, dtype=float))
     motion = scene.motion.replace(angle=theta_2, branch=branch)
     return replace(scene, motion=motion, **changes)  # type: ignore[arg-type]
+
+
+def _take_both_branches(scene: Scene, label: str = "") -> Scenes:
+    """Yield a scene in both of its assemblies."""
+    for branch, name in BRANCH_NAMES.items():
+        motion = scene.motion.replace(branch=branch)
+        yield f"{label} {name}".strip(), replace(scene, motion=motion)
+
+
+def _sweep(scene: Scene, start: float, stop: float, steps: int) -> Scene:
+    """Sweep the input evenly from one angle to another, rad."""
+    sweep = Sweep(start, stop, steps)
+    return replace(scene, motion=scene.motion.replace(angle=sweep, acceleration=0.0))
 
 
 def _compute_corners(
@@ -102,14 +105,13 @@ def _compute_corners(
 
     `opposite` is the third side.
     """
-    if not second_side:
-        return []
-    squares = side * side + second_side * second_side - opposite * opposite
-    cosine = squares / (2 * side * second_side)
-    if not abs(cosine) < 1.0:
-        return []
-    corner = math.acos(cosine)
-    return [corner, -corner]
+    if second_side:
+        squares = side * side + second_side * second_side - opposite * opposite
+        cosine = squares / (2 * side * second_side)
+        if abs(cosine) < 1.0:
+            corner = math.acos(cosine)
+            return [corner, -corner]
+    return []
 
 
 def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
@@ -134,9 +136,7 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     places = []
     for along in (a + b, a - b):
         for psi in _compute_corners(d, along, c):
-            u = complex(math.cos(psi), math.sin(psi))
-            branch = _find_sense(d - a * u, (along - a) * u)
-            places.append((psi, branch))
+            places.append((psi, _find_sense(psi, d, a, along - a)))
     return places
 
 
@@ -147,43 +147,41 @@ def _find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     """
     d, a, b, c = lengths
     places = []
-    for joined, side in ((a - c, 1.0), (a + c, -1.0)):
+    for joined, along in ((a - c, c), (a + c, -c)):
         for psi in _compute_corners(d, joined, b):
-            u = complex(math.cos(psi), math.sin(psi))
-            branch = _find_sense(d - joined * u, side * c * u)
-            places.append((psi, branch))
+            places.append((psi, _find_sense(psi, d, joined, along)))
     return places
 
 
-def _find_sense(one: complex, second: complex) -> int:
-    """Return the sign of the rotation from one direction to another."""
-    if (one.conjugate() * second).imag > 0.0:
-        return 1
-    return -1
+def _find_sense(psi: float, ground: float, offset: float, along: float) -> int:
+    """Return the sign of the rotation from ground - offset u to along u.
+
+    Here u is e^{i psi}.
+    """
+    u = complex(math.cos(psi), math.sin(psi))
+    turned = (ground - offset * u).conjugate() * (along * u)
+    return 1 if turned.imag > 0.0 else -1
 
 
 def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
     """Approach bars 3, 4 in line from inside, and the same distances beyond it."""
-    for kind in _ROCKERS:
-        for seed in seeds:
-            lengths = draw_lengths_of_type(kind, seed)
-            scene = dress(lengths, seed)
-            for psi, stretched in find_collinear_3_4(lengths):
-                inward = -1.0 if stretched else 1.0
-                inside = psi + inward * np.array([*REGULAR, *distances])
-                beyond = psi - inward * np.array(distances)
-                angles = [*inside, *beyond[::-1]]
-                in_line = "stretched" if stretched else "folded"
-                for branch, name in BRANCH_NAMES.items():
-                    label = f"{kind.value} {seed} {in_line} {name}"
-                    yield label, set_angles(scene, angles, branch)
+    for kind, seed in product(_ROCKERS, seeds):
+        lengths = draw_lengths_of_type(kind, seed)
+        scene = dress(lengths, seed)
+        for psi, stretched in find_collinear_3_4(lengths):
+            inward = -1.0 if stretched else 1.0
+            inside = psi + inward * np.array([*REGULAR, *distances])
+            beyond = psi - inward * np.array(distances)
+            in_line = "stretched" if stretched else "folded"
+            label = f"{kind.value} {seed} {in_line}"
+            near = set_angles(scene, [*inside, *beyond[::-1]])
+            yield from _take_both_branches(near, label)
 
 
 def _list_both_sides(distances: tuple[float, ...]) -> Array:
     """List offsets from a singular position: up to it, and on from it, rad."""
-    towards = [*REGULAR, *distances]
-    before = [-distance for distance in towards]
-    return np.array([*before, *reversed(towards)])
+    towards = np.array([*REGULAR, *distances])
+    return np.concatenate((-towards, towards[::-1]))
 
 
 def _approach_poles(bar: int) -> Scenes:
@@ -192,10 +190,8 @@ def _approach_poles(bar: int) -> Scenes:
     for seed in range(2):
         lengths = draw_lengths_of_type(TYPES_WITH_A_CRANK, seed)
         scene = dress(lengths, seed)
-        if bar == 3:
-            poles = _find_parallel_2_4(lengths)
-        else:
-            poles = find_collinear_2_3(lengths)
+        find = _find_parallel_2_4 if bar == 3 else find_collinear_2_3
+        poles = find(lengths)
         for number, (psi, branch) in enumerate(poles[:3]):
             near = set_angles(scene, psi + offsets, branch, drive_bar=bar)
             yield f"{seed} {number}", near
@@ -208,10 +204,8 @@ def _driven_output() -> Scenes:
     """
     for seed in range(2):
         scene = dress(draw_lengths_of_type(TYPES_WITH_A_CRANK, seed), seed)
-        turn = Sweep(0.05, 0.05 + 2 * math.pi, 180)
-        for branch, name in BRANCH_NAMES.items():
-            motion = Motion(turn, 3.0, 0.0, branch)
-            yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
+        turn = _sweep(replace(scene, drive_bar=4), 0.05, 0.05 + 2 * math.pi, 180)
+        yield from _take_both_branches(turn, str(seed))
 
 
 CHANGE_POINTS: dict[str, tuple[Lengths, tuple[float, ...]]] = {
@@ -232,9 +226,8 @@ def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
     for kind, (lengths, points) in CHANGE_POINTS.items():
         scene = dress(lengths)
         for psi in points:
-            for branch, name in BRANCH_NAMES.items():
-                label = f"{kind} {math.degrees(psi):.0f} {name}"
-                yield label, set_angles(scene, psi + offsets, branch)
+            near = set_angles(scene, psi + offsets)
+            yield from _take_both_branches(near, f"{kind} {math.degrees(psi):.0f}")
 
 
 def sweep_change_point(*, steps: int = 145) -> Scenes:
@@ -242,10 +235,8 @@ def sweep_change_point(*, steps: int = 145) -> Scenes:
     for kind, (lengths, _) in CHANGE_POINTS.items():
         scene = dress(lengths)
         start = scene.linkage.ground_angle + 0.3
-        turns = Sweep(start, start + 4 * math.pi, steps)
-        for branch, name in BRANCH_NAMES.items():
-            motion = Motion(turns, 3.0, 0.0, branch)
-            yield f"{kind} {name}", replace(scene, motion=motion)
+        turns = _sweep(scene, start, start + 4 * math.pi, steps)
+        yield from _take_both_branches(turns, kind)
 
 
 def _miss_grashof() -> Scenes:
@@ -256,20 +247,16 @@ def _miss_grashof() -> Scenes:
     d = 0.4
     a = 0.1
     b = 0.25
-    for gap in (1e-3, 1e-6, 1e-9, 1e-12):
-        for sign in (1.0, -1.0):
-            scene = dress((d, a, b, d + a - b + sign * gap))
-            start = scene.linkage.ground_angle
-            sweep = Sweep(start, start + 2 * math.pi, 60)
-            motion = scene.motion.replace(angle=sweep, acceleration=0.0)
-            yield f"{sign * gap:+.0e}", replace(scene, motion=motion)
+    for gap, sign in product((1e-3, 1e-6, 1e-9, 1e-12), (1.0, -1.0)):
+        scene = dress((d, a, b, d + a - b + sign * gap))
+        start = scene.linkage.ground_angle
+        turn = _sweep(scene, start, start + 2 * math.pi, 60)
+        yield f"{sign * gap:+.0e}", turn
 
 
 def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     """Sweep through one turn of the input."""
-    turn = Sweep(0.1, 0.1 + 2 * math.pi, steps)
-    motion = scene.motion.replace(angle=turn, acceleration=0.0)
-    return replace(scene, motion=motion)
+    return _sweep(scene, 0.1, 0.1 + 2 * math.pi, steps)
 
 
 def _shorten_crank() -> Scenes:
@@ -282,12 +269,11 @@ def _shorten_crank() -> Scenes:
 def _vary_mass_ratio() -> Scenes:
     """Make one bar heavier or lighter than the others by up to 1e6."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
-    for name, bar in list_moving(base):
-        for k in (-6, -3, 3, 6):
-            times = 10.0**k
-            inertia = bar.moment_of_inertia * times
-            heavy = replace(bar, mass=bar.mass * times, inertia=inertia)
-            yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
+    for (name, bar), k in product(list_moving(base), (-6, -3, 3, 6)):
+        times = 10.0**k
+        inertia = bar.moment_of_inertia * times
+        heavy = replace(bar, mass=bar.mass * times, inertia=inertia)
+        yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
 
 
 def _remove_inertia() -> Scenes:
@@ -296,10 +282,9 @@ def _remove_inertia() -> Scenes:
     Some have loads only on massless bars.
     """
     base = sweep_turn(dress(ORDINARY_LENGTHS))
-    massless = {}
+    massless = {name: Bar(bar.length) for name, bar in list_moving(base)}
     for name, bar in list_moving(base):
         point_mass = replace(bar, inertia=0.0)
-        massless[name] = Bar(bar.length)
         yield f"{name} point mass", replace_bars(base, **{name: point_mass})
         yield f"{name} massless", replace_bars(base, **{name: massless[name]})
     yield "all massless", replace_bars(base, **massless)
@@ -308,10 +293,9 @@ def _remove_inertia() -> Scenes:
 def _move_centres_out() -> Scenes:
     """Put mass centres far outside the bar."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
-    for name, bar in list_moving(base):
-        for k in (3.0, 100.0, 1e4):
-            far = replace(bar, centre=(k * bar.length, 2.0))
-            yield f"{name} {k:g}", replace_bars(base, **{name: far})
+    for (name, bar), k in product(list_moving(base), (3.0, 100.0, 1e4)):
+        far = replace(bar, centre=(k * bar.length, 2.0))
+        yield f"{name} {k:g}", replace_bars(base, **{name: far})
 
 
 def _scale_sizes() -> Scenes:
@@ -326,10 +310,10 @@ def _scale_sizes() -> Scenes:
 def _scale_speeds() -> Scenes:
     """Vary omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
     base = sweep_turn(dress(ORDINARY_LENGTHS))
-    for k in (-6, -3, 0, 3, 6):
-        for sign, name in ((1.0, "+"), (-1.0, "-")):
-            motion = base.motion.replace(speed=sign * 10.0**k)
-            yield f"{name}1e{k:+d}", replace(base, motion=motion)
+    senses = (("+", 1.0), ("-", -1.0))
+    for k, (name, sign) in product((-6, -3, 0, 3, 6), senses):
+        motion = base.motion.replace(speed=sign * 10.0**k)
+        yield f"{name}1e{k:+d}", replace(base, motion=motion)
 
 
 def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
@@ -337,14 +321,14 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     base = sweep_turn(dress(ORDINARY_LENGTHS))
     for k in exponents:
         times = 10.0**k
-        scaled = []
-        for load in base.loads:
-            force = None
-            if load.force is not None:
-                size, angle = load.force
-                force = (size * times, angle)
-            scaled.append(replace(load, force=force, moment=load.moment * times))
-        yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
+        pushed, turned = base.loads
+        assert pushed.force is not None
+        size, angle = pushed.force
+        scaled = (
+            replace(pushed, force=(size * times, angle)),
+            replace(turned, moment=turned.moment * times),
+        )
+        yield f"1e{k:+d}", replace(base, loads=scaled)
 
 
 def _sweep_out_and_back() -> Scenes:
@@ -354,12 +338,9 @@ def _sweep_out_and_back() -> Scenes:
         scene = dress(lengths, seed)
         (psi, stretched), *_ = find_collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
-        inside = psi - outward * 0.6
-        outside = psi + outward * 0.5
-        out = np.linspace(inside, outside, 40)
-        angles = [*out, *out[::-1]]
-        for branch, name in BRANCH_NAMES.items():
-            yield f"{seed} {name}", set_angles(scene, angles, branch)
+        out = np.linspace(psi - outward * 0.6, psi + outward * 0.5, 40)
+        crossing = set_angles(scene, [*out, *out[::-1]])
+        yield from _take_both_branches(crossing, str(seed))
 
 
 def _drive_thesis_to_limits() -> Scenes:
@@ -377,8 +358,7 @@ def _drive_thesis_to_limits() -> Scenes:
     (psi, _), *_ = find_collinear_3_4(linkage.lengths)
     theta_1 = linkage.ground_angle
     sweep = Sweep(theta_1 + psi, theta_1 + 2 * math.pi - psi, 120)
-    for branch, name in BRANCH_NAMES.items():
-        yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
+    yield from _take_both_branches(Scene(linkage, Motion(sweep, 0.2244), 4))
 
 
 def released(

@@ -158,17 +158,11 @@ def draw_scene(
     """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
     bars = draw_bars(rng, moving, ranges)
-    linkage = FourBar(
-        d,
-        bars[0],
-        bars[1],
-        bars[2],
-        ranges.ground_angle(rng),
-    )
+    two, three, four = bars
+    linkage = FourBar(d, two, three, four, ranges.ground_angle(rng))
     weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
-    loads = [
-        _draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3)))
-    ]
+    count = int(rng.integers(0, 3))
+    loads = [_draw_load(rng, linkage, weight, ranges) for _ in range(count)]
     effects: list[Any] = []
     if rng.random() < ranges.gravity:
         effects.append(Gravity())
@@ -183,29 +177,19 @@ def draw_scene(
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
     branch = OPEN if rng.random() < 0.5 else CROSSED
-    motion = Motion(0.0, omega, alpha, branch)
     bar = int(rng.choice(MOVING_BARS))
-    if not ranges.pushed or rng.random() >= ranges.pushed:
-        return Scene(
-            linkage,
-            motion,
-            bar,
-            tuple(loads),
-            tuple(effects),
-        )
-    length = linkage.bar(bar).length
-    place = Place(bar, (length * (1.0 + ranges.arm(rng)), _ANY_ANGLE(rng)))
-    drive = PointDrive(
-        place,
-        _ANY_ANGLE(rng),
-        str(rng.choice(FRAMES)),
-    )
+    drive: dict[str, Any] = {"drive_bar": bar}
+    if ranges.pushed and rng.random() < ranges.pushed:
+        length = linkage.bar(bar).length
+        place = Place(bar, (length * (1.0 + ranges.arm(rng)), _ANY_ANGLE(rng)))
+        direction = _ANY_ANGLE(rng)
+        drive = {"drive": PointDrive(place, direction, str(rng.choice(FRAMES)))}
     return Scene(
         linkage,
-        motion,
+        Motion(0.0, omega, alpha, branch),
         loads=tuple(loads),
         effects=tuple(effects),
-        drive=drive,
+        **drive,
     )
 
 
@@ -254,30 +238,26 @@ def _draw_springs(
     """
     effects: list[Any] = []
     size = weight * abs(ranges.load(rng))
+    lengths = linkage.lengths
     if rng.random() < ranges.sprung:
-        places = []
-        for bar in rng.choice([1, *MOVING_BARS], 2, replace=False).tolist():
-            length = linkage.lengths[bar - 1]
-            places.append(Place(bar, (length * ranges.arm(rng), _ANY_ANGLE(rng))))
-        start, end = places
-        longest = max(linkage.lengths)
-        spring = Spring(
-            start,
-            end,
-            (size or 1.0) / longest,
-            longest * _ANY_PART(rng),
-            size * _EITHER_SIGN(rng),
+        start, end = (
+            Place(bar, (lengths[bar - 1] * ranges.arm(rng), _ANY_ANGLE(rng)))
+            for bar in rng.choice([1, *MOVING_BARS], 2, replace=False).tolist()
         )
+        longest = max(lengths)
+        stiffness = (size or 1.0) / longest
+        free = longest * _ANY_PART(rng)
+        spring = Spring(start, end, stiffness, free, size * _EITHER_SIGN(rng))
         effects.append(Springs((spring,)))
     if rng.random() < ranges.sprung:
-        couple = size * max(linkage.lengths[1:])
+        couple = size * max(lengths[1:])
         pin = str(rng.choice(list(PINS)))
         rest = _ANY_ANGLE(rng)
         preload = couple * _EITHER_SIGN(rng)
         effects.append(Torsion.at(**{pin: (couple or 1.0, rest, preload)}))
     if rng.random() < ranges.sprung:
         bar = int(rng.choice([2, 4]))
-        inertia = (linkage.bar(bar).mass or 1.0) * linkage.bar(bar).length ** 2
+        inertia = (linkage.bar(bar).mass or 1.0) * lengths[bar - 1] ** 2
         effects.append(Flywheel(inertia * ranges.inertia(rng), bar))
     return effects
 
@@ -325,13 +305,15 @@ def draw_lengths(
         surplus = p + q - shortest - longest
         if p + q + shortest - longest < _CLEARANCE:
             continue
-        if kind is DrawnType.TRIPLE_ROCKER:
-            if surplus < -_CLEARANCE:
-                return tuple(float(x) for x in rng.permutation(lengths))  # type: ignore[return-value]
-        elif surplus > _CLEARANCE:
-            others = list(rng.permutation(lengths[1:]))
-            others.insert(SHORTEST_BAR[kind], shortest)
-            return tuple(float(x) for x in others)  # type: ignore[return-value]
+        if kind is DrawnType.TRIPLE_ROCKER and surplus < -_CLEARANCE:
+            drawn = rng.permutation(lengths)
+        elif kind is not DrawnType.TRIPLE_ROCKER and surplus > _CLEARANCE:
+            others = rng.permutation(lengths[1:])
+            drawn = np.insert(others, SHORTEST_BAR[kind], shortest)
+        else:
+            continue
+        d, a, b, c = drawn.tolist()
+        return d, a, b, c
 
 
 def draw_uneven_lengths(
@@ -412,12 +394,6 @@ def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> DrawnLinka
     )
 
 
-_MACHINE_FAMILIES = {
-    kind: RandomFamily(partial(_draw_machine_place, kind), MACHINES)
-    for kind in DrawnType
-}
-
-
 def draw_random_scene(
     seed: int,
     index: int,
@@ -429,6 +405,6 @@ def draw_random_scene(
     name = UNEVEN_TYPE
     if types:
         kind = types[index % len(types)]
-        family = _MACHINE_FAMILIES[kind]
+        family = RandomFamily(partial(_draw_machine_place, kind), MACHINES)
         name = kind.value
     return replace(family.draw(rng), title=f"{name} {index}")

@@ -9,8 +9,9 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
@@ -210,31 +211,21 @@ def read_suite(path: Path) -> Files:
     The file is TOML with `scenes = [...]`, or has one per line. An entry may hold * for
     any name. InputError where an entry leaves the folder or names no file.
     """
-
-    def refuse(entry: object, allowed: str) -> InputError:
-        return InputError(
-            "--suite",
-            entry,
-            allowed,
-            str(path),
-        )
-
+    refuse = partial(InputError, "--suite", file=str(path))
     if not path.exists():
         raise refuse(
             path.name,
             'must be "hard" or a file that lists scenes: there is no such file',
         )
     text = writing.read_text(path, "--suite", LARGEST_LIST)
-    try:
-        lines = [
-            line.partition("#")[0].strip() for line in text.splitlines()
-        ]  # one entry each; # begins a comment
-        if path.suffix == ".toml":
+    # one entry each; # begins a comment
+    lines = (line.partition("#")[0].strip() for line in text.splitlines())
+    entries: Any = [*filter(None, lines)]
+    if path.suffix == ".toml":
+        try:
             entries = tomllib.loads(text).get("scenes")
-        else:
-            entries = [line for line in lines if line]
-    except (ValueError, RecursionError):  # no TOML
-        raise refuse(path.name, "is no list of scenes") from None
+        except (ValueError, RecursionError):  # no TOML
+            raise refuse(path.name, "is no list of scenes") from None
     if not isinstance(entries, list) or not all(
         isinstance(entry, str) and entry for entry in entries
     ):
