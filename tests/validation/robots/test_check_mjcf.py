@@ -3,6 +3,7 @@
 What differs is named, what it costs is measured, and the file is data.
 """
 
+import itertools
 import math
 import os
 import re
@@ -531,6 +532,17 @@ def test_each_entry_is_mended_in_a_model_of_its_own(monkeypatch):
     assert np.array_equal(*torques[1:])
     assert not np.array_equal(*torques[:2])
     monkeypatch.setattr(examining, "PRICING", 0.0)
+    assert mend(STILL, file, MINE, settings) == [None, None]
+
+
+def test_a_busy_machine_leaves_no_entry_unpriced(monkeypatch):
+    """A minute of others' work between two readings of the clock does not count."""
+    file = RobotFile(MINE_XML, other_plane())
+    settings = [("closure.softness", None), ("option.tolerance", 1e-8)]
+    minutes = itertools.count(step=60.0)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(minutes))
+    assert all(mend(STILL, file, MINE, settings))
+    monkeypatch.setattr(time, "process_time", lambda: next(minutes))
     assert mend(STILL, file, MINE, settings) == [None, None]
 
 

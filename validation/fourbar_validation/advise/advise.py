@@ -5,9 +5,9 @@ look, and short runs of the scene itself decide. With fitted pads the softness o
 closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -79,45 +79,30 @@ _CHEAPER = 0.97
 """Part of the work below which a kind of step counts as cheaper. Less is the noise of
 its timing.
 """
-KindOfStep = Callable[[Settings], Settings]
-"""Function that changes what a step costs: solver, flywheel, integrator, pads."""
-
-
-def _solve_once(settings: Settings) -> Settings:
-    """Stop after one iteration of Newton's method."""
-    return replace(settings, iterations=1)
-
-
-def _lighten(flywheel: float, settings: Settings) -> Settings:
-    """Leave the tolerance to MuJoCo, which is tight enough beside a light flywheel."""
-    return replace(settings, tolerance=1e-8, iterations=100, flywheel=flywheel)
-
-
-def _leave_out_pads(kind: KindOfStep, settings: Settings) -> Settings:
-    return replace(kind(settings), pad=None)
-
-
-def _change_integrator(integrator: str, settings: Settings) -> Settings:
-    """Integrate by first order, with a closure as stiff as it carries."""
-    return replace(
-        settings,
-        integrator=integrator,
-        iterations=1,
-        time_constant_steps=SHORTEST_TIME_CONSTANT,
-    )
-
-
+_LIGHT: dict[str, Any] = {"tolerance": 1e-8, "iterations": 100}
+"""Solver of MuJoCo, whose tolerance is tight enough beside a light flywheel."""
 INTEGRATORS_OF_FIRST_ORDER = ("Euler", "implicitfast")
-KINDS_OF_STEP: dict[str, KindOfStep] = {
+KINDS_OF_STEP: dict[str, dict[str, Any]] = {
+    "": {},
+    "flywheel 100": {**_LIGHT, "flywheel": 1e2},
+    "flywheel 1000": {**_LIGHT, "flywheel": 1e3},
+    "flywheel 10000": {**_LIGHT, "flywheel": 1e4},
+    "one iteration": {"iterations": 1},
+    "no pads": {**_LIGHT, "flywheel": 1e2, "pad": None},
     **{
-        f"flywheel {flywheel:g}": partial(_lighten, flywheel)
-        for flywheel in (1e2, 1e3, 1e4)
+        # with a closure as stiff as it carries
+        name: {
+            "integrator": name,
+            "iterations": 1,
+            "time_constant_steps": SHORTEST_TIME_CONSTANT,
+        }
+        for name in INTEGRATORS_OF_FIRST_ORDER
     },
-    "one iteration": _solve_once,
-    "no pads": partial(_leave_out_pads, partial(_lighten, 1e2)),
-    **{name: partial(_change_integrator, name) for name in INTEGRATORS_OF_FIRST_ORDER},
 }
-"""Kinds of step that are tried beside RK4 with tolerance 0, ten iterations and pads."""
+"""Changes of settings by the kind of step: solver, flywheel, integrator, pads.
+
+They are tried beside RK4 with tolerance 0, ten iterations and pads, which is "".
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,27 +143,25 @@ class _Advice:
 
         The table is of several scenes.
         """
-        error = f"{self.best.errors.worst:.1e}" + (
-            "" if self.reached else " (not reached)"
-        )
+        best = self.best
         return (
-            error,
-            f"{self.best.steps_per_revolution:.0f}",
-            f"{self.best.settings.time_constant_steps:.3g}",
+            f"{best.errors.worst:.1e}" + " (not reached)" * (not self.reached),
+            f"{best.steps_per_revolution:.0f}",
+            f"{best.settings.time_constant_steps:.3g}",
         )
 
     @property
     def reason(self) -> str:
         """Write the attempt in one line for the reader."""
-        e = self.best.errors
+        best = self.best
         errors = (
             f"Errors at the steps and between them, by a curve of degree "
-            f"{DEGREE_BETWEEN} through the steps: torque {e.torque:.1e}, "
-            f"worst pin force {e.force:.1e}"
+            f"{DEGREE_BETWEEN} through the steps: torque {best.errors.torque:.1e}, "
+            f"worst pin force {best.errors.force:.1e}"
         )
         setting = (
-            f"{self.best.description} ({self.best.steps} steps in all); the flywheel "
-            f"lets the speed vary by {self.best.speed_error:.1e} of itself, and the "
+            f"{best.description} ({best.steps} steps in all); the flywheel "
+            f"lets the speed vary by {best.speed_error:.1e} of itself, and the "
             "forces are those of the motion made"
         )
         if self.reached:
@@ -204,30 +187,9 @@ def advise(
     Raises LimitError for a scene that cannot be run through in time.
     """
     if not 0.0 < error < 1.0:
-        raise InputError(
-            "--error",
-            error,
-            "must be a relative error, above 0 and below 1",
-        )
-    return _CheapestSearch(
-        scene,
-        error,
-        setup or JudgedSetup(scene),
-    ).advice()
-
-
-def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
-    """Time the steps and readings of an attempt, CPU seconds.
-
-    The time of each is the least of several rounds.
-    """
-    time_steps, time_readings = setup.make_clocks(attempt.settings)
-    step = min(time_steps(STEPS_TIMED) for _ in range(TIMINGS_OF_A_KIND)) / STEPS_TIMED
-    reading = (
-        min(time_readings(READINGS_TIMED) for _ in range(TIMINGS_OF_A_KIND))
-        / READINGS_TIMED
-    )
-    return attempt.steps * step + attempt.readings * reading
+        allowed = "must be a relative error, above 0 and below 1"
+        raise InputError("--error", error, allowed)
+    return _CheapestSearch(scene, error, setup or JudgedSetup(scene)).advice()
 
 
 def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
@@ -240,6 +202,30 @@ def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
         f" ({revolution:.2g} ms per revolution): {attempt.steps} steps, and"
         f" {attempt.readings} readings of torque and pin forces."
     )
+
+
+def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
+    """Time the steps and readings of an attempt, CPU seconds."""
+    times, reading = _time_kinds(setup, {"": attempt.settings})
+    return attempt.steps * times[""] + attempt.readings * reading
+
+
+def _time_kinds(
+    setup: TrialSetup, kinds: Mapping[str, Settings]
+) -> tuple[dict[str, float], float]:
+    """Time a step of each kind, and a reading of the first, CPU seconds.
+
+    Each time is the least of interleaved rounds.
+    """
+    clocks = {name: setup.make_clocks(settings) for name, settings in kinds.items()}
+    (_, time_readings), *_ = clocks.values()
+    steps = dict.fromkeys(kinds, math.inf)
+    reading = math.inf
+    for _ in range(TIMINGS_OF_A_KIND):
+        for name, (time_steps, _) in clocks.items():
+            steps[name] = min(steps[name], time_steps(STEPS_TIMED) / STEPS_TIMED)
+        reading = min(reading, time_readings(READINGS_TIMED) / READINGS_TIMED)
+    return steps, reading
 
 
 class _CheapestSearch:
@@ -255,8 +241,10 @@ class _CheapestSearch:
         self.error = error
         self.setup = setup
         self.attempts: list[SearchRun] = []
+        self.costs = {"": 1.0}
+        """CPU time of a step of each kind, as in `SearchRun.step_cost`."""
         self.reading_cost = 0.0
-        """CPU time of a reading, in steps as those of `SearchRun.step_cost`."""
+        """CPU time of a reading, in the same steps."""
 
     def advice(self) -> _Advice:
         """Find the cheapest settings that reach the error.
@@ -267,115 +255,86 @@ class _CheapestSearch:
         first, tc = guess(self.error)
         self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
-            constant = min(
-                max(tc * factor, SHORTEST_TIME_CONSTANT), LONGEST_TIME_CONSTANT
-            )
+            constant = tc * factor
+            constant = max(constant, SHORTEST_TIME_CONSTANT)
+            constant = min(constant, LONGEST_TIME_CONSTANT)
             if constant != tc:
                 self._polish(constant)
-        if self._list_served():
-            self._try_kinds()
         served = self._list_served()
         if served:
-            best = min(served, key=self._work)
+            self._try_kinds(min(served, key=lambda attempt: attempt.steps))
+            best = min(self._list_served(), key=self._work)
         else:
-            best = _find_nearest(self.attempts)
-        return _Advice(
-            self.error,
-            best,
-            tuple(self.attempts),
-            bool(served),
-        )
+            best = self._find_nearest()
+        return _Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _work(self, attempt: SearchRun) -> float:
         """Return the CPU time of a run with its readings, in steps."""
         return attempt.steps * attempt.step_cost + attempt.readings * self.reading_cost
 
-    def _try_kinds(self) -> None:
+    def _try_kinds(self, start: SearchRun) -> None:
         """Try each kind of step with as many steps as would be cheaper.
 
         Where so many serve, fewer are tried.
         """
-        start = min(self._list_served(), key=lambda attempt: attempt.steps)
         settings = start.settings
-        costs = self._time_kinds(settings)
-        for name in sorted(KINDS_OF_STEP, key=costs.__getitem__):
-            cheapest = min(map(self._work, self._list_served()))
-            left = _CHEAPER * cheapest - start.readings * self.reading_cost
-            part = left / (costs[name] * start.steps)
+        kinds = {
+            name: replace(settings, **changes)
+            for name, changes in KINDS_OF_STEP.items()
+        }
+        times, reading = _time_kinds(self.setup, kinds)
+        base = times.pop("")
+        self.reading_cost = reading / base
+        for name, seconds in sorted(times.items(), key=lambda pair: pair[1]):
+            cost = self.costs[name] = seconds / base
+            allowed = _CHEAPER * min(map(self._work, self._list_served()))
             # with fewer steps than positions each step has a reading
-            both = costs[name] + self.reading_cost
-            part = max(part, _CHEAPER * cheapest / (both * start.steps))
+            steps = max(
+                (allowed - start.readings * self.reading_cost) / cost,
+                allowed / (cost + self.reading_cost),
+            )
+            part = steps / start.steps
             if name not in INTEGRATORS_OF_FIRST_ORDER:
                 # of the same order: what serves needs no fewer steps by much
                 part = min(part, 1.0)
             n = settings.steps_per_revolution * part
             tc = settings.time_constant_steps
-            if n < FEWEST_STEPS or part < 1.0 / _CLOSE_ENOUGH:
-                continue
-            kind = KINDS_OF_STEP[name]
-            cost = costs[name]
-            if self._serves(self._try(n, tc, kind, cost)):
-                self._bisect(tc, n / _CLOSE_ENOUGH, serves=n, kind=kind, cost=cost)
-
-    def _time_kinds(self, settings: Settings) -> dict[str, float]:
-        """Return the time of a step of each kind, in steps of the settings.
-
-        A reading's time is kept as `reading_cost`. Each time is the least of
-        interleaved rounds.
-        """
-        variants = {
-            "": settings,
-            **{name: kind(settings) for name, kind in KINDS_OF_STEP.items()},
-        }
-        clocks = {name: self.setup.make_clocks(s) for name, s in variants.items()}
-        times: dict[str, list[float]] = {name: [] for name in variants}
-        readings = []
-        for _ in range(TIMINGS_OF_A_KIND):
-            for name, (time_steps, _) in clocks.items():
-                times[name].append(time_steps(STEPS_TIMED) / STEPS_TIMED)
-            readings.append(clocks[""][1](READINGS_TIMED) / READINGS_TIMED)
-        base = min(times.pop(""))
-        self.reading_cost = min(readings) / base
-        return {name: min(values) / base for name, values in times.items()}
+            if n >= FEWEST_STEPS and part >= 1.0 / _CLOSE_ENOUGH:
+                self._refine(tc, n, name)
 
     def _polish(self, tc: float) -> None:
         """Try whether another time constant serves, or serves with fewer steps."""
         served = self._list_served()
         if not served:
-            self._bisect(tc, _find_nearest(self.attempts).settings.steps_per_revolution)
+            nearest = self._find_nearest()
+            self._bisect(tc, nearest.settings.steps_per_revolution)
             return
         fewest = min(served, key=lambda a: (a.steps, a.errors.worst))
         n = fewest.settings.steps_per_revolution / _CLOSE_ENOUGH
-        if n >= FEWEST_STEPS and self._serves(self._try(n, tc)):
-            self._bisect(tc, n / _CLOSE_ENOUGH, serves=n)
+        if n >= FEWEST_STEPS:
+            self._refine(tc, n)
+
+    def _refine(self, tc: float, n: float, kind: str = "") -> None:
+        """Try so many steps, and fewer if they serve."""
+        if self._serves(self._try(n, tc, kind)):
+            self._bisect(tc, n / _CLOSE_ENOUGH, kind, serves=n)
 
     def _bisect(
-        self,
-        tc: float,
-        n: float,
-        serves: float | None = None,
-        kind: KindOfStep | None = None,
-        cost: float = 1.0,
+        self, tc: float, n: float, kind: str = "", serves: float | None = None
     ) -> None:
         """Narrow down the least steps per revolution at one time constant."""
         fails: float | None = None
         last: SearchRun | None = None
         for _ in range(_MOST_TRIALS):
-            attempt = self._try(n, tc, kind, cost)
+            attempt = self._try(n, tc, kind)
             ratio = attempt.errors.worst / (PART_OF_THE_ERROR * self.error)
-            if ratio < float("inf"):
-                step = ratio ** (1.0 / ORDER_OF_RK4)
-            else:
-                step = 2.0
+            step = ratio ** (1.0 / ORDER_OF_RK4) if ratio < math.inf else 2.0
             if self._serves(attempt):
                 serves = n
                 ahead = n * min(max(step, 0.4), 1.0 / _CLOSE_ENOUGH)
             else:
-                if (
-                    last is not None
-                    and n > (fails or 0.0)
-                    and self._is_floored(last, attempt)
-                ):
+                more = n > (fails or 0.0)
+                if last is not None and more and _is_floored(last, attempt):
                     return
                 fails = n
                 last = attempt
@@ -390,31 +349,17 @@ class _CheapestSearch:
                 return
             n = max(ahead, FEWEST_STEPS)
 
-    def _is_floored(self, before: SearchRun, after: SearchRun) -> bool:
-        """Tell whether more steps bought nothing."""
-        worst = after.errors.worst
-        return (
-            worst < 1e-2
-            and worst > _LEAST_GAIN * before.errors.worst
-            and after.steps > 1.3 * before.steps
-        )
-
     def _serves(self, attempt: SearchRun) -> bool:
         return attempt.errors.worst <= PART_OF_THE_ERROR * self.error
 
     def _list_served(self) -> list[SearchRun]:
         return [attempt for attempt in self.attempts if self._serves(attempt)]
 
-    def _try(
-        self,
-        n: float,
-        tc: float,
-        kind: KindOfStep | None = None,
-        cost: float = 1.0,
-    ) -> SearchRun:
-        settings = make_settings(n, tc)
-        if kind is not None:
-            settings = kind(settings)
+    def _find_nearest(self) -> SearchRun:
+        return min(self.attempts, key=lambda a: a.errors.worst)
+
+    def _try(self, n: float, tc: float, kind: str) -> SearchRun:
+        settings = replace(make_settings(n, tc), **KINDS_OF_STEP[kind])
         steps = self.setup.steps(settings)
         if steps > MOST_STEPS_OF_A_RUN:
             fewer = settings.steps_per_revolution * MOST_STEPS_OF_A_RUN / steps
@@ -427,26 +372,30 @@ class _CheapestSearch:
             judge_trial(self.scene, trial),
             trial.steps_per_revolution,
             _find_speed_error(self.setup, trial),
-            cost,
+            self.costs[kind],
         )
         self.attempts.append(attempt)
         return attempt
 
 
+def _is_floored(before: SearchRun, after: SearchRun) -> bool:
+    """Tell whether more steps bought nothing."""
+    worst = after.errors.worst
+    return (
+        _LEAST_GAIN * before.errors.worst < worst < 1e-2
+        and after.steps > 1.3 * before.steps
+    )
+
+
 def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:
     """Find the greatest deviation of the speed from the commanded one, relative."""
     theta_2 = trial.at.theta_2
-    omega_2 = np.asarray(trial.at.omega_2, float)
-    first = theta_2.min() if setup.course.speed > 0.0 else theta_2.max()
-    squared = setup.course.speed**2 + 2.0 * setup.course.acceleration * (
-        theta_2 - first
-    )
+    course = setup.course
+    first = theta_2.min() if course.speed > 0.0 else theta_2.max()
+    squared = course.speed**2 + 2.0 * course.acceleration * (theta_2 - first)
     due = np.sqrt(np.maximum(squared, 0.0))
-    return float(np.max(np.abs(np.abs(omega_2) - due)) / np.max(due))
-
-
-def _find_nearest(attempts: Sequence[SearchRun]) -> SearchRun:
-    return min(attempts, key=lambda a: a.errors.worst)
+    made = np.abs(np.asarray(trial.at.omega_2, float))
+    return float(np.max(np.abs(made - due)) / np.max(due))
 
 
 def _advise_robot(
@@ -525,50 +474,39 @@ def advise_command(
     from fourbar.files import load
 
     if output is not None and len(scenes) > 1:
-        raise InputError(
-            "-o",
-            str(output),
-            f"is the MJCF of one scene, not of {len(scenes)}",
-        )
+        allowed = f"is the MJCF of one scene, not of {len(scenes)}"
+        raise InputError("-o", str(output), allowed)
     loaded = [(scene, load(scene)) for scene in scenes]
     if output is not None:
         require_file(output, *scenes)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     reached = True
     for file, scene in loaded:
         try:
             setup = JudgedSetup(scene)
             advice = advise(scene, wanted, setup)
         except LimitError as error:
-            reason = (
-                f"cannot be simulated: {error}; inverse dynamics with loop multipliers"
-                " can answer it"
+            print_sentence(
+                f"{file.name}: cannot be simulated: {error}; inverse dynamics with"
+                " loop multipliers can answer it"
             )
-            print_sentence(f"{file.name}: {reason}")
             rows.append((file.name, "-", "-", "-", "cannot be simulated"))
             reached = False
             continue
         influences = measure_influences(scene, setup, advice.best.settings)
-        print_sentence(f"{file.name}: {advice.reason}")
-        print_sentence(_describe_time(setup, advice.best))
-        print_sentence(write_sentence(influences))
         steps = sum(attempt.steps for attempt in advice.attempts)
-        print_sentence(
+        for sentence in (
+            f"{file.name}: {advice.reason}",
+            _describe_time(setup, advice.best),
+            write_sentence(influences),
             f"The search ran the scene {len(advice.attempts)} times, {steps} steps in"
-            " all."
-        )
+            " all.",
+        ):
+            print_sentence(sentence)
         reached &= advice.reached
-        rows.append(
-            (
-                file.name,
-                *advice.cells(),
-                (
-                    influences[0].setting
-                    if influences[0].times >= MATTERS
-                    else "none by itself"
-                ),
-            )
-        )
+        most = influences[0]
+        matters = most.setting if most.times >= MATTERS else "none by itself"
+        rows.append((file.name, *advice.cells(), matters))
         if output is not None and advice.reached:
             write_text(output, write_mjcf(scene, advice.best.settings))
             click.echo(f"The MJCF is written to {output}.")

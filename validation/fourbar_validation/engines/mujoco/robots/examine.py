@@ -49,7 +49,9 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
 )
 
 PRICING = 60.0
-"""Seconds in which differences are tried one by one; each takes two evaluations."""
+"""Processor time in which differences are tried one by one, s; each takes two
+evaluations.
+"""
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
 _PLAIN = MeasureOptions(PoseOptions())
@@ -117,7 +119,7 @@ def examine_changed(
     """Measure the generated file, then it with each entry alone changed.
 
     The file is without a drive, and first as it is. None stands for an entry that
-    cannot be set alone. After PRICING seconds the rest are not evaluated either.
+    cannot be set alone. After PRICING the rest are not evaluated either.
     """
     file = _generate(scene, "none")
     found = find_loop_of_scene(file, scene, options)
@@ -160,14 +162,13 @@ def examine_mended(
 def _take_in_time(
     answers: Iterator[LoopMeasurement | None], count: int
 ) -> Iterator[LoopMeasurement | None]:
-    """Yield answers, None for each that is not begun within PRICING seconds."""
-    start = time.perf_counter()
+    """Yield answers, None for each that is not begun within PRICING."""
+    end = time.process_time() + PRICING
     for _ in range(count):
-        if time.perf_counter() - start >= PRICING:
-            yield None
-            continue
-        with collect_warnings():
-            answer = next(answers)
+        answer = None
+        if time.process_time() < end:
+            with collect_warnings():
+                answer = next(answers)
         yield answer
 
 
