@@ -10,11 +10,7 @@ import re
 
 import pytest
 
-from fourbar_lab.benchmark import (
-    BENCHMARKED_ENGINES,
-    REFUSED,
-    read_reasons,
-)
+from fourbar_lab.benchmark import BENCHMARKED_ENGINES, REFUSED, read_reasons
 from fourbar_lab.cli import status
 from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.engines.environments import read_engines, read_engines_of

@@ -26,9 +26,7 @@ SEED = 0
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "path",
-    sorted(COUNTEREXAMPLES.glob("*.toml")),
-    ids=lambda path: path.stem,
+    "path", sorted(COUNTEREXAMPLES.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_kept_counterexample_holds(path):
     assert examine.list_findings(loads(path.read_text(encoding="utf-8"))) == []
@@ -62,8 +60,7 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
     solving = import_module("fourbar.evaluation.case")
     monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
     scene = replace(
-        crank_rocker(),
-        motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0),
+        crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
     )
     assert examine.list_findings(scene)
     small = shrink_scene(

@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 from fourbar_lab.simulators.mujoco_c import MujocoFile
-from fourbar_lab.worlds import (
-    CONTENDERS,
-    FORMULAS_ON_ONE_CORE,
-    measure_worlds,
-)
+from fourbar_lab.worlds import CONTENDERS, FORMULAS_ON_ONE_CORE, measure_worlds
 from tests.lab.simulators.test_simulators import ask_position
 from tests.whole.test_imports import ROOT
 

@@ -199,11 +199,7 @@ def free_piece(scene, motion, answer, bar, cut):
     else:
         centre = make_vector(find_centre(described))
         to_G = motion.unit[bar] * centre
-        piece.push(
-            bar,
-            -find_mass(described) * (a_pin + motion.swing(bar, to_G)),
-            to_G,
-        )
+        piece.push(bar, -find_mass(described) * (a_pin + motion.swing(bar, to_G)), to_G)
         piece.place = centre.real
         piece.couple(bar, -find_inertia(described) * motion.alpha[bar])
     return piece
@@ -218,11 +214,7 @@ def _push_rigid(piece, mass, ends, a_pin, gravity):
     middle = 0.5 * (start + end)
     bar = piece.bar
     arm = middle * piece.motion.unit[bar]
-    piece.push(
-        bar,
-        mass * (gravity - a_pin - piece.motion.swing(bar, arm)),
-        arm,
-    )
+    piece.push(bar, mass * (gravity - a_pin - piece.motion.swing(bar, arm)), arm)
     piece.place = middle
     piece.couple(bar, -mass * (end - start) ** 2 / 12.0 * piece.motion.alpha[bar])
     piece.place = 0.0

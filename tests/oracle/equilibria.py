@@ -27,12 +27,7 @@ from fourbar_validation.compare.pins import (
     state_from_pins,
 )
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import (
-    EPS,
-    RANDOM_WALK,
-    WELL_CONDITIONED,
-    K,
-)
+from fourbar_validation.compare.tolerance import EPS, RANDOM_WALK, WELL_CONDITIONED, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
@@ -79,11 +74,7 @@ def equilibria(question):
         branches = (int(question.solution.branch[0]),)
     torques = {branch: _hold(scene, theta_2, branch) for branch in branches}
     if turns_fully(scene.linkage) and len(change_points(scene.linkage)) == 2:
-        signs = find_signs(
-            scene.linkage,
-            theta_2,
-            int(question.at.branch[0]),
-        )
+        signs = find_signs(scene.linkage, theta_2, int(question.at.branch[0]))
         for branch, torque in torques.items():  # one assembly is a circuit of its own
             torque[signs != branch] = np.nan
     if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):

@@ -22,11 +22,7 @@ from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import REFUSES, Row, keep_worst
 from fourbar_validation.compare.tolerance import EPS, K
-from tests.oracle.variants import (
-    ask_free_bodies,
-    hold_to,
-    take_few,
-)
+from tests.oracle.variants import ask_free_bodies, hold_to, take_few
 
 NUMBER_IN_A_FILE = r"[-+.\deE]+"
 
@@ -165,11 +161,7 @@ def _read_sdf(text):
                 at_pins[pin] = numbers(joint, f"axis/dynamics/{name}")[0]
     gravity = complex(*numbers(next(root.iter("world")), "gravity")[:2])
     return Contents(
-        bodies,
-        pins,
-        [_read_turns(bodies), _read_noted(text)],
-        gravity,
-        **dynamics,
+        bodies, pins, [_read_turns(bodies), _read_noted(text)], gravity, **dynamics
     )
 
 

@@ -29,10 +29,7 @@ def points(question):
         and question.at.speed is not None
     ):
         yield compare_points(
-            question,
-            question.scene,
-            question.solution,
-            question.reference,
+            question, question.scene, question.solution, question.reference
         )
 
 

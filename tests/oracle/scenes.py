@@ -29,8 +29,7 @@ SPIKE = Load(
     2,
     moment=-0.5,
     table=Table(
-        tuple(np.radians((0.0, 98.3, 101.3, 104.3, 360.0))),
-        (0.5, 0.5, 50.0, 0.5, 0.5),
+        tuple(np.radians((0.0, 98.3, 101.3, 104.3, 360.0))), (0.5, 0.5, 50.0, 0.5, 0.5)
     ),
 )
 """Couple whose corners lie between the positions of a turn."""

@@ -13,6 +13,7 @@ import numpy as np
 import fourbar
 from fourbar.effects import Load
 from fourbar.effects.load import Table
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, LINE, UNKNOWNS, Array
 from fourbar.scene.numbers import POINT_STAGES, Point
 from fourbar.studies.keys import command_key
@@ -59,21 +60,13 @@ def furnish(scene, question):
     coupler = scene.linkage.coupler
     first = float(question.solution.theta_2[0])
     if not scene.points:
-        arms = {
-            bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)
-        }
-        scene = replace(
-            scene,
-            points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()),
-        )
-    assert question.free_body is not None
+        lengths = {bar: scene.linkage.bar(bar).length for bar in MOVING_BARS}
+        made = [Point(f"P{k}", k, (0.6 * lengths[k], 0.4 * k)) for k in lengths]
+        scene = replace(scene, points=tuple(made))
     size = magnitude(question.free_body.quantities["F12"])
     positive = size[np.isfinite(size) & (size > 0.0)]
-    if (
-        not any(load.table for load in scene.loads)
-        and positive.size
-        and scene.motion.law is None
-    ):
+    tabled = any(load.table for load in scene.loads)
+    if positive.size and not tabled and scene.motion.law is None:
         force = 0.5 * float(np.median(positive))
         table = Table(tuple(first + x for x in _CORNERS), (1.0, -0.5, 2.0, 1.0))
         load = Load(
@@ -125,40 +118,22 @@ def _judge_study(question, scene, nominal, keys):
     stated = SceneFile(scene).find_stated(keys)
     commanded = command_key(scene)
     stated.pop(commanded, None)
-    values = {
-        key: np.array([x + number * apart * step for number in range(_MEMBERS)])
-        for key, (x, step) in stated.items()
-    }
+    parts = [apart * number for number in range(_MEMBERS)]
+    values = {key: x + step * np.array(parts) for key, (x, step) in stated.items()}
     # the places of each member lie within those of the scene: nothing says that a table
     # reaches further
-    positions = np.array(
-        [
-            places + apart * number * (places.mean() - places)
-            for number in range(_MEMBERS)
-        ]
-    )
-    members = {}
-    for number, member_positions in enumerate(positions):
-        with suppress(
-            NotAskedError
-        ):  # the others are judged, beside one that never assembles
-            changes = {
-                name: number * apart * entry.step for name, entry in stated.items()
-            }
-            members[number] = SceneFile(at_places(scene, member_positions)).move(
-                changes
-            )
+    values[commanded] = places + np.outer(parts, places.mean() - places)
     rows = []
     with np.errstate(all="ignore"):
-        solved = fourbar.solve(fourbar.vary(scene, values | {commanded: positions}))
-        for number, one in members.items():
-            rows += hold_to(
-                question,
-                "study",
-                one,
-                take_member(solved, number),
-                ask_beside(one, scene, nominal),
-            )
+        solved = fourbar.solve(fourbar.vary(scene, values))
+        for number, part in enumerate(parts):
+            changes = {key: part * entry.step for key, entry in stated.items()}
+            with suppress(NotAskedError):  # one that never assembles, beside others
+                file = SceneFile(at_places(scene, values[commanded][number]))
+                one = file.move(changes)
+                answer = ask_beside(one, scene, nominal)
+                ours = take_member(solved, number)
+                rows += hold_to(question, "study", one, ours, answer)
     return rows
 
 
@@ -272,11 +247,9 @@ def _place_points(scene, answer, drawing):
     """Return places, velocities and accelerations of the scene's points by an
     answer's angles, in the coordinates of a drawing if there is one.
     """
-    reference = make_reference(scene, answer)
-    assert reference is not None
     origin = complex(*drawing.O2) if drawing else 0j
     placed = {}
-    for name, moved in move_points(scene, reference).items():
+    for name, moved in move_points(scene, make_reference(scene, answer)).items():
         shifts = (origin, 0j, 0j)
         parts = zip(POINT_STAGES, moved.arms, moved.feet, shifts, strict=True)
         for start, arm, foot, shift in parts:
@@ -294,8 +267,7 @@ def tolerances(question):
         fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names
     )
     scene = replace(
-        scene,
-        tolerances=(scene.tolerances or tuple(defaults))[:MOST_TOLERANCES],
+        scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST_TOLERANCES]
     )
     _require_beside(scene)
     spread = fourbar.tolerances(scene, SPREAD_SAMPLES)
@@ -324,11 +296,6 @@ def tolerances(question):
     ]
 
 
-def _find_worst_deviation(tolerance):
-    """Return how far the worst case of a tolerance reaches."""
-    return tolerance.width * (3.0 if tolerance.sigma else 1.0)
-
-
 def _require_beside(scene):
     """Require that what the tolerances reach keeps to the nominal assembly.
 
@@ -342,10 +309,10 @@ def _require_beside(scene):
         for tolerance in scene.tolerances
         if tolerance.key.startswith(("lengths.", "pins."))
     ]
-    for signs in product((1.0, -1.0), repeat=len(of_lengths)):
+    for reaches in product((1.0, -1.0), repeat=len(of_lengths)):
         changes = {
-            tolerance.key: sign * _find_worst_deviation(tolerance)
-            for tolerance, sign in zip(of_lengths, signs, strict=True)
+            tolerance.key: reach * tolerance.width * (3.0 if tolerance.sigma else 1.0)
+            for tolerance, reach in zip(of_lengths, reaches, strict=True)
         }
         if not stays_beside(file.move(changes), scene):
             raise NotAskedError("the tolerances reach far past a change point")
@@ -389,21 +356,16 @@ def _compute_expected(scene):
 
     weights = []
     off = []
-    nodes = [
-        [(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)]
-        for x, w in (_NODES[tolerance.sigma] for tolerance in scene.tolerances)
-    ]
-    for node in product(*nodes):
-        off.append(
-            changed(
-                {
-                    tolerance.key: x * tolerance.width
-                    for tolerance, (x, _) in zip(scene.tolerances, node, strict=True)
-                }
-            )
-        )
-        weights.append(math.prod(w for _, w in node))
     slopes = []
+    nodes = []
+    for tolerance in scene.tolerances:
+        x, w = _NODES[tolerance.sigma]
+        x *= tolerance.width
+        key = tolerance.key
+        nodes.append([(key, 0.0, 1.0 - 2.0 * w), (key, x, w), (key, -x, w)])
+    for node in product(*nodes):
+        off.append(changed({key: x for key, x, _ in node}))
+        weights.append(math.prod(w for *_, w in node))
     for tolerance in scene.tolerances:
         h = FIRST_ORDER_STEP * max(abs(numbers[tolerance.key].step), tolerance.width)
         up, down = (changed({tolerance.key: change}) for change in (h, -h))
@@ -414,14 +376,9 @@ def _compute_expected(scene):
         rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN)
         for tolerance in scene.tolerances
     ]
-    samples = np.array(drawn).T
     widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
-    variances = np.array(
-        [[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances]
-    )
-    reaches = np.array(
-        [[_find_worst_deviation(tolerance)] for tolerance in scene.tolerances]
-    )
+    normal = np.array([[tolerance.sigma] for tolerance in scene.tolerances])
+    variances = np.where(normal, 1.0, 1.0 / 3.0)
     expected = {}
     for part in nominal:
         values, slope = (
@@ -436,11 +393,9 @@ def _compute_expected(scene):
         straight = bent <= NEARLY_LINEAR
         if straight.any():
             percentiles[:, straight] = np.percentile(
-                samples @ (slope * widths)[:, straight],
-                (1.0, 99.0),
-                axis=0,
+                np.transpose(drawn) @ (slope * widths)[:, straight], (1.0, 99.0), axis=0
             )
-        worst = np.abs(slope * reaches).sum(axis=0)
+        worst = np.abs(slope * widths * np.where(normal, 3.0, 1.0)).sum(axis=0)
         expected[part] = Expected(deviation, first_order, worst, bent, *percentiles)
     return expected
 
@@ -448,31 +403,25 @@ def _compute_expected(scene):
 def _compute_off(spread, expected, slight):
     """Compute by what part the figures of a spread are off, (n,)."""
     bent = expected.bent
-    every = bent >= 0.0
-    near = bent <= _NEARLY_STRAIGHT
-    straight = bent <= NEARLY_LINEAR
-    pairs = [
-        (spread.worst, expected.worst, expected.worst, 1.0, every),
-        (spread.first_order, expected.first_order, expected.first_order, 1.0, every),
-        (spread.deviation, expected.deviation, expected.deviation, 1.0, near),
-        (spread.low - spread.nominal, expected.low, expected.deviation, 0.1, straight),
-        (
-            spread.high - spread.nominal,
-            expected.high,
-            expected.deviation,
-            0.1,
-            straight,
-        ),
-    ]
-    errors = [
-        np.where(
-            judged & (expected.worst > slight),
-            part * divide(np.abs(ours - theirs), size),
-            0.0,
-        )
-        for ours, theirs, size, part, judged in pairs
-    ]
-    return np.asarray(np.max(errors, axis=0))
+    errors = []
+
+    def judge(ours, theirs, size, most):
+        apart = divide(np.abs(ours - theirs), size)
+        judged = (bent <= most) & (expected.worst > slight)
+        errors.append(np.where(judged, apart, 0.0))
+
+    for name, most in (
+        ("worst", np.inf),
+        ("first_order", np.inf),
+        ("deviation", _NEARLY_STRAIGHT),
+    ):
+        theirs = getattr(expected, name)
+        judge(getattr(spread, name), theirs, theirs, most)
+    for name in ("low", "high"):
+        ours = getattr(spread, name) - spread.nominal
+        theirs = getattr(expected, name)
+        judge(ours, theirs, 10.0 * expected.deviation, NEARLY_LINEAR)
+    return np.max(errors, axis=0)
 
 
 def _subtract(name, one, minus):

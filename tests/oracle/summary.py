@@ -35,29 +35,10 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.question import NotAskedError, Question
-from tests.oracle.bounds import (
-    CUT,
-    LOCATED_ROUGHLY,
-    PRINTED,
-    PRINTED_TO_FOUR_DIGITS,
-)
-from tests.oracle.cuts import (
-    CUT_POSITIONS,
-    free_piece,
-    move_bars,
-)
+from tests.oracle.bounds import CUT, LOCATED_ROUGHLY, PRINTED, PRINTED_TO_FOUR_DIGITS
+from tests.oracle.cuts import CUT_POSITIONS, free_piece, move_bars
 from tests.oracle.variants import ask_free_bodies, make_row
 
-ROW_NAMES = (
-    "ranges",
-    "peaks",
-    "integrals",
-    "pins",
-    "frame_force",
-    "bending",
-    "bore",
-)
-"""Names of the rows."""
 _CUT_BESIDE = 1e-10
 """Part of the length by which a bar is cut on either side of a place. A couple that
 acts there makes a jump.
@@ -91,10 +72,7 @@ parts of the largest.
 """
 _PRESSURE = 1e6
 """Pressure of the cylinder whose bore is judged, Pa."""
-ROW_TOLERANCES = {
-    "bore": PRINTED_TO_FOUR_DIGITS,
-    "bending": LOCATED_ROUGHLY,
-}
+ROW_TOLERANCES = {"bore": PRINTED_TO_FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
 
 
 @dataclass
@@ -131,9 +109,9 @@ class _SummaryJudge:
         if scene.motion.law is None and scene.motion.bar == 2:
             tables = (load.table for load in scene.loads if load.table is not None)
             inner = [corner for table in tables for corner in table.theta_2]
-        ends = np.sort(places[[0, -1]])
-        inside = [place for place in inner if ends[0] < place < ends[1]]
-        return np.union1d(ends, inside)
+        low, high = np.sort(places[[0, -1]])
+        inside = [place for place in inner if low < place < high]
+        return np.union1d([low, high], inside)
 
     @cached_property
     def fine_places(self):
@@ -170,9 +148,7 @@ class _SummaryJudge:
     @cached_property
     def motor(self):
         """Return the entry of the JSON."""
-        entry = list_duty(self.solution, {})
-        assert entry is not None
-        return entry
+        return list_duty(self.solution, {})
 
     @cached_property
     def closed(self):
@@ -193,27 +169,25 @@ class _SummaryJudge:
     @cached_property
     def loaded_pins(self):
         """Return the pins whose load is more than the rounding of the largest."""
-        return {pin for pin, load in self._loads.items() if load > self._rounding}
+        loads = self._loads
+        return {pin for pin in loads if loads[pin].max() > self._rounding}
 
     @cached_property
     def drives(self):
         """Return whether the drive exerts more than the rounding of pin forces."""
         values, _ = _find_work(self, self.own)
         lever = 1.0 if self.facts.linear else max(self.scene.linkage.lengths)
-        return bool(np.abs(values).max() > self._rounding * lever)
+        return np.abs(values).max() > self._rounding * lever
 
     @cached_property
     def _loads(self):
-        """Return the largest load of each pin, N."""
+        """Return the load of each pin, N."""
         quantities = self.own.quantities
-        return {
-            pin: float(magnitude(quantities[name]).max())
-            for pin, name in PIN_FORCE.items()
-        }
+        return {pin: magnitude(quantities[name]) for pin, name in PIN_FORCE.items()}
 
     @property
     def _rounding(self):
-        return BALANCED_SHARE * max(self._loads.values())
+        return BALANCED_SHARE * np.max([*self._loads.values()])
 
     def ask(self, places):
         """Ask the free bodies at other positions of the motion."""
@@ -247,7 +221,6 @@ class _SummaryJudge:
 def _find_conditions(scene, answer):
     """Find the conditions of motion and drive by the free bodies' angles, (2, n)."""
     reference = make_reference(scene, answer)
-    assert reference is not None and reference.drive_condition is not None
     return np.stack((reference.condition, reference.drive_condition))
 
 
@@ -256,29 +229,22 @@ def summary(question):
 
     Shaking force, bending and bore are judged too.
     """
-    judged = _SummaryJudge(question, summarize_scene(question))
+    judged = _SummaryJudge(question, _summarize_scene(question))
     _judge_ranges(judged)
     _judge_drive(judged)
     _judge_pins(judged)
     _judge_integrals(judged)
     _judge_bending(judged)
     _judge_growth(judged)
-    rows = []
-    for name in ROW_NAMES:
-        errors = judged.errors.get(name, [])
-        if not errors:
-            continue
-        tolerance = ROW_TOLERANCES.get(name, PRINTED)
+    for name, errors in judged.errors.items():
         error = np.array(errors)
-        reason = f"{len(errors)} numbers, {PEAK_INTERVALS + 1} positions"
+        tolerance = ROW_TOLERANCES.get(name, PRINTED)
         nowhere = np.full(len(errors), math.nan)
-        rows.append(
-            make_row(question, "summary", name, error, tolerance, nowhere, reason)
-        )
-    return rows
+        reason = f"{len(errors)} numbers, {PEAK_INTERVALS + 1} positions"
+        yield make_row(question, "summary", name, error, tolerance, nowhere, reason)
 
 
-def summarize_scene(question):
+def _summarize_scene(question):
     """Summarize the scene.
 
     Raises NotAskedError if its motion has nothing between its positions, or poles.
@@ -308,11 +274,7 @@ def _judge_ranges(judged):
         near = np.array([fine.min(), fine.max()])
         reached = near + wrap_difference(there - near)
         judged.add("ranges", np.abs(reached - [low.value, high.value]))
-        judged.add_excess(
-            "ranges",
-            fine.max() - high.value,
-            low.value - fine.min(),
-        )
+        judged.add_excess("ranges", near[1] - high.value, low.value - near[0])
     least = judged.facts.transmission
     answers = judged.ask(least.place), judged.fine
     # at a change point the sine is the root of a rounding, and its square has digits
@@ -331,37 +293,28 @@ def _find_work(judged, answer):
     values = answer.quantities[name_driving(scene)]
     if scene.drive is None:
         return values, answer.quantities[f"omega_{scene.drive_bar}"]
-    reference = make_reference(scene, answer)
-    assert reference is not None and reference.stroke_speed is not None
-    return values, reference.stroke_speed
+    return values, make_reference(scene, answer).stroke_speed
 
 
 def _judge_drive(judged):
     """Judge the peaks of the drive and its bore, as printed and in the JSON."""
     facts = judged.facts
     entry = judged.motor
-    assert facts.duty is not None
     if not judged.drives:
         return
     name = name_driving(judged.scene)
     fine_values, fine_speed = _find_work(judged, judged.fine)
     kind = "force" if facts.linear else "torque"
     if name not in judged.growing:
-        assert facts.peak is not None
         at_peak, _ = _find_work(judged, judged.ask(facts.peak.place))
         judged.add_peak("peaks", facts.peak, at_peak, fine_values)
         judged.add_value("peaks", entry[f"peak_{kind}"], abs(facts.peak.value))
     judged.add("integrals", float(entry["closed"] != judged.closed))
-    for key, fine in (
-        ("peak_speed", fine_speed),
-        ("peak_power", fine_values * fine_speed),
-    ):
-        most = float(np.abs(fine).max())
-        if key.removeprefix("peak_") not in judged.growing and most != 0.0:
-            judged.add_excess("peaks", (most - entry[key]) / most)
-            judged.add_excess(
-                "peaks", entry[key] / most - 1.0 - EXCESS_BETWEEN_POSITIONS
-            )
+    for name, fine in ("speed", fine_speed), ("power", fine_values * fine_speed):
+        most = np.abs(fine).max()
+        if name not in judged.growing and most != 0.0:
+            beyond = entry[f"peak_{name}"] / most - 1.0
+            judged.add_excess("peaks", -beyond, beyond - EXCESS_BETWEEN_POSITIONS)
     _judge_bore(judged, fine_values)
 
 
@@ -375,32 +328,24 @@ def _find_turned(judged):
 class _Panels(NamedTuple):
     """Curves of the free bodies at the Gauss nodes of panels that follow each other."""
 
-    low: Array
-    high: Array
-    values: Array
-    """(panels, nodes, curves)."""
+    width: Array
+    curves: dict[str, Array]
+    """(panels, nodes, components)."""
 
-    def mean_square(self, curves):
-        """Return the mean of the square of some curves together."""
-        width = self.high - self.low
-        squares = np.square(self.values[:, :, curves]).sum(axis=2)
-        return float(width @ squares @ (0.5 * _WEIGHTS) / width.sum())
+    def find_rms(self, name):
+        """Return the root of the mean square of a number or vector."""
+        squares = np.square(self.curves[name]).sum(axis=2)
+        return math.sqrt(self.width @ squares @ (0.5 * _WEIGHTS) / self.width.sum())
 
-    def accumulate(self, curve, less=0.0):
+    def accumulate(self, name, less=0.0):
         """Return the integral of a curve, less a number, up to each edge and zero."""
         totals = [np.zeros(1)]
-        for low, high, values in zip(
-            self.low, self.high, self.values[:, :, curve] - less, strict=True
-        ):
-            polynomial = Legendre.fit(
-                _NODES,
-                values,
-                len(_NODES) - 1,
-                [-1.0, 1.0],
-            )
+        curve = self.curves[name][:, :, 0] - less
+        for width, values in zip(self.width, curve, strict=True):
+            polynomial = Legendre.fit(_NODES, values, len(_NODES) - 1, [-1.0, 1.0])
             zeros = polynomial.roots()
             zeros = np.sort(zeros[np.isreal(zeros) & (np.abs(zeros) < 1.0)].real)
-            area = 0.5 * (high - low) * polynomial.integ(lbnd=-1.0)
+            area = 0.5 * width * polynomial.integ(lbnd=-1.0)
             totals.append(totals[-1][-1] + area(np.append(zeros, 1.0)))
         return np.concatenate(totals)
 
@@ -413,7 +358,9 @@ def _lay_panels(sample, edges):
     high = np.concatenate([piece[1:] for piece in pieces])
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     places = middle[:, np.newaxis] + half[:, np.newaxis] * _NODES
-    return _Panels(low, high, sample(places.ravel()).reshape(*places.shape, -1))
+    curves = sample(places.ravel())
+    shaped = {name: curves[name].reshape(*places.shape, -1) for name in curves}
+    return _Panels(high - low, shaped)
 
 
 def _judge_integrals(judged):
@@ -423,27 +370,16 @@ def _judge_integrals(judged):
         return  # a change point, beside which free bodies have no digits
     entry = judged.motor
     drive = name_driving(judged.scene)
-    names = [drive, "power", *PIN_FORCE.values()]
-    integrable = [judged.integrates(name) for name in names]
-    columns = {name: slice(2 * i - 2, 2 * i) for i, name in enumerate(names)}
-    columns |= {drive: slice(0, 1), "power": slice(1, 2)}
 
     def sample(places):
         answer = judged.ask(places)
         values, speed = _find_work(judged, answer)
-        pins = [answer.quantities[name] for name in PIN_FORCE.values()]
-        curves = [values[:, np.newaxis], (values * speed)[:, np.newaxis], *pins]
-        known = [
-            curve if integral else 0.0 * curve
-            for curve, integral in zip(curves, integrable, strict=True)
-        ]
-        return np.concatenate(known, axis=1)
+        return answer.quantities | {drive: values, "power": values * speed}
 
     panels = _lay_panels(sample, judged.edges)
 
     def judge_mean(ours, name):
-        rms = math.sqrt(panels.mean_square(columns[name]))
-        if judged.integrates(name) and rms != 0.0:
+        if judged.integrates(name) and (rms := panels.find_rms(name)) != 0.0:
             judged.add_value("integrals", ours, rms)
 
     for pin, name in PIN_FORCE.items():
@@ -458,8 +394,8 @@ def _judge_integrals(judged):
     second = 1.0 if motion.law is not None else abs(motion.speed or 0.0)
     if not judged.integrates("power") or second == 0.0:
         return
-    work = np.diff(panels.accumulate(1)) / second
-    sums = (float(work[work > 0.0].sum()), float(-work[work < 0.0].sum()))
+    work = np.diff(panels.accumulate("power")) / second
+    sums = (work[work > 0.0].sum(), -work[work < 0.0].sum())
     most = max(sums)
     for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
         judged.add("integrals", divide(abs(entry[key] - total), most))
@@ -468,7 +404,7 @@ def _judge_integrals(judged):
         return
     given = sums[0] - sums[1]
     level = given * second / np.ptp(judged.edges)
-    surplus = panels.accumulate(1, level) / second
+    surplus = panels.accumulate("power", level) / second
     swing = abs(entry["energy_swing"] - np.ptp(surplus))
     judged.add("integrals", divide(swing, most))
     at = judged.solution.at
@@ -490,7 +426,7 @@ def _judge_bore(judged, fine):
         word: 1e-3 * float(number)
         for number, word in re.findall(r"(\d\S*) mm\b[^;]*? to (\w+) ", text)
     }
-    for word, force in (("push", float(fine.max())), ("pull", -float(fine.min()))):
+    for word, force in ("push", fine.max()), ("pull", -fine.min()):
         if not force <= 0.0:
             bore = math.sqrt(4.0 * force / (math.pi * _PRESSURE))
             judged.add_value("bore", printed.get(word), bore)
@@ -504,9 +440,7 @@ def _judge_pins(judged):
     facts = judged.facts
     for pin, name in PIN_FORCE.items():
         load = facts.pins[pin]
-        if pin not in judged.loaded_pins:
-            continue
-        if name in judged.growing:
+        if pin not in judged.loaded_pins or name in judged.growing:
             continue
         there = judged.ask(load.peak.place)
         at_peak = magnitude(there.quantities[name])
@@ -517,11 +451,10 @@ def _judge_pins(judged):
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
         judged.add("pins", np.abs(wrap_difference(apart)))
     if judged.scene.drive is None:
-        on_frame = -(judged.own.quantities["F12"] + judged.own.quantities["F14"])
-        size = magnitude(judged.own.quantities["F12"]).max()
-        size += magnitude(judged.own.quantities["F14"]).max()
+        forces = [judged.own.quantities[name] for name in ("F12", "F14")]
+        size = sum(magnitude(force).max() for force in forces)
         if size != 0.0:
-            apart = magnitude(shaking_force(judged.solution) - on_frame)
+            apart = magnitude(shaking_force(judged.solution) + sum(forces))
             judged.add("frame_force", apart / size)
 
 
@@ -539,11 +472,9 @@ def _judge_bending(judged):
         there = judged.ask(largest.peak.place)
         motion = move_bars(judged.scene, commanded, there)
         length = judged.scene.linkage.bar(bar).length
-        beside = [
-            largest.x * (1.0 + off) + off * length
-            for off in (-_CUT_BESIDE, _CUT_BESIDE)
-        ]
-        anywhere = [*beside, *(part * length for part in CUT_POSITIONS)]
+        off = np.array([-_CUT_BESIDE, _CUT_BESIDE])
+        beside = largest.x * (1.0 + off) + off * length
+        anywhere = [*beside, *np.multiply(CUT_POSITIONS, length)]
         at_peak, others = (
             [free_piece(stated, moved, answer, bar, cut) for cut in cuts]
             for moved, answer, cuts in (

@@ -87,11 +87,7 @@ SLOWLY = Motion(0.1, 2.0, 0.5)
 VARIED = "study sensitivity tolerances"
 AT_REST = "missed torque slope inertia"
 HARD = {
-    "a parallelogram through change points": (
-        PARALLELOGRAM,
-        VARIED,
-        "theta_4 torque",
-    ),
+    "a parallelogram through change points": (PARALLELOGRAM, VARIED, "theta_4 torque"),
     "a kite through change points": (
         passing_change_points((0.3, 0.1, 0.1, 0.3), -1),
         VARIED,

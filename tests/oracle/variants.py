@@ -31,10 +31,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import make_prediction
-from fourbar_validation.run.question import (
-    FREE_BODY,
-    NotAskedError,
-)
+from fourbar_validation.run.question import FREE_BODY, NotAskedError
 from tests.oracle.points import compare_points
 
 POSITIONS_OF_VARIANTS = 5

@@ -5,10 +5,7 @@ from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
 
 
 def point(
-    steps: float,
-    worst: float,
-    curve: str = "c",
-    kind: str = STEPPED_MOTION,
+    steps: float, worst: float, curve: str = "c", kind: str = STEPPED_MOTION
 ) -> CostPoint:
     """Return a point with one error of all quantities and a microsecond a step."""
     errors = WorstErrors(*[worst] * len(ERROR_NAMES))

@@ -132,11 +132,7 @@ def _centre_kept(r):
 
 def _proximal(mu):
     """Tell whether Pinocchio's constrained acceleration is finite at a proximal mu."""
-    scene = replace(
-        _base(),
-        loads=(),
-        motion=Motion(1.0, 3.0),
-    )
+    scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
     kept = pinocchio.PROXIMAL_SETTINGS
     try:
         pinocchio.PROXIMAL_SETTINGS = (kept[0], mu, kept[2] if mu else 1)

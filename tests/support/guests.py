@@ -40,11 +40,7 @@ class Hosted(programs.Running):
         self._number += 1
         line = json.dumps({"id": self._number, **question}, allow_nan=False)
         said = io.BytesIO()
-        engine.serve(
-            self.program.command[-1],
-            io.BytesIO(line.encode()),
-            said,
-        )
+        engine.serve(self.program.command[-1], io.BytesIO(line.encode()), said)
         return self._read(said.getvalue())
 
 

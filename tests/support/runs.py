@@ -10,11 +10,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import compare_runs
-from fourbar_validation.regression.record import (
-    describe_run,
-    open_run,
-    write_about,
-)
+from fourbar_validation.regression.record import describe_run, open_run, write_about
 
 HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 """What a run of one engine was made with."""

@@ -40,10 +40,7 @@ def crank_rocker(**changes):
     parts = {
         "linkage": linkage,
         "motion": Motion(Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
-        "loads": (
-            Load(4, (3.0, 0.7), arm=(0.05, 1.0)),
-            Load(3, moment=-0.2),
-        ),
+        "loads": (Load(4, (3.0, 0.7), arm=(0.05, 1.0)), Load(3, moment=-0.2)),
         "effects": (Gravity(),),
         "title": "crank-rocker",
     }
@@ -133,13 +130,7 @@ def thesis(theta_2=None):
     loads = [Load(2, (10.0, 0.0), arm=(0.05, math.radians(265.0)))]
     loads += [Load(bar, moment=-0.15) for bar in (2, 3, 4)]
     angles = np.radians([135.0]) if theta_2 is None else theta_2
-    return Scene(
-        linkage,
-        Motion(angles, 0.2244),
-        4,
-        tuple(loads),
-        title="thesis",
-    )
+    return Scene(linkage, Motion(angles, 0.2244), 4, tuple(loads), title="thesis")
 
 
 def change_place(load, change):

@@ -99,11 +99,7 @@ class Loop:
 
     def first_pins(self, angles):
         """Return O2, A and O4."""
-        return [
-            0j,
-            self.a * np.exp(1j * angles[0]),
-            self.d * np.exp(1j * self.theta_1),
-        ]
+        return [0j, self.a * np.exp(1j * angles[0]), self.d * np.exp(1j * self.theta_1)]
 
     def write(self, settings, timestep, wheel):
         """Write the MJCF.
@@ -248,12 +244,7 @@ class Simulation:
         acceleration, closing, drive = self.probe_drive(angles, alpha_2)
         turned = _add_crank(acceleration)
         forces = self.balance(angles, speeds, turned, closing, drive)
-        return Sample(
-            float(angles[0]),
-            float(speeds[0]),
-            alpha_2,
-            forces,
-        )
+        return Sample(float(angles[0]), float(speeds[0]), alpha_2, forces)
 
     def probe_drive(self, angles, alpha_2):
         """Find the drive that gives the crank its acceleration.

@@ -57,12 +57,7 @@ def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
 def test_a_number_where_a_bar_belongs_gets_a_sentence(number):
     words = r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar"
     with pytest.raises(InputError, match=words):
-        FourBar(
-            0.3,
-            Bar(0.1),
-            number,
-            Bar(0.22),
-        )
+        FourBar(0.3, Bar(0.1), number, Bar(0.22))
 
 
 ALWAYS_WRONG = (5j, [[1, 2], [3]], np.zeros((3, 3)), object())
@@ -232,9 +227,7 @@ def calls():
         ),
         "tolerances": (
             lambda *x: fourbar.tolerances(
-                replace(scene, tolerances=x[0]),
-                samples=x[1],
-                seed=x[2],
+                replace(scene, tolerances=x[0]), samples=x[1], seed=x[2]
             ),
             ((Tolerance("lengths.input", 1e-4),), 2, 0),
         ),
@@ -245,10 +238,7 @@ def calls():
                 "solve, a study": (study, "force", None, 0),
             }.items()
         },
-        "solve, out": (
-            lambda x: fourbar.solve(scene, out=x),
-            ({"torque": torques},),
-        ),
+        "solve, out": (lambda x: fourbar.solve(scene, out=x), ({"torque": torques},)),
         "solve, out torque": (
             lambda x: fourbar.solve(scene, out={"torque": x}),
             (torques,),

@@ -63,10 +63,7 @@ def compute_row(text, steps, folder):
         steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / MUJOCO_TIMESTEP
     integrator = text.partition(",")[0]
     settings = replace(
-        BEST,
-        pad=None,
-        integrator=integrator,
-        steps_per_revolution=steps,
+        BEST, pad=None, integrator=integrator, steps_per_revolution=steps
     )
     setup = work_precision.CostStudy("page", SCENE, folder).setup(settled=True)
     trial = setup.try_out(settings, restore_defaults)

@@ -247,11 +247,7 @@ def test_every_command_of_harness_and_lab_is_listed(program, commands):
 
 def anchors(page):
     """Return the anchors of the headings, as GitHub and the site name them."""
-    headings = re.findall(
-        r"^#+ (.*)$",
-        read(page).lower(),
-        re.MULTILINE,
-    )
+    headings = re.findall(r"^#+ (.*)$", read(page).lower(), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", words).replace(" ", "-") for words in headings}
 
 
@@ -364,9 +360,7 @@ def test_the_pictures_are_those_that_are_drawn(name, options, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "path",
-    sorted(DOCS.rglob("*.svg")),
-    ids=lambda path: path.name,
+    "path", sorted(DOCS.rglob("*.svg")), ids=lambda path: path.name
 )
 def test_every_figure_has_a_form_for_dark_pages(path):
     assert "prefers-color-scheme" in read(path)
@@ -425,12 +419,7 @@ def test_the_second_crank_of_the_pump_goes_240_to_375_times_a_minute():
 
 
 def test_hoecken_s_curve_is_straight_to_1_5_mm_over_440():
-    curve = fourbar.coupler_curve(
-        shown("hoecken").linkage,
-        0.5,
-        0.0,
-        steps=720,
-    )
+    curve = fourbar.coupler_curve(shown("hoecken").linkage, 0.5, 0.0, steps=720)
     straight = curve.y < 0.4015
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999
     assert np.ptp(curve.x[straight]) > 0.44

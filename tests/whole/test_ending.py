@@ -28,12 +28,7 @@ ENDLESS_MJCF = """<mujoco><worldbody><replicate count="20000" offset="0.1 0 0">
 <body><joint/><geom size="0.1"/></body></replicate></worldbody></mujoco>"""
 """Bodies that MuJoCo compiles for minutes, in little memory."""
 HELLO = json.dumps(
-    {
-        "id": 1,
-        "engine": "busy",
-        "answers": ["theta_3"],
-        "effects": ["gravity", "loads"],
-    }
+    {"id": 1, "engine": "busy", "answers": ["theta_3"], "effects": ["gravity", "loads"]}
 )
 BUSY_GUEST = f"""
 import os, sys

@@ -279,8 +279,7 @@ def test_the_help_of_the_harness_imports_no_engine():
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    not Path("/dev/full").exists(),
-    reason="only Linux has a device that is always full",
+    not Path("/dev/full").exists(), reason="only Linux has a device that is always full"
 )
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence():
     code = "import click, sys; from fourbar.errors import run; "

@@ -61,11 +61,7 @@ LAYERS = {
 """From the ground up: no layer imports one above it or on its own floor, not even
 inside a function.
 """
-ON_ONE_FLOOR = {
-    ("files", "studies"),
-    ("scenes", "compare"),
-    ("run", "check"),
-}
+ON_ONE_FLOOR = {("files", "studies"), ("scenes", "compare"), ("run", "check")}
 """Of two layers on one floor the first may use the second."""
 MOST = {"fourbar": 16, "fourbar_validation": 15}
 """Entries at a package's own level, dunder files not counted: what a stranger can take

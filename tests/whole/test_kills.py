@@ -44,13 +44,7 @@ from fourbar_validation.scenes.suites import (
 from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
 from tests.support.texts import LENGTHS
-from tests.support.unlucky import (
-    Few,
-    Moody,
-    Unlucky,
-    dies_at_first,
-    start_and_sleep,
-)
+from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first, start_and_sleep
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -201,11 +195,7 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path):
 
 def test_a_record_is_read_from_its_part_as_it_was(tmp_path):
     errors = (math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
-    record = Record(
-        "a",
-        title="A",
-        rows=[Row("a", "engine", "exact", "F12", *errors)],
-    )
+    record = Record("a", title="A", rows=[Row("a", "engine", "exact", "F12", *errors)])
     with Store(tmp_path, {}).held() as store:
         store.put(5, [record.kept_all()])
         (kept,) = store.read(5)
@@ -405,9 +395,7 @@ class Blunders:
         if scene.title == "b":
             raise RuntimeError("no licence")
         return Answer(
-            "blunders",
-            "exact",
-            refusal=None if scene.title == "c" else "declined",
+            "blunders", "exact", refusal=None if scene.title == "c" else "declined"
         )
 
 
@@ -430,11 +418,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(jobs, "judge_job", noting)
     monkeypatch.setattr("fourbar_validation.report.run_summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.plan, "PICTURED", 3)
-    monkeypatch.setattr(
-        fourbar_validation.run.run,
-        "write_html",
-        lambda *_, **__: "",
-    )
+    monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
     without = run(
         Plan(Few(), (*EXACT, blunders), RunOptions(drawn=False)), tmp_path / "without"

@@ -305,9 +305,7 @@ def test_wheel_and_archive_install_on_every_python(tmp_path):
         if (
             python
             and subprocess.run(
-                [python, "--version"],
-                capture_output=True,
-                check=False,
+                [python, "--version"], capture_output=True, check=False
             ).returncode
             == 0
         ):

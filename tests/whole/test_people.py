@@ -141,12 +141,10 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(ask, tmp_path):
     (tmp_path / "pins.toml").write_text(text.replace('omega_2 = "60 rpm"', stated))
     text = ask("analyze", "pins.toml")
     assert row_of(text, "bar 2")[1:] == pytest.approx(
-        [-0.4285714, -4.338192],
-        rel=PRINTED,
+        [-0.4285714, -4.338192], rel=PRINTED
     )
     assert row_of(text, "bar 3")[1:] == pytest.approx(
-        [-0.8571429, -0.104956],
-        rel=PRINTED,
+        [-0.8571429, -0.104956], rel=PRINTED
     )
 
 

@@ -9,10 +9,7 @@ import pytest
 
 from fourbar import Motion, solve
 from fourbar.effects import PinFriction
-from fourbar.quantities import (
-    LINE_QUANTITIES,
-    QUANTITIES,
-)
+from fourbar.quantities import LINE_QUANTITIES, QUANTITIES
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FORMULAS, RESULT_COLUMNS, Row
@@ -129,9 +126,7 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results):
     assert len(kept) == len(table)
     for one, other in zip(kept, table, strict=True):
         for ours, theirs in zip(
-            dataclasses.astuple(one),
-            dataclasses.astuple(other),
-            strict=True,
+            dataclasses.astuple(one), dataclasses.astuple(other), strict=True
         ):
             assert ours == theirs or (math.isnan(ours) and math.isnan(theirs))
 
