@@ -41,7 +41,7 @@ def test_every_entry_fits_its_module_and_says_what_catches_it():
 
 
 @pytest.mark.slow
-def test_every_faulted_module_compiles() -> None:
+def test_every_faulted_module_compiles():
     for entry in read_faults():
         for name, text in inject_fault(entry).items():
             compile(text, name, "exec")

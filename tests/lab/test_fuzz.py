@@ -29,7 +29,7 @@ SEED = 0
     "path", sorted(COUNTEREXAMPLES.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_kept_counterexample_holds(path):
-    assert examine.list_findings(loads(path.read_text(encoding="utf-8"))) == []
+    assert examine.list_findings(loads(path.read_text("utf-8"))) == []
 
 
 @pytest.mark.slow
@@ -68,7 +68,7 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
     )
     assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
     kept = keep_counterexample(small, "billionth", tmp_path)
-    assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
+    assert examine.list_findings(loads(kept.read_text("utf-8")))
 
 
 def test_a_traceback_is_a_finding_and_so_is_a_file_of_another_scene(monkeypatch):

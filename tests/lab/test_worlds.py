@@ -62,7 +62,7 @@ def test_a_world_that_is_not_finite_fails():
 
 
 def test_the_page_states_errors_that_hold():
-    page = (ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "cost.md").read_text("utf-8")
     table = page.partition("<!-- data worlds -->")[2].partition("<!-- end -->")[0]
     rows = {}
     for line in table.strip().splitlines()[2:]:

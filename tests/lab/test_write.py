@@ -26,20 +26,20 @@ def test_no_mjcf_without_its_scene():
 
 def test_a_changed_scene_makes_its_mjcf_stale(tmp_path):
     file = tmp_path / "scene.toml"
-    file.write_text(FILES[0].read_text(encoding="utf-8"), encoding="utf-8")
+    file.write_text(FILES[0].read_text("utf-8"), "utf-8")
     assert find_stale([file]) == [file]
     write_models([file])
     assert find_stale([file]) == []
     xml = file.with_suffix(".xml")
-    text = xml.read_text(encoding="utf-8")
-    xml.write_text(text.replace("0.1 ", "0.1000000001 ", 1), encoding="utf-8")
-    assert text != xml.read_text(encoding="utf-8")
+    text = xml.read_text("utf-8")
+    xml.write_text(text.replace("0.1 ", "0.1000000001 ", 1), "utf-8")
+    assert text != xml.read_text("utf-8")
     assert find_stale([file]) == [file]
-    xml.write_text(text, encoding="utf-8")
-    changed = file.read_text(encoding="utf-8").replace(
+    xml.write_text(text, "utf-8")
+    changed = file.read_text("utf-8").replace(
         "branch = ", 'alpha_2 = "1 rad/s^2"\nbranch = '
     )
-    file.write_text(changed, encoding="utf-8")
+    file.write_text(changed, "utf-8")
     assert find_stale([file]) == [file]
     with pytest.raises(InputError):
         load(tmp_path / "none.toml")

@@ -4,9 +4,7 @@ from fourbar_validation.advise.worst_errors import ERROR_NAMES, WorstErrors
 from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
 
 
-def point(
-    steps: float, worst: float, curve: str = "c", kind: str = STEPPED_MOTION
-) -> CostPoint:
+def point(steps, worst, curve="c", kind=STEPPED_MOTION):
     """Return a point with one error of all quantities and a microsecond a step."""
     errors = WorstErrors(*[worst] * len(ERROR_NAMES))
     return CostPoint(

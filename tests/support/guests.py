@@ -16,7 +16,7 @@ from fourbar_validation import engine
 from fourbar_validation.engines import guests, programs
 from tests.support.processes import ROOT
 
-PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "protocol.md").read_text("utf-8")
 (PLAIN,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 """The page's engine in plain Python."""
 
@@ -27,7 +27,7 @@ def write_program(folder, name, *replacements):
         assert old in text
         text = text.replace(old, new)
     file = folder / f"{name.replace(' ', '_')}.py"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text, "utf-8")
     return shlex.join([sys.executable, "-I", "-S", str(file)])
 
 

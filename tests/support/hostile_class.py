@@ -5,7 +5,6 @@ Free bodies under other names, and what the hostile ones do besides.
 
 import os
 import sys
-from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,15 +15,15 @@ from fourbar_validation.engines.free_body import FreeBody
 class Right:
     name = "right"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         return FreeBody().answer(scene, command)
 
 
 class Angle(Right):
     name = "angle"
-    quantities: ClassVar[tuple[str, ...]] = ("theta_3",)
+    quantities = ("theta_3",)
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         answer = super().answer(scene, command)
         return Answer(
             self.name,
@@ -40,10 +39,10 @@ class Releases(Right):
 
     name = "releases"
 
-    def __init__(self, step: float = 1e-3) -> None:
+    def __init__(self, step=1e-3):
         self.step = step
 
-    def release(self, scene: Any, times: Any) -> Any:
+    def release(self, scene, times):
         from fourbar_validation.engines.mujoco.forward import MujocoForward
 
         return MujocoForward(self.step).release(scene, times)
@@ -56,7 +55,7 @@ class OfAnyBar(Right):
     commands = ("theta_4", "stroke")
     effects = ("gravity", "loads", "cylinder")
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         assert not command.moves_stroke or np.isnan(command.angle).all()
         return super().answer(scene, command)
 
@@ -66,13 +65,13 @@ class Changes(Right):
 
     name = "changes"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         from fourbar_validation.compare import compare, rows
         from fourbar_validation.compare.tolerance import EQUIVALENCE
         from fourbar_validation.run import judge
 
         for module in (compare, rows, judge):
-            module.FAILS = module.AGREES = "agrees"  # type: ignore[attr-defined]
+            module.FAILS = module.AGREES = "agrees"
         object.__setattr__(EQUIVALENCE, "factor", 1e30)
         answer = super().answer(scene, command)
         answer.quantities["torque"] = 1.01 * answer.quantities["torque"]
@@ -82,7 +81,7 @@ class Changes(Right):
 class Prints(Right):
     name = "prints"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         print("\x1b]0;owned\x07begin")
         sys.stdout.flush()
         os.system("echo from a shell")
@@ -92,14 +91,14 @@ class Prints(Right):
 class Empty(Right):
     name = "empty"
 
-    def answer(self, scene: Any, command: Any) -> Any:
+    def answer(self, scene, command):
         return None
 
 
 class Leaves(Right):
     name = "leaves"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         sys.exit(0)
 
 
@@ -107,9 +106,9 @@ class Lacks(Right):
     """One quantity NaN, one missing."""
 
     name = "lacks"
-    quantities: ClassVar[tuple[str, ...]] = ("theta_3", "theta_4", "torque")
+    quantities = ("theta_3", "theta_4", "torque")
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         answer = super().answer(scene, command)
         theta = answer.quantities["theta_3"]
         return Answer(
@@ -124,7 +123,7 @@ class Lacks(Right):
 class Shapes(Right):
     name = "shapes"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         answer = super().answer(scene, command)
         answer.quantities["F12"] = answer.quantities["F12"].T
         return answer
@@ -133,7 +132,7 @@ class Shapes(Right):
 class Complex(Right):
     name = "complex"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         answer = super().answer(scene, command)
         answer.quantities["torque"] = answer.quantities["torque"].astype(complex)
         return answer
@@ -142,7 +141,7 @@ class Complex(Right):
 class Elsewhere(Right):
     name = "elsewhere"
 
-    def answer(self, scene: Any, command: Any) -> Answer:
+    def answer(self, scene, command):
         return super().answer(scene, command._replace(speed=0.0))
 
 

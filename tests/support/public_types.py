@@ -8,7 +8,6 @@ import importlib.util
 import json
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import fourbar
@@ -17,7 +16,7 @@ from tests.support.processes import ROOT, run_python
 SKIPPED = "not checked: pyright is not installed: pip install 'pyright[nodejs]'"
 
 
-def list_public() -> set[str]:
+def list_public():
     """List the public names by the modules that define them."""
     public = set()
     for name in fourbar.__all__:
@@ -27,7 +26,7 @@ def list_public() -> set[str]:
     return public
 
 
-def list_unknown() -> Iterator[str]:
+def list_unknown():
     """Yield a line for each public symbol whose type is unknown or only inferred."""
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
     # pyright reads the libraries of the first Python on PATH: that is this one, also
@@ -48,7 +47,7 @@ def list_unknown() -> Iterator[str]:
                 yield f"{name}: {' '.join(found['message'].split())}"
 
 
-def main() -> int:
+def main():
     """Print the symbols whose types are not known."""
     if importlib.util.find_spec("pyright") is None:
         print(f"public types: {SKIPPED}")

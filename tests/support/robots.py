@@ -1,22 +1,13 @@
 """MJCF of robots with loops of known lengths, written from points in a plane."""
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.description import Value
-from fourbar_validation.engines.mujoco.robots.answers import (
-    LoopMeasurement,
-    MeasureOptions,
-)
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import (
-    Examined,
     examine_changed,
     examine_file,
     examine_mended,
@@ -24,7 +15,7 @@ from fourbar_validation.engines.mujoco.robots.examine import (
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.files import read_robot
-from fourbar_validation.robots.judge_loop import LoopJudgement, judge_file, list_answers
+from fourbar_validation.robots.judge_loop import judge_file, list_answers
 
 Point = tuple[float, float]
 TILT = (0.3, -0.2, 0.7, 0.5)
@@ -234,17 +225,12 @@ LIFTED = """
 """A weld that is a pin, springs, friction, and bodies that are held against gravity."""
 
 
-def file_of(text: str) -> RobotFile:
+def file_of(text):
     """Return a text as a file that names no other."""
     return RobotFile(Path("robot.xml"), text)
 
 
-def measure(
-    file: str | RobotFile,
-    scene: Scene | None = None,
-    pose: PoseOptions | None = None,
-    **options: Any,
-) -> LoopMeasurement:
+def measure(file, scene=None, pose=None, **options):
     """Measure the one loop of a file or text, or the one that is chosen."""
     if isinstance(file, str):
         file = file_of(file)
@@ -253,7 +239,7 @@ def measure(
     return loop
 
 
-def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
+def examine_text(scene, text, names):
     """Examine a text as a file that names no other.
 
     None: the file generated from the scene.
@@ -262,44 +248,37 @@ def examine_text(scene: Scene, text: str | None, names: Mapping[str, str]) -> Ex
     return examine_file(scene, file, MeasureOptions(PoseOptions(), names=names))
 
 
-def change(
-    scene: Scene, changes: Sequence[tuple[str, Value | None]]
-) -> list[list[Answer] | None]:
+def change(scene, changes):
     """Return the answers of the generated file, and with each entry changed."""
     return list(map(_answers_or_none, examine_changed(scene, changes)))
 
 
-def mend(
-    scene: Scene,
-    file: RobotFile,
-    names: Mapping[str, str],
-    changes: Sequence[tuple[str, Value | None]],
-) -> list[list[Answer] | None]:
+def mend(scene, file, names, changes):
     """Return the answers of a file with each entry as in the generated one."""
     options = MeasureOptions(PoseOptions(), names=names)
     return list(map(_answers_or_none, examine_mended(scene, file, options, changes)))
 
 
-def _answers_or_none(measured: LoopMeasurement | None) -> list[Answer] | None:
+def _answers_or_none(measured):
     return None if measured is None else list_answers(measured)
 
 
-def judge_path(name: str, scene: Scene, path: Path) -> LoopJudgement:
+def judge_path(name, scene, path):
     """Judge a file as `check-mjcf SCENE FILE` does."""
     return judge_file(name, scene, read_robot(path), MeasureOptions(PoseOptions()))
 
 
-def notes_of(examined: Examined) -> list[str]:
+def notes_of(examined):
     """Return the notes on a file and on what was found in it."""
     return [*examined.notes, *examined.measured.remarks]
 
 
-def answers_of(examined: Examined) -> list[Answer]:
+def answers_of(examined):
     """Return the answers of a file that was examined."""
     return list_answers(examined.measured)
 
 
-def answer_of(examined: Examined, how: str) -> Answer:
+def answer_of(examined, how):
     """Return the answer of one engine to a file; it has one."""
     (answer,) = (one for one in answers_of(examined) if one.engine == how)
     assert answer.refusal is None, answer.refusal
@@ -336,7 +315,7 @@ class Planar:
     more: str = ""
     """Further elements of the file."""
 
-    def body(self, name: str, pin: str, at: Point, inside: str = "") -> str:
+    def body(self, name, pin, at, inside=""):
         """Return a body on a hinge at a pin, its frame there.
 
         The frame of its parent is at `at`.
@@ -350,12 +329,12 @@ class Planar:
             f"{inside}</body>"
         )
 
-    def end(self, name: str, bar_at: Point) -> str:
+    def end(self, name, bar_at):
         """Return a site at the cut pin on a body whose frame is at `bar_at`."""
         x, y = np.subtract(self.pins[self.cut], bar_at).tolist()
         return f'<site name="{name}" pos="{x!r} {y!r} 0"/>'
 
-    def hang(self, bars: list[tuple[str, str]], site: str) -> tuple[str, Point, str]:
+    def hang(self, bars, site):
         """Return the last of the bodies that hang on each other, each by its pin, its
         place, and all of them as text with a site at the cut pin on the last.
         """
@@ -367,7 +346,7 @@ class Planar:
             text = self.body(name, pin, before, text)
         return ("ground", *(name for _, name in bars))[-1], places[-1], text
 
-    def text(self) -> str:
+    def text(self):
         """Write the MJCF."""
         p = self.pins
         if self.by == "weld":
@@ -397,7 +376,7 @@ class Planar:
         )
         return self._wrap(bodies, closed)
 
-    def _wrap(self, bodies: str, closed: str) -> str:
+    def _wrap(self, bodies, closed):
         quat = " ".join(map(repr, TILT))
         motor = f'<actuator><motor name="motor" joint="{self.drive}"/></actuator>'
         return (
@@ -409,14 +388,14 @@ class Planar:
             "</mujoco>"
         )
 
-    def lengths(self) -> tuple[float, ...]:
+    def lengths(self):
         """Return the lengths of ground, input, coupler and output, m."""
         p = self.pins
         pairs = (("O2", "O4"), ("O2", "A"), ("A", "B"), ("O4", "B"))
         return tuple(math.dist(p[one], p[other]) for one, other in pairs)
 
 
-def rotation(quaternion: Sequence[float]) -> np.ndarray:
+def rotation(quaternion):
     """Return the matrix of a quaternion (w, x, y, z), which is normalized first."""
     w, x, y, z = np.asarray(quaternion, float) / np.linalg.norm(quaternion)
     return np.array(
@@ -460,7 +439,7 @@ PARALLELOGRAM = """
 """Bars of uniform rods; the rest pose is the rectangle."""
 
 
-def make_parallelogram(ground: float, crank: float, gravity: str) -> RobotFile:
+def make_parallelogram(ground, crank, gravity):
     text = PARALLELOGRAM.format(ground=ground, crank=crank, gravity=gravity)
     return RobotFile(Path("parallelogram.xml"), text)
 
@@ -494,7 +473,7 @@ FOOT_PARALLELOGRAM = """
 """
 
 
-def draw_knee(drawn: float) -> str:
+def draw_knee(drawn):
     """Write a parallelogram of 250 and 30 mm, drawn with all bars in line.
 
     `drawn`: 0 or 180 deg, the angle of the crank from the ground.

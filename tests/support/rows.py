@@ -1,7 +1,7 @@
 """Tables of cases as text: a line is a case, and " | " stands between its columns."""
 
 
-def read_rows(table: str) -> list[tuple[str, ...]]:
+def read_rows(table):
     """Return the cells of each line, without the spaces around them.
 
     Empty lines, and those that begin with #, are none.

@@ -74,7 +74,7 @@ def balance(left, omega_2=0.01):
     return Scene(linkage, motion, effects=(Gravity(),))
 
 
-def balanced_lamp(omega_2: float | None = None) -> Scene:
+def balanced_lamp(omega_2=None):
     """Make a lamp that a spring of no free length balances: k = m g l/(r h)."""
     arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
     linkage = FourBar(0.06, *arms, 0.5 * math.pi)

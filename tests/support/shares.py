@@ -1,12 +1,9 @@
 """Shares of a table of cases that the quick tests take."""
 
-from collections.abc import Container, Iterable
-from typing import Any
-
 import pytest
 
 
-def slow_but(quick: Container[Any], cases: Iterable[Any]) -> list[Any]:
+def slow_but(quick, cases):
     """Return the cases of a test, of which all but the quick ones are slow.
 
     A case of several arguments is a tuple.

@@ -45,7 +45,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 @pytest.mark.slow
 def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     names = sorted(dir(fourbar))
-    page = (DOCS / "api.md").read_text(encoding="utf-8")
+    page = (DOCS / "api.md").read_text("utf-8")
     table = page.partition("## Names by task")[2].partition("\n\n|")[2]
     rows = table.partition("\n\n")[0].splitlines()[2:]
     assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == names

@@ -23,8 +23,8 @@ from fourbar_validation.report.svg import write_alone
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGE = (DOCS / "cost.md").read_text(encoding="utf-8")
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "cost.md").read_text("utf-8")
+README = (ROOT / "README.md").read_text("utf-8")
 SCENE = load(ROOT / "models" / "crank_rocker.toml")
 PRINTED = 0.06
 """Two printed digits, of the error and of the settings, hold an error to this part."""
@@ -103,7 +103,7 @@ def read_words(svg):
 def test_the_other_pictures_are_those_that_are_drawn(name):
     with apply_style():
         drawn = write_alone(DRAWS[f"draw_{name.replace('-', '_')}"](), name)
-    kept = (DOCS / "cost" / f"{name}.svg").read_text(encoding="utf-8")
+    kept = (DOCS / "cost" / f"{name}.svg").read_text("utf-8")
     assert read_words(drawn) == read_words(kept)
 
 

@@ -49,7 +49,7 @@ FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 
 def read(name):
     """Return the text of a file, by its path or its name in the checkout."""
-    return (ROOT / name).read_text(encoding="utf-8")
+    return (ROOT / name).read_text("utf-8")
 
 
 def table_after(name, heading):
@@ -145,7 +145,7 @@ def test_the_table_of_the_exercise_is_right(checkout, capsys):
     (table,) = blocks("csv", read("docs/tutorial.md"))
     wrong = table.replace("0.4467", "0.4476")
     for text, code, words in ((table, HOLDS, "4 of 4"), (wrong, FAILED, "3 of 4")):
-        (checkout / "theirs.csv").write_text(text, encoding="utf-8")
+        (checkout / "theirs.csv").write_text(text, "utf-8")
         assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == code
         assert f"{words} numbers agree" in capsys.readouterr().out
 
@@ -153,7 +153,7 @@ def test_the_table_of_the_exercise_is_right(checkout, capsys):
 @pytest.mark.slow
 def test_the_engine_of_the_guide_agrees(checkout, monkeypatch, capsys):
     (program,) = blocks("python", read("docs/guide-simulator.md"))
-    (checkout / "closure.py").write_text(program, encoding="utf-8")
+    (checkout / "closure.py").write_text(program, "utf-8")
     monkeypatch.syspath_prepend(str(checkout))
     judge_here(monkeypatch)
     # the second of them begins at a limit

@@ -31,8 +31,8 @@ from tests.validation.engines.test_applied_effects import (
 
 FOLDERS = ("", "fourbar", "validation", "validation/fourbar_validation")
 THE_READER_MAKES = {"fourbar/effects/latch.py", "tests/fourbar/effects/test_latch.py"}
-PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
-REFERENCE = (ROOT / "docs" / "scene-file.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "extending.md").read_text("utf-8")
+REFERENCE = (ROOT / "docs" / "scene-file.md").read_text("utf-8")
 PAGE, QUANTITY = PAGE.split("\n## A quantity\n")
 SCENE = """
 [lengths]
@@ -57,7 +57,7 @@ def block(language, page=PAGE, number=0):
 @pytest.fixture
 def latch(monkeypatch, tmp_path):
     """The effect of the page, from its one file in the folder of effects."""
-    (tmp_path / "latch.py").write_text(block("python"), encoding="utf-8")
+    (tmp_path / "latch.py").write_text(block("python"), "utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
     forget = effects.list_classes.cache_clear
     forget()
@@ -168,7 +168,7 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on():
 
 @pytest.mark.parametrize("page", ["architecture", "extending"])
 def test_each_file_and_each_name_in_one_is_where_the_page_says(page):
-    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     stated = re.findall(r"`(\w+(?:/[\w.-]+)*/[\w-]+\.\w+)`", text)
     placed = re.findall(
         r"`([\w.]+)(?:\([\w, ]*\))?`(?: \w+)? (?:in|of|\() ?`([\w/]+\.\w+)`", text
@@ -178,7 +178,7 @@ def test_each_file_and_each_name_in_one_is_where_the_page_says(page):
         assert find_files(file), file
     for name, file in placed:
         word = re.compile(rf"\b{name.rpartition('.')[2]}\b")
-        texts = [path.read_text(encoding="utf-8") for path in find_files(file)]
+        texts = [path.read_text("utf-8") for path in find_files(file)]
         assert any(map(word.search, texts)), (name, file)
 
 
@@ -216,15 +216,15 @@ def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(tmp_path):
     for number, (file, beside) in enumerate(ADDED.items()):
         assert f"`{file}`" in QUANTITY
         path = tmp_path / file
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text("utf-8").splitlines()
         (index,) = (i for i, line in enumerate(lines) if line.startswith(beside))
         stated = block("python", QUANTITY, number)
         indent = " " * (len(beside) - len(beside.lstrip()))
         lines.insert(index + ("|=" in beside), textwrap.indent(stated, indent))
-        path.write_text("\n".join(lines), encoding="utf-8")
+        path.write_text("\n".join(lines), "utf-8")
     loop = tmp_path / "fourbar_validation" / "engines" / "loop.py"
-    text = loop.read_text(encoding="utf-8")
-    loop.write_text(text.replace('"v_A",', '"slip_B", "v_A",'), encoding="utf-8")
+    text = loop.read_text("utf-8")
+    loop.write_text(text.replace('"v_A",', '"slip_B", "v_A",'), "utf-8")
     code = f"SCENE = {SCENE!r}\n{JUDGED}"
     judged = run_python("-c", code, folder=tmp_path, PYTHONPATH=str(tmp_path))
     assert judged.returncode == 0, judged.stderr

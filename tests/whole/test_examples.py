@@ -24,7 +24,7 @@ def find_modules():
     for package in PACKAGES:
         folder = ROOT / package
         for path in sorted(folder.rglob("*.py")):
-            if ">>> " in path.read_text(encoding="utf-8"):
+            if ">>> " in path.read_text("utf-8"):
                 module = path.relative_to(folder.parent).with_suffix("")
                 names.append(".".join(module.parts).removesuffix(".__init__"))
     return names

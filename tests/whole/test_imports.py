@@ -71,7 +71,7 @@ in at a glance.
 
 @cache
 def parse(path):
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return ast.parse(path.read_text("utf-8"))
 
 
 @cache
@@ -213,7 +213,7 @@ def test_no_class_name_stands_for_two_things():
 
 @pytest.mark.slow
 def test_the_picture_of_the_layers_is_what_the_imports_make():
-    picture = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
+    picture = (ROOT / "docs" / "architecture.svg").read_text("utf-8")
     assert (
         picture == runpy.run_path(str(ROOT / "docs" / "architecture.py"))["text"]()
     ), "python docs/architecture.py"
@@ -233,6 +233,4 @@ def test_nothing_that_is_shipped_knows_the_lab():
         for path in PACKAGES[package].rglob("*.py")
     ]
     assert len(shipped) > 200
-    assert not [
-        path for path in shipped if "fourbar_lab" in path.read_text(encoding="utf-8")
-    ]
+    assert not [path for path in shipped if "fourbar_lab" in path.read_text("utf-8")]

@@ -90,7 +90,7 @@ def test_a_killed_workbench_leaves_a_whole_scene_file(tmp_path):
     path.write_bytes((MODELS / "crank_rocker.toml").read_bytes())
     session = Session(path, tmp_path / "exports")
     session.do({"do": "set", "path": ["lengths", "input"], "value": "101 mm"})
-    texts = {path.read_text(encoding="utf-8"), session.now.text}
+    texts = {path.read_text("utf-8"), session.now.text}
     for _ in die_at_each_name(lambda: session.do({"do": "save", "over": True})):
-        assert path.read_text(encoding="utf-8") in texts
+        assert path.read_text("utf-8") in texts
         assert fourbar.load(path).linkage.input.length in (0.1, 0.101)

@@ -25,7 +25,7 @@ BUT = {*(TESTS / "whole").glob("*.py"), *TESTS.rglob("test_bench*.py")}
 NUMERICAL = [
     file
     for file in sorted({*TESTS.rglob("test_*.py")} - BUT)
-    if "numpy" in file.read_text(encoding="utf-8")
+    if "numpy" in file.read_text("utf-8")
 ]
 
 

@@ -62,7 +62,7 @@ def run_shell(script, folder, options=(), **variables):
 
 def collect_as_shown(folder):
     """Run the command that the page shows for collecting."""
-    page = (ROOT / "docs" / "many-machines.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "many-machines.md").read_text("utf-8")
     line = "fourbar-validation collect parts/* --out results"
     assert line in page
     run_shell(line, folder)
@@ -71,7 +71,7 @@ def collect_as_shown(folder):
 
 def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     """One task is killed in the middle, and submitted again."""
-    script = (CI / "slurm.sh").read_text(encoding="utf-8")
+    script = (CI / "slurm.sh").read_text("utf-8")
     for task in (1, 2):
         of_slurm = {
             "SLURM_ARRAY_TASK_ID": str(task),

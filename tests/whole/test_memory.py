@@ -39,10 +39,10 @@ memory of the process that started it in it.
 @pytest.mark.linux
 def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
     scene = tmp_path / "million.toml"
-    text = (MODELS / "crank_rocker.toml").read_text(encoding="utf-8")
+    text = (MODELS / "crank_rocker.toml").read_text("utf-8")
     longer, steps = re.subn(r"steps = \d+", "steps = 999998", text)
     assert steps == 1
-    scene.write_text(longer, encoding="utf-8")
+    scene.write_text(longer, "utf-8")
     done = run_python("-c", ANALYZE_AND_LOOK, "analyze", scene)
     status, peak, seconds = done.stderr.split()
     assert int(status) == HOLDS

@@ -82,7 +82,7 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere():
         module = f"validation/{package.replace('.', '/')}/__init__.py"
         assert (ROOT / module).is_file() and f"include {module}\n" in (
             ROOT / "MANIFEST.in"
-        ).read_text(encoding="utf-8")
+        ).read_text("utf-8")
 
 
 @pytest.mark.parametrize("line", ["write", "problems"])

@@ -71,7 +71,7 @@ def list_patterns():
     """List the literal patterns of the three packages, each with its place."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
-            for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for call in ast.walk(ast.parse(path.read_text("utf-8"))):
                 if not isinstance(call, ast.Call) or not call.args:
                     continue
                 called = call.func

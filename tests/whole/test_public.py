@@ -86,7 +86,7 @@ def public():
 
 
 def test_nothing_public_changes_unnoticed():
-    kept, current = KEPT.read_text(encoding="utf-8").splitlines(), public().splitlines()
+    kept, current = KEPT.read_text("utf-8").splitlines(), public().splitlines()
     gone, new = (
         "\n".join(line for line in one if line not in other)
         for one, other in ((kept, current), (current, kept))

@@ -54,7 +54,7 @@ def test_a_page_does_and_prints_what_it_says(
     commands = 0
     for language, text in BLOCK.findall((ROOT / f"{page}.md").read_text("utf-8")):
         if language == "toml":
-            (tmp_path / text.split()[1]).write_text(text, encoding="utf-8")
+            (tmp_path / text.split()[1]).write_text(text, "utf-8")
         elif language == "python" and page in PROGRAMS:
             out = io.StringIO()
             with contextlib.redirect_stdout(out):

@@ -34,7 +34,7 @@ def test_each_finding_holds_or_says_since_when_not(finding, monkeypatch):
 
 def test_each_finding_is_a_report_and_stands_in_the_list():
     assert FINDINGS is not None and len(ALL) >= 8
-    listed = (FINDINGS.parent / "findings.md").read_text(encoding="utf-8")
+    listed = (FINDINGS.parent / "findings.md").read_text("utf-8")
     for finding in ALL:
         assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
         entry = (

@@ -106,12 +106,12 @@ def test_the_files_are_those_of_today(name):
 @pytest.mark.parametrize("name", slow_but(set(NAMES) - {"iftomm_a02"}, NAMES))
 def test_a_problem_is_what_the_schema_says(name):
     jsonschema = pytest.importorskip("jsonschema")
-    text = (ROOT / "docs" / "protocol.schema.json").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "protocol.schema.json").read_text("utf-8")
     definitions = json.loads(text)["$defs"]
     check = jsonschema.Draft202012Validator(
         {"$ref": "#/$defs/problem", "$defs": definitions}
     )
-    problem = json.loads((PROBLEMS / f"{name}.json").read_text(encoding="utf-8"))
+    problem = json.loads((PROBLEMS / f"{name}.json").read_text("utf-8"))
     check.validate(problem)
     for wrong in ("given", "scene"):
         assert not check.is_valid({**problem, wrong: {}})
@@ -289,7 +289,7 @@ def solve_pin_forces(problem, theta, omega):
 
 
 def test_the_page_s_example_reads_an_answer_without_this_project():
-    page = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/benchmark.md").read_text("utf-8")
     code = page.partition("```python")[2].partition("```")[0]
     assert "fourbar" not in code.replace("fourbar-problem/4", "")
     names = {}
@@ -304,17 +304,17 @@ def test_the_page_s_example_reads_an_answer_without_this_project():
 def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem():
     written = runpy.run_path(str(ROOT / "docs/benchmark.py"))
     for name, words in {"benchmark.md": 2800, "findings.md": 1750}.items():
-        page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        page = (ROOT / "docs" / name).read_text("utf-8")
         assert page == written["text"](name), "python docs/benchmark.py"
         assert len(page.split()) <= words
-    page = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/benchmark.md").read_text("utf-8")
     assert sorted(written["BLOCK"].findall(page)) == sorted([*NAMES, "matrix"])
     assert {file.stem for file in (ROOT / "docs/benchmark").glob("*.svg")} == set(NAMES)
 
 
 def test_the_proposed_problem_rests_and_swings_as_its_page_says():
     mp = pytest.importorskip("mpmath").mp
-    text = (ROOT / "docs/benchmark.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/benchmark.md").read_text("utf-8")
     page = text.partition("## Proposed")[2]
     scene = fourbar.load(PROBLEMS.parent / "proposed" / "diagonal_spring.toml")
     rows = fourbar.equilibrium(scene).found

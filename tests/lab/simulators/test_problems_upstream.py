@@ -20,7 +20,7 @@ DIGITS = 1e-8
 
 
 def read_problem_file(name):
-    return json.loads((PROBLEMS / f"{name}.json").read_text(encoding="utf-8"))
+    return json.loads((PROBLEMS / f"{name}.json").read_text("utf-8"))
 
 
 def run_statements(path, *kinds):
