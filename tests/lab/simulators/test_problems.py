@@ -12,6 +12,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
+from mpmath import mp
+from scipy import integrate, special
 
 import fourbar
 from fourbar.quantities import PIN_FORCES
@@ -28,10 +31,12 @@ from fourbar_validation.check.problem import (
 from fourbar_validation.cli import status
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
+from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
 from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
+PAGE = (ROOT / "docs/benchmark.md").read_text("utf-8")
 NAMES = list_problems()
 APART = 2.0
 """Error bars between the answers of two CPUs."""
@@ -40,10 +45,8 @@ LONG = () if os.environ.get("PROBLEMS") == "all" else ("iftomm_a02",)
 LEVELS_TOLD = "levels: motion A, torque A, reactions A"
 RELEASED = ("gz_physics_987", "iftomm_a02")
 SLIDING = ("slider_crank", "slider_crank_offset")
-PRESCRIBED = [name for name in NAMES if name not in (*RELEASED, *SLIDING)]
-IN_MANY_DIGITS = [
-    name for name in PRESCRIBED if name not in ("cylinder", "pin_friction")
-]
+BY_FREE_BODIES = ("cylinder", "pin_friction")
+IN_MANY_DIGITS = {*NAMES} - {*RELEASED, *SLIDING, *BY_FREE_BODIES}
 
 
 @cache
@@ -105,12 +108,9 @@ def test_the_files_are_those_of_today(name):
 
 @pytest.mark.parametrize("name", slow_but(set(NAMES) - {"iftomm_a02"}, NAMES))
 def test_a_problem_is_what_the_schema_says(name):
-    jsonschema = pytest.importorskip("jsonschema")
-    text = (ROOT / "docs" / "protocol.schema.json").read_text("utf-8")
-    definitions = json.loads(text)["$defs"]
-    check = jsonschema.Draft202012Validator(
-        {"$ref": "#/$defs/problem", "$defs": definitions}
-    )
+    schema = json.loads((ROOT / "docs/protocol.schema.json").read_text("utf-8"))
+    definitions = {"$ref": "#/$defs/problem", "$defs": schema["$defs"]}
+    check = Draft202012Validator(definitions)
     problem = json.loads((PROBLEMS / f"{name}.json").read_text("utf-8"))
     check.validate(problem)
     for wrong in ("given", "scene"):
@@ -124,22 +124,20 @@ def read_question(name):
     return protocol.command_from_json(scene, problem["command"])
 
 
-@pytest.mark.parametrize("name", ["cylinder", "pin_friction"])
+@pytest.mark.parametrize("name", BY_FREE_BODIES)
 def test_the_free_bodies_answer_the_same(name):
     answers = FreeBody().answer(*read_question(name)).quantities
     least = float(np.abs(answers["sin_mu"]).min())
     assert_agreement(name, answers, K * EPS / least**2)
 
 
-@pytest.mark.parametrize("name", IN_MANY_DIGITS)
+@pytest.mark.parametrize("name", sorted(IN_MANY_DIGITS))
 def test_ninety_digits_answer_the_same(name):
-    exact = pytest.importorskip("fourbar_validation.engines.exact")
-    pytest.importorskip("flint")
-    answer = exact.BallArithmetic().answer(*read_question(name))
+    answer = BallArithmetic().answer(*read_question(name))
     assert_agreement(name, answer.quantities)
 
 
-def slide(mp, scene, place, omega, alpha):
+def slide(scene, place, omega, alpha):
     """Answer a slider-crank by virtual work.
 
     The motion as functions of time, which are differentiated in many digits. Each
@@ -196,18 +194,14 @@ def slide(mp, scene, place, omega, alpha):
 
 @pytest.mark.parametrize("name", SLIDING)
 def test_virtual_work_answers_the_slider_cranks_the_same(name):
-    mp = pytest.importorskip("mpmath").mp
     problem = read_stored(name)
     command = problem["command"]
     with mp.workdps(60):
         rates = mp.mpf(command["omega_2"]), mp.mpf(command["alpha_2"])
-        rows = [
-            slide(mp, problem["scene"], mp.mpf(place), *rates)
-            for place in command["theta_2"]
-        ]
+        places = map(mp.mpf, command["theta_2"])
+        rows = [slide(problem["scene"], place, *rates) for place in places]
     assert rows[0].keys() == problem["answers"].keys()
-    columns = {quantity: [row[quantity] for row in rows] for quantity in rows[0]}
-    assert_agreement(name, columns)
+    assert_agreement(name, {key: [row[key] for row in rows] for key in rows[0]})
 
 
 def pendulum(problem):
@@ -228,7 +222,6 @@ def pendulum(problem):
 
 
 def test_gazebos_four_bar_swings_as_a_pendulum():
-    special = pytest.importorskip("scipy.special")
     problem = read_stored("gz_physics_987")
     answers, errors = problem["answers"], problem["errors"]
     rate = math.sqrt(pendulum(problem)[0])
@@ -247,7 +240,6 @@ def test_gazebos_four_bar_swings_as_a_pendulum():
 
 
 def test_a02_passes_every_angle_when_energy_says():
-    integrate = pytest.importorskip("scipy.integrate")
     problem = read_stored("iftomm_a02")
     answers, errors = problem["answers"], problem["errors"]
     k, energy = pendulum(problem)
@@ -273,14 +265,12 @@ def solve_pin_forces(problem, theta, omega):
 
     Bars 2 and 4 are parallel, and no torque is needed at their own acceleration.
     """
-    exact = pytest.importorskip("fourbar_validation.engines.exact")
-    pytest.importorskip("flint")
     scene = protocol.scene_from_json(problem["scene"])
     branch = np.sign(np.sin(theta)).astype(np.int8)
     growth = -pendulum(problem)[0] * np.cos(theta)
-    motion = Command(np.asarray(theta), branch, np.asarray(omega), growth)
+    motion = Command(theta, branch, omega, growth)
     released = replace(scene, motion=fourbar.Motion(0.0, 0.0))
-    answers = exact.BallArithmetic().answer(released, motion).quantities
+    answers = BallArithmetic().answer(released, motion).quantities
     forces = {name: answers[name] for name in PIN_FORCES}
     largest = max(np.abs(force).max() for force in forces.values())
     length = problem["scene"]["lengths"]["input"]
@@ -289,8 +279,7 @@ def solve_pin_forces(problem, theta, omega):
 
 
 def test_the_page_s_example_reads_an_answer_without_this_project():
-    page = (ROOT / "docs/benchmark.md").read_text("utf-8")
-    code = page.partition("```python")[2].partition("```")[0]
+    code = PAGE.partition("```python")[2].partition("```")[0]
     assert "fourbar" not in code.replace("fourbar-problem/4", "")
     names = {}
     exec(code, names)
@@ -307,20 +296,15 @@ def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem():
         page = (ROOT / "docs" / name).read_text("utf-8")
         assert page == written["text"](name), "python docs/benchmark.py"
         assert len(page.split()) <= words
-    page = (ROOT / "docs/benchmark.md").read_text("utf-8")
-    assert sorted(written["BLOCK"].findall(page)) == sorted([*NAMES, "matrix"])
+    assert sorted(written["BLOCK"].findall(PAGE)) == sorted([*NAMES, "matrix"])
     assert {file.stem for file in (ROOT / "docs/benchmark").glob("*.svg")} == set(NAMES)
 
 
 def test_the_proposed_problem_rests_and_swings_as_its_page_says():
-    mp = pytest.importorskip("mpmath").mp
-    text = (ROOT / "docs/benchmark.md").read_text("utf-8")
-    page = text.partition("## Proposed")[2]
+    page = PAGE.partition("## Proposed")[2]
     scene = fourbar.load(PROBLEMS.parent / "proposed" / "diagonal_spring.toml")
-    rows = fourbar.equilibrium(scene).found
-    (rest,) = (
-        row for row in rows if row.stability == "stable" and row.place.theta_2 < 3.0
-    )
+    stable = (x for x in fourbar.equilibrium(scene).found if x.stability == "stable")
+    (rest,) = (row for row in stable if row.place.theta_2 < 3.0)
 
     def energy(x):
         stretch = 2 * mp.cos(x / 2) - mp.sqrt(2)
