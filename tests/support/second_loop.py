@@ -53,10 +53,8 @@ class Loop:
         self.inertias = self.bodies.inertia.tolist()
         self.centres = self.bodies.centre.tolist()
         """Mass centres from the bars' first pins, along the bars."""
-        self.gravity = 0j
-        for effect in scene.effects:
-            assert isinstance(effect, fourbar.Gravity), "the second loop knows no other"
-            self.gravity = polar((effect.magnitude, effect.angle))
+        (weight,) = scene.effects
+        self.gravity = polar((weight.magnitude, weight.angle))
         self.loads = scene.loads
         self.drive = scene.drive or scene.drive_bar
         self.branch = scene.motion.branch
@@ -67,12 +65,6 @@ class Loop:
         right = [0.0] * 8 + [omega_2]
         return self.bodies.theta, np.linalg.solve(self.bodies.jacobian(), right)[6:]
 
-    def load_place(self, load, number):
-        """Return where a load acts on its bar, from the first pin; a couple, at G."""
-        if load.from_pin is not None:
-            return polar(load.from_pin)
-        return self.centres[number] + polar(load.from_centre or (0.0, 0.0))
-
     def drive_direction(self, angles):
         """Return the forces on bars 2, 3 and 4, and their couples about the first pin
         of the bar, of a drive of size one.
@@ -81,25 +73,18 @@ class Loop:
         if isinstance(self.drive, int):
             couples[self.drive - 2] = 1.0
             return forces, couples
+        A, O4 = polar((self.a, angles[0])), polar((self.d, self.theta_1))
         ends = []
         for end in (self.drive.start, self.drive.end):
-            arm = polar((end.distance, end.angle))
-            if end.bar == 1:
-                ends.append((1, 0j, arm * np.exp(1j * self.theta_1)))
-                continue
-            arm = arm * np.exp(1j * angles[end.bar - 2])
-            ends.append((end.bar, arm, self.first_pins(angles)[end.bar - 2] + arm))
+            number = end.bar - 2
+            arm = polar((end.distance, end.angle + angles[number]))
+            ends.append((number, arm, (0j, A, O4)[number] + arm))
         line = ends[1][2] - ends[0][2]
         line /= abs(line)
-        for (bar, arm, _), push in zip(ends, (-line, line), strict=True):
-            if bar > 1:
-                forces[bar - 2] += push
-                couples[bar - 2] += _cross(arm, push)
+        for (number, arm, _), push in zip(ends, (-line, line), strict=True):
+            forces[number] += push
+            couples[number] += _cross(arm, push)
         return forces, couples
-
-    def first_pins(self, angles):
-        """Return O2, A and O4."""
-        return [0j, self.a * np.exp(1j * angles[0]), self.d * np.exp(1j * self.theta_1)]
 
     def write(self, settings, timestep, wheel):
         """Write the MJCF.
@@ -144,7 +129,7 @@ class Loop:
         for index, load in enumerate(self.loads):
             number = load.bar - 2
             push = polar(load.force or (0.0, 0.0))
-            place = self.load_place(load, number)
+            place = self.centres[number] + polar(load.from_centre or (0.0, 0.0))
             frame = "" if load.frame == "bar" else 'refsite="world"'
             couple = float(load.moment)
             if load.arm is not None:
