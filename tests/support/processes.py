@@ -6,6 +6,9 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+LOAD = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+BUSY = max(1.0, LOAD / (os.cpu_count() or 1))
+"""Factor of time on cores that others use too."""
 
 
 def run_python(*words, folder=ROOT, **variables):

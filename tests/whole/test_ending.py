@@ -17,23 +17,18 @@ import pytest
 
 from fourbar.errors import INTERRUPTED
 from tests.support.guests import list_processes
+from tests.support.processes import BUSY, ROOT, run_python
 
-ROOT = Path(__file__).parents[2]
-LOAD = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-BUSY = max(1.0, LOAD / (os.cpu_count() or 1))
-"""Factor of time on cores that others use too."""
 PATIENCE = 8.0 * BUSY
 """Seconds after which nothing may be left, as SECURITY.md promises."""
 ENDLESS_MJCF = """<mujoco><worldbody><replicate count="20000" offset="0.1 0 0">
 <body><joint/><geom size="0.1"/></body></replicate></worldbody></mujoco>"""
 """Bodies that MuJoCo compiles for minutes, in little memory."""
-HELLO = json.dumps(
-    {"id": 1, "engine": "busy", "answers": ["theta_3"], "effects": ["gravity", "loads"]}
-)
+HELLO = {"id": 1, "engine": "busy", "answers": ["theta_3"], "effects": ["loads"]}
 BUSY_GUEST = f"""
 import os, sys
 sys.stdin.readline()
-print({HELLO!r}, flush=True)
+print({json.dumps(HELLO)!r}, flush=True)
 sys.stdin.readline()
 while True:
     pass
@@ -60,8 +55,9 @@ def start(what, folder, mark):
         guest.write_text(BUSY_GUEST)
         scene = str(ROOT / "models" / "crank_rocker.toml")
         program = f"{sys.executable} -I -S {guest}"
-        line = [*harness, "run", scene, "--guest", program, "--engines", "free-body"]
-        line += ["--no-pictures", "--workers", "1", "--out", str(folder / "out")]
+        options = "--engines free-body --no-pictures --workers 1"
+        line = [*harness, "run", scene, *options.split(), "--guest", program]
+        line += ["--out", str(folder / "out")]
     return subprocess.Popen(
         line,
         cwd=ROOT,
@@ -139,7 +135,4 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
 def test_a_process_bounds_itself(program, status):
     name = program.partition("(")[0]
     line = f"import sys; from fourbar_validation.engines.programs import {name}\n"
-    ended = subprocess.run(
-        [sys.executable, "-c", line + program], timeout=60, check=False
-    )
-    assert ended.returncode == status
+    assert run_python("-c", line + program).returncode == status
