@@ -21,57 +21,55 @@ stability`.
 FED_BACK = 8
 """Per family and bar."""
 ONCE_BAD = {
-    # seed, number, and what once was beyond its bound there
-    "random": [
-        (0, 131),  # bar of the torque
-        # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
-        (0, 986),
-        # sin mu: Heron's factor of a short coupler and output by the longer route
-        (3, 78),
-        (3, 1063),  # bars: rounding of theta_2 - theta_1 near a whole turn
+    # family, seed: numbers, and what once was beyond its bound there
+    ("random", 0): [
+        131,  # bar of the torque
+        986,  # F43, F14: the moment of -m a_A about O2 as a difference of large numbers
     ],
-    "scales": [
-        (0, 347),  # bars, likewise
-        (0, 952),
-        (0, 1091),
+    ("random", 3): [
+        78,  # sin mu: Heron's factor of a short coupler and output by the longer route
+        1063,  # bars: rounding of theta_2 - theta_1 near a whole turn
+    ],
+    ("scales", 0): [
+        *(347, 952, 1091),  # bars, likewise
         # F32, driven on bar 4: the moment about B of a coupler whose mass centre lies
         # there
-        (0, 5133),
+        5133,
     ],
-    "speeds": [(0, 246), (0, 784)],  # bars, likewise
-    "ratios": [
+    ("speeds", 0): [246, 784],  # bars, likewise
+    ("ratios", 0): [
         # torque: products of constants rounded to doubles in the pass with 32 digits
-        (0, 36),
-        (0, 828),  # drive condition: length of the unit vector of a short bar
+        36,
+        828,  # drive condition: length of the unit vector of a short bar
     ],
-    "drives": [
+    ("drives", 0): [
         # F12_y: the drive of bars 2 and 4 has no part in it, and the contract takes the
         # vector
-        (0, 31),
+        31,
         # power beside a pole: a stroke's speed and the force had other roundings of
         # ds/dq
-        (0, 857),
+        857,
         # condition, of bars that meet: from speeds of the ends in place of the turn at
         # their pin
-        (0, 2997),
-        (0, 4506),  # bar: the arm about pin B as a difference
+        2997,
+        4506,  # bar: the arm about pin B as a difference
     ],
     # 3.9 without the load's factor, which two numbers of a table leave of each other
-    "tables": [(0, 8523)],
+    ("tables", 0): [8523],
     # F12_y of 1.8 mN: the spring between input and coupler pulls with 5.4 N, and was in
     # the sums of a third pin
-    "springs": [(0, 2515)],
-    "strokes": [(0, 42)],  # its own speed, as computed from the angle's
-    "change_point": [
-        (0, 12),  # dry friction taken for at rest, at margins of 60 digits
-        (0, 58),  # likewise, in 32 digits
-        (0, 656),  # likewise, where bars stay parallel
-        (0, 164),  # bar of the forces: directions of bars that stay parallel
-        (0, 580),  # bars: products of constants
-        (0, 464),  # v_B: the small sine of theta_4 as a difference of large angles
+    ("springs", 0): [2515],
+    ("strokes", 0): [42],  # its own speed, as computed from the angle's
+    ("change_point", 0): [
+        12,  # dry friction taken for at rest, at margins of 60 digits
+        58,  # likewise, in 32 digits
+        656,  # likewise, where bars stay parallel
+        164,  # bar of the forces: directions of bars that stay parallel
+        580,  # bars: products of constants
+        464,  # v_B: the small sine of theta_4 as a difference of large angles
         # bar of the forces: half a last digit lost in theta_2 - theta_1, added to it,
         # was rounded away
-        (0, 6915),
+        6915,
     ],
 }
 ONCE_TOO_WIDE = [126, 1497, 2410, 6894, 7017]
@@ -153,7 +151,7 @@ def test_a_share_is_one_that_chance_explains():
 
 @pytest.mark.parametrize(
     ("family", "seed", "number"),
-    [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad],
+    [(*drawn, number) for drawn, bad in ONCE_BAD.items() for number in bad],
 )
 def test_samples_that_once_were_bad(family, seed, number):
     assert_bounds(judge_samples(family, range(number, number + 1), seed))

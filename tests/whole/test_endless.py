@@ -13,52 +13,44 @@ import fourbar.cli
 import fourbar_validation.cli
 from fourbar.errors import BAD_INPUT
 from fourbar.evaluation import free_motion
+from tests.support.processes import ROOT
 
-ROOT = Path(__file__).parents[2]
-SCENE = str(ROOT / "models" / "crank_rocker.toml")
+SCENE = ROOT / "models" / "crank_rocker.toml"
 READING = [
     # what reads a file of somebody's; ENDLESS stands for the file
-    ["fourbar", "analyze", "ENDLESS"],
-    ["fourbar", "mjcf", "ENDLESS", "-o", "OUT"],
-    ["fourbar", "plot", "ENDLESS", "-o", "OUT.svg"],
-    ["fourbar", "animate", "ENDLESS", "-o", "OUT.html"],
-    ["fourbar", "animate", SCENE, "--picture", "coupler=ENDLESS", "-o", "OUT.html"],
-    ["validation", "check", "ENDLESS", "ENDLESS"],
-    ["validation", "check", SCENE, "ENDLESS"],
-    ["validation", "run", "ENDLESS", "--out", "OUT"],
-    ["validation", "check-mjcf", SCENE, "ENDLESS", "--out", "OUT"],
-    ["validation", "run", SCENE, "--against", "ENDLESS", "--out", "OUT"],
-    ["validation", "run", "--suite", "ENDLESS", "--out", "OUT"],
-    ["validation", "compare", "ENDLESS", "ENDLESS"],
-    ["validation", "accept", "ENDLESS"],
-    ["validation", "advise", "ENDLESS", "--error", "1e-3"],
-    ["validation", "cost", "ENDLESS", "--out", "OUT"],
+    "fourbar analyze ENDLESS",
+    "fourbar mjcf ENDLESS -o OUT",
+    "fourbar plot ENDLESS -o OUT.svg",
+    "fourbar animate ENDLESS -o OUT.html",
+    f"fourbar animate {SCENE} --picture coupler=ENDLESS -o OUT.html",
+    "validation check ENDLESS ENDLESS",
+    f"validation check {SCENE} ENDLESS",
+    "validation run ENDLESS --out OUT",
+    f"validation check-mjcf {SCENE} ENDLESS --out OUT",
+    f"validation run {SCENE} --against ENDLESS --out OUT",
+    "validation run --suite ENDLESS --out OUT",
+    "validation compare ENDLESS ENDLESS",
+    "validation accept ENDLESS",
+    "validation advise ENDLESS --error 1e-3",
+    "validation cost ENDLESS --out OUT",
 ]
 
 
 @pytest.mark.posix
 @pytest.mark.timeout(30)
 @pytest.mark.parametrize("what", ["pipe", "device", "directory"])
-@pytest.mark.parametrize("line", READING, ids=lambda line: " ".join(line[:2]))
+@pytest.mark.parametrize("line", READING, ids=lambda line: line[:18])
 def test_what_may_never_end_is_not_waited_for(line, what, tmp_path, capsys):
-    endless = {
-        "pipe": tmp_path / "pipe",
-        "device": Path("/dev/zero"),
-        "directory": tmp_path / "folder",
-    }[what]
+    endless = Path("/dev/zero") if what == "device" else tmp_path / what
     os.mkfifo(tmp_path / "pipe")
     writer = subprocess.Popen(f"exec cat /dev/zero >'{tmp_path / 'pipe'}'", shell=True)
-    (tmp_path / "folder").mkdir()
+    (tmp_path / "directory").mkdir()
     before = sorted(tmp_path.rglob("*"))
-    out = str(tmp_path / "out")
-    program, *arguments = (
-        part.replace("ENDLESS", str(endless)).replace("OUT", out) for part in line
-    )
-    status = (
-        fourbar.cli.status if program == "fourbar" else fourbar_validation.cli.status
-    )
+    line = line.replace("ENDLESS", str(endless)).replace("OUT", str(tmp_path / "out"))
+    program, *arguments = line.split()
+    status = {"fourbar": fourbar.cli, "validation": fourbar_validation.cli}[program]
     try:
-        assert status(arguments) == BAD_INPUT
+        assert status.status(arguments) == BAD_INPUT
     finally:
         writer.kill()
         writer.wait()
@@ -100,13 +92,10 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
     tmp_path, capsys
 ):
-    (tmp_path / "released.toml").write_text(RELEASED)
-    assert (
-        fourbar_validation.cli.status(
-            ["run", str(tmp_path / "released.toml"), "--out", str(tmp_path / "out")]
-        )
-        == BAD_INPUT
-    )
+    file, out = tmp_path / "released.toml", tmp_path / "out"
+    file.write_text(RELEASED)
+    line = ["run", str(file), "--out", str(out)]
+    assert fourbar_validation.cli.status(line) == BAD_INPUT
     printed = capsys.readouterr().err
     assert (
         "motion.free.duration" in printed

@@ -8,7 +8,8 @@ module alone, `support/` holds what tests share.
 
 import pytest
 
-from tests.whole.test_imports import ROOT
+from tests.support.processes import ROOT
+from tests.support.rows import read_rows
 
 SOURCES = {
     "fourbar": ROOT / "fourbar",
@@ -16,139 +17,103 @@ SOURCES = {
     "lab": ROOT / "lab" / "fourbar_lab",
 }
 """Folder of tests, and folder of the modules that it mirrors."""
-JUDGED_BY = {
-    # what a command reads, does and prints is tested through the command
-    "fourbar/cli/test_cli.py": (
-        "fourbar/cli: analyze export given; fourbar/show: tables"
-    ),
-    "whole/test_exits.py": (
-        "validation: cli; validation/report: sentences terminal; lab: cli fuzz_files"
-    ),
-    "whole/test_kills.py": "validation/run: jobs",
-    "whole/test_narrow_terminal.py": "fourbar/show: folded",
-    "whole/test_results_format.py": "validation/compare: results_file",
-    # one table or one evaluation, whose rows are no use alone
-    "fourbar/effects/test_effects.py": "fourbar/effects: *",
-    "fourbar/edit/test_session.py": "fourbar/edit: dragging scene_entries",
-    "fourbar/edit/test_server.py": "fourbar/edit: redirect",
-    "fourbar/files/test_files.py": "fourbar/files: scene_text",
-    "fourbar/formulas/test_formulas.py": (
-        "fourbar/formulas: arithmetic many_digits path"
-    ),
-    "fourbar/studies/test_equilibrium.py": (
-        "fourbar/studies: circuit_curve; fourbar/show: studies"
-    ),
-    "fourbar/test_solving.py": "fourbar/evaluation: case",
-    "fourbar/show/test_located.py": "fourbar/studies: course",
-    "fourbar/show/test_columns.py": "fourbar/show: derived",
-    "fourbar/show/test_position_sheet.py": "fourbar/show: change_point",
-    "fourbar/show/test_summary.py": "fourbar/show: driving motion_curves",
-    "fourbar/studies/test_paths.py": "fourbar/show: path_rows",
-    # parts of one document or picture
-    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document model",
-    "fourbar/show/test_animate.py": "fourbar/show/plot: film",
-    "fourbar/show/test_page.py": "fourbar/show: tolerances",
-    "fourbar/show/plot/test_curves.py": "fourbar/show/plot: traced_paths",
-    "fourbar/show/plot/test_plot.py": (
-        "fourbar/show/plot: figures freebody labels linkage_figure style"
-        " tolerance_figures view"
-    ),
-    # a comparison is tested by engines with given answers
-    "validation/run/test_judge.py": (
-        "validation/compare: answer effect_sizes; "
-        "validation/run: command identities judge_engines law question"
-    ),
-    "validation/run/test_parts.py": "validation/run: plan progress request",
-    # adapters: judged against printed figures, each other, and faults put in front of
-    # them
-    "validation/engines/test_engines.py": (
-        "validation/engines: balls description limits loaded loop pinocchio tree;"
-        " lab/engines: drake exudyn exudyn_elements opensim; validation/scenes: random;"
-        " validation/engines/mujoco: closed_loop inverse"
-    ),
-    "validation/engines/test_guests.py": (
-        "validation: engine; validation/engines: programs workers"
-    ),
-    "validation/engines/test_free_body.py": (
-        "validation/engines: free_body_closure free_body_effects"
-    ),
-    "validation/scenes/test_hard_families.py": (
-        "validation/engines/mujoco: shipped; validation/scenes: bars"
-    ),
-    "validation/report/test_sections.py": "validation/report: hard_picture",
-    "validation/engines/mujoco/test_simulate.py": (
-        "validation/engines/mujoco: defaults monitor"
-    ),
-    "validation/run/test_released.py": "validation/engines/mujoco: forward",
-    "validation/check/test_check.py": (
-        "validation/check: calculated csv_columns fitted judge_table mistakes theirs"
-        " variants"
-    ),
-    "validation/robots/test_check_mjcf.py": (
-        "validation/robots: differences guard judge_loop; "
-        "validation/engines/mujoco: describe; "
-        "validation/engines/mujoco/robots: examine seen"
-    ),
-    "validation/engines/mujoco/robots/test_closures.py": (
-        "validation/engines/mujoco/robots: ancestry frame loop_facts"
-    ),
-    "validation/engines/mujoco/robots/test_measure.py": (
-        "validation/engines/mujoco/robots: planes"
-    ),
-    "validation/robots/test_files.py": "validation/engines/mujoco/robots: compiled",
-    "validation/robots/test_loops.py": "validation/robots: options",
-    "validation/published/test_published.py": (
-        "validation/published: comparison printed_figures textbook thesis thirteen"
-    ),
-    "validation/regression/test_regression.py": (
-        "validation/regression: accept engines history record render rules scenes"
-    ),
-    "validation/report/test_report.py": (
-        "validation/report: machine overview run_summary scene_pictures "
-        "scene_record svg templating words"
-    ),
-    # studies: each through its command
-    "lab/test_bench.py": "lab: contenders starts",
-    "lab/test_effect_costs.py": "lab: tables",
-    "lab/test_stability.py": "lab: families slopes tally",
-    "lab/test_faults.py": "lab: fault_scenes injection",
-    "validation/cost/test_cost.py": (
-        "validation/cost: charts formulas series work_precision"
-    ),
-    "validation/advise/test_advise.py": "validation/advise: judged_setup matters",
-    "lab/test_benchmark.py": (
-        "lab/simulators: slider_engines slider_mujoco slider_pinocchio"
-    ),
-    "lab/simulators/test_problems.py": (
-        "lab/simulators: slider_crank; validation/check: problem"
-    ),
-    # simulators that need not be there: their scripts run where they are installed
-    "lab/simulators/test_simulators.py": (
-        "lab/simulators: dart drake_sap exudyn_simulated genesis_rigid gradients"
-        " mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco"
-        " pinocchio_simulated protocol_engines pybullet"
-    ),
-}
-"""Modules without a test of their name, folder by folder, and the test that says when
-one of them is wrong.
+JUDGED_BY = read_rows("""
+# what a command reads, does and prints is tested through the command
+fourbar/cli/test_cli.py | analyze export given
+fourbar/cli/test_cli.py | fourbar/show: tables
+whole/test_exits.py | validation: cli
+whole/test_exits.py | validation/report: sentences terminal
+whole/test_exits.py | lab: cli fuzz_files
+whole/test_kills.py | validation/run: jobs
+whole/test_narrow_terminal.py | fourbar/show: folded
+whole/test_results_format.py | validation/compare: results_file
+# one table or one evaluation, whose rows are no use alone
+fourbar/effects/test_effects.py | *
+fourbar/edit/test_session.py | dragging scene_entries
+fourbar/edit/test_server.py | redirect
+fourbar/files/test_files.py | scene_text
+fourbar/formulas/test_formulas.py | arithmetic many_digits path
+fourbar/studies/test_equilibrium.py | circuit_curve
+fourbar/studies/test_equilibrium.py | fourbar/show: studies
+fourbar/test_solving.py | fourbar/evaluation: case
+fourbar/show/test_located.py | fourbar/studies: course
+fourbar/show/test_columns.py | derived
+fourbar/show/test_position_sheet.py | change_point
+fourbar/show/test_summary.py | driving motion_curves
+fourbar/studies/test_paths.py | fourbar/show: path_rows
+# parts of one document or picture
+fourbar/mjcf/test_mjcf.py | document model
+fourbar/show/test_animate.py | fourbar/show/plot: film
+fourbar/show/test_page.py | tolerances
+fourbar/show/plot/test_curves.py | traced_paths
+fourbar/show/plot/test_plot.py | figures freebody labels linkage_figure style
+fourbar/show/plot/test_plot.py | tolerance_figures view
+# a comparison is tested by engines with given answers
+validation/run/test_judge.py | validation/compare: answer effect_sizes
+validation/run/test_judge.py | command identities judge_engines law question
+validation/run/test_parts.py | plan progress request
+# adapters: judged against printed figures, each other, and faults put in front of
+# them
+validation/engines/test_engines.py | balls description limits loaded loop pinocchio tree
+validation/engines/test_engines.py | lab/engines: drake exudyn exudyn_elements opensim
+validation/engines/test_engines.py | validation/scenes: random
+validation/engines/test_engines.py | validation/engines/mujoco: closed_loop inverse
+validation/engines/test_guests.py | validation: engine
+validation/engines/test_guests.py | programs workers
+validation/engines/test_free_body.py | free_body_closure free_body_effects
+validation/scenes/test_hard_families.py | validation/engines/mujoco: shipped
+validation/scenes/test_hard_families.py | bars
+validation/report/test_sections.py | hard_picture
+validation/engines/mujoco/test_simulate.py | defaults monitor
+validation/run/test_released.py | validation/engines/mujoco: forward
+validation/check/test_check.py | calculated csv_columns fitted
+validation/check/test_check.py | judge_table mistakes theirs variants
+validation/robots/test_check_mjcf.py | differences guard judge_loop
+validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
+validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: examine seen
+validation/engines/mujoco/robots/test_closures.py | ancestry frame loop_facts
+validation/engines/mujoco/robots/test_measure.py | planes
+validation/robots/test_files.py | validation/engines/mujoco/robots: compiled
+validation/robots/test_loops.py | options
+validation/published/test_published.py | comparison printed_figures textbook
+validation/published/test_published.py | thesis thirteen
+validation/regression/test_regression.py | accept engines history record render rules
+validation/regression/test_regression.py | scenes
+validation/report/test_report.py | machine overview run_summary
+validation/report/test_report.py | scene_pictures scene_record svg templating words
+# studies: each through its command
+lab/test_bench.py | contenders starts
+lab/test_effect_costs.py | tables
+lab/test_stability.py | families slopes tally
+lab/test_faults.py | fault_scenes injection
+validation/cost/test_cost.py | charts formulas series work_precision
+validation/advise/test_advise.py | judged_setup matters
+lab/test_benchmark.py | lab/simulators: slider_engines slider_mujoco slider_pinocchio
+lab/simulators/test_problems.py | slider_crank
+lab/simulators/test_problems.py | validation/check: problem
+# simulators that need not be there: their scripts run where they are installed
+lab/simulators/test_simulators.py | dart drake_sap exudyn_simulated
+lab/simulators/test_simulators.py | genesis_rigid gradients mujoco_c
+lab/simulators/test_simulators.py | mujoco_mjx mujoco_warp newton_kamino
+lab/simulators/test_simulators.py | newton_mujoco pinocchio_simulated
+lab/simulators/test_simulators.py | protocol_engines pybullet
+""")
+"""A test, and the modules without a test of their name of which it says when they are
+wrong: those of its own folder if none is named.
 """
 
 
 def listed():
     """The test of each module of the table."""
     tests_of = {}
-    for test, groups in JUDGED_BY.items():
-        for group in groups.split(";"):
-            folder, _, names = group.strip().partition(": ")
-            if names == "*":  # all that have none of their own
-                top, _, inner = folder.partition("/")
-                paths = [
-                    path
-                    for path in (SOURCES[top] / inner).glob("*.py")
-                    if not path.name.startswith("__")
-                ]
-                names = " ".join(path.stem for path in paths if not own_test(path, top))
-            tests_of |= {f"{folder}/{name}.py": test for name in names.split()}
+    for test, group in JUDGED_BY:
+        folder, _, names = group.rpartition(": ")
+        folder = folder or test.rpartition("/")[0]
+        if names == "*":  # all that have none of their own
+            top, _, inner = folder.partition("/")
+            paths = (SOURCES[top] / inner).glob("[!_]*.py")
+            names = " ".join(path.stem for path in paths if not own_test(path, top))
+        tests_of |= {f"{folder}/{name}.py": test for name in names.split()}
     return tests_of
 
 
@@ -162,9 +127,7 @@ def own_test(path, top):
 
 @pytest.mark.parametrize("top", SOURCES)
 def test_every_module_has_a_test_or_is_listed(top):
-    paths = [
-        path for path in SOURCES[top].rglob("*.py") if not path.name.startswith("__")
-    ]
+    paths = list(SOURCES[top].rglob("[!_]*.py"))
     assert paths
     without = {
         f"{top}/{path.relative_to(SOURCES[top]).as_posix()}"
@@ -176,7 +139,7 @@ def test_every_module_has_a_test_or_is_listed(top):
 
 
 def test_the_tests_of_the_table_are_there():
-    assert all((ROOT / "tests" / test).is_file() for test in JUDGED_BY)
+    assert all((ROOT / "tests" / test).is_file() for test, _ in JUDGED_BY)
 
 
 @pytest.mark.parametrize("top", SOURCES)

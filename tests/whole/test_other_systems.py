@@ -62,8 +62,6 @@ def folder(tmp_path):
     ],
 )
 def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
-    if "mjcf" in line:
-        pytest.importorskip("mujoco")
     path = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "validation")])}
     arguments = line.format(models=ROOT / "models").split()
     done = subprocess.run(
