@@ -21,6 +21,7 @@ from fourbar import (
     Sweep,
     uniform,
 )
+from tests.support.processes import ROOT
 
 ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 """A cylinder from the ground to the coupler."""
@@ -112,25 +113,11 @@ def low_parallelogram(steps=8, **changes):
 
 
 def thesis(theta_2=None):
-    """The thesis's model mechanism, uniform bars 2.54 cm wide.
-
-    The source is Linares Mendoza, sections 4.12 and 5.7.
-    """
-
-    def inertia(mass, length):
-        return mass * (length**2 + 0.0254**2) / 12.0
-
-    linkage = FourBar(
-        0.20,
-        Bar(0.48, 57.0, 11.119275, (0.765, 0.0)),
-        Bar(0.55, 0.544, inertia(0.544, 0.55)),
-        Bar(0.20, 0.2, inertia(0.2, 0.20)),
-        ground_angle=math.radians(45.0),
-    )
-    loads = [Load(2, (10.0, 0.0), arm=(0.05, math.radians(265.0)))]
-    loads += [Load(bar, moment=-0.15) for bar in (2, 3, 4)]
+    """Return the thesis's model mechanism at these positions, or at one."""
+    scene = fourbar.load(ROOT / "models" / "thesis.toml")
     angles = np.radians([135.0]) if theta_2 is None else theta_2
-    return Scene(linkage, Motion(angles, 0.2244), 4, tuple(loads), title="thesis")
+    motion = scene.motion.replace(angle=angles)
+    return replace(scene, motion=motion, title="thesis", source="")
 
 
 def change_place(load, change):

@@ -46,7 +46,6 @@ from fourbar_validation.published.thesis import (
     compute_right_unknowns,
     make_model_scene,
 )
-from tests.support import scenes
 from tests.support.rows import read_rows
 
 LISTED = 0.5e-12
@@ -309,10 +308,9 @@ def test_answers_that_sympy_leaves_to_be_solved():
     assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == relative
 
 
-@pytest.mark.parametrize("name", ["code", "file"])
-def test_inputs_are_those_of_the_model(name):
+def test_inputs_are_those_of_the_model():
     """Accelerated, so that every mass, inertia and load takes part."""
-    theirs = fourbar.load(MODELS / "thesis.toml") if name == "file" else scenes.thesis()
+    theirs = fourbar.load(MODELS / "thesis.toml")
     ours = make_model_scene(THETA_2)
     assert ours.effects == theirs.effects == ()
     accelerated = {"angle": THETA_2, "acceleration": 7.0}
