@@ -4,8 +4,9 @@ The error is measured with one setting changed at a time.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,12 +46,6 @@ Below it they speed up too much.
 """
 _MUJOCO_TOLERANCE = 1e-8
 """MuJoCo's own default."""
-
-
-Reason = Callable[[TrialSetup, float, float], str]
-"""Function from the setup and two growths to the cause. The growths are that of the
-error, and that at the steps alone.
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,44 +96,45 @@ def _compute_errors_between(
     has poles, through which no curve can be drawn: each stretch between them has a
     spline of its own.
     """
-    theta_2, first = np.unique(trial.at.theta_2[samples], return_index=True)
-    n = samples.stop - samples.start
-    if (
-        len(theta_2) <= steps or not np.isfinite(theta_2).all()
-    ):  # each gap has a position of its own
+    at = trial.at
+    theta_2, first = np.unique(at.theta_2[samples], return_index=True)
+    # each gap has a position of its own
+    if len(theta_2) <= steps or not np.isfinite(theta_2).all():
         return
-    made = {
-        "omega_2": trial.at.omega_2,
-        "alpha_2": trial.at.alpha_2,
-        **trial.quantities,
-    }
+    made = {"omega_2": at.omega_2, "alpha_2": at.alpha_2, **trial.quantities}
     read = {name: np.asarray(values)[samples][first] for name, values in made.items()}
-    if len(theta_2) < 2 or not all(
-        np.isfinite(values).all() for values in read.values()
-    ):
+    finite = (np.isfinite(values).all() for values in read.values())
+    if len(theta_2) < 2 or not all(finite):
         yield INFINITE_ERRORS
         return
-    branch = trial.at.branch[samples][first]
-    at_steps = Command(
-        theta_2,
-        branch,
-        read["omega_2"],
-        read["alpha_2"],
-    )
-    places = np.linspace(theta_2[0], theta_2[-1], 2 * n)
+    branch = at.branch[samples][first]
+    at_steps = Command(theta_2, branch, read["omega_2"], read["alpha_2"])
+    places = np.linspace(theta_2[0], theta_2[-1], 2 * (samples.stop - samples.start))
     for stretch in split_at_poles(scene, at_steps):
-        inside = (theta_2[stretch.start] <= places) & (
-            places <= theta_2[stretch.stop - 1]
-        )
-        if not inside.any():
-            continue
-        yield _compute_stretch(
-            scene,
-            at_steps.branch[0],
-            theta_2[stretch],
-            {name: values[stretch] for name, values in read.items()},
-            places[inside],
-        )
+        known = theta_2[stretch]
+        inside = places[(known[0] <= places) & (places <= known[-1])]
+        if inside.size:
+            curves = _draw_curves(known, stretch, read, inside)
+            command = Command(
+                inside,
+                np.full(inside.shape, branch[0]),
+                curves.pop("omega_2"),
+                curves.pop("alpha_2"),
+            )
+            yield compute_errors(scene, command, curves)
+
+
+def _draw_curves(
+    theta_2: Array, stretch: slice, read: Mapping[str, Array], places: Array
+) -> dict[str, Array]:
+    """Return the values at some places of splines through what was read."""
+    from scipy.interpolate import make_interp_spline
+
+    degree = min(DEGREE_BETWEEN, len(theta_2) - 1)
+    return {
+        name: make_interp_spline(theta_2, values[stretch], degree)(places)
+        for name, values in read.items()
+    }
 
 
 def split_at_poles(scene: Scene, command: Command) -> list[slice]:
@@ -151,44 +147,20 @@ def split_at_poles(scene: Scene, command: Command) -> list[slice]:
     return [slice(rows[0], rows[-1] + 1) for rows in stretches if len(rows) > 1]
 
 
-def _compute_stretch(
-    scene: Scene,
-    branch: int,
-    theta_2: Array,
-    read: dict[str, Array],
-    places: Array,
-) -> WorstErrors:
-    """Compute errors at some places of the splines through what was read."""
-    from scipy.interpolate import make_interp_spline
-
-    degree = min(DEGREE_BETWEEN, len(theta_2) - 1)
-    curves = {
-        name: make_interp_spline(theta_2, values, degree)(places)
-        for name, values in read.items()
-    }
-    command = Command(
-        places,
-        np.full(places.shape, branch, dtype=np.int8),
-        curves.pop("omega_2"),
-        curves.pop("alpha_2"),
-    )
-    return compute_errors(scene, command, curves)
-
-
 def measure_influences(
     scene: Scene,
     setup: TrialSetup,
     settings: Settings,
 ) -> list[SettingInfluence]:
     """List every setting changed alone, the one that matters most first."""
-    before, before_at_steps = _measure_errors(scene, setup, settings)
+    before, at_steps_before = _measure_errors(scene, setup, settings)
     influences = []
-    for name, changed, varied, why in _describe_setting(scene, settings):
-        worst, at_steps = _measure_errors(scene, setup, varied)
+    for name, changed, changes, why in _list_changes(scene, settings):
+        worst, at_steps = _measure_errors(scene, setup, replace(settings, **changes))
         times = worst / before if 0.0 < before < math.inf else math.nan
-        growth = at_steps / before_at_steps if before_at_steps > 0.0 else math.nan
-        reason = why(setup, times, growth)
-        influences.append(SettingInfluence(name, changed, worst, times, reason))
+        growth = at_steps / at_steps_before if at_steps_before > 0.0 else math.nan
+        cause = why or _explain_timestep(setup, times, growth)
+        influences.append(SettingInfluence(name, changed, worst, times, cause))
     return sorted(
         influences,
         key=lambda one: math.inf if math.isnan(one.times) else -one.times,
@@ -218,57 +190,39 @@ def write_sentence(influences: list[SettingInfluence]) -> str:
     )
 
 
-def _describe_setting(
-    scene: Scene,
-    settings: Settings,
-) -> Iterator[tuple[str, str, Settings, Reason]]:
-    """Say what is changed to what, and what a growth of the error would come from."""
-    steps = settings.steps_per_revolution
-    tc = settings.time_constant_steps
+def _list_changes(
+    scene: Scene, settings: Settings
+) -> Iterator[tuple[str, str, dict[str, Any], str]]:
+    """List changes of one setting, and what a growth of the error would come from.
+
+    Each is the setting, to what it is changed, the fields of the settings, and the
+    cause, "" if that is measured.
+    """
     window = max(settings.steps_per_window // 2, 1)
-    coarse = replace(
-        settings,
-        steps_per_revolution=steps / 2.0,
-        steps_per_window=window,
-    )
-    yield "the timestep", "twice as long", coarse, _explain_timestep
-    if tc / 2.0 >= SHORTEST_TIME_CONSTANT / 2.0:
-        stiff = replace(settings, time_constant_steps=tc / 2.0)
-        yield (
-            "the closure's time constant",
-            "half as long",
-            stiff,
-            lambda *_: (
-                "a closure of few steps is a spring that RK4 follows badly, in"
-                " proportion to (h/tc)^4"
-            ),
+    coarse = {"steps_per_revolution": settings.steps_per_revolution / 2.0}
+    yield "the timestep", "twice as long", coarse | {"steps_per_window": window}, ""
+    tc = settings.time_constant_steps
+    name = "the closure's time constant"
+    if tc >= SHORTEST_TIME_CONSTANT:
+        why = (
+            "a closure of few steps is a spring that RK4 follows badly, in proportion"
+            " to (h/tc)^4"
         )
+        yield name, "half as long", {"time_constant_steps": tc / 2.0}, why
     if 2.0 * tc <= LONGEST_TIME_CONSTANT:
-        slow = replace(settings, time_constant_steps=2.0 * tc)
-        yield (
-            "the closure's time constant",
-            "twice as long",
-            slow,
-            lambda *_: _find_yielding(scene, "a slow closure"),
-        )
+        why = _find_yielding(scene, "a slow closure")
+        yield name, "twice as long", {"time_constant_steps": 2.0 * tc}, why
     if settings.pad is not None:
-        yield (
-            "the stiffness by pads",
-            "left out",
-            replace(settings, pad=None),
-            lambda *_: _find_yielding(scene, "without pads the closure"),
-        )
+        why = _find_yielding(scene, "without pads the closure")
+        yield "the stiffness by pads", "left out", {"pad": None}, why
     if settings.tolerance == 0.0:
-        loose = replace(settings, tolerance=_MUJOCO_TOLERANCE)
-        yield (
-            "the solver's tolerance",
-            f"at MuJoCo's own {_MUJOCO_TOLERANCE:g}",
-            loose,
-            lambda *_: (
-                "MuJoCo divides it by the inertia of the flywheel, next to which the"
-                " linkage is small"
-            ),
+        changed = f"at MuJoCo's own {_MUJOCO_TOLERANCE:g}"
+        why = (
+            "MuJoCo divides it by the inertia of the flywheel, next to which the"
+            " linkage is small"
         )
+        loose = {"tolerance": _MUJOCO_TOLERANCE}
+        yield "the solver's tolerance", changed, loose, why
 
 
 def _explain_timestep(
@@ -281,13 +235,11 @@ def _explain_timestep(
     The curve is drawn between the steps.
     """
     motion = solve(setup.scene, "position", at=setup.command)
-    sines = np.abs(motion.sin_mu)
-    nearest = int(np.nanargmin(sines))
-    if sines[nearest] < NEAR_A_TOGGLE:
-        near, angle = (
-            math.degrees(x)
-            for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest]))
-        )
+    nearest = int(np.nanargmin(np.abs(motion.sin_mu)))
+    sine = abs(motion.sin_mu[nearest])
+    if sine < NEAR_A_TOGGLE:
+        near = math.degrees(math.asin(sine))
+        angle = math.degrees(setup.command.theta_2[nearest])
         return (
             f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 ="
             f" {angle:.4g} deg and speed up there"

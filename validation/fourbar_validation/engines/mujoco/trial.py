@@ -17,6 +17,7 @@ how wrong it is against them stays a finding.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import mujoco
 import numpy as np
@@ -99,15 +100,16 @@ def make_settings(steps_per_revolution: float, time_constant_steps: float) -> Se
 
 def describe_settings(settings: Settings, steps_per_revolution: float) -> str:
     """Write in one line what is to be typed into MuJoCo."""
-    parts = [
-        f"{settings.integrator}, {steps_per_revolution:.0f} steps a revolution",
-        f"time constant {settings.time_constant_steps:.3g} steps",
-        "no pads" if settings.pad is None else "pads",
-        f"tolerance {settings.tolerance:g}",
-        write_count(settings.iterations, "iteration"),
-        f"flywheel {settings.flywheel:g}",
-    ]
-    return ", ".join(parts)
+    return ", ".join(
+        (
+            f"{settings.integrator}, {steps_per_revolution:.0f} steps a revolution",
+            f"time constant {settings.time_constant_steps:.3g} steps",
+            "no pads" if settings.pad is None else "pads",
+            f"tolerance {settings.tolerance:g}",
+            write_count(settings.iterations, "iteration"),
+            f"flywheel {settings.flywheel:g}",
+        )
+    )
 
 
 @dataclass(slots=True, eq=False)
@@ -217,52 +219,39 @@ class TrialSetup:
         ----------
         edit : changes the text of every loop: how the four-bar is closed.
         """
-        samples = [index for segment in self.segments for index in segment]
-        names = (*MADE, name_driving(self.scene), *PIN_FORCES)
-        out = make_blank(len(samples), names)
+        samples = [*chain.from_iterable(self.segments)]
+        driving = name_driving(self.scene)
+        out = make_blank(len(samples), (*MADE, driving, *PIN_FORCES))
         trial = Trial(self.command)
         first = 0
         for segment in self.segments:
-            before = trial.steps
+            run = self._start(segment, settings, edit)
+            for row, index in enumerate(segment, first):
+                run.to(index)
+                run.loop.forward()
+                d = run.loop.data
+                lost = run.stepper.lost() or run.loop.bad()
+                if lost or not np.isfinite(d.qacc).all():
+                    trial.broken = (
+                        "MuJoCo lost the motion: a value not finite, or too large"
+                    )
+                    break
+                torque, pins = run.read()
+                motion = d.qpos[O2] - run.turns, d.qvel[O2], d.qacc[O2]
+                values = dict(zip(MADE, motion, strict=True))
+                values[driving] = np.nan if torque is None else torque
+                for name, value in (values | pins).items():
+                    out[name][row] = value
             rows = slice(first, first + len(segment))
-            of_segment = {name: x[rows] for name, x in out.items()}
-            self._run(segment, settings, edit, of_segment, trial)
-            trial.segments += ((rows, trial.steps - before),)
             first = rows.stop
+            trial.segments += ((rows, run.stepper.done),)
+            made = 2.0 * np.pi / run.motion_segment.fastest / run.stepper.timestep
+            trial.steps_per_revolution = max(trial.steps_per_revolution, made)
             if trial.broken:
                 break
+        trial.steps = sum(steps for _, steps in trial.segments)
         trial.at, trial.quantities = split_answer(out, self.command.branch[samples])
         return trial
-
-    def _run(
-        self,
-        segment: list[int],
-        settings: Settings,
-        edit: Edit | None,
-        out: dict[str, Array],
-        trial: Trial,
-    ) -> None:
-        run = self._start(segment, settings, edit)
-        loop = run.loop
-        driving = name_driving(self.scene)
-        for row, index in enumerate(segment):
-            run.to(index)
-            loop.forward()
-            d = loop.data
-            if run.stepper.lost() or loop.bad() or not np.isfinite(d.qacc).all():
-                trial.broken = (
-                    "MuJoCo lost the motion: a value not finite, or too large"
-                )
-                break
-            torque, pins = run.read()
-            motion = d.qpos[O2] - run.turns, d.qvel[O2], d.qacc[O2]
-            values = dict(zip(MADE, motion, strict=True))
-            values[driving] = np.nan if torque is None else torque
-            for name, value in (values | pins).items():
-                out[name][row] = value
-        trial.steps += run.stepper.done
-        made = 2.0 * np.pi / run.motion_segment.fastest / run.stepper.timestep
-        trial.steps_per_revolution = max(trial.steps_per_revolution, made)
 
     def _start(
         self, segment: list[int], settings: Settings, edit: Edit | None
@@ -344,30 +333,31 @@ class SimulatedToError:
         """
         steps, tc = guess(self.error)
         spent = 0.0
-        runs = 0
+        runs = 0.0
         for _ in range(MOST_SIMULATIONS):
             answer = MujocoSimulated(make_settings(steps, tc)).answer(scene, command)
             if answer.refusal is not None:
                 return answer
-            spent = spent + answer.evidence["steps"]
-            runs = runs + 1
+            spent += answer.evidence["steps"]
+            runs += 1.0
             expected = compute_expected_error(scene, answer)
-            if expected <= PREDICTED_PART * self.error and not answer.alarms:
-                break
             ratio = expected / (PREDICTED_PART * self.error)
+            if ratio <= 1.0 and not answer.alarms:
+                break
+            growth = _MOST_GROWTH
             if np.isfinite(ratio):
-                growth = ratio ** (1.0 / ORDER_OF_RK4)
-            else:
-                growth = _MOST_GROWTH
-            growth = min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
+                growth = min(ratio ** (1.0 / ORDER_OF_RK4), _MOST_GROWTH)
+            growth = max(growth, _LEAST_GROWTH)
             # a run has at least as many steps as it has positions to read
-            steps_made = float(
-                answer.setting.rpartition(" ")[2].removesuffix("/rev")
-            )  # of "RK4 628/rev"
-            steps = max(steps, steps_made) * growth
+            made = answer.setting.rpartition(" ")[2]  # of "RK4 628/rev"
+            steps = max(steps, float(made.removesuffix("/rev"))) * growth
             tc = min(tc * growth, LONGEST_TIME_CONSTANT)
-        answer.evidence |= {"wanted_error": self.error, "expected_error": expected}
-        answer.evidence |= {"steps_with_the_search": spent, "runs": float(runs)}
+        answer.evidence |= {
+            "wanted_error": self.error,
+            "expected_error": expected,
+            "steps_with_the_search": spent,
+            "runs": runs,
+        }
         return answer
 
 
