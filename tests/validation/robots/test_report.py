@@ -46,6 +46,7 @@ from tests.support.rows import read_rows
 
 SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
 """A parallelogram, in line at 0 and 180 deg."""
+SETTINGS = RobotSettings((0.02, 1.0), (0.9,), 1e-3, "Euler", "Newton", 100, 1e-8)
 
 
 @cache
@@ -85,9 +86,8 @@ def test_percentages_have_one_notation(part, written):
 
 
 def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
-    settings = RobotSettings((0.02, 1.0), (0.9,), 1e-6, "Euler", "Newton", 100, 1e-8)
     missing = WorstState(math.inf)
-    tried = TriedSettings(settings, {}, WorstState(0.1), missing, math.inf, math.inf)
+    tried = TriedSettings(SETTINGS, {}, WorstState(0.1), missing, math.inf, math.inf)
     advice = SettingsAdvice(0.2, 9, tried, (), tried, 1, (), None)
     *_, table = describe_advice(SimpleNamespace(refusal="too many"), advice)
     assert table.rows == [("nothing", "0.1", "-", "-")]
@@ -95,11 +95,10 @@ def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
 
 def test_what_has_no_answer_is_no_number_of_a_sentence():
     """Of the file as it is MuJoCo loses the motion, and held less firmly too."""
-    settings = RobotSettings((0.02, 1.0), (0.9,), 1e-3, "Euler", "Newton", 100, 1e-8)
     missing, found = WorstState(math.inf), WorstState(0.1, "F12", 0.5, 0.5)
-    before = TriedSettings(settings, {}, found, missing, math.inf, 1e-5)
+    before = TriedSettings(SETTINGS, {}, found, missing, math.inf, 1e-5)
     changes = {"timestep": "0.0001"}
-    best = TriedSettings(settings, changes, found, found, 1e-4, 2e-5)
+    best = TriedSettings(SETTINGS, changes, found, found, 1e-4, 2e-5)
     advice = SettingsAdvice(0.2, 9, before, (), best, 1, (), None)
     (loop,) = measured().loops
     *_, reached, _, _ = describe_advice(loop, advice)
@@ -187,32 +186,22 @@ def test_a_small_transmission_angle_is_told_as_well():
 
 
 @pytest.mark.parametrize(
-    "changes, error, reached, said",
-    [
-        ({}, 0.001, True, "The file is within 0.01 as it is."),
-        ({"solref": "1 1"}, 0.001, True, "Type this for an error within 0.01:"),
-        (
-            {"solref": "1 1"},
-            0.1,
-            False,
-            "None of 9 combinations was within 0.01; the best:",
-        ),
-        (
-            {},
-            0.1,
-            False,
-            "None of 9 combinations was within 0.01; the best is the file",
-        ),
-        ({}, math.inf, False, "None of 9 combinations has an answer: too many steps"),
-    ],
+    "solref, error, reached, said",
+    read_rows("""
+ | 0.001 | within | The file is within 0.01 as it is.
+1 1 | 0.001 | within | Type this for an error within 0.01:
+1 1 | 0.1 | | None of 9 combinations was within 0.01; the best:
+ | 0.1 | | None of 9 combinations was within 0.01; the best is the file
+ | inf | | None of 9 combinations has an answer: too many steps
+"""),
 )
-def test_advice_begins_with_what_was_reached(changes, error, reached, said):
-    settings = RobotSettings((0.02, 1.0), (0.9,), 0.001, "Euler", "Newton", 100, 1e-8)
+def test_advice_begins_with_what_was_reached(solref, error, reached, said):
+    changes, error = {"solref": solref} if solref else {}, float(error)
     worst = WorstState(error, "F12", 0.5, 0.5)
-    tried = TriedSettings(settings, changes, worst, WorstState(0.0), 0.0, 1e-6)
+    tried = TriedSettings(SETTINGS, changes, worst, WorstState(0.0), 0.0, 1e-6)
     without = math.inf if reached else 0.4 * error
     advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None, ("knee",), without)
-    assert advice.reached == reached
+    assert advice.reached == bool(reached)
     loop = SimpleNamespace(
         refusal="too many steps", scene=SCENE, turned=0.0, joint="knee"
     )

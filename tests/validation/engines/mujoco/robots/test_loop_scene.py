@@ -112,49 +112,33 @@ class WholeRobot:
             drift += side * self.closure(moved)[1] @ speeds / (2.0 * DIFFERENCE)
         accelerations = self.rates(jacobian, 0.0, drift)
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos, speeds, accelerations
-        active = data.eq_active.copy()
-        data.eq_active[:] = 0
+        data.eq_active[self.loop.equality] = 0
         mujoco.mj_inverse(model, data)
+        data.eq_active[self.loop.equality] = 1
         needed = data.qfrc_inverse + model.dof_frictionloss * np.sign(speeds)
         rows = list(self.dofs.values())
         drive = np.zeros((model.nv, 1))
         drive[self.dofs["O2"]] = 1.0
         matrix = np.hstack([jacobian.T, drive])[rows]
         solved = np.linalg.lstsq(matrix, needed[rows], rcond=1e-9)[0]
-        forces = self.pin_forces(solved[:-1])
-        data.eq_active[:] = active
-        data.xfrc_applied[:] = 0.0
-        return Whole(float(solved[-1]), forces)
+        return Whole(float(solved[-1]), self.pin_forces(qpos, solved[:-1]))
 
-    def pin_forces(self, multipliers):
+    def pin_forces(self, qpos, multipliers):
         """Sizes in the plane, from the recursion of MuJoCo.
 
         The closing force and gravcomp are applied.
         """
         model, data = self.model, self.data
-        data.xfrc_applied[:] = 0.0
+        self.closure(qpos)
+        data.efc_force[: len(multipliers)] = multipliers
         lifted = model.body_gravcomp * model.body_mass
-        data.xfrc_applied[:, :3] -= np.outer(lifted, model.opt.gravity)
-        objects = (model.eq_obj1id, model.eq_obj2id)
-        number = self.loop.equality
-        for which, sign in enumerate((1.0, -1.0)):
-            target = int(objects[which][number])
-            if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-                body = int(model.site_bodyid[target])
-                place = data.site_xpos[target]
-            else:
-                body = target
-                anchor = model.eq_data[number, 3 * which : 3 * which + 3]
-                place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor
-            force = sign * multipliers[:3]
-            data.xfrc_applied[body, :3] += force
-            data.xfrc_applied[body, 3:] += np.cross(place - data.xipos[body], force)
+        data.xfrc_applied[:, :3] = -np.outer(lifted, model.opt.gravity)
         mujoco.mj_rnePostConstraint(model, data)
         axis = data.xaxis[self.loop.joint]
+        data.xfrc_applied[:] = 0.0
         forces = {self.loop.cut: multipliers[:3]}
         for pin, joint in self.loop.hinges.items():
-            body = int(model.jnt_bodyid[joint])
-            forces[pin] = data.cfrc_int[body, 3:]
+            forces[pin] = data.cfrc_int[model.jnt_bodyid[joint], 3:]
         return {
             pin: float(np.linalg.norm(force - (force @ axis) * axis))
             for pin, force in forces.items()
