@@ -37,34 +37,34 @@ ALARM = changed(quantity="watch", verdict=FAILS, error=NAN)
 
 
 KINDS = [
-    ([ROW], [ROW], Kind.SAME),
-    ([FAILING], [FAILING], Kind.STILL_FAILS),
-    ([ROW], [changed(error=ROW.error + 40 * EPS)], Kind.SAME),
-    ([ROW], [changed(error=60 * EPS)], Kind.GREW),
-    ([changed(allowed=1e-15)], [changed(error=60 * EPS)], Kind.WORSE),
-    ([HARD], [replace(HARD, error=3000 * EPS)], Kind.SAME),
-    ([HARD], [replace(HARD, error=6000 * EPS, allowed=1.0)], Kind.WORSE),
-    ([HARD], [replace(HARD, error=6000 * EPS, condition=1.0)], Kind.WORSE),
-    ([SIMULATED], [replace(SIMULATED, error=1.2e-6)], Kind.SAME),
-    ([SIMULATED], [replace(SIMULATED, error=1.3e-6)], Kind.GREW),
-    ([SIMULATED], [replace(SIMULATED, error=1.3e-5, allowed=1)], Kind.WORSE),
-    ([SIMULATED], [replace(SIMULATED, error=0.7e-6)], Kind.BETTER),
-    ([SIMULATED], [replace(SIMULATED, error=0.9e-6)], Kind.SAME),
-    ([ROW], [changed(verdict=DEGRADED)], Kind.VERDICT_WORSE),
-    ([ROW], [changed(verdict=REFUSES, error=NAN)], Kind.VERDICT_WORSE),
-    ([ROW], [changed(verdict=FAILS, error=NAN)], Kind.VERDICT_WORSE),
-    ([FAILING], [ROW], Kind.VERDICT_BETTER),
-    ([FAILING], [changed(verdict=FAILS, error=NAN)], Kind.WORSE),
-    ([ROW], [], Kind.GONE),
-    ([FAILING], [], Kind.GONE),
-    ([ALARM], [], Kind.GONE_FAILURE),
-    ([], [OTHER], Kind.NEW),
-    ([], [replace(OTHER, verdict=FAILS, reason=WHY)], Kind.NEW_FAILURE),
-    ([ROW], [changed(setting="h/2", error=1.0)], Kind.NOT_COMPARED),
-    ([ROW], [changed(setting="h/2", verdict=FAILS)], Kind.NEW_FAILURE),
-    ([FAILING], [changed(setting="h/2", verdict=FAILS)], Kind.NOT_COMPARED),
+    (ROW, ROW, Kind.SAME),
+    (FAILING, FAILING, Kind.STILL_FAILS),
+    (ROW, changed(error=ROW.error + 40 * EPS), Kind.SAME),
+    (ROW, changed(error=60 * EPS), Kind.GREW),
+    (changed(allowed=1e-15), changed(error=60 * EPS), Kind.WORSE),
+    (HARD, replace(HARD, error=3000 * EPS), Kind.SAME),
+    (HARD, replace(HARD, error=6000 * EPS, allowed=1.0), Kind.WORSE),
+    (HARD, replace(HARD, error=6000 * EPS, condition=1.0), Kind.WORSE),
+    (SIMULATED, replace(SIMULATED, error=1.2e-6), Kind.SAME),
+    (SIMULATED, replace(SIMULATED, error=1.3e-6), Kind.GREW),
+    (SIMULATED, replace(SIMULATED, error=1.3e-5, allowed=1), Kind.WORSE),
+    (SIMULATED, replace(SIMULATED, error=0.7e-6), Kind.BETTER),
+    (SIMULATED, replace(SIMULATED, error=0.9e-6), Kind.SAME),
+    (ROW, changed(verdict=DEGRADED), Kind.VERDICT_WORSE),
+    (ROW, changed(verdict=REFUSES, error=NAN), Kind.VERDICT_WORSE),
+    (ROW, changed(verdict=FAILS, error=NAN), Kind.VERDICT_WORSE),
+    (FAILING, ROW, Kind.VERDICT_BETTER),
+    (FAILING, changed(verdict=FAILS, error=NAN), Kind.WORSE),
+    (ROW, None, Kind.GONE),
+    (FAILING, None, Kind.GONE),
+    (ALARM, None, Kind.GONE_FAILURE),
+    (None, OTHER, Kind.NEW),
+    (None, replace(OTHER, verdict=FAILS, reason=WHY), Kind.NEW_FAILURE),
+    (ROW, changed(setting="h/2", error=1.0), Kind.NOT_COMPARED),
+    (ROW, changed(setting="h/2", verdict=FAILS), Kind.NEW_FAILURE),
+    (FAILING, changed(setting="h/2", verdict=FAILS), Kind.NOT_COMPARED),
 ]
-"""Rows of the old and of the new run, and what happened: each line in its own scene."""
+"""Row of the old and of the new run, and what happened: each line in its own scene."""
 
 
 @pytest.fixture(scope="module")
@@ -73,9 +73,9 @@ def compared():
     runs = ([], [])
     for number, (*both, _) in enumerate(KINDS):
         beside = changed(engine="formulas", error=0.0, allowed=0.0)
-        for run, rows in zip(runs, both, strict=True):
+        for run, row in zip(runs, both, strict=True):
             scene = f"case {number}"
-            run += [replace(row, scene=scene) for row in (*rows, beside)]
+            run += [replace(one, scene=scene) for one in (row, beside) if one]
     return compare_rows(*((HERE, run) for run in runs))
 
 

@@ -30,7 +30,7 @@ from fourbar_validation.engines.mujoco.robots.examine import (
     examine_file,
     predict_softness,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.differences import find_differences
@@ -40,7 +40,7 @@ from fourbar_validation.robots.judge_loop import (
 )
 from fourbar_validation.robots.loop_errors import find_left_out
 from fourbar_validation.run.transformed import read_from_other_end
-from tests.support.robots import Planar, answer_of, judge_path, notes_of
+from tests.support.robots import Planar, answer_of, file_of, judge_path, notes_of
 from tests.support.robots import examine_text as examine
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
@@ -177,7 +177,7 @@ def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(tmp_path)
 
 @pytest.mark.slow
 def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it():
-    file = RobotFile(Path("theirs.xml"), default_friction())
+    file = file_of(default_friction())
     left = predict_softness(DRY, file, MeasureOptions(PoseOptions()))
     ours = solve(DRY, "force")
     for pin in PIN_FORCES:
@@ -470,7 +470,7 @@ def read_cut(cut):
     """
     option = '<option timestep="0.0002" integrator="RK4" tolerance="0"/>'
     text = Planar(base="", drive="", cut=cut, equality=STIFF, more=option).text()
-    file = RobotFile(Path("cut.xml"), text)
+    file = file_of(text)
     scene = read_loop_scene(file, PoseOptions(), None, 1.0).scene
     few = np.linspace(*command(scene).theta_2[[0, -1]], 5)
     return replace(scene, motion=scene.motion.replace(angle=few)), file

@@ -28,13 +28,20 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.robots.files import read_robot
-from tests.support.robots import ADAPTIVE, EXCAVATOR, FINGER, LIFTED, draw_knee
+from tests.support.robots import (
+    ADAPTIVE,
+    EXCAVATOR,
+    FINGER,
+    LIFTED,
+    draw_knee,
+    file_of,
+)
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
 FILES = ["biped_foot", "gripper"]
@@ -60,10 +67,9 @@ RIGID = 1e-8
 @cache
 def open_loop(name):
     closing, options = LOOPS.get(name, (None, PoseOptions()))
+    in_texts = name in TEXTS
     path = ROBOTS / f"{name}.xml"
-    text = TEXTS.get(name)
-    file = read_robot(path) if text is None else RobotFile(path, text)
-    compiled = compile_robot(file)
+    compiled = compile_robot(file_of(TEXTS[name]) if in_texts else read_robot(path))
     posed = pose_robot(compiled.model, options)
     loop = next(
         closure.loop
@@ -139,7 +145,7 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     scene = load(ROBOTS.parent / "crank_rocker.toml")
     text = write_mjcf(scene).replace("0.9999 0.9999", impedance)
     options = MeasureOptions(PoseOptions())
-    found = find_loop_of_scene(RobotFile(Path("wheel.xml"), text), scene, options)
+    found = find_loop_of_scene(file_of(text), scene, options)
     inside, motion = put_loop_inside(found)
     assert inside.flywheel > 1e6
     (row,) = inside.answer_states(motion.thin_out(3)._replace(angle=(2.0,))).rows
@@ -239,7 +245,7 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
 ):
     """The open one is the parallelogram, and the other its mirror image."""
     options = PoseOptions()
-    compiled = compile_robot(RobotFile(Path("robot.xml"), draw_knee(drawn)))
+    compiled = compile_robot(file_of(draw_knee(drawn)))
     posed = pose_robot(compiled.model, options)
     (closure,) = find_closures(posed, options)
     inside = LoopInside(posed.model, closure.loop, bar=bar, branch=branch)

@@ -18,11 +18,13 @@ from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
-FOOT = ROOT / "models" / "robots" / "biped_foot.xml"
+FOOT = (ROOT / "models" / "robots" / "biped_foot.xml").read_text()
 
 
-def compiled(text):
-    return mujoco.MjModel.from_xml_string(text)
+def pose(text, key=None, **joints):
+    """Pose a robot as stated."""
+    model = mujoco.MjModel.from_xml_string(text)
+    return pose_robot(model, PoseOptions(joints=joints, key=key))
 
 
 def gap(model, qpos):
@@ -72,8 +74,8 @@ GRAB = """
     ),
 )
 def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(text, joints):
-    model = compiled(text)
-    qpos = pose_robot(model, PoseOptions(joints=joints)).data.qpos
+    posed = pose(text, **joints)
+    model, qpos = posed.model, posed.data.qpos
     assert gap(model, qpos) < 1e-9
     low, high = model.jnt_range.T
     inside = (low <= qpos) & (qpos <= high)
@@ -83,9 +85,9 @@ def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(text, joints):
 
 
 def test_a_stated_joint_stays_and_the_loop_closes_around_it():
-    model = compiled(FOOT.read_text())
     joints = {"crank": "20deg", "knee": "60 deg"}
-    posed = pose_robot(model, PoseOptions(joints=joints))
+    posed = pose(FOOT, **joints)
+    model = posed.model
     at = {name: posed.data.qpos[model.joint(name).qposadr[0]] for name in joints}
     assert at == {
         "crank": approx(math.radians(20.0)),
@@ -102,28 +104,26 @@ def test_a_stated_joint_stays_and_the_loop_closes_around_it():
 
 
 def test_a_rest_pose_outside_the_ranges_is_closed_inside_them():
-    text = FOOT.read_text().replace('range="-70 60"', 'range="15 60"')
-    model = compiled(text)
-    posed = pose_robot(model, PoseOptions())
+    text = FOOT.replace('range="-70 60"', 'range="15 60"')
+    posed = pose(text)
+    model = posed.model
     crank = posed.data.qpos[model.joint("crank").qposadr[0]]
     assert math.radians(15.0) - 1e-9 <= crank <= math.radians(60.0)
     assert gap(model, posed.data.qpos) < 1e-9
     assert posed.notes[0] == "outside their ranges in the rest pose of the file: crank"
-    stated = pose_robot(model, PoseOptions(joints={"crank": "14 deg"}))
+    stated = pose(text, crank="14 deg")
     assert stated.notes[0] == "outside their ranges as --pose states them: crank"
 
 
 @pytest.mark.slow
 def test_closing_does_not_leave_the_range_of_a_joint():
-    joints = {"crank": "20deg"}
-    free = pose_robot(compiled(FOOT.read_text()), PoseOptions(joints=joints))
-    model = free.model
-    address = model.joint("ankle").qposadr[0]
+    free = pose(FOOT, crank="20deg")
+    address = free.model.joint("ankle").qposadr[0]
     turned = math.degrees(free.data.qpos[address])
     end = 0.5 * turned
     bounds = f"{min(end, -50.0)} {max(end, 0.0)}" if turned > 0 else f"{end} 40"
-    text = FOOT.read_text().replace('range="-50 40"', f'range="{bounds}"')
-    posed = pose_robot(compiled(text), PoseOptions(joints=joints))
+    text = FOOT.replace('range="-50 40"', f'range="{bounds}"')
+    posed = pose(text, crank="20deg")
     assert math.degrees(posed.data.qpos[address]) == approx(end)
     assert any(
         "cannot close all loops within the joints' ranges" in note
@@ -132,20 +132,18 @@ def test_closing_does_not_leave_the_range_of_a_joint():
 
 
 def test_a_keyframe_is_a_pose():
-    model = compiled(FOOT.read_text())
-    posed = pose_robot(model, PoseOptions(key="crouch"))
+    posed = pose(FOOT, "crouch")
     assert posed.data.qpos[2] == 0.82
-    assert posed.data.qpos[model.joint("knee").qposadr[0]] == 1.0
-    same = pose_robot(model, PoseOptions(key="0"))
+    assert posed.data.qpos[posed.model.joint("knee").qposadr[0]] == 1.0
+    same = pose(FOOT, "0")
     assert np.array_equal(same.data.qpos, posed.data.qpos)
     with raises(InputError, match="no such keyframe; the file has: crouch"):
-        pose_robot(model, PoseOptions(key="jump"))
+        pose(FOOT, "jump")
 
 
 @pytest.mark.slow
 def test_a_pose_that_cannot_close_says_what_is_left():
-    model = compiled(FOOT.read_text().replace('pos="0.001 -0.316 0"', 'pos="0 -0.6 0"'))
-    posed = pose_robot(model, PoseOptions())
+    posed = pose(FOOT.replace('pos="0.001 -0.316 0"', 'pos="0 -0.6 0"'))
     assert any("no pose near this one closes all loops" in note for note in posed.notes)
 
 
@@ -158,9 +156,8 @@ def test_a_pose_that_cannot_close_says_what_is_left():
     ],
 )
 def test_what_is_no_position_is_refused(joints, words):
-    model = compiled(FOOT.read_text())
     with raises(InputError, match=words):
-        pose_robot(model, PoseOptions(joints=joints))
+        pose(FOOT, **joints)
 
 
 BOOM = """
@@ -181,7 +178,7 @@ BOOM = """
 
 def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop():
     held = '<actuator><motor joint="boom"/></actuator>'
-    posed = pose_robot(compiled(BOOM.format(actuator=held)), PoseOptions())
+    posed = pose(BOOM.format(actuator=held))
     boom, tilt, stroke = posed.data.qpos
     # the stroke is along (1, 1)/sqrt(2) of the tube: the distance of the eye decides it
     reach = np.array([0.4, 0.35]) + stroke * np.sqrt([0.5, 0.5])
@@ -193,12 +190,12 @@ def test_what_a_motor_holds_stays_where_the_passive_joints_close_the_loop():
     assert f"tilt by {math.degrees(tilt):.4g} deg, stroke by {1e3 * stroke:.4g} mm" in (
         note
     )
-    free = pose_robot(compiled(BOOM.format(actuator="")), PoseOptions())
+    free = pose(BOOM.format(actuator=""))
     assert "boom by" in free.notes[0]
 
 
 def test_a_stated_joint_with_ranges_beside_it_is_the_reason_too():
-    (note,) = pose_robot(compiled(GRAB), PoseOptions(joints={"pin": "-150 deg"})).notes
+    (note,) = pose(GRAB, pin="-150 deg").notes
     assert note.startswith(
         "--pose holds pin, around which the other joints cannot close all loops within"
         " the joints' ranges; what is left is 3."
@@ -206,20 +203,18 @@ def test_a_stated_joint_with_ranges_beside_it_is_the_reason_too():
 
 
 def test_zero_needs_no_unit():
-    model = compiled(FOOT.read_text())
-    posed = pose_robot(model, PoseOptions(joints={"crank": "0"}))
-    assert posed.data.qpos[model.joint("crank").qposadr[0]] == 0.0
+    posed = pose(FOOT, crank="0")
+    assert posed.data.qpos[posed.model.joint("crank").qposadr[0]] == 0.0
 
 
 def test_a_floating_body_that_is_tied_to_the_ground_moves_there():
     """A metre along x and a turn of 30 deg about z, by half angles."""
-    model = compiled(
+    posed = pose(
         """<mujoco><worldbody><body name="part"><freejoint name="free"/>
         <geom size="0.1"/></body></worldbody><equality><weld body1="part"
         relpose="-1 0 0 0.9659258262890683 0 0 0.25881904510252074"/></equality>
         </mujoco>"""
     )
-    posed = pose_robot(model, PoseOptions())
     assert posed.notes == (
         "the loops are closed again by least squares: free by 1000 mm and 30 deg",
     )
