@@ -46,14 +46,16 @@ from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, Refuse
 NAN = math.nan
 
 
-def rows(**counts):
-    """So many rows of each verdict."""
-    names = ("agree", "degraded", "undecided", "refuse", "fail")
-    verdicts = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
+WORDS = {verdict.partition(" ")[0]: verdict for verdict in VERDICTS}
+
+
+def rows(text):
+    """So many rows of each verdict, and perhaps of the formulas."""
+    entries = (entry.split() for entry in text.split(", ") if entry)
     return [
-        changed(verdict=verdict)
-        for name, verdict in zip(names, verdicts, strict=True)
-        for _ in range(counts.get(name, 0))
+        changed(verdict=WORDS[word], engine=(*engine, ROW.engine)[0])
+        for count, word, *engine in entries
+        for _ in range(int(count))
     ]
 
 
@@ -92,54 +94,31 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named():
     assert stated not in write_summary_page(summary_of(records[1:2]))
 
 
-IDENTITY = changed(engine="formulas", quantity="closure")
-
-
 @pytest.mark.parametrize(
-    "rows, sentence, status",
-    [
-        (rows(agree=2), "All 2 comparisons hold: 2 agree", HOLDS),
-        (
-            rows(agree=1, degraded=2, undecided=1, refuse=3),
-            "All 3 comparisons hold: 1 agrees, 2 degraded as predicted; not compared:"
-            " 1 undecided, 3 refuse",
-            HOLDS,
-        ),
-        (
-            rows(agree=1, fail=2, refuse=1),
-            "FAILS: 2 of 3 comparisons do not hold: 1 agrees, 2 fail; not compared:"
-            " 1 refuses",
-            FAILED,
-        ),
-        (
-            rows(agree=70, fail=1),
-            "FAILS: 1 of 71 comparisons do not hold: 70 agree, 1 fails",
-            FAILED,
-        ),
-        (rows(refuse=2), "Nothing was compared: 2 refuse", FAILED),
-        (rows(undecided=1), "Nothing was compared: 1 undecided", FAILED),
-        ([], "Nothing was compared", FAILED),
-        (
-            [IDENTITY],
-            "Nothing was compared: 1 of the formulas' own identities hold",
-            FAILED,
-        ),
-        (
-            [replace(IDENTITY, verdict=FAILS)],
-            "FAILS: 1 identities of the formulas do not hold",
-            FAILED,
-        ),
-    ],
+    "text, sentence, status",
+    read_rows("""
+2 agrees | All 2 comparisons hold: 2 agree | 0
+1 agrees, 2 degraded, 1 undecided, 3 refuses | All 3 comparisons hold: 1 agrees, 2 \
+degraded as predicted; not compared: 1 undecided, 3 refuse | 0
+1 agrees, 2 fails, 1 refuses | FAILS: 2 of 3 comparisons do not hold: 1 agrees, 2 \
+fail; not compared: 1 refuses | 1
+70 agrees, 1 fails | FAILS: 1 of 71 comparisons do not hold: 70 agree, 1 fails | 1
+2 refuses | Nothing was compared: 2 refuse | 1
+1 undecided | Nothing was compared: 1 undecided | 1
+ | Nothing was compared | 1
+1 agrees formulas | Nothing was compared: 1 of the formulas' own identities hold | 1
+1 fails formulas | FAILS: 1 identities of the formulas do not hold | 1
+"""),
 )
-def test_all_hold_counts_what_was_compared_alone(rows, sentence, status):
-    counts = Counts(rows)
-    assert (counts.sentence(), counts.status) == (sentence, status)
+def test_all_hold_counts_what_was_compared_alone(text, sentence, status):
+    counts = Counts(rows(text))
+    assert (counts.sentence(), counts.status) == (sentence, int(status))
 
 
 def test_scenes_are_counted_and_a_row_passes_where_it_was_compared_and_holds():
     counts = Counts()
-    counts.add_scene(rows(agree=40))
-    counts.add_scene(rows(refuse=3))
+    counts.add_scene(rows("40 agrees"))
+    counts.add_scene(rows("3 refuses"))
     assert (counts.scenes, counts.scenes_compared, counts.total) == (2, 1, 43)
     passing = {verdict for verdict in VERDICTS if changed(verdict=verdict).passed}
     assert passing == {AGREES, DEGRADED}
@@ -156,7 +135,7 @@ def test_a_row_without_a_number_or_of_another_word_has_no_verdict(fields):
 
 def test_a_table_cannot_say_that_a_refusal_passed(tmp_path):
     file = tmp_path / "results.csv"
-    write_results(rows(refuse=1), file)
+    write_results(rows("1 refuses"), file)
     text = file.read_text()
     assert ",false,refuses," in text
     file.write_text(text.replace(",false,", ",true,"))

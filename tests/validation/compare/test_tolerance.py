@@ -23,9 +23,8 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     replace_zero_size,
 )
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
-
-NAN, INF = float("nan"), float("inf")
 
 
 @pytest.mark.parametrize(
@@ -55,18 +54,18 @@ def test_arrays_of_two_shapes_have_no_error_and_no_size_demands_zero():
 
 @pytest.mark.parametrize(
     "error, allowed, share",
-    [
-        (1.0, 4.0, 0.25),
-        (0.0, 0.0, 0.0),
-        (1e-300, 0.0, INF),
-        (NAN, 1.0, INF),
-        (1.0, NAN, INF),
-        (INF, INF, INF),
-        (-INF, 1.0, INF),
-    ],
+    read_rows("""
+1 | 4 | 0.25
+0 | 0 | 0
+1e-300 | 0 | inf
+nan | 1 | inf
+1 | nan | inf
+inf | inf | inf
+-inf | 1 | inf
+"""),
 )
 def test_what_is_no_number_uses_more_than_is_allowed(error, allowed, share):
-    assert find_used(error, allowed) == share
+    assert find_used(float(error), float(allowed)) == float(share)
 
 
 def test_conditions_of_several_quantities_are_those_of_their_units():

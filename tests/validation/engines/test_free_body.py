@@ -24,6 +24,7 @@ from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody, continue_couples
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import imported
 
@@ -177,23 +178,23 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect):
 
 @pytest.mark.parametrize(
     "F, C, x",
-    [
-        (1.0, 0.5, 2.0),
-        (1.0, -0.5, 2.0 / 3.0),
-        (3j, 0.0, 3.0),
-        (0.0, 0.7, 0.0),
-        (1.0, 2.0, math.nan),
-        (1.0, 1.0, math.nan),
-    ],
+    read_rows("""
+1 | 0.5 | 2
+1 | -0.5 | 0.6666666666666667
+3j | 0 | 3
+0 | 0.7 | 0
+1 | 2 | nan
+1 | 1 | nan
+"""),
 )
 def test_friction_of_one_pin(F, C, x):
     """x = |F + C x| by hand.
 
     Where the couple adds to its own load by as much as it is, the pin jams.
     """
-    load, couple = np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex)
+    load, couple = np.array([[complex(F)]]), np.array([[[complex(C)]]])
     couples = continue_couples(load, couple, np.array([1.0]))
-    assert couples[0, 0] == approx(x, rel=1e-14, nan_ok=True)
+    assert couples[0, 0] == approx(float(x), rel=1e-14, nan_ok=True)
 
 
 def test_friction_of_several_pins_fulfils_its_equations():

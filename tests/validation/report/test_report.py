@@ -347,6 +347,11 @@ OF_MINE = Row(
 )
 
 
+def mine(**fields):
+    """Return OF_MINE with other fields."""
+    return replace(OF_MINE, **fields)
+
+
 def test_failures_are_one_line_an_engine_and_cause(printed):
     """A mistake that explains more scenes is named before one that fits a few by
     chance.
@@ -355,7 +360,7 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
     sign = "sign reversed"
     scenes = []
     for k in range(23):
-        of_scene = replace(OF_MINE, scene=f"scene {k:02d}")
+        of_scene = mine(scene=f"scene {k:02d}")
         wrong = [fail(replace(of_scene, quantity=name)) for name in ("F32", "F43")]
         causes = {"mine": [sign, swapped] if k < 3 else [swapped]}
         scenes.append(record_of(of_scene.scene, [of_scene, *wrong], causes=causes))
@@ -387,8 +392,7 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
         SOLUTION.assembled,
         numbers,
     )
-    row = replace(
-        OF_MINE,
+    row = mine(
         quantity="F43",
         error=2.0,
         allowed=1e-6,
@@ -409,9 +413,8 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     assert "F43 " not in drawn and "allowed to mine" not in drawn
 
 
-RIGHT = [replace(OF_MINE, quantity=name) for name in ("F12", "theta_3")]
-OPEN = replace(
-    OF_MINE,
+RIGHT = [mine(quantity=name) for name in ("F12", "theta_3")]
+OPEN = mine(
     quantity="assembled",
     error=9.0,
     allowed=0.0,
@@ -430,7 +433,7 @@ UNKNOWN = "no known mistake explains it"
 CAUSES = [
     ([fail(OF_MINE)], f"torque differs, pin forces and motion agree; {UNKNOWN}"),
     (
-        [fail(replace(OF_MINE, quantity="closure"))],
+        [fail(mine(quantity="closure"))],
         f"closure differs, pin forces and motion agree; {UNKNOWN}",
     ),
     (
@@ -439,11 +442,11 @@ CAUSES = [
         f" {UNKNOWN}",
     ),
     (
-        [fail(replace(OF_MINE, quantity="torque_inertia"))],
+        [fail(mine(quantity="torque_inertia"))],
         f"inertial part of the torque differs, pin forces and motion agree; {UNKNOWN}",
     ),
     (
-        [fail(replace(OF_MINE, quantity=name), 3e-8) for name in ("torque", "F32")],
+        [fail(mine(quantity=name), 3e-8) for name in ("torque", "F32")],
         "torque and pin forces differ, motion agrees: the first 7 digits agree",
     ),
     ([fail(OF_MINE, math.nan)], "no number for torque"),
@@ -471,9 +474,9 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
     """The identity that fails with it has the larger error, and is a consequence."""
     names = ("torque", *PIN_FORCES, "theta_3")
     rows = [
-        fail(replace(OF_MINE, engine=FORMULAS, quantity="power"), 0.9),
-        fail(replace(OF_MINE, engine="one"), 0.3),
-        fail(replace(OF_MINE, engine="one", quantity="torque_inertia"), 0.2),
+        fail(mine(engine=FORMULAS, quantity="power"), 0.9),
+        fail(mine(engine="one"), 0.3),
+        fail(mine(engine="one", quantity="torque_inertia"), 0.2),
     ]
     against = {name: ["one", "two"] for name in names}
     summary = summary_of([record_of("a", rows, against=against)])
@@ -483,8 +486,8 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
 
 
-BROKEN = fail(replace(OF_MINE, engine=FORMULAS, quantity="force_sum"))
-ALONE = fail(replace(OF_MINE, quantity="a_G3"), 0.5)
+BROKEN = fail(mine(engine=FORMULAS, quantity="force_sum"))
+ALONE = fail(mine(quantity="a_G3"), 0.5)
 ALONE_TOO = replace(ALONE, engine="two")
 
 
@@ -510,8 +513,8 @@ def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
 
 def test_pin_forces_of_which_one_fails_do_not_agree():
     """Its row is fourbar's cause, as two other engines blame fourbar for it."""
-    rows = [fail(replace(OF_MINE, quantity=name)) for name in ("F12", "torque")]
-    rows.append(replace(OF_MINE, quantity="F14"))
+    rows = [fail(mine(quantity=name)) for name in ("F12", "torque")]
+    rows.append(mine(quantity="F14"))
     summary = summary_of([record_of("a", rows, against={"F12": ["one", "two"]})])
     causes = {cause.engine: cause.text for cause in summary.overview.causes}
     assert causes["mine"] == "torque differs; mistakes are not looked for there"
@@ -560,7 +563,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
     ],
 )
 def test_what_was_not_compared_is_counted_by_its_reason(verdict, reason, kind):
-    row = replace(OF_MINE, quantity="torque_inertia", verdict=verdict, reason=reason)
+    row = mine(quantity="torque_inertia", verdict=verdict, reason=reason)
     assert summary_of([record_of("a", [row])]).overview.not_compared == {kind: 1}
 
 
@@ -588,13 +591,13 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     overview.listed = {"two": dict.fromkeys(["friction", "gravity", "torque", "F12"])}
     for name, counts in (("a", (5, 5)), ("b", (5, 4)), ("c", (5, 0))):
         rows = [
-            replace(OF_MINE, scene=name, engine=engine, quantity=quantity)
+            mine(scene=name, engine=engine, quantity=quantity)
             for engine, count in zip(("one", "two"), counts, strict=True)
             for quantity in ("torque", *PIN_FORCES)[:count]
         ]
         overview.add(replace(record_of(name, rows), needs=["gravity"]))
     needs = ["friction"]  # inertia alone is asked without it
-    bare = replace(OF_MINE, scene="d", engine="two", quantity="torque_inertia")
+    bare = mine(scene="d", engine="two", quantity="torque_inertia")
     overview.add(replace(record_of("d", [bare]), needs=needs))
     assert "two lists friction: compared in no scene" in overview.notes
     assert overview.checked_twice == confirmed
@@ -645,8 +648,8 @@ def test_the_picture_shows_the_pin_force_that_fails():
     )
     assert f"|{largest}|" in (draw_scene_figure(record) or "")
     record.rows = [
-        fail(replace(OF_MINE, quantity=other), error=0.5),
-        fail(replace(OF_MINE, quantity=largest)),
+        fail(mine(quantity=other), error=0.5),
+        fail(mine(quantity=largest)),
     ]
     drawn = draw_scene_figure(record) or ""
     assert f"|{other}|" in drawn and f"|{largest}|" not in drawn
