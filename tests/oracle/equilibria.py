@@ -71,10 +71,10 @@ def equilibria(question):
         raise NotAskedError("the linkage is indifferent")
     branches = (1, -1)
     if turns_fully(scene.linkage) and not change_points(scene.linkage):
-        branches = (int(question.solution.branch[0]),)
+        branches = (question.solution.branch[0],)
     torques = {branch: _hold(scene, theta_2, branch) for branch in branches}
     if turns_fully(scene.linkage) and len(change_points(scene.linkage)) == 2:
-        signs = find_signs(scene.linkage, theta_2, int(question.at.branch[0]))
+        signs = find_signs(scene.linkage, theta_2, question.at.branch[0])
         for branch, torque in torques.items():  # one assembly is a circuit of its own
             torque[signs != branch] = np.nan
     if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):
@@ -143,7 +143,7 @@ def _list_samples(question):
     turn = 2.0 * math.pi
     if not len(swept):
         raise NotAskedError("the linkage assembles at none of its positions")
-    first = float(swept[0])
+    first = swept[0]
     away = math.inf
     for start, stop in find_intervals(
         linkage
@@ -157,8 +157,8 @@ def _list_samples(question):
         if turns_fully(linkage):
             low = first - 2.0 * turn
             high = first + 2.0 * turn
-        low = max(low, float(swept.min()))
-        high = min(high, float(swept.max()), float(swept.min()) + turn)
+        low = max(low, swept.min())
+        high = min(high, swept.max(), swept.min() + turn)
     return np.arange(
         low + _OFF_GRID * turn / POSITIONS_OF_A_TURN, high, turn / POSITIONS_OF_A_TURN
     )
@@ -182,7 +182,7 @@ def _hold(scene, angle, branch):
         if "torque" not in answer.quantities:  # no position assembles
             return np.full(angle.shape, np.nan)
         sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
-    sound = np.asarray(answer.assembled) & (np.abs(sine) >= WELL_CONDITIONED)
+    sound = answer.assembled & (np.abs(sine) >= WELL_CONDITIONED)
     return np.where(sound, answer.quantities["torque"], np.nan)
 
 
@@ -199,19 +199,16 @@ def _count_missed(scene, branch, theta_2, torque, places):
     open_steps = ~np.isfinite(torque[:-1] * torque[1:])
     for angle, off in places:
         turned = theta_2[0] + np.remainder(angle - theta_2[0], 2.0 * np.pi)
-        index = int(np.searchsorted(theta_2, turned)) - 1
+        index = np.searchsorted(theta_2, turned) - 1
         if 0 <= index < len(counted):
             counted[index] += 1
-        first, last = (
-            int(np.searchsorted(theta_2, end)) - 1
-            for end in (turned - off, turned + off)
-        )
+        first, last = np.searchsorted(theta_2, [turned - off, turned + off]) - 1
         if first != last:
             open_steps[max(first, 0) : max(last + 1, 0)] = True
     differing = ~open_steps & ((torque[:-1] * torque[1:] < 0.0) != (counted % 2 == 1))
 
     def is_certain(index):
-        held = _derive_torque(scene, 2, float(theta_2[index]), branch)
+        held = _derive_torque(scene, 2, theta_2[index], branch)
         return (
             held is not None
             and held[0].value * torque[index] > 0.0

@@ -71,8 +71,8 @@ def _judge_file(question, engine, read):
     # a drive at a named point keeps its place without the point
     few = state_from_pins(take_few(question))
     scene = replace(few, loads=(), points=())
-    theta_2 = np.asarray(scene.motion.theta_2)
-    opened = replace(scene, motion=scene.motion.replace(angle=theta_2[:1]))
+    first = scene.motion.theta_2[:1]
+    opened = replace(scene, motion=scene.motion.replace(angle=first))
     try:
         held = read(opened)
     except (LimitError, InputError) as limit:

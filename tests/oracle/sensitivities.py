@@ -58,7 +58,7 @@ def furnish(scene, question):
     The load is as large as the scene's forces.
     """
     coupler = scene.linkage.coupler
-    first = float(question.solution.theta_2[0])
+    first = question.solution.theta_2[0]
     if not scene.points:
         lengths = {bar: scene.linkage.bar(bar).length for bar in MOVING_BARS}
         made = [Point(f"P{k}", k, (0.6 * lengths[k], 0.4 * k)) for k in lengths]
@@ -67,7 +67,7 @@ def furnish(scene, question):
     positive = size[np.isfinite(size) & (size > 0.0)]
     tabled = any(load.table for load in scene.loads)
     if positive.size and not tabled and scene.motion.law is None:
-        force = 0.5 * float(np.median(positive))
+        force = 0.5 * np.median(positive)
         table = Table(tuple(first + x for x in _CORNERS), (1.0, -0.5, 2.0, 1.0))
         load = Load(
             3,
@@ -281,7 +281,7 @@ def tolerances(question):
         ]
         if not parts:
             continue
-        slight = _SLIGHT * max(float(np.max(expected[part].worst)) for part in parts)
+        slight = _SLIGHT * max(expected[part].worst.max() for part in parts)
         errors[name] = np.max(
             [
                 _compute_off(spread.spreads[part], expected[part], slight)
@@ -427,6 +427,6 @@ def _compute_off(spread, expected, slight):
 def _subtract(name, one, minus):
     """Subtract, angles within half a turn."""
     difference = one - minus
-    return np.asarray(
-        np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference
-    )
+    if name.startswith("theta"):
+        return np.angle(np.exp(1j * difference))
+    return difference

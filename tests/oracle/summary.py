@@ -321,8 +321,7 @@ def _judge_drive(judged):
 def _find_turned(judged):
     """Find the angle that the commanded bar turns, with its sense, rad."""
     at = judged.solution.at
-    sense = np.sign(np.mean(np.asarray(at.speed, float)))
-    return float(sense * abs(at.angle[-1] - at.angle[0]))
+    return np.sign(np.mean(at.speed)) * abs(at.angle[-1] - at.angle[0])
 
 
 class _Panels(NamedTuple):

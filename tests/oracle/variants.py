@@ -3,7 +3,6 @@ results.
 """
 
 import cmath
-import json
 import tomllib
 from contextlib import suppress
 from copy import deepcopy
@@ -11,6 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import tomlkit
 
 from fourbar.errors import InputError
 from fourbar.files import dump, loads
@@ -66,11 +66,6 @@ def take_few(question):
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
     reference = question.reference
-    assert (
-        reference is not None
-        and reference.drive_condition is not None
-        and reference.F12 is not None
-    )
     fit = (
         (solution.status_code == OK)
         & (reference.condition >= WELL_CONDITIONED)
@@ -79,9 +74,7 @@ def take_few(question):
     fit &= (reference.drive_condition >= WELL_CONDITIONED) & (
         command.branch == scene.motion.branch
     )
-    fit &= ~mark_reversing(scene, solution, _NOT_AT_REST) & (
-        np.asarray(command.speed) != 0.0
-    )
+    fit &= ~mark_reversing(scene, solution, _NOT_AT_REST) & (command.speed != 0.0)
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
             fit &= (
@@ -222,9 +215,7 @@ class SceneFile:
             else:
                 table[last] = _change_entry(old, change)
         try:
-            return loads(
-                "\n".join(_write_toml_line(*entry) for entry in document.items())
-            )
+            return loads(tomlkit.dumps(document))
         except InputError as refused:
             if refused.key != "lengths":
                 raise
@@ -241,20 +232,6 @@ def _change_entry(quantity, change):
     if unit:
         return f"{float(number) + change!r} {unit}"
     return float(number) + change
-
-
-def _write_toml_line(key, value):
-    return f"{json.dumps(key)} = {_write_toml(value)}"
-
-
-def _write_toml(value):
-    if isinstance(value, dict):
-        return (
-            "{" + ", ".join(_write_toml_line(*entry) for entry in value.items()) + "}"
-        )
-    if isinstance(value, list):
-        return "[" + ",\n".join(map(_write_toml, value)) + "]"
-    return json.dumps(value)
 
 
 def ask_free_bodies(scene, command=None):
@@ -294,7 +271,7 @@ def stays_beside(member, scene):
     bar = scene.motion.bar
     nominal = _measure_misses(scene.linkage, bar)
     changed = _measure_misses(member.linkage, bar)
-    return bool(np.all(changed[nominal <= PERTURBATION_TRIED] <= PERTURBATION_TRIED))
+    return np.all(changed[nominal <= PERTURBATION_TRIED] <= PERTURBATION_TRIED)
 
 
 def ask_beside(member, scene, nominal):
@@ -333,7 +310,6 @@ def hold_to(question, engine, scene, solution, answer):
     A public call gave the solution for a scene.
     """
     answer = replace(answer, engine=engine)
-    assert answer.at is not None
     predicted = make_prediction(FREE_BODY, scene, answer.at, answer)
     reference = make_reference(scene, answer)
     rows = Comparison(

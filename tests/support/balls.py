@@ -20,8 +20,8 @@ def answer_in_balls(scene, at=None):
     (n,), vectors (n, 2), NaN where it has no value.
     """
     at = with_signs(scene.linkage, fourbar.command(scene) if at is None else at)
-    rows, precision = [], ctx.prec
-    try:
+    rows = []
+    with ctx.workprec(ctx.prec):
         places = at.stated[0]
         for place, branch in zip(places.tolist(), at.branch.tolist(), strict=True):
             inputs = make_balls(scene, place)
@@ -34,8 +34,6 @@ def answer_in_balls(scene, at=None):
                     for name, ball in outputs.items()
                 }
             )
-    finally:
-        ctx.prec = precision
     columns = {
         name: np.array([row.get(name, np.nan) for row in rows])
         for name in set().union(*rows)
@@ -56,14 +54,11 @@ def move_in_balls(linkage, bar, angle, sign):
     """
     names = f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}"
     scene = Scene(linkage, Motion(**dict(zip(names, (angle, 1.0, 0.0), strict=True))))
-    precision = ctx.prec
-    try:
+    with ctx.workprec(ctx.prec):
         inputs = make_balls(scene, angle)
         outputs = compute_outputs(scene, sign, inputs)
         directions = compute_directions(inputs, sign)
         ground = polar_ball(arb(1), inputs["theta_1"])
         for number, u in enumerate((ground, *directions), 1):
             outputs[f"u_{number}"] = complex(float(u.real), float(u.imag))
-    finally:
-        ctx.prec = precision
     return inputs | outputs

@@ -124,10 +124,8 @@ def _centre_kept(r):
     base = _base()
     scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
     loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
-    return bool(
-        loop.model.body_sameframe[loop.model.body("output").id]
-        != mujoco.mjtSameFrame.mjSAMEFRAME_BODY
-    )
+    body = loop.model.body("output").id
+    return loop.model.body_sameframe[body] != mujoco.mjtSameFrame.mjSAMEFRAME_BODY
 
 
 def _proximal(mu):
@@ -139,7 +137,7 @@ def _proximal(mu):
         released = pinocchio.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
         pinocchio.PROXIMAL_SETTINGS = kept
-    return bool(np.isfinite(released.theta_2).all())
+    return np.isfinite(released.theta_2).all()
 
 
 MEASURED = (

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 import fourbar
 from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command
 from fourbar_validation.compare.pins import state_from_pins
 from tests.support.textbook import Bodies, Textbook, polar
 
-Array = NDArray[np.float64]
 TURNS_AT_LEAST = 0.1
 """Part of a bar's greatest speed above which a couple on it is judged: it has poles
 where the bar stands still.
@@ -48,7 +47,7 @@ class Loop:
     def __init__(self, scene):
         self.bodies = Bodies(state_from_pins(scene), Textbook.newton_steps)
         self.d, self.a, self.b, self.c = map(float, scene.linkage.lengths)
-        self.theta_1 = float(scene.linkage.ground_angle)
+        self.theta_1 = scene.linkage.ground_angle
         self.masses = self.bodies.mass.tolist()
         self.inertias = self.bodies.inertia.tolist()
         self.centres = self.bodies.centre.tolist()
@@ -131,7 +130,7 @@ class Loop:
             push = polar(load.force or (0.0, 0.0))
             place = self.centres[number] + polar(load.from_centre or (0.0, 0.0))
             frame = "" if load.frame == "bar" else 'refsite="world"'
-            couple = float(load.moment)
+            couple = load.moment
             if load.arm is not None:
                 couple += _cross(polar(load.arm), push)
             sites[number].append(
@@ -162,26 +161,14 @@ class Loop:
         </mujoco>"""
 
 
-@dataclass(frozen=True)
-class Sample:
-    """What was read of one state."""
-
-    theta_2: float
-    omega_2: float
-    alpha_2: float
-    forces: dict[str, Array]
-    """Pin forces, and the drive under "torque"."""
-
-
 class Simulation:
     """A crank with a heavy flywheel carries the loop through its sweep."""
 
     def __init__(self, scene, settings):
         self.loop = Loop(scene)
         self.settings = settings
-        self.sweep = np.asarray(fourbar.solve(scene, "position").theta_2)
-        self.omega = float(scene.motion.omega_2)
-        assert float(scene.motion.alpha_2) == 0.0, "the flywheel keeps its speed"
+        self.sweep = fourbar.solve(scene, "position").theta_2
+        self.omega = scene.motion.omega_2
         self.timestep = 2.0 * math.pi / settings.steps_per_revolution / abs(self.omega)
         self.model = self.compile(settings.wheel)
         self.data = mujoco.MjData(self.model)
@@ -206,9 +193,9 @@ class Simulation:
 
     def run(self):
         """Step through the sweep and read states on the way."""
-        self.start(float(self.sweep[0] if self.omega > 0.0 else self.sweep[-1]))
+        self.start(self.sweep[0] if self.omega > 0.0 else self.sweep[-1])
         n = self.settings.steps_per_revolution
-        steps = math.floor(float(np.ptp(self.sweep)) / (2.0 * math.pi) * n)
+        steps = math.floor(np.ptp(self.sweep) / (2.0 * math.pi) * n)
         stride = max(1, round(n / SAMPLES))
         samples = []
         for step in range(steps + 1):
@@ -218,18 +205,19 @@ class Simulation:
         return samples
 
     def read(self):
-        """Read one state.
+        """Read angle, speed and acceleration of the crank in one state, pin forces, and
+        the drive under "torque".
 
         The drive is the one that gives the crank the acceleration which the flywheel
         gives it.
         """
         mujoco.mj_forward(self.model, self.data)
-        alpha_2 = float(self.data.qacc[0])
+        alpha_2 = self.data.qacc[0]
         angles, speeds = _add_crank(self.data.qpos), _add_crank(self.data.qvel)
         acceleration, closing, drive = self.probe_drive(angles, alpha_2)
         turned = _add_crank(acceleration)
         forces = self.balance(angles, speeds, turned, closing, drive)
-        return Sample(float(angles[0]), float(speeds[0]), alpha_2, forces)
+        return angles[0], speeds[0], alpha_2, forces
 
     def probe_drive(self, angles, alpha_2):
         """Find the drive that gives the crank its acceleration.
@@ -240,7 +228,7 @@ class Simulation:
         answers = []
         wheel_torque = np.array([self.wheel_read * alpha_2, 0.0, 0.0])
         # large enough to be felt by the crank's acceleration above its round-off
-        scale = max(self.wheel_read, 1.0) / float(np.abs(unit).max())
+        scale = max(self.wheel_read, 1.0) / np.abs(unit).max()
         probe = self.probe
         for amount in (0.0, scale):
             probe.qpos[:], probe.qvel[:] = self.data.qpos[:3], self.data.qvel[:3]
@@ -251,7 +239,7 @@ class Simulation:
         part = (alpha_2 - rest[0]) / (pushed[0] - rest[0])
         acceleration = rest + part * (pushed - rest)
         closing = rest_closing + part * (pushed_closing - rest_closing)
-        return acceleration, closing, float(part * scale)
+        return acceleration, closing, part * scale
 
     def generalized_drive(self, angles):
         """Return the generalized forces on the three joints of a drive of size one, by
@@ -295,26 +283,24 @@ def measure(scene, settings):
     """Return the worst error of the drive and of each pin's force, relative to the
     largest value in the sweep.
     """
-    samples = Simulation(scene, settings).run()
-    columns = np.array([(s.theta_2, s.omega_2, s.alpha_2) for s in samples]).T
-    at = fourbar.command(scene)
-    branch = np.full(len(samples), at.branch[0])
-    names = ("angle", "speed", "acceleration")
-    at = at._replace(**dict(zip(names, columns, strict=True)), branch=branch)
+    *motion, forces = zip(*Simulation(scene, settings).run(), strict=True)
+    angle, speed, acceleration = np.array(motion)
+    branch = np.full(len(angle), scene.motion.branch)
+    at = Command(angle, branch, speed, acceleration)
     right = fourbar.solve(scene, at=at)
     drive, speed = "torque", right[f"omega_{scene.drive_bar or 2}"]
     if scene.drive is not None:
         drive, speed = "drive_force", right.stroke_speed
-    judged = np.ones(len(samples), dtype=bool)
+    judged = np.ones(len(angle), dtype=bool)
     if scene.drive is not None or scene.drive_bar != 2:  # with poles where it rests
         judged = np.abs(speed) > TURNS_AT_LEAST * np.abs(speed).max()
     errors = {}
     for name in ("torque", *PIN_FORCES):
-        ours = np.array([sample.forces[name] for sample in samples])[judged]
+        ours = np.array([one[name] for one in forces])[judged]
         exact = right[drive if name == "torque" else name][judged]
         exact = exact.reshape(ours.shape)
         apart, size = (np.linalg.norm(one, axis=1) for one in (ours - exact, exact))
-        errors[name] = float(apart.max() / size.max())
+        errors[name] = apart.max() / size.max()
     return errors
 
 
@@ -326,4 +312,4 @@ def _add_crank(joints):
 
 
 def _cross(arm, force):
-    return float((arm.conjugate() * force).imag)
+    return (arm.conjugate() * force).imag

@@ -61,7 +61,7 @@ class Textbook:
             zip(command.theta_2, command.branch, strict=True)
         ):
             try:
-                assembled[i] = bodies.close(float(theta_2), int(branch))
+                assembled[i] = bodies.close(theta_2, branch)
                 answered = bodies.solve(omega[i], alpha[i]) if assembled[i] else {}
             except np.linalg.LinAlgError:  # on a change point
                 assembled[i], answered = True, {}
