@@ -14,7 +14,7 @@ from fourbar_lab.benchmark import BENCHMARKED_ENGINES, REFUSED, read_reasons
 from fourbar_lab.cli import status
 from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.engines.environments import read_engines, read_engines_of
-from tests.whole.test_imports import ROOT
+from tests.support.checkout import read
 
 WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 
@@ -25,9 +25,9 @@ def folder(tmp_path):
 
     The engine of the page, one that is wrong, and the entries of both.
     """
-    (code,) = re.findall(
-        r"```python\n(.*?)```", (ROOT / "docs" / "protocol.md").read_text(), re.DOTALL
-    )[:1]
+    (code,) = re.findall(r"```python\n(.*?)```", read("docs/protocol.md"), re.DOTALL)[
+        :1
+    ]
     assert WRONG[0] in code
     (tmp_path / "mine.py").write_text(code)
     (tmp_path / "wrong.py").write_text(code.replace(*WRONG))

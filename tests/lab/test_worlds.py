@@ -11,7 +11,7 @@ import pytest
 from fourbar_lab.simulators.mujoco_c import MujocoFile
 from fourbar_lab.worlds import CONTENDERS, FORMULAS_ON_ONE_CORE, measure_worlds
 from tests.lab.simulators.test_simulators import ask_position
-from tests.whole.test_imports import ROOT
+from tests.support.checkout import read
 
 MUJOCO = "MuJoCo, one core"
 EXACT = 1e-10
@@ -62,7 +62,7 @@ def test_a_world_that_is_not_finite_fails():
 
 
 def test_the_page_states_errors_that_hold():
-    page = (ROOT / "docs" / "cost.md").read_text("utf-8")
+    page = read("docs/cost.md")
     table = page.partition("<!-- data worlds -->")[2].partition("<!-- end -->")[0]
     rows = {}
     for line in table.strip().splitlines()[2:]:

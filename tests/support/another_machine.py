@@ -10,7 +10,7 @@ from typing import NamedTuple
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 from fourbar_validation.report.machine import find_blas
-from tests.support.processes import run_python
+from tests.support.checkout import run_python
 
 BEFORE = "MACHINE_BEFORE"
 """The environment variable that tells the child what its parent calculates with."""

@@ -14,9 +14,9 @@ import pytest
 
 from fourbar_validation import engine
 from fourbar_validation.engines import guests, programs
-from tests.support.processes import ROOT
+from tests.support.checkout import read
 
-PAGE = (ROOT / "docs" / "protocol.md").read_text("utf-8")
+PAGE = read("docs/protocol.md")
 (PLAIN,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 """The page's engine in plain Python."""
 

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import fourbar
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, run_python
 
 SKIPPED = "not checked: pyright is not installed: pip install 'pyright[nodejs]'"
 

@@ -21,7 +21,7 @@ from fourbar import (
     Sweep,
     uniform,
 )
-from tests.support.processes import ROOT
+from tests.support.checkout import ROOT
 
 ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 """A cylinder from the ground to the coupler."""

@@ -11,7 +11,6 @@ import runpy
 from dataclasses import fields, is_dataclass, replace
 from decimal import Decimal
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,19 +36,17 @@ from fourbar import (
 from fourbar.cli import status
 from fourbar.files import save
 from fourbar_lab.fault_scenes import FAULT_SCENES
+from tests.support.checkout import ROOT, read
 from tests.support.scenes import CYLINDER, crank_rocker
-
-DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.mark.slow
 def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     names = sorted(dir(fourbar))
-    page = (DOCS / "api.md").read_text("utf-8")
-    table = page.partition("## Names by task")[2].partition("\n\n|")[2]
+    table = read("docs/api.md").partition("## Names by task")[2].partition("\n\n|")[2]
     rows = table.partition("\n\n")[0].splitlines()[2:]
     assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == names
-    reference = runpy.run_path(str(DOCS / "api.py"))["text"]()
+    reference = runpy.run_path(ROOT / "docs/api.py")["text"]()
     assert all(f"\n### {name}\n" in reference for name in names)
 
 
@@ -195,7 +192,7 @@ def calls():
         ("bearing_load",): (solution, "A"),
         ("internal_forces",): (scene, solution, 2, (0.0, 0.05)),
         ("units",): ("mm",),
-        ("load",): (str(DOCS.parent / "models" / "thesis.toml"),),
+        ("load",): (str(ROOT / "models/thesis.toml"),),
         ("save",): (scene, "a.toml"),
         ("vary",): (scene, {"lengths.input": [0.1]}),
         ("release",): (still,),
@@ -331,7 +328,7 @@ def test_scenes_compare_by_value(tmp_path):
         replace(scene, title="another"),
     ):
         assert scene != changed
-    file = DOCS.parent / "models" / "thesis.toml"
+    file = ROOT / "models/thesis.toml"
     save(fourbar.load(file), tmp_path / "a.toml")
     assert fourbar.load(file) == fourbar.load(tmp_path / "a.toml")
 

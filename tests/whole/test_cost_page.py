@@ -6,7 +6,6 @@ import math
 import re
 import runpy
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -20,15 +19,14 @@ from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP
 from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
 from fourbar_validation.report.svg import write_alone
+from tests.support.checkout import ROOT, read
 
-ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs"
-PAGE = (DOCS / "cost.md").read_text("utf-8")
-README = (ROOT / "README.md").read_text("utf-8")
-SCENE = load(ROOT / "models" / "crank_rocker.toml")
+PAGE = read("docs/cost.md")
+README = read("README.md")
+SCENE = load(ROOT / "models/crank_rocker.toml")
 PRINTED = 0.06
 """Two printed digits, of the error and of the settings, hold an error to this part."""
-DRAWS = runpy.run_path(str(DOCS / "cost.py"))
+DRAWS = runpy.run_path(ROOT / "docs/cost.py")
 
 
 def read_rows():
@@ -103,8 +101,7 @@ def read_words(svg):
 def test_the_other_pictures_are_those_that_are_drawn(name):
     with apply_style():
         drawn = write_alone(DRAWS[f"draw_{name.replace('-', '_')}"](), name)
-    kept = (DOCS / "cost" / f"{name}.svg").read_text("utf-8")
-    assert read_words(drawn) == read_words(kept)
+    assert read_words(drawn) == read_words(read(f"docs/cost/{name}.svg"))
 
 
 def test_every_point_of_the_hard_picture_stays_below_the_limit():

@@ -8,7 +8,6 @@ import math
 import re
 import runpy
 import shlex
-from pathlib import Path
 
 import click
 import numpy as np
@@ -24,9 +23,9 @@ from fourbar_validation.cli import group as harness
 from fourbar_validation.cli import status as run_harness
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.scenes.suites import read_suite
+from tests.support.checkout import ROOT, read
 from tests.support.here import judge_here
 
-ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 GALLERY = ROOT / "models" / "gallery"
 GROUPS = {
@@ -38,11 +37,6 @@ GROUPS = {
 TOP = ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY", "paper/paper")
 PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
 FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
-
-
-def read(name):
-    """Return the text of a file, by its path or its name in the checkout."""
-    return (ROOT / name).read_text("utf-8")
 
 
 def table_after(name, heading):
@@ -71,7 +65,7 @@ def test_the_examples_of_continuous_integration_use_commands_that_exist():
             options_of = commands_of(GROUPS[program])[name].params
             taken = {name for option in options_of for name in option.opts}
             wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
-            assert wanted <= taken and wanted, (file.name, name, wanted - taken)
+            assert wanted <= taken and wanted
 
 
 def test_every_long_part_is_run_in_the_night():
@@ -306,7 +300,7 @@ def measure_word(word):
 
 def test_the_reference_of_the_commands_lists_every_option():
     commands = commands_of(group)
-    reference = runpy.run_path(str(DOCS / "commands.py"))["text"]()
+    reference = runpy.run_path(DOCS / "commands.py")["text"]()
     assert re.findall(r"^## (\w+)$", reference, re.MULTILINE) == [*commands]
     described = re.findall(r"^\| `(-.*?)` \|", reference, re.MULTILINE)
     names = {name.split()[0] for row in described for name in row.split(", ")}
@@ -318,7 +312,7 @@ def test_the_reference_of_the_commands_lists_every_option():
 
 @pytest.mark.slow
 def test_the_architecture_names_every_layer_and_no_other():
-    uses = runpy.run_path(str(DOCS / "architecture.py"))["uses"]
+    uses = runpy.run_path(DOCS / "architecture.py")["uses"]
     for package in ("fourbar", "fourbar_validation"):
         rows = table_after("docs/architecture.md", f"\n## {package}\n\n")
         listed = re.findall(r"`(\w+)/?`", "".join(row.split("|")[1] for row in rows))
@@ -326,7 +320,7 @@ def test_the_architecture_names_every_layer_and_no_other():
 
 
 def test_the_figure_of_the_theory_is_the_one_that_is_drawn():
-    assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
+    assert read("docs/theory.svg") == runpy.run_path(DOCS / "theory.py")["text"]()
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.run.judge import judge
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, read, run_python
 from tests.validation.engines.test_applied_effects import (
     EXACT,
     ON_TREES,
@@ -31,9 +31,8 @@ from tests.validation.engines.test_applied_effects import (
 
 FOLDERS = ("", "fourbar", "validation", "validation/fourbar_validation")
 THE_READER_MAKES = {"fourbar/effects/latch.py", "tests/fourbar/effects/test_latch.py"}
-PAGE = (ROOT / "docs" / "extending.md").read_text("utf-8")
-REFERENCE = (ROOT / "docs" / "scene-file.md").read_text("utf-8")
-PAGE, QUANTITY = PAGE.split("\n## A quantity\n")
+PAGE, QUANTITY = read("docs/extending.md").split("\n## A quantity\n")
+REFERENCE = read("docs/scene-file.md")
 SCENE = """
 [lengths]
 ground = "300 mm"
@@ -168,7 +167,7 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on():
 
 @pytest.mark.parametrize("page", ["architecture", "extending"])
 def test_each_file_and_each_name_in_one_is_where_the_page_says(page):
-    text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
+    text = read(f"docs/{page}.md")
     stated = re.findall(r"`(\w+(?:/[\w.-]+)*/[\w-]+\.\w+)`", text)
     placed = re.findall(
         r"`([\w.]+)(?:\([\w, ]*\))?`(?: \w+)? (?:in|of|\() ?`([\w/]+\.\w+)`", text
@@ -178,8 +177,7 @@ def test_each_file_and_each_name_in_one_is_where_the_page_says(page):
         assert find_files(file), file
     for name, file in placed:
         word = re.compile(rf"\b{name.rpartition('.')[2]}\b")
-        texts = [path.read_text("utf-8") for path in find_files(file)]
-        assert any(map(word.search, texts)), (name, file)
+        assert any(map(word.search, map(read, find_files(file)))), name
 
 
 def find_files(name):

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from fourbar.errors import INTERRUPTED
+from tests.support.checkout import BUSY, ROOT, run_python
 from tests.support.guests import list_processes
-from tests.support.processes import BUSY, ROOT, run_python
 
 PATIENCE = 8.0 * BUSY
 """Seconds after which nothing may be left, as SECURITY.md promises."""

@@ -13,7 +13,7 @@ import fourbar.cli
 import fourbar_validation.cli
 from fourbar.errors import BAD_INPUT
 from fourbar.evaluation import free_motion
-from tests.support.processes import ROOT
+from tests.support.checkout import ROOT
 
 SCENE = ROOT / "models" / "crank_rocker.toml"
 READING = [

@@ -33,8 +33,8 @@ from fourbar_validation.compare.rows import FAILS, write_results
 from fourbar_validation.published.printed_figures import PublishedFigure
 from fourbar_validation.regression.record import find_baseline
 from tests.support.alone import alone
+from tests.support.checkout import ROOT, run_python
 from tests.support.here import judge_here
-from tests.support.processes import ROOT, run_python
 from tests.support.runs import ROW, changed
 from tests.support.scenes import crank_rocker
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, read, run_python
 
 HEAVY = (
     "pint",
@@ -71,7 +71,7 @@ in at a glance.
 
 @cache
 def parse(path):
-    return ast.parse(path.read_text("utf-8"))
+    return ast.parse(read(path))
 
 
 @cache
@@ -157,24 +157,10 @@ def modules(package):
 @pytest.mark.parametrize("package", LAYERS)
 def test_layers_stand_on_floors(package):
     floors = [floor.split() for floor in LAYERS[package]]
-    entries = {
-        path.name.removesuffix(".py")
-        for path in PACKAGES[package].iterdir()
-        if not path.name.startswith("__")
-        and (path.suffix == ".py" or any(path.glob("*.py")))
-    }
-    assert {name for floor in floors for name in floor} == entries
-    assert (
-        len(
-            [
-                path
-                for path in PACKAGES[package].iterdir()
-                if not path.name.startswith("__") and path.name != "py.typed"
-            ]
-        )
-        <= MOST[package]
-    )
     height = {name: number for number, floor in enumerate(floors) for name in floor}
+    assert height.keys() == {*map(layer, modules(package))}
+    shown = {path.name for path in PACKAGES[package].glob("[!_]*")}
+    assert len(shown - {"py.typed"}) <= MOST[package]
     for name, path in modules(package).items():
         for used_module in (
             module for module in imported(path) if module.startswith(f"{package}.")
@@ -213,10 +199,8 @@ def test_no_class_name_stands_for_two_things():
 
 @pytest.mark.slow
 def test_the_picture_of_the_layers_is_what_the_imports_make():
-    picture = (ROOT / "docs" / "architecture.svg").read_text("utf-8")
-    assert (
-        picture == runpy.run_path(str(ROOT / "docs" / "architecture.py"))["text"]()
-    ), "python docs/architecture.py"
+    drawn = runpy.run_path(ROOT / "docs/architecture.py")["text"]()
+    assert read("docs/architecture.svg") == drawn, "python docs/architecture.py"
 
 
 def test_the_formulas_know_numpy_and_the_linkage_alone():
@@ -233,4 +217,4 @@ def test_nothing_that_is_shipped_knows_the_lab():
         for path in PACKAGES[package].rglob("*.py")
     ]
     assert len(shipped) > 200
-    assert not [path for path in shipped if "fourbar_lab" in path.read_text("utf-8")]
+    assert not [path for path in shipped if "fourbar_lab" in read(path)]

@@ -42,9 +42,9 @@ from fourbar_validation.scenes.suites import (
     Random,
     read_scene_files,
 )
+from tests.support.checkout import BUSY, ROOT
 from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
-from tests.support.processes import BUSY, ROOT
 from tests.support.texts import LENGTHS
 from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first, start_and_sleep
 

@@ -8,7 +8,6 @@ import os
 from contextlib import suppress
 from dataclasses import replace
 from itertools import count
-from pathlib import Path
 
 import pytest
 
@@ -17,12 +16,13 @@ from fourbar.edit.session import Session
 from fourbar.errors import HOLDS, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
+from tests.support.checkout import ROOT
 from tests.support.runs import HERE, read_run, save_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.posix]
 DRAFT = ".*.part"
 """Hidden files that a killed process may leave: nothing reads them."""
-MODELS = Path(__file__).parents[2] / "models"
+MODELS = ROOT / "models"
 DIED = 77
 
 

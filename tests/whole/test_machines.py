@@ -11,7 +11,7 @@ import os
 import pytest
 
 from tests.support.another_machine import BEFORE, CORES, environment, machine, why_not
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, run_python
 
 ALL = os.environ.get("MACHINES") == "all"
 TESTS = ROOT / "tests"

@@ -19,10 +19,9 @@ import pytest
 
 from fourbar.errors import HOLDS
 from fourbar_validation.cli import status
+from tests.support.checkout import ROOT, read
 from tests.support.here import judge_here
-from tests.support.processes import ROOT
 
-CI = ROOT / "docs" / "ci"
 SCENES = 41
 """Scenes of the run: three tasks, the last of which has one scene."""
 OPTIONS = ["--random", str(SCENES), "--engines", "free-body", "--no-pictures"]
@@ -62,16 +61,15 @@ def run_shell(script, folder, options=(), **variables):
 
 def collect_as_shown(folder):
     """Run the command that the page shows for collecting."""
-    page = (ROOT / "docs" / "many-machines.md").read_text("utf-8")
     line = "fourbar-validation collect parts/* --out results"
-    assert line in page
+    assert line in read("docs/many-machines.md")
     run_shell(line, folder)
     return folder / "results"
 
 
 def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     """One task is killed in the middle, and submitted again."""
-    script = (CI / "slurm.sh").read_text("utf-8")
+    script = read("docs/ci/slurm.sh")
 
     def submit(task, tasks, **variables):
         of_slurm = {"SLURM_ARRAY_TASK_ID": task, "SLURM_ARRAY_TASK_COUNT": tasks}
@@ -128,7 +126,7 @@ def test_a_dask_worker_that_dies_and_one_that_joins_change_no_byte(alone, tmp_pa
         wait_for(lambda: has_address(scheduler), serving)
         address = json.loads(scheduler.read_text())["address"]
         with started(*worker, folder=tmp_path) as first:
-            line = [str(CI / "dask_run.py"), address, "2", str(out), *OPTIONS]
+            line = [str(ROOT / "docs/ci/dask_run.py"), address, "2", str(out), *OPTIONS]
             program = subprocess.Popen([sys.executable, *line], cwd=tmp_path)
             wait_for(lambda: any(out.glob("[0-9]")), program)
             first.send_signal(signal.SIGKILL)

@@ -10,9 +10,8 @@ from fourbar.errors import HOLDS
 from fourbar.scene import command
 from fourbar.show import motion_curves
 from fourbar.solving import solve
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, read, run_python
 
-MODELS = ROOT / "models"
 MOST_MEMORY, MOST_TIME = 600, 8.0
 """MB, s: what `analyze` of a million positions may take. The arrays of its solution are
 400 MB, and their evaluation with error bars takes 4 s.
@@ -39,7 +38,7 @@ memory of the process that started it in it.
 @pytest.mark.linux
 def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
     scene = tmp_path / "million.toml"
-    text = (MODELS / "crank_rocker.toml").read_text("utf-8")
+    text = read("models/crank_rocker.toml")
     longer, steps = re.subn(r"steps = \d+", "steps = 999998", text)
     assert steps == 1
     scene.write_text(longer, "utf-8")
@@ -52,7 +51,7 @@ def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
 
 @pytest.mark.parametrize("name", ["crank_rocker", "capabilities/springs"])
 def test_bending_is_the_same_in_blocks(name, monkeypatch):
-    scene = fourbar.load(MODELS / f"{name}.toml")
+    scene = fourbar.load(ROOT / f"models/{name}.toml")
     solution = solve(scene, at=command(scene))
     whole = motion_curves.compute_bending(solution)
     monkeypatch.setattr(motion_curves, "POSITIONS_OF_A_BLOCK", 7)

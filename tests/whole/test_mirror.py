@@ -8,7 +8,7 @@ module alone, `support/` holds what tests share.
 
 import pytest
 
-from tests.support.processes import ROOT
+from tests.support.checkout import ROOT
 from tests.support.rows import read_rows
 
 SOURCES = {

@@ -8,7 +8,7 @@ import os
 
 import pytest
 
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, run_python
 
 BLOCKER = """
 import os

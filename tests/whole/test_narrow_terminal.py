@@ -8,9 +8,10 @@ import pytest
 
 import fourbar.cli
 import fourbar_validation.cli
+from tests.support.checkout import ROOT
 from tests.support.here import judge_here
 
-MODELS = Path(__file__).parents[2] / "models"
+MODELS = ROOT / "models"
 MODEL = f"{MODELS}/crank_rocker"
 NARROW, WIDE = 40, 80
 ALIGNED = re.compile(r"\S {2,}\S|[─━]")

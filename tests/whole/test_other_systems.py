@@ -17,7 +17,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import save
 from fourbar_validation.cli import status as harness
-from tests.support.processes import ROOT
+from tests.support.checkout import ROOT
 
 HOSTILE = {
     "LC_ALL": "C",

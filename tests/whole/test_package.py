@@ -17,7 +17,6 @@ import sys
 import tarfile
 import tomllib
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -26,11 +25,11 @@ from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, say_install
 from fourbar.files import save
 from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
+from tests.support.checkout import ROOT, read
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import imported
 
-ROOT = Path(__file__).parents[2]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT = tomllib.loads(read("pyproject.toml"))
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 MODELS = "fourbar_validation.models"
 MOST_OF_THE_ACCEPTED = 200_000
@@ -80,9 +79,8 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere():
     """
     for package in PROJECT["tool"]["setuptools"]["package-dir"]:
         module = f"validation/{package.replace('.', '/')}/__init__.py"
-        assert (ROOT / module).is_file() and f"include {module}\n" in (
-            ROOT / "MANIFEST.in"
-        ).read_text("utf-8")
+        assert (ROOT / module).is_file()
+        assert f"include {module}\n" in read("MANIFEST.in")
 
 
 @pytest.mark.parametrize("line", ["write", "problems"])
@@ -126,7 +124,7 @@ def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_p
     shutil.copytree(ROOT / "models", package / "models")
     shutil.copy(ROOT / "validation" / "fourbar_validation" / "places.py", package)
     (tmp_path / "pyproject.toml").touch()
-    places = runpy.run_path(str(package / "places.py"))
+    places = runpy.run_path(package / "places.py")
     assert places["CHECKOUT"] is None and (places["MODELS"] / "thesis.toml").is_file()
 
 

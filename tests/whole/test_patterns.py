@@ -6,11 +6,11 @@ No text that somebody hands in may hang the program.
 import ast
 import re
 import time
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.support.checkout import ROOT, read
+
 FOLDERS = ("fourbar", "validation/fourbar_validation", "lab/fourbar_lab")
 FUNCTIONS = {
     "compile",
@@ -71,7 +71,7 @@ def list_patterns():
     """List the literal patterns of the three packages, each with its place."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
-            for call in ast.walk(ast.parse(path.read_text("utf-8"))):
+            for call in ast.walk(ast.parse(read(path))):
                 if not isinstance(call, ast.Call) or not call.args:
                     continue
                 called = call.func

@@ -16,9 +16,9 @@ from fourbar import errors
 from fourbar.quantities import QUANTITIES
 from fourbar_validation import Answer
 from fourbar_validation.compare.rows import RESULT_COLUMNS
+from tests.support.checkout import ROOT
 
 KEPT = Path(__file__).with_name("public.txt")
-API = Path(__file__).parents[2] / "docs" / "api.py"
 GROUPS = {
     "fourbar": fourbar.cli.group,
     "fourbar-validation": fourbar_validation.cli.group,
@@ -42,7 +42,7 @@ def of_commands():
 
 
 def of_python():
-    page = runpy.run_path(str(API))
+    page = runpy.run_path(ROOT / "docs/api.py")
     public = {
         name: getattr(fourbar, name)
         for name in fourbar.__all__

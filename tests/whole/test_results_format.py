@@ -2,7 +2,6 @@
 
 import dataclasses
 import re
-from pathlib import Path
 
 import pytest
 
@@ -28,10 +27,11 @@ from fourbar_validation.run.released import FORWARD, RELEASED_ERRORS
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
+from tests.support.checkout import read
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 
-PAGE = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
+PAGE = read("docs/results.md")
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 """Of every engine, besides what it says of positions and of the linkage."""
 SHIPPED_RUN = find_baseline(ACCEPTED)

@@ -12,8 +12,9 @@ import pytest
 
 from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
+from tests.support.checkout import ROOT
 
-MODELS = Path(__file__).parents[2] / "models"
+MODELS = ROOT / "models"
 MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
 
 

@@ -6,15 +6,14 @@ page leaves out.
 
 import re
 import shlex
-from pathlib import Path
 
 import pytest
 
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar_validation.cli import status as harness
+from tests.support.checkout import ROOT, read
 
-ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 STATUS_OF = {"fourbar": status, "fourbar-validation": harness}
@@ -48,7 +47,7 @@ def test_a_page_does_and_prints_what_it_says(
     names = {}
     printed = ""
     commands = 0
-    for language, text in BLOCK.findall((ROOT / f"{page}.md").read_text("utf-8")):
+    for language, text in BLOCK.findall(read(f"{page}.md")):
         if language == "toml":
             (tmp_path / text.split()[1]).write_text(text, "utf-8")
         elif language == "python" and page in PROGRAMS:

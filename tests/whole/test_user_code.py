@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from tests.support.processes import ROOT, run_python
+from tests.support.checkout import ROOT, run_python
 
 PAGE = "tests/support/user_code.py"
 

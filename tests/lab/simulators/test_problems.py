@@ -33,10 +33,10 @@ from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
+from tests.support.checkout import ROOT, read
 from tests.support.shares import slow_but
-from tests.whole.test_imports import ROOT
 
-PAGE = (ROOT / "docs/benchmark.md").read_text("utf-8")
+PAGE = read("docs/benchmark.md")
 NAMES = list_problems()
 APART = 2.0
 """Error bars between the answers of two CPUs."""
@@ -108,10 +108,10 @@ def test_the_files_are_those_of_today(name):
 
 @pytest.mark.parametrize("name", slow_but(set(NAMES) - {"iftomm_a02"}, NAMES))
 def test_a_problem_is_what_the_schema_says(name):
-    schema = json.loads((ROOT / "docs/protocol.schema.json").read_text("utf-8"))
+    schema = json.loads(read("docs/protocol.schema.json"))
     definitions = {"$ref": "#/$defs/problem", "$defs": schema["$defs"]}
     check = Draft202012Validator(definitions)
-    problem = json.loads((PROBLEMS / f"{name}.json").read_text("utf-8"))
+    problem = json.loads(read(PROBLEMS / f"{name}.json"))
     check.validate(problem)
     for wrong in ("given", "scene"):
         assert not check.is_valid({**problem, wrong: {}})
@@ -291,9 +291,9 @@ def test_the_page_s_example_reads_an_answer_without_this_project():
 
 
 def test_the_page_has_the_data_the_letters_and_a_figure_of_every_problem():
-    written = runpy.run_path(str(ROOT / "docs/benchmark.py"))
+    written = runpy.run_path(ROOT / "docs/benchmark.py")
     for name, words in {"benchmark.md": 2800, "findings.md": 1750}.items():
-        page = (ROOT / "docs" / name).read_text("utf-8")
+        page = read(f"docs/{name}")
         assert page == written["text"](name), "python docs/benchmark.py"
         assert len(page.split()) <= words
     assert sorted(written["BLOCK"].findall(PAGE)) == sorted([*NAMES, "matrix"])

@@ -1,4 +1,4 @@
-"""Python in a process of its own."""
+"""The files of the checkout, and Python in a process of its own."""
 
 import os
 import subprocess
@@ -9,6 +9,11 @@ ROOT = Path(__file__).parents[2]
 LOAD = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 BUSY = max(1.0, LOAD / (os.cpu_count() or 1))
 """Factor of time on cores that others use too."""
+
+
+def read(name):
+    """Return the text of a file, by its path or its name in the checkout."""
+    return (ROOT / name).read_text("utf-8")
 
 
 def run_python(*words, folder=ROOT, **variables):
