@@ -67,7 +67,7 @@ COMPARED_OPTIONS = (
     "wind",
 )
 ENUMERATIONS = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver}
-MJCF_WORDS = {
+_MJCF_WORDS = {
     "EULER": "Euler",
     "IMPLICIT": "implicit",
     "IMPLICITFAST": "implicitfast",
@@ -118,8 +118,7 @@ class _Description:
         for name in COMPARED_OPTIONS:
             setting = getattr(model.opt, name)
             if name in ENUMERATIONS:
-                kind = ENUMERATIONS[name](setting).name.partition("_")[2]
-                setting = MJCF_WORDS.get(kind, kind)
+                setting = word_of_number(name, setting)
             self.put(f"option.{name}", setting, "option", name)
         touching = model.npair or (
             model.geom_contype.any() and model.geom_conaffinity.any()
@@ -558,7 +557,7 @@ def mend_entry(
         for i in list_actuators(model, joint):
             model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
     elif subject == "option" and rest in ENUMERATIONS:
-        setattr(model.opt, rest, _number_of_word(rest, str(value)))
+        setattr(model.opt, rest, number_of_word(rest, str(value)))
     elif subject == "option":
         was = getattr(model.opt, rest)
         setattr(model.opt, rest, np.asarray(value).astype(np.asarray(was).dtype))
@@ -579,7 +578,13 @@ def mend_entry(
     return True
 
 
-def _number_of_word(name: str, word: str) -> int:
+def word_of_number(name: str, number: int) -> str:
+    """Return the word by which MJCF calls an integrator or a solver."""
+    kind: str = ENUMERATIONS[name](number).name.partition("_")[2]
+    return _MJCF_WORDS.get(kind, kind)
+
+
+def number_of_word(name: str, word: str) -> int:
     """Find the number of an integrator or a solver that MJCF calls by a word."""
     members = ENUMERATIONS[name].__members__
     prefix = next(iter(members)).partition("_")[0]

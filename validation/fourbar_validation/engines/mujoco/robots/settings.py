@@ -11,14 +11,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import product
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import mujoco
 
 from fourbar.errors import LimitError
-from fourbar_validation.engines.mujoco.describe import ENUMERATIONS, MJCF_WORDS
+from fourbar_validation.engines.mujoco.describe import number_of_word, word_of_number
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
@@ -65,16 +65,12 @@ _OF_FRICTION = ("solreffriction", "solimpfriction")
 def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
     """Read the settings of a compiled model."""
     option = model.opt
-    integrator, solver = (
-        kinds(getattr(option, name)).name.partition("_")[2]
-        for name, kinds in ENUMERATIONS.items()
-    )
     return RobotSettings(
         tuple(model.eq_solref[loop.equality].tolist()),
         tuple(model.eq_solimp[loop.equality].tolist()),
         float(option.timestep),
-        MJCF_WORDS.get(integrator, integrator),
-        MJCF_WORDS.get(solver, solver),
+        word_of_number("integrator", option.integrator),
+        word_of_number("solver", option.solver),
         int(option.iterations),
         float(option.tolerance),
     )
@@ -98,19 +94,17 @@ def _set_settings(
     All closures of the loop get the same.
     """
     changed = copy(model)
-    for equality in loop.closures:
-        changed.eq_solref[equality] = settings.solref
-        changed.eq_solimp[equality] = settings.solimp
+    closures = [*loop.closures]
     rubbing = _list_rubbing(model, loop)
+    changed.eq_solref[closures] = settings.solref
+    changed.eq_solimp[closures] = settings.solimp
     if settings.solreffriction is not None:
         changed.dof_solref[rubbing] = settings.solreffriction
     if settings.solimpfriction is not None:
         changed.dof_solimp[rubbing] = settings.solimpfriction
     option = changed.opt
-    integrator = f"mjINT_{settings.integrator.upper()}"
-    solver = f"mjSOL_{settings.solver.upper()}"
-    option.integrator = int(getattr(mujoco.mjtIntegrator, integrator))
-    option.solver = int(getattr(mujoco.mjtSolver, solver))
+    option.integrator = number_of_word("integrator", settings.integrator)
+    option.solver = number_of_word("solver", settings.solver)
     option.timestep = settings.timestep
     option.iterations = settings.iterations
     option.tolerance = settings.tolerance
@@ -187,30 +181,30 @@ class SettingsSearch:
         answers = self._answer(settings, self.whole)
         if len(answers) < 2 or answers[1].lost:
             return None
-        states, through = ({row.angle: row for row in one.rows} for one in answers)
-        places = sorted(states)
-        ranges = combinations(range(len(places)), 2)
+        places = sorted({row.angle for row in answers[0].rows})
+        ranges = (
+            places[first : first + count]
+            for count in range(len(places), 2, -1)
+            for first in range(len(places) - count + 1)
+        )
         tried = 0
-        for first, last in sorted(ranges, key=lambda ends: ends[0] - ends[1]):
-            low = places[first]
-            high = places[last]
-            parts = [
-                InsideAnswer(
-                    [row for angle, row in rows.items() if low <= angle <= high]
-                )
-                for rows in (states, through)
-            ]
-            if last - first < 2 or tried == RANGES_TRIED:
+        for inside in ranges:
+            low = inside[0]
+            high = inside[-1]
+            states, through = (
+                InsideAnswer([row for row in one.rows if low <= row.angle <= high])
+                for one in answers
+            )
+            if tried == RANGES_TRIED:
                 return None
-            scales = parts[0].scales(self.inside.lever)
-            if max(part.find_worst(scales) for part in parts).error > wanted:
+            scales = states.scales(self.inside.lever)
+            if max(one.find_worst(scales) for one in (states, through)).error > wanted:
                 continue
             tried += 1
-            inside = tuple(places[first : last + 1])
-            motion = self.whole._replace(angle=inside)
+            motion = self.whole._replace(angle=tuple(inside))
             search = SettingsSearch(self.inside, motion)
             if search.measure(settings).error <= wanted:
-                ends = [states[place].joint for place in (low, high)]
+                ends = [row.joint for row in states.rows if row.angle in (low, high)]
                 return min(ends), max(ends)
         return None
 
@@ -258,13 +252,12 @@ class SettingsSearch:
         for name, values in self._list_values().items():
             for value in values[1:]:
                 yield replace(own, **{name: value})
-        looser = {
-            "solver": own.solver != SOLVER["solver"],
-            "iterations": own.iterations < SOLVER["iterations"],
-            "tolerance": own.tolerance > SOLVER["tolerance"],
-        }
-        for name in filter(looser.get, SOLVER):
-            yield replace(own, **{name: SOLVER[name]})
+        if own.solver != SOLVER["solver"]:
+            yield replace(own, solver=SOLVER["solver"])
+        if own.iterations < SOLVER["iterations"]:
+            yield replace(own, iterations=SOLVER["iterations"])
+        if own.tolerance > SOLVER["tolerance"]:
+            yield replace(own, tolerance=SOLVER["tolerance"])
 
     def _list_values(self) -> dict[str, list[Any]]:
         """Return the values of each setting that are combined, the file's own first."""
@@ -354,26 +347,22 @@ def _write_elements(
     if option:
         written.append(write("option", option))
     root = ET.fromstring(file.text)
-    equalities = [
-        element
-        for section in root.iter("equality")
-        for element in section
-        if element.tag != "equality"
-    ]
+    elements = root.findall(".//equality/*")
+    equalities = [one for one in elements if one.tag != "equality"]
     for number in loop.closures if closure else ():
         one = equalities[number]
         written.append(write(one.tag, one.attrib | closure))
     joints = [
-        element
-        for section in root.iter("worldbody")
-        for element in section.iter()
-        if element.tag in {"joint", "freejoint"}
+        one.attrib
+        for one in root.findall(".//worldbody//*")
+        if one.tag in ("joint", "freejoint")
     ]
-    stated = {joint.get("name"): joint.attrib for joint in joints}
-    names = [joint.get("name", "") for joint in joints]
-    in_order = names == [model.joint(number).name for number in range(model.njnt)]
+    stated = {attributes.get("name", ""): attributes for attributes in joints}
+    in_order = [attributes.get("name", "") for attributes in joints] == [
+        model.joint(number).name for number in range(model.njnt)
+    ]
     for number in rubbing if friction else ():
         name = name_joint(model, number)
-        own = joints[number].attrib if in_order else stated.get(name, {"name": name})
+        own = joints[number] if in_order else stated.get(name, {"name": name})
         written.append(write("joint", own | friction))
     return tuple(written)
