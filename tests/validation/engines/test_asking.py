@@ -20,21 +20,8 @@ class Told:
         return Answer(self.name, "exact", at=self.at or command)
 
 
-@pytest.fixture
-def told():
-    """Ask an engine that keeps what it is told: its command, and that of the answer."""
-
-    def ask(scene, at=None):
-        engine = Told()
-        engine.at = at
-        made = ask_at(engine, scene, fourbar.command(scene)).at
-        return engine.command, made
-
-    return ask
-
-
 @pytest.mark.parametrize("branch", [1, -1])
-def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch, told):
+def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch):
     """With a single change point the sign is back after two turns alone.
 
     A motion that the engine made is named by its assembly too.
@@ -42,7 +29,10 @@ def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch, told):
     linkage = fourbar.uniform(0.4, 0.1, 0.27, 0.23)
     angles = np.radians([90.0, 270.0, 450.0, 630.0])
     scene = Scene(linkage, fourbar.Motion(angles, 3.0, branch=branch))
-    command, _ = told(scene)
-    assert command.branch.tolist() == [branch, -branch, -branch, branch]
-    _, made = told(scene, command._replace(angle=angles + 1e-3))
+    engine, command = Told(), fourbar.command(scene)
+    ask_at(engine, scene, command)
+    told = engine.command
+    assert told.branch.tolist() == [branch, -branch, -branch, branch]
+    engine.at = told._replace(angle=angles + 1e-3)
+    made = ask_at(engine, scene, command).at
     assert made.branch.tolist() == [branch] * 4
