@@ -1,7 +1,7 @@
 """MJCF of robots with loops of known lengths, written from points in a plane."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from fourbar_validation.engines.mujoco.robots.examine import (
     examine_mended,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import judge_file, list_answers
@@ -231,6 +232,15 @@ def file_of(text):
     return RobotFile(Path("robot.xml"), text)
 
 
+def read_scene(text, loop=None, speed=3.0, **pose):
+    """Return what is read of a loop of a text in a pose, as a scene."""
+    return read_loop_scene(file_of(text), PoseOptions(**pose), loop, speed)
+
+
+AS_DRAWN = MeasureOptions(PoseOptions())
+"""A robot is measured in the pose of its file."""
+
+
 def measure(file, scene=None, pose=None, **options):
     """Measure the one loop of a file or text, or the one that is chosen."""
     if isinstance(file, str):
@@ -246,7 +256,7 @@ def examine_text(scene, text, names):
     None: the file generated from the scene.
     """
     file = None if text is None else file_of(text)
-    return examine_file(scene, file, MeasureOptions(PoseOptions(), names=names))
+    return examine_file(scene, file, replace(AS_DRAWN, names=names))
 
 
 def change(scene, changes):
@@ -256,7 +266,7 @@ def change(scene, changes):
 
 def mend(scene, file, names, changes):
     """Return the answers of a file with each entry as in the generated one."""
-    options = MeasureOptions(PoseOptions(), names=names)
+    options = replace(AS_DRAWN, names=names)
     return list(map(_answers_or_none, examine_mended(scene, file, options, changes)))
 
 
@@ -266,7 +276,7 @@ def _answers_or_none(measured):
 
 def judge_path(name, scene, path):
     """Judge a file as `check-mjcf SCENE FILE` does."""
-    return judge_file(name, scene, read_robot(path), MeasureOptions(PoseOptions()))
+    return judge_file(name, scene, read_robot(path), AS_DRAWN)
 
 
 def notes_of(examined):

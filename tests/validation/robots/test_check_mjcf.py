@@ -33,8 +33,7 @@ from fourbar_validation.engines.description import ModelEntry
 from fourbar_validation.engines.mujoco.describe import describe_model
 from fourbar_validation.engines.mujoco.robots import examine as examining
 from fourbar_validation.engines.mujoco.robots import measure as measuring
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
@@ -56,7 +55,7 @@ from fourbar_validation.robots.judge_loop import (
     LoopJudgement,
     judge_file,
 )
-from tests.support.robots import answer_of, answers_of, change, mend, notes_of
+from tests.support.robots import AS_DRAWN, answer_of, answers_of, change, mend, notes_of
 from tests.support.robots import examine_text as examine
 from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
@@ -241,8 +240,7 @@ contacts | push each other
 
 def described(text, scene=CRANK_ROCKER):
     """Describe a file without measuring it."""
-    options = MeasureOptions(PoseOptions())
-    found = find_loop_of_scene(RobotFile(MINE_XML, text), scene, options)
+    found = find_loop_of_scene(RobotFile(MINE_XML, text), scene, AS_DRAWN)
     inside, _ = put_loop_inside(found)
     seen = SeenLoop(found.robot.model, found.loop, found.turned, 2)
     return describe_model(seen, inside.flywheel)
@@ -715,7 +713,7 @@ def test_what_to_type_is_advised_where_a_setting_differs():
 
 def test_a_range_is_asked_of_both_files(monkeypatch):
     monkeypatch.setattr(measuring, "POSITIONS_OF_A_LOOP", 5)
-    options = MeasureOptions(PoseOptions(), span=(0.5, 0.9))
+    options = replace(AS_DRAWN, span=(0.5, 0.9))
     file = RobotFile(MINE_XML, GENERATED)
     judgement = judge_file("range", CRANK_ROCKER, file, options)
     joints = [row.joint for row in judgement.measured.states.rows]

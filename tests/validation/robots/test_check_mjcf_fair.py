@@ -25,13 +25,10 @@ from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import AGREES, DEGRADED
 from fourbar_validation.compare.tolerance import wrap_difference
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import (
     examine_file,
     predict_softness,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.differences import find_differences
 from fourbar_validation.robots.judge_loop import (
@@ -40,7 +37,15 @@ from fourbar_validation.robots.judge_loop import (
 )
 from fourbar_validation.robots.loop_errors import find_left_out
 from fourbar_validation.run.transformed import read_from_other_end
-from tests.support.robots import Planar, answer_of, file_of, judge_path, notes_of
+from tests.support.robots import (
+    AS_DRAWN,
+    Planar,
+    answer_of,
+    file_of,
+    judge_path,
+    notes_of,
+    read_scene,
+)
 from tests.support.robots import examine_text as examine
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
@@ -178,7 +183,7 @@ def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(tmp_path)
 @pytest.mark.slow
 def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it():
     file = file_of(default_friction())
-    left = predict_softness(DRY, file, MeasureOptions(PoseOptions()))
+    left = predict_softness(DRY, file, AS_DRAWN)
     ours = solve(DRY, "force")
     for pin in PIN_FORCES:
         size = float(np.hypot(*np.asarray(getattr(ours, pin)).T).max())
@@ -470,18 +475,16 @@ def read_cut(cut):
     """
     option = '<option timestep="0.0002" integrator="RK4" tolerance="0"/>'
     text = Planar(base="", drive="", cut=cut, equality=STIFF, more=option).text()
-    file = file_of(text)
-    scene = read_loop_scene(file, PoseOptions(), None, 1.0).scene
+    scene = read_scene(text, speed=1.0).scene
     few = np.linspace(*command(scene).theta_2[[0, -1]], 5)
-    return replace(scene, motion=scene.motion.replace(angle=few)), file
+    return replace(scene, motion=scene.motion.replace(angle=few)), file_of(text)
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3])
 def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     """Seen from its other end the loop is cut at O2: no hinge bears the input."""
     scene, file = read_cut("O4")
-    options = MeasureOptions(PoseOptions())
-    in_pose = find_loop_of_scene(file, scene, options).loop.angles[1]
+    in_pose = find_loop_of_scene(file, scene, AS_DRAWN).loop.angles[1]
     few = in_pose + np.linspace(-0.3, 0.3, 9)
     moved = scene.motion.replace(angle=few)
     there = solve(replace(scene, motion=moved), "position")
@@ -492,8 +495,8 @@ def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
         for branch in BRANCH_NAMES
     ]
     other = min(ways, key=lambda way: np.ptp(solve(way).theta_4 - there.theta_2))
-    assert find_loop_of_scene(file, other, options).loop.cut == "O2"
-    loop = examine_file(other, file, options).measured
+    assert find_loop_of_scene(file, other, AS_DRAWN).loop.cut == "O2"
+    loop = examine_file(other, file, AS_DRAWN).measured
     assert loop.joint == "theta_2"
     assert find_left_out(loop) < ROUND_OFF
     through = loop.through_time
@@ -511,9 +514,8 @@ def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too():
     scene, file = read_cut("A")
     angles = np.linspace(*command(scene).theta_2[[0, -1]], 19)
     scene = replace(scene, motion=scene.motion.replace(angle=angles, speed=10.0))
-    options = MeasureOptions(PoseOptions())
-    left = predict_softness(scene, file, options)
-    answer = answer_of(examine_file(scene, file, options), FILE_THROUGH_TIME)
+    left = predict_softness(scene, file, AS_DRAWN)
+    answer = answer_of(examine_file(scene, file, AS_DRAWN), FILE_THROUGH_TIME)
     ours = solve(scene, "velocity", at=answer.at)
     for name in ("theta_3", "theta_4", "omega_3", "omega_4"):
         away = answer.quantities[name] - np.asarray(getattr(ours, name))

@@ -16,11 +16,16 @@ from fourbar_validation.engines.mujoco.robots.inside import (
     LoopInside,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
-from tests.support.robots import FOOT_PARALLELOGRAM, file_of, measure, rotation
+from tests.support.robots import (
+    FOOT_PARALLELOGRAM,
+    file_of,
+    measure,
+    read_scene,
+    rotation,
+)
 from tests.support.rows import read_rows
 from tests.support.shares import slow_but
 
@@ -63,10 +68,6 @@ CHANGE_POINT = """
 """
 
 
-def read(text):
-    return read_loop_scene(file_of(text), PoseOptions(), None, 1.0)
-
-
 def list_equal(made):
     return [remark for remark in made.remarks if "read as equal" in remark]
 
@@ -94,7 +95,7 @@ def test_the_rounding_of_numbers_is_half_of_the_last_digit_that_one_shows(text, 
     ids=["six digits", "five digits", "quaternions", "large"],
 )
 def test_a_parallelogram_of_rounded_numbers_is_the_one_that_was_built(text, size):
-    made = read(text)
+    made = read_scene(text)
     lengths = np.multiply(size, (0.14, 0.06, 0.14, 0.06))
     assert made.scene.linkage.lengths == approx(lengths, rel=1e-12)
     assert made.loop.rounding > 1e-8 * size
@@ -110,7 +111,7 @@ def test_what_is_read_as_equal_is_said_with_its_difference():
     pin_b = np.array([-0.055821, 0.0, 0.15 + 0.022])
     coupler = 0.14 - np.linalg.norm(pin_a - pin_b)
     output = 0.06 - math.hypot(0.055821, 0.022)
-    (said,) = list_equal(read(FOOT_PARALLELOGRAM))
+    (said,) = list_equal(read_scene(FOOT_PARALLELOGRAM))
     assert said == (
         "lengths read as equal within the digits of the file: ground and coupler, which"
         f" differ by {coupler:.4g} m; input and output, which differ by {output:.4g} m"
@@ -119,7 +120,7 @@ def test_what_is_read_as_equal_is_said_with_its_difference():
 
 def test_the_range_of_the_motor_is_that_of_the_file():
     """It passes the change point at which the rounded lengths would stop it."""
-    made = read(FOOT_PARALLELOGRAM)
+    made = read_scene(FOOT_PARALLELOGRAM)
     sweep = made.scene.motion.angle
     assert sweep.stop - sweep.start == approx(2.4, rel=1e-9)
 
@@ -133,7 +134,7 @@ def test_the_range_of_the_motor_is_that_of_the_file():
     ids=["another length", "more digits"],
 )
 def test_what_the_digits_tell_apart_stays(text):
-    made = read(text)
+    made = read_scene(text)
     assert not list_equal(made)
     assert made.loop.rounding == 0.0
     assert made.scene.linkage.lengths == approx(made.loop.lengths, rel=1e-11)
@@ -146,11 +147,11 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
     exact = FREE.replace(QUATERNION, f"{math.cos(half)!r} 0 {math.sin(half)!r} 0")
     x, z = 0.06 * math.cos(2.0 * half), 0.06 * math.sin(2.0 * half)
     exact = exact.replace(ROD, f"{-x!r} 0 {z!r}")
-    assert not list_equal(read(exact))
-    assert classify(read(exact).scene.linkage).name == "parallelogram"
+    assert not list_equal(read_scene(exact))
+    assert classify(read_scene(exact).scene.linkage).name == "parallelogram"
     saved = tmp_path / "saved.xml"
     mujoco.mj_saveLastXML(str(saved), mujoco.MjModel.from_xml_string(exact))
-    made = read(saved.read_text(encoding="utf-8"))
+    made = read_scene(saved.read_text(encoding="utf-8"))
     assert list_equal(made)
     assert made.scene.linkage.lengths == approx((0.14, 0.06) * 2, rel=2e-6)
     assert classify(made.scene.linkage).name == "parallelogram"
@@ -176,7 +177,7 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
 
 def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     """The bars are in line there, and leave a gap of what a + d = b + c misses by."""
-    made = read(LARGE)
+    made = read_scene(LARGE)
     model = pose_robot(compile_robot(file_of(LARGE)).model, PoseOptions()).model
     in_line = 0.5 * math.pi
     ground, crank, coupler, output = made.loop.lengths
@@ -189,6 +190,6 @@ def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
 
 def test_one_equality_alone_is_met_by_chance():
     """The sum d + a is b + c but for 1e-5: less than three roundings of 5e-6."""
-    made = read(CHANGE_POINT)
+    made = read_scene(CHANGE_POINT)
     assert not list_equal(made)
     assert made.scene.linkage.lengths == approx((4.0, 1.00001, 2.00001, 3.00001))

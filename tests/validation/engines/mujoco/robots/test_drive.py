@@ -14,13 +14,10 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import examine_file
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.loop_errors import find_left_out, list_errors_by_method
-from tests.support.robots import Planar, file_of, measure
+from tests.support.robots import AS_DRAWN, Planar, file_of, measure, read_scene
 from tests.support.shares import slow_but
 
 SCENE = """
@@ -138,8 +135,8 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
     """
     text = Planar(base="", drive="", cut=cut, equality=STIFF, more=SOLVER).text()
     file = file_of(text)
-    made = read_loop_scene(file, PoseOptions(), None, 2.0).scene
-    posed = find_loop_of_scene(file, made, MeasureOptions(PoseOptions()))
+    made = read_scene(text, speed=2.0).scene
+    posed = find_loop_of_scene(file, made, AS_DRAWN)
     bars = made.linkage.moving
     crank = 2 + int(np.argmin([one.length for one in bars]))
     start = posed.loop.angles[crank - 1] - posed.turned + math.pi * away

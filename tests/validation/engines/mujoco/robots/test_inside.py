@@ -22,7 +22,6 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.robots.answers import (
     FORCE_QUANTITIES,
     LoopMotion,
-    MeasureOptions,
     measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
@@ -36,6 +35,7 @@ from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.robots.files import read_robot
 from tests.support.robots import (
     ADAPTIVE,
+    AS_DRAWN,
     EXCAVATOR,
     FINGER,
     LIFTED,
@@ -144,8 +144,7 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     """M a + c - J^T f = tau and J a + R f = r, solved at once, a of the input given."""
     scene = load(ROBOTS.parent / "crank_rocker.toml")
     text = write_mjcf(scene).replace("0.9999 0.9999", impedance)
-    options = MeasureOptions(PoseOptions())
-    found = find_loop_of_scene(file_of(text), scene, options)
+    found = find_loop_of_scene(file_of(text), scene, AS_DRAWN)
     inside, motion = put_loop_inside(found)
     assert inside.flywheel > 1e6
     (row,) = inside.answer_states(motion.thin_out(3)._replace(angle=(2.0,))).rows

@@ -19,9 +19,7 @@ from pytest import approx, raises
 
 import fourbar
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
-from tests.support.robots import Planar, file_of
+from tests.support.robots import Planar, read_scene
 from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
@@ -145,11 +143,6 @@ class WholeRobot:
         }
 
 
-def read(text, *, loop=None, speed=3.0, **pose):
-    options = PoseOptions(**pose)
-    return read_loop_scene(file_of(text), options, loop, speed)
-
-
 def compare(text, made, speed=3.0):
     """Hold torque and pin forces of the scene's sweep against the whole robot."""
     robot = WholeRobot(text, made)
@@ -197,7 +190,7 @@ RIGHT = {
 @pytest.mark.parametrize("name", RIGHT)
 def test_torques_and_forces_are_those_of_the_whole_robot(name):
     text, asked = RIGHT[name]
-    compare(text, read(text, **asked))
+    compare(text, read_scene(text, **asked))
 
 
 EVERYTHING = {
@@ -226,7 +219,7 @@ def test_every_effect_is_that_of_the_whole_robot(name):
         text = text.replace('name="O4" axis', 'name="O4" armature="0.02" axis')
         text = text.replace('name="O2" axis', 'name="O2" armature="0.03" axis')
     text = text.replace('name="O2" ', 'name="O2" range="-0.5 0.4" limited="true" ')
-    made = read(text)
+    made = read_scene(text)
     compare(text, made)
 
 
@@ -236,14 +229,14 @@ def test_a_motor_counts_behind_its_gear():
     text = Planar().text().replace(plain, motor)
     if not hasattr(mujoco.MjModel, "actuator_armature"):
         pytest.skip("this MuJoCo has no armature of motors")
-    effects = {effect.key: effect for effect in read(text).scene.effects}
+    effects = {effect.key: effect for effect in read_scene(text).scene.effects}
     assert effects["flywheel"].inertia == approx(0.01)
     assert effects["viscous"].coefficients == (("O2", approx(0.2)),)
 
 
 def test_armature_between_moving_bars_is_named_with_its_size():
     text = Planar().text().replace('name="A" axis', 'name="A" armature="0.125" axis')
-    remarks = read(text).remarks
+    remarks = read_scene(text).remarks
     assert any("armature 0.125 kg m^2 of A" in remark for remark in remarks)
 
 
@@ -265,14 +258,14 @@ def test_what_acts_along_a_tendon_is_named(tendon, actuator, named):
     )
     if "damping" in tendon and not hasattr(mujoco.MjModel, "tendon_dampingpoly"):
         pytest.skip("this MuJoCo has no polynomials of tendons")
-    remarks = read(Planar(more=acting).text()).remarks
+    remarks = read_scene(Planar(more=acting).text()).remarks
     expected = [f"not in the scene: {named}"] if named else []
     left_out = [one for one in remarks if "not in the scene: the" in one]
     assert left_out == expected
 
 
 def test_forces_across_the_plane_are_named_with_their_sizes():
-    made = read(FOOT)
+    made = read_scene(FOOT)
     (remark,) = [r for r in made.remarks if "across the plane" in r]
     model = mujoco.MjModel.from_xml_string(FOOT)
     data = mujoco.MjData(model)
@@ -287,7 +280,7 @@ def test_the_range_of_another_hinge_ends_the_sweep_and_is_named():
         '<joint name="right_follower" class="passive" />',
         '<joint name="right_follower" class="passive" range="-10 20" />',
     )
-    made = read(text, loop="right_finger-right_follower")
+    made = read_scene(text, loop="right_finger-right_follower")
     motion = made.scene.motion.angle
     assert motion.stop - motion.start == approx(math.radians(30.0), rel=0.01)
     assert motion.stop - motion.start < math.radians(30.0) + 1e-9
@@ -296,14 +289,14 @@ def test_the_range_of_another_hinge_ends_the_sweep_and_is_named():
 
 def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     planar = Planar()
-    made = read(planar.text())
+    made = read_scene(planar.text())
     d, a, b, c = planar.lengths()
     # the input turns fully, for it and the longest bar are shorter than the other two
     assert a + d < b + c
     motion = made.scene.motion.angle
     assert motion.stop - motion.start == approx(math.tau)
     rocker = replace(planar, pins={**planar.pins, "A": (0.12, 0.2)})
-    made = read(rocker.text())
+    made = read_scene(rocker.text())
     d, a, b, c = rocker.lengths()
     assert a + d > b + c
     # it stops where coupler and output are in one line
@@ -362,7 +355,7 @@ RELATION = (
     ],
 )
 def test_the_relation_of_joint_and_angle_is_that_of_the_world(text, joint, crank):
-    made = read(text)
+    made = read_scene(text)
     said = re.fullmatch(RELATION, made.parts[-1])
     sign, plus, constant, *axes = said.groups()
     theta_2 = float(f"{plus or ''}{constant or 0}") + float(f"{sign}1") * joint
@@ -378,7 +371,7 @@ def test_the_relation_of_joint_and_angle_is_that_of_the_world(text, joint, crank
 
 def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts():
     text = FOOT.replace('<body name="toe"', '<body name="toe" gravcomp="1"')
-    made = read(text)
+    made = read_scene(text)
     (load,) = made.scene.loads
     assert load.bar == 4
     # the toe's mass centre from the ankle: 150, -50 mm; the foot's line ends at the rod
@@ -391,14 +384,14 @@ def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts():
 
 def test_a_loop_is_asked_for_where_there_are_several():
     with raises(InputError, match="right_finger-right_follower, left_finger"):
-        read(GRIPPER)
+        read_scene(GRIPPER)
     with raises(InputError, match="no such closure"):
-        read(GRIPPER, loop="thumb")
+        read_scene(GRIPPER, loop="thumb")
 
 
 def test_a_pose_in_a_change_point_is_said():
     text = GRIPPER.replace('range="-40 40"', 'range="-100 100"')
-    made = read(
+    made = read_scene(
         text,
         loop="right_finger-right_follower",
         joints={"right_driver": "90deg"},

@@ -22,7 +22,6 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.loop_errors import (
@@ -43,6 +42,7 @@ from tests.support.robots import (
     file_of,
     make_parallelogram,
     measure,
+    read_scene,
 )
 from tests.support.scenes import mirrored
 from tests.whole.test_imports import ROOT
@@ -191,7 +191,7 @@ def test_what_a_scene_does_not_have_is_left_out():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dip_loop", "pip_link-middle"])
 def test_the_loop_of_a_scene_is_found_by_its_lengths(name):
-    scene = read_loop_scene(file_of(FINGER), PoseOptions(), name, None).scene
+    scene = read_scene(FINGER, name, None).scene
     loop = measure(FINGER, scene)
     assert loop.name == name
     assert find_left_out(loop) < 1e-7

@@ -10,12 +10,18 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.judge_loop import FILE_THROUGH_TIME
 from fourbar_validation.robots.loop_errors import find_left_out, find_worst_of_loop
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
-from tests.support.robots import answer_of, examine_text, file_of, measure, notes_of
+from tests.support.robots import (
+    answer_of,
+    examine_text,
+    file_of,
+    measure,
+    notes_of,
+    read_scene,
+)
 
 TEXT = """
 <mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
@@ -104,22 +110,22 @@ def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes():
 
 
 def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
-    made = read_loop_scene(FILE, PoseOptions(), None, 4.0)
+    made = read_scene(TEXT)
     (remark,) = [text for text in made.remarks if "in line" in text]
     assert "closed to the crossed one" in remark
     assert made.scene.motion.branch == CROSSED
-    other = read_loop_scene(FILE, PoseOptions(read_advice(remark)), None, 4.0)
+    other = read_scene(TEXT, joints=read_advice(remark))
     assert other.scene.motion.branch == OPEN
     assert not [text for text in other.remarks if "in line" in text]
     # the rocker is at -100 deg there, in the other assembly at 100 deg
     limited = TEXT.replace('name="j_rocker"', 'name="j_rocker" range="-170 0"')
-    made = read_loop_scene(file_of(limited), PoseOptions(), None, 4.0)
+    made = read_scene(limited)
     (remark,) = [text for text in made.remarks if "in line" in text]
     assert remark.endswith("closed to the crossed one")
 
 
 def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():
-    made = read_loop_scene(FILE, PoseOptions(OPEN_POSE), None, 4.0)
+    made = read_scene(TEXT, joints=OPEN_POSE)
     (note,) = [note for note in made.notes if "what is left is 6.24 mm" in note]
     assert "--pose holds j_crank, j_rod, j_rocker, around which" in note
     assert "ranges" not in note

@@ -11,7 +11,7 @@ from pytest import approx, raises
 from scipy.optimize import brentq
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.answers import LoopMotion, MeasureOptions
+from fourbar_validation.engines.mujoco.robots.answers import LoopMotion
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
@@ -27,7 +27,7 @@ from fourbar_validation.robots.loop_errors import (
     list_errors_by_method,
     read_measure_options,
 )
-from tests.support.robots import measure
+from tests.support.robots import AS_DRAWN, measure
 from tests.support.shares import slow_but
 
 FOOT = Path(__file__).parents[5] / "models" / "robots" / "biped_foot.xml"
@@ -208,7 +208,7 @@ def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
 @pytest.mark.parametrize("sense", slow_but({-1}, [1, -1]))
 def test_a_range_is_that_of_the_driven_joint(sense):
     span = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
-    options = MeasureOptions(PoseOptions(), span=span)
+    options = replace(AS_DRAWN, span=span)
     measurement = measure_loops(write_leg(sense), options, None)
     joints = [row.joint for row in measurement.loops[0].states.rows]
     assert (min(joints), max(joints)) == approx(span, abs=1e-9)
