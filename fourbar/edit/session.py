@@ -260,12 +260,15 @@ class Session:
         return {"compared": self.reference, "data": kept.evaluate(self.units)}
 
     def locate_kept_peaks(self) -> dict[str, float | None]:
-        """List the located peaks of the state that the present one is held against."""
+        """List the located peaks of the state that the present one is held against.
+
+        None if it states one position: its curves go on over the whole range.
+        """
         text = self.kept[self.reference]
         if text not in self.located:
-            scene = self.read(text).scene
-            solution = solve(scene)
-            self.located = {text: list_peaks(solution, Facts(solution))}
+            kept = solve(self.read(text).scene)
+            peaks = list_peaks(kept, Facts(kept)) if len(kept) > 1 else {}
+            self.located = {text: peaks}
         return self.located[text]
 
     def do(self, asked: Asked) -> Asked:

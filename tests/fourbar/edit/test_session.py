@@ -529,6 +529,19 @@ def test_the_answer_is_what_analyze_says(session):
     assert "lbf" in "\n".join(settled(session)["data"]["summary"])
 
 
+@pytest.mark.parametrize("stated", ["60 deg", ["0 deg", "60 deg"]])
+def test_what_is_compared_is_the_peak_of_the_same_positions(session, stated):
+    """The curves of one position go on over the whole range, where no peak is located.
+
+    A scene that is held against itself has its own peaks.
+    """
+    session.change(lambda document: document.put(["motion", "theta_2"], stated))
+    ask(session, "keep")
+    here = settled(session)["data"].get("peaks", {})
+    assert session.locate_kept_peaks() == here
+    assert bool(here) == isinstance(stated, list)
+
+
 @pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.stem)
 def test_every_linkage_that_people_know_has_an_answer(tmp_path, path):
     told = Session(path, tmp_path / "exports").answer()
