@@ -40,7 +40,7 @@ what serves.
 """
 TIME_CONSTANTS_TRIED = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
 STEPPED_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
-_FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
+_FIRST_ORDER_TIME_CONSTANTS: tuple[float, ...] = (2.0, 3.0, 6.0, 12.0)
 TIMED_ROUNDS = 15
 STEPS_OF_A_TIMING = 400
 TYPES = tuple(kind for kind in DrawnType if kind is not DrawnType.ROCKER_CRANK)
@@ -61,9 +61,11 @@ decides at another.
 _NEEDED_MET = 0.95
 _NEEDED_CHEAP = 0.80
 _CHEAP = 3.0
+StepKind = tuple[str, bool]
+"""Integrator, and whether the pins have pads."""
 
 
-def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
+def time_relative_costs(setup: TrialSetup) -> dict[StepKind, float]:
     """Time a step by integrator and pads, relative to RK4 with pads.
 
     The times are medians of interleaved rounds.
@@ -71,73 +73,57 @@ def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     kinds = [("RK4", True), *((name, False) for name in ("RK4", *STEPPED_INTEGRATORS))]
     clocks = {}
     for kind in kinds:
-        settings = _change_kind(kind, make_settings(628.0, 20.0))
-        clocks[kind] = partial(setup.make_clocks(settings)[0], STEPS_OF_A_TIMING)
+        time_steps, _ = setup.make_clocks(_make_settings(kind, 628.0, 20.0))
+        clocks[kind] = partial(time_steps, STEPS_OF_A_TIMING)
     times = time_in_turns(clocks, TIMED_ROUNDS)
     reference = median(times["RK4", True])
     return {kind: median(values) / reference for kind, values in times.items()}
 
 
-def _change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
-    """Change the integrator, and leave out the pads where requested."""
+def _make_settings(kind: StepKind, steps_per_revolution: float, tc: float) -> Settings:
+    """Make settings of an integrator, without the pads where requested."""
     integrator, pads = kind
+    settings = make_settings(steps_per_revolution, tc)
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
 def try_all_settings(
-    setup: TrialSetup,
-    error: float,
-    costs: Mapping[tuple[str, bool], float],
-) -> float | None:
+    setup: TrialSetup, error: float, costs: Mapping[StepKind, float]
+) -> float:
     """Try every integrator, with and without pads, over time constants and steps.
 
-    The result is the least cost of a run that serves. In recommended RK4 steps; None
+    The result is the least cost of a run that serves, in recommended RK4 steps; NaN
     where nothing serves.
     """
-    best: float | None = None
+    best = math.nan
     for kind, ratio in costs.items():
-        tried: tuple[float, ...] = _FIRST_ORDER_TIME_CONSTANTS
+        tried = _FIRST_ORDER_TIME_CONSTANTS
         if kind[0] == "RK4":
             tried = TIME_CONSTANTS_TRIED
         for tc in tried:
-            most = MOST_STEPS_OF_A_RUN if best is None else best / ratio
+            most = MOST_STEPS_OF_A_RUN if math.isnan(best) else best / ratio
             steps = _find_least_steps(setup, kind, tc, most, error)
-            if steps is not None and (best is None or steps * ratio < best):
-                best = steps * ratio
+            best = float(np.fmin(best, steps * ratio))
     return best
 
 
 def _find_least_steps(
-    setup: TrialSetup,
-    kind: tuple[str, bool],
-    tc: float,
-    most: float,
-    error: float,
-) -> int | None:
-    """Find the least steps of the ladder, fewer than `most`, that serve."""
+    setup: TrialSetup, kind: StepKind, tc: float, most: float, error: float
+) -> float:
+    """Find the least steps of the ladder, fewer than `most`, that serve, or NaN."""
+    per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
+
+    def serves(steps: float) -> bool:
+        trial = setup.try_out(_make_settings(kind, steps / per_run, tc))
+        return judge_trial(setup.scene, trial).worst <= error
+
     n = FEWEST_STEPS
     while n < most:
-        if _serves(setup, kind, tc, n, error):
-            finer = (
-                steps
-                for steps in (n / STEP_RATIOS**2, n / STEP_RATIOS)
-                if _serves(setup, kind, tc, steps, error)
-            )
+        if serves(n):
+            finer = filter(serves, (n / STEP_RATIOS**2, n / STEP_RATIOS))
             return int(next(finer, n) + 0.5)
         n *= COARSE
-    return None
-
-
-def _serves(
-    setup: TrialSetup,
-    kind: tuple[str, bool],
-    tc: float,
-    steps: float,
-    error: float,
-) -> bool:
-    per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
-    trial = setup.try_out(_change_kind(kind, make_settings(steps / per_run, tc)))
-    return judge_trial(setup.scene, trial).worst <= error
+    return math.nan
 
 
 class AdviceCase(NamedTuple):
@@ -171,9 +157,7 @@ class AdviceCase(NamedTuple):
 
         An error that is rightly called unreachable counts too.
         """
-        if not self.reached:
-            return self.met
-        return not self.cost > _CHEAP * self.cheapest
+        return not self.cost > _CHEAP * self.cheapest if self.reached else self.met
 
 
 def draw_advised_scene(seed: int, index: int) -> tuple[Scene, float]:
@@ -185,13 +169,11 @@ def draw_advised_scene(seed: int, index: int) -> tuple[Scene, float]:
     rng = np.random.default_rng([seed, index, 1])
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*_SPEEDS))
     alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-_GENTLE, _GENTLE)]))
-    sweep = scene.motion.theta_2
-    start, stop = sweep.start, sweep.stop
+    sweep = replace(scene.motion.theta_2, steps=SCENE_INTERVALS)
     if not turns_fully(scene.linkage):
-        left_out = 0.5 * (1.0 - PART_OF_THE_RANGE) * (stop - start)
-        start, stop = start + left_out, stop - left_out
-    angles = Sweep(start, stop, SCENE_INTERVALS)
-    motion = Motion(angles, omega, alpha, scene.motion.branch)
+        left_out = 0.5 * (1.0 - PART_OF_THE_RANGE) * (sweep.stop - sweep.start)
+        sweep = Sweep(sweep.start + left_out, sweep.stop - left_out, SCENE_INTERVALS)
+    motion = Motion(sweep, omega, alpha, scene.motion.branch)
     return replace(scene, motion=motion), float(10.0 ** rng.uniform(*REQUIRED_ERRORS))
 
 
@@ -205,7 +187,7 @@ def _make_denser(scene: Scene, times: int) -> Scene:
 def measure_case(
     seed: int,
     index: int,
-    costs: dict[tuple[str, bool], float],
+    costs: Mapping[StepKind, float],
 ) -> AdviceCase:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
     scene, required = draw_advised_scene(seed, index)
@@ -220,15 +202,8 @@ def measure_case(
         advice.reached,
         judge_trial(dense, trial).worst,
         advice.best.steps * advice.best.step_cost,
-        math.nan if cheapest is None else cheapest,
+        cheapest,
     )
-
-
-def _compute_wilson(successes: int, n: int) -> float:
-    """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
-    from scipy.stats import binomtest
-
-    return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low)
 
 
 def measure_cases(
@@ -243,7 +218,7 @@ def measure_cases(
     with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
         done = store.done()
         first = draw_advised_scene(seed, 0)[0]
-        costs: dict[tuple[str, bool], float] = {}
+        costs: dict[StepKind, float] = {}
         for index in range(count):
             if index not in done:
                 costs = costs or time_relative_costs(TrialSetup(first, command(first)))
@@ -274,36 +249,29 @@ def advice_command(count: int, seed: int, out: Path) -> int:
     """
     from rich.console import Console
     from rich.progress import track
+    from scipy.stats import binomtest
 
-    cases = list(
-        track(
-            measure_cases(seed, count, out),
-            "advising",
-            total=count,
-            console=Console(stderr=True),
-        )
-    )
+    measured = measure_cases(seed, count, out)
+    shown = Console(stderr=True)
+    cases = list(track(measured, "advising", total=count, console=shown))
     met = sum(case.met for case in cases)
     cheap = sum(case.cheap for case in cases)
-    unreachable = sum(not case.reached for case in cases)
+    refused = [case for case in cases if not case.reached]
+    wrongly = sum(not case.met for case in refused)
+    # the lower bound of the Wilson score interval of a proportion, at 95 %
+    bound = float(binomtest(met, len(cases)).proportion_ci(0.95, "wilson").low)
+    share = cheap / len(cases)
+    click.echo(
+        f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed"
+        f" {_NEEDED_MET})\n"
+        f"called unreachable: {len(refused)}, of which the search reached {wrongly}\n"
+        f"within {_CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f}"
+        f" (needed {_NEEDED_CHEAP})"
+    )
     ratios = sorted(
         case.cost / case.cheapest
         for case in cases
-        if case.reached and case.cheapest == case.cheapest
-    )
-    bound = _compute_wilson(met, len(cases))
-    click.echo(
-        f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed"
-        f" {_NEEDED_MET})"
-    )
-    wrongly = sum(not case.met for case in cases if not case.reached)
-    click.echo(
-        f"called unreachable: {unreachable}, of which the search reached {wrongly}"
-    )
-    share = cheap / len(cases)
-    click.echo(
-        f"within {_CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f}"
-        f" (needed {_NEEDED_CHEAP})"
+        if case.reached and not math.isnan(case.cheapest)
     )
     if ratios:
         high = ratios[int(0.95 * (len(ratios) - 1))]

@@ -127,15 +127,13 @@ def _draw_near_change_point(rng: Generator) -> DrawnLinkage:
         if rng.random() < 0.5:
             lengths, straight = (d, a, b, d + a - b), math.pi
     distance = _draw_signed(rng, -8.0, 0.0)
+    changed = [*lengths]
     if rng.random() < 0.3:
         k = int(rng.integers(0, 4))
         missed = 0.1 * distance**2
-        if missed < _BESIDE_ROUNDING:
-            missed = 0.0
-        changed = list(lengths)
-        changed[k] *= 1.0 + missed
-        return (*changed,), command_angle(straight + distance)
-    return lengths, command_angle(straight + distance)
+        if missed >= _BESIDE_ROUNDING:
+            changed[k] *= 1.0 + missed
+    return changed, command_angle(straight + distance)
 
 
 def _draw_with_ratios(rng: Generator) -> DrawnLinkage:
@@ -306,11 +304,14 @@ def tables(rng: Generator) -> Scene:
 
 def drives(rng: Generator) -> Scene:
     """Draw a cylinder between any two bars."""
-    return _put_cylinder(
-        ANYWHERE.draw(rng),
-        rng,
-        *rng.choice((1, *MOVING_BARS), 2, replace=False).tolist(),
-    )
+    scene = ANYWHERE.draw(rng)
+    bars = rng.choice((1, *MOVING_BARS), 2, replace=False)
+    return _put_cylinder(scene, rng, *bars.tolist())
+
+
+def _drive_by(scene: Scene, drive: LinearDrive | PointDrive) -> Scene:
+    """Drive a scene by a cylinder or a push instead of a couple."""
+    return replace(scene, drive_bar=None, drive=drive)  # type: ignore[arg-type]
 
 
 def strokes(rng: Generator) -> Scene:
@@ -321,14 +322,12 @@ def strokes(rng: Generator) -> Scene:
     bar = int(rng.choice([2, 4]))
     scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
     solution = solve(scene, "acceleration")
-    first, second = (
-        (solution.theta_3, solution.theta_4)
-        if bar == 2
-        else (solution.theta_2, solution.theta_3)
-    )
+    directions = [solution.theta_2, solution.theta_3, solution.theta_4]
     turning = solution.omega_4[0]
     if bar == 2:
         turning = float(scene.motion.speed or 0.0)
+        del directions[0]
+    first, second, *_ = directions
     grows = solution.stroke_speed[0] * turning > 0.0
     motion = Motion(
         stroke=float(solution.stroke[0]),
@@ -347,7 +346,7 @@ def _put_cylinder(
     other: int,
 ) -> Scene:
     start, end = (_draw_place(bar, rng, 0.05) for bar in (one, other))
-    return replace(scene, drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
+    return _drive_by(scene, LinearDrive(start, end))
 
 
 def pushes(rng: Generator) -> Scene:
@@ -357,7 +356,7 @@ def pushes(rng: Generator) -> Scene:
     place = _draw_place(bar, rng, 0.05)
     direction = rng.uniform(-3.0, 3.0)
     drive = PointDrive(place, direction, frame)
-    return replace(ANYWHERE.draw(rng), drive_bar=None, drive=drive)  # type: ignore[arg-type]
+    return _drive_by(ANYWHERE.draw(rng), drive)
 
 
 def _near_pins(rng: Generator) -> Scene:
@@ -391,11 +390,7 @@ def _near_pins(rng: Generator) -> Scene:
         load = Load(near, force, from_pin=(distance, angle), frame=frame)
         return replace(scene, linkage=linkage, loads=(load,))
     if kind == 1:
-        return replace(
-            ANYWHERE.draw(rng),
-            drive_bar=None,  # type: ignore[arg-type]
-            drive=LinearDrive(start, end),
-        )
+        return _drive_by(ANYWHERE.draw(rng), LinearDrive(start, end))
     stiffness = rng.uniform(10.0, 1000.0)
     length = rng.uniform(0.0, 2.0)
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
