@@ -3,7 +3,7 @@
 Samples give the spread, and the sensitivities give it to first order.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,7 @@ from fourbar.linkage import require_whole
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Scene, command
 from fourbar.solution import find_values, is_scalar, split_parts
-from fourbar.solving import solve
+from fourbar.solving import solve, split
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
     LEFT_OUT,
@@ -238,14 +238,13 @@ def tolerances(
     without = np.zeros(n, dtype=np.intp)
     gone = np.zeros(len(study), dtype=bool)
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
-    for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
+    for columns in split(n, max(1, EVALUATED_AT_ONCE // samples)):
 
-        def take(value: Any, extra: Any = extra) -> Any:
+        def take(value: Any, columns: slice = columns) -> Any:
             has_columns = isinstance(value, np.ndarray) and value.size > len(value)
-            return value[:, extra] if has_columns else value
+            return value[:, columns] if has_columns else value
 
-        parts = replace(study, at=study.at.with_arrays(take))
-        width = columns.stop - columns.start
+        parts = replace(study, at=study.at.with_arrays(take), motion=study.at)
         shape = parts.at.angle.shape
         out = {
             name: np.empty(shape if is_scalar(name) else (*shape, 2))
@@ -253,11 +252,11 @@ def tolerances(
             if name != "theta_2"  # every solution has it
         }
         solution = solve(parts, out=out)
-        code = solution.status_code[:, -width:]
+        code = solution.status_code
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
-            number = find_values(solution, name)[:, -width:]
+            number = find_values(solution, name)
             if name.startswith("theta_"):
                 # each member counts its turns from its own first position
                 turns = np.rint((number - values[name][name][columns]) / TURN)
@@ -301,25 +300,6 @@ def _make_members(scene: Scene, samples: int, seed: int | np.random.Generator) -
     if scene.motion.law is None:
         numbers[command_key(scene)] = command(scene).places
     return vary(scene, numbers)
-
-
-def _list_blocks(
-    study: Study,
-    scene: Scene,
-    samples: int,
-    closes: NDArray[np.bool_],
-) -> Iterator[tuple[slice, NDArray[np.intp]]]:
-    """List blocks of positions with their indices.
-
-    The start of the motion comes first if an effect counts from it.
-    """
-    n = study.at.angle.shape[1]
-    first = int(np.argmax(closes))
-    begins = [first] if scene.counts_turns else []
-    size = max(1, EVALUATED_AT_ONCE // samples)
-    for start in range(0, n, size):
-        columns = slice(start, min(start + size, n))
-        yield columns, np.array([*begins, *range(columns.start, columns.stop)])
 
 
 def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:

@@ -1,13 +1,13 @@
 """A scene with arrays in place of some numbers: one linkage for each entry."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import evaluate
@@ -26,7 +26,6 @@ from fourbar.studies.keys import (
     list_entries,
     refuse_key,
     replace_numbers,
-    replace_place,
 )
 from fourbar.writing import describe_extent, list_names
 
@@ -48,6 +47,8 @@ class Study:
     """Commanded angle and branch (m, n), with speed and acceleration. The latter are
     those of the scene, or (m, 1).
     """
+    motion: Command | None = None
+    """Motion of which `at` has some positions; None: it has all."""
 
     def __len__(self) -> int:
         return len(self.invalid)
@@ -76,12 +77,16 @@ class Study:
         evaluated = None
         m, n = request.shape
         block = request.block
+        counts_turns = request.asks_forces and self.scene.counts_turns
         with np.errstate(all="ignore"):
             for rows in split(m, max(1, block // n)):
-                begins = self.begin(rows) if request.asks_forces else self.scene
+                begin = self.begin(rows) if counts_turns else None
                 for columns in split(n, block):
-                    scene = self.members(rows, columns.stop - columns.start, begins)
-                    case = Case.of(scene, at.bar, side).beside(self.scene)
+                    count = columns.stop - columns.start
+                    case = self.case(rows, count, side)
+                    if begin is not None:
+                        start = begin.with_arrays(partial(_repeat, count=count))
+                        case = case.begin_at(start)
                     positions = _take_members(at, rows, columns)
                     # kept until the next block is evaluated, so that its memory is used
                     # again
@@ -90,7 +95,11 @@ class Study:
                     )
                     results.store(case, evaluated, (rows, columns))
         solution = make_solution(self.columns(), at, results)
-        self.refuse(results)
+        # what a scene would refuse, and strokes that a cylinder cannot have
+        results.codes[np.isnan(at.angle)] = NOT_ASSEMBLED
+        results.codes[self.invalid] = INVALID
+        for array in results.arrays.values():
+            array[self.invalid] = np.nan
         return solution
 
     def columns(self) -> Scene:
@@ -98,60 +107,35 @@ class Study:
         columns = {key: values[:, None] for key, values in self.values.items()}
         return replace_numbers(self.scene, columns)
 
-    def members(self, rows: slice, count: int, begins: Scene) -> Scene:
-        """Make the scene of some members, whose numbers are arrays.
-
-        `count`: positions for which each is repeated.
-
-        `begins`: the scene with effects that know where the motion begins.
-        """
+    def case(self, rows: slice, count: int, side: int = 0) -> Case:
+        """Return the case of some members, each repeated for `count` positions."""
         numbers = {
             key: _repeat(values[rows], count) for key, values in self.values.items()
         }
-        scene = replace_numbers(begins, numbers)
-        for index, turns in _find_pin_turns(scene.effects).items():
-            repeated = tuple(_repeat(turn, count) for turn in turns)
-            scene = replace_place(scene, ("effects", index, "turns"), repeated)
-        return scene
+        scene = replace_numbers(self.scene, numbers)
+        return Case.of(scene, self.at.bar, side).beside(self.scene)
 
-    def begin(self, rows: slice) -> Scene:
-        """Make the scene with effects that begin where each member's motion does.
+    def begin(self, rows: slice) -> Command:
+        """Command the positions at which the motions of some members begin, (k,).
 
-        A motion begins where the member first assembles.
+        A motion begins where the member first assembles; NaN: nowhere, or it changes
+        its branch.
         """
-        scene = self.scene
-        at = self.at
-        if not scene.counts_turns:
-            return scene
-        count = rows.stop - rows.start
-        n = at.angle.shape[1]
-        flat = _take_members(at, rows, slice(0, n))
-        half, _ = Case.of(self.members(rows, n, scene), at.bar).half_angle(flat)
-        assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, n)
+        motion = self.motion or self.at
+        n = motion.angle.shape[1]
+        half, _ = self.case(rows, n).half_angle(_take_members(motion, rows, slice(n)))
+        assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(-1, n)
         first = np.argmax(assembled, axis=1)
-        begins = assembled.any(axis=1) & (np.ptp(at.branch[rows], axis=1) == 0)
-        angle = np.where(begins, at.angle[rows][np.arange(count), first], np.nan)
-        start = Command(angle, at.branch[rows, 0], 0.0, 0.0, at.bar)
-        case = Case.of(self.members(rows, 1, scene), at.bar).beside(self.scene)
-        counted = case.begin_at(start).terms[len(scene.loads) :]
-        for index, turns in _find_pin_turns(counted).items():
-            scene = replace_place(scene, ("effects", index, "turns"), turns)
-        return scene
-
-    def refuse(self, results: Results) -> None:
-        """Mark the members that a scene would refuse.
-
-        Strokes that a cylinder cannot have are marked too.
-        """
-        results.codes[np.isnan(self.at.angle)] = NOT_ASSEMBLED
-        results.codes[self.invalid] = INVALID
-        for array in results.arrays.values():
-            array[self.invalid] = np.nan
+        branch = motion.branch[rows]
+        begins = assembled.any(axis=1) & (np.ptp(branch, axis=1) == 0)
+        angle = np.take_along_axis(motion.angle[rows], first[:, None], axis=1)[:, 0]
+        start = np.where(begins, angle, np.nan)
+        return Command(start, branch[:, 0], 0.0, 0.0, motion.bar)
 
 
 def _take_members(at: Command, rows: slice, columns: slice) -> Command:
     """Take some positions of some members, one after the other, (k,)."""
-    count = columns.stop - columns.start
+    count = len(range(at.angle.shape[1])[columns])
 
     def flat(value: Any) -> Any:
         if np.ndim(value) < 2:
@@ -163,23 +147,9 @@ def _take_members(at: Command, rows: slice, columns: slice) -> Command:
     return at.with_arrays(flat)
 
 
-def _find_pin_turns(effects: Iterable[Effect]) -> dict[int, Any]:
-    """Return the whole turns of pins by index of the effect that counts them.
-
-    Only effects that depend on where the motion begins count turns.
-    """
-    turns = {}
-    for index, effect in enumerate(effects):
-        of_pins = getattr(effect, "turns", None) if effect.counts_turns else None
-        if of_pins is not None:
-            turns[index] = of_pins
-    return turns
-
-
-def _repeat(values: Array, count: int) -> Array:
-    if count == 1:
-        return values
-    return np.repeat(values, count)
+def _repeat(values: Any, count: int) -> Any:
+    """Repeat each entry of an array; a number stays."""
+    return values if count == 1 or not np.ndim(values) else np.repeat(values, count)
 
 
 def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
