@@ -480,6 +480,7 @@ class _Run:
 
     def report(self, times: Array) -> Released:
         """Report the motion at times, (n,) rising from 0, s."""
+        linkage = self.scene.linkage
         reported = []
         rows = []
         due = times
@@ -492,9 +493,36 @@ class _Run:
                 if now.size:
                     reported.append(now)
                     rows.append(self._read(stretch, now))
-        released = self._conclude(times, np.concatenate(reported), np.concatenate(rows))
+            columns = np.concatenate(rows).T
+        theta_2, omega_2, alpha_2, sine, energy, work, bar, *independent = columns
+        path = prepare_path(linkage.lengths, linkage.ground_angle)
+        signs = np.array(path.sign(theta_2, np.copysign(1.0, sine)))
+        # at a limit of theta_2 both branches meet, and the last one goes on
+        is_sure = np.abs(sine) > NO_DIGIT_LEFT
+        last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
+        signs = np.where(last < 0, command(self.scene).branch[0], signs[last])
+        instants = np.concatenate(reported)
+        whole = Command(
+            theta_2,
+            signs.astype(np.int8),
+            omega_2,
+            alpha_2,
+            time=instants,
+            origin=ReleaseOrigin(bar.astype(np.int8), *independent),
+        )
+        motion = whole.part(np.isin(instants, times))
         if self.scene.counts_turns:
-            self._require_unwound(released.command)
+            self._require_unwound(motion)
+        largest = float(np.max(np.abs([energy, work])))
+        drift = float(np.max(np.abs(energy - energy[0] - work)))
+        released = Released(
+            motion,
+            drift / largest if largest else 0.0,
+            # two may lie within one step
+            tuple(sorted({time for time in self.change_points if time <= times[-1]})),
+            whole,
+        )
+        released._run = self
         return released
 
     def _require_unwound(self, motion: Command) -> None:
@@ -511,34 +539,3 @@ class _Run:
                         " s the free motion has turned a pin by more than half a turn"
                         " from the rest of its spring, which is not modelled"
                     )
-
-    def _conclude(self, times: Array, reported: Array, rows: Array) -> Released:
-        """Put the reported instants together; the branch is that of the start."""
-        theta_2, omega_2, alpha_2, sine, energy, work, bar, *independent = rows.T
-        linkage = self.scene.linkage
-        path = prepare_path(linkage.lengths, linkage.ground_angle)
-        signs = np.array(path.sign(theta_2, np.copysign(1.0, sine)))
-        # at a limit of theta_2 both branches meet, and the last one goes on
-        is_sure = np.abs(sine) > NO_DIGIT_LEFT
-        last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
-        branch = command(self.scene).branch[0]
-        signs = np.where(last < 0, branch, signs[last])
-        whole = Command(
-            theta_2,
-            signs.astype(np.int8),
-            omega_2,
-            alpha_2,
-            time=reported,
-            origin=ReleaseOrigin(bar.astype(np.int8), *independent),
-        )
-        largest = float(np.max(np.abs([energy, work])))
-        drift = float(np.max(np.abs(energy - energy[0] - work)))
-        released = Released(
-            whole.part(np.isin(reported, times)),
-            drift / largest if largest else 0.0,
-            # two may lie within one step
-            tuple(sorted({time for time in self.change_points if time <= times[-1]})),
-            whole,
-        )
-        released._run = self
-        return released

@@ -123,9 +123,15 @@ class Pair(NDArrayOperatorsMixin):
         *inputs: Any,
         **options: Any,
     ) -> Any:
-        if method != "__call__" or options or function not in LONGER_FUNCTIONS:
-            return NotImplemented
-        return LONGER_FUNCTIONS[function](*map(_as_pair, inputs))
+        pairs = [*map(_as_pair, inputs)]
+        if method == "__call__" and not options:
+            if function in LONGER_FUNCTIONS:
+                return LONGER_FUNCTIONS[function](*pairs)
+            if function in COMPARISONS:
+                return function((pairs[0] - pairs[1]).high, 0.0)
+            if function in OF_DOUBLES:
+                return function(*(pair.high for pair in pairs))
+        return NotImplemented
 
     def __array_function__(
         self,
@@ -150,9 +156,7 @@ def _as_pair(number: Any) -> Pair:
 def _choose(mask: Any, x: Any, y: Any) -> Any:
     x = _as_pair(x)
     y = _as_pair(y)
-    high = np.where(mask, x.high, y.high)
-    low = np.where(mask, x.low, y.low)
-    return Pair(high, low)
+    return Pair(np.where(mask, x.high, y.high), np.where(mask, x.low, y.low))
 
 
 def _renew(high: Any, low: Any) -> Pair:
@@ -185,14 +189,8 @@ def _multiply_real(x: Any, y: Any) -> Any:
 
 
 def _multiply(x: Any, y: Any) -> Any:
-    x_is_complex = np.iscomplexobj(x.high)
-    y_is_complex = np.iscomplexobj(y.high)
-    if not x_is_complex and not y_is_complex:
+    if np.isrealobj(x.high) and np.isrealobj(y.high):
         return _multiply_real(x, y)
-    if not y_is_complex:
-        return _join_parts(_multiply_real(x.real, y), _multiply_real(x.imag, y))
-    if not x_is_complex:
-        return _multiply(y, x)
     real = _multiply_real(x.real, y.real) - _multiply_real(x.imag, y.imag)
     imag = _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real)
     return _join_parts(real, imag)
@@ -208,13 +206,9 @@ def _divide_longer(x: Any, y: Any) -> Any:
         return _multiply(x, y.conjugate()) / square
     if np.iscomplexobj(x.high):
         return _join_parts(_divide_longer(x.real, y), _divide_longer(x.imag, y))
-    first = x.high / y.high
-    remainder = x - _multiply_real(Pair(first, 0.0), y)
-    second = remainder.high / y.high
-    quotient = _renew(first, second)
-    remainder = x - _multiply_real(quotient, y)
-    third = remainder.high / y.high
-    return quotient + Pair(third, 0.0)
+    near = x.high / y.high
+    remainder = x - _multiply_real(Pair(near, 0.0), y)
+    return _renew(near, remainder.high / y.high)
 
 
 def _root(x: Any) -> Any:
@@ -271,14 +265,16 @@ def _size_of_longer(x: Any) -> Any:
     return _root(along * along + across * across) * unit
 
 
-def _make_comparison(function: Any) -> Callable[[Any, Any], Any]:
-    return lambda x, y: function((x - y).high, 0.0)
-
-
-def _take_remainder(x: Any, y: Any) -> Any:
-    return x - y * np.floor(x.high / y.high)
-
-
+COMPARISONS = (
+    np.less,
+    np.less_equal,
+    np.greater,
+    np.greater_equal,
+    np.equal,
+    np.not_equal,
+)
+OF_DOUBLES = (np.sign, np.isnan, np.isfinite, np.frexp, np.copysign)
+"""Functions of the doubles alone."""
 LONGER_FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.add: _add_longer,
     np.subtract: lambda x, y: _add_longer(x, -y),
@@ -292,24 +288,7 @@ LONGER_FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.arctan2: _arctangent,
     np.absolute: _size_of_longer,
     np.conjugate: lambda x: x.conjugate(),
-    np.remainder: _take_remainder,
+    np.remainder: lambda x, y: x - y * np.floor(x.high / y.high),
     np.fmod: lambda x, y: x - y * np.trunc(x.high / y.high),
-    **{
-        function: _make_comparison(function)
-        for function in (
-            np.less,
-            np.less_equal,
-            np.greater,
-            np.greater_equal,
-            np.equal,
-            np.not_equal,
-        )
-    },
-    **{
-        function: lambda x, f=function: f(x.high)
-        for function in (np.sign, np.isnan, np.isfinite)
-    },
     np.rint: lambda x: Pair(np.rint(x.high), 0.0),
-    np.frexp: lambda x: np.frexp(x.high),
-    np.copysign: lambda x, y: np.copysign(x.high, y.high),
 }

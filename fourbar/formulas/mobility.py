@@ -153,13 +153,10 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
     theta_1 = linkage.ground_angle
     first, second = (number for number in MOVING_BARS if number != bar)
     shorter = second if reach.x >= reach.y else first
-    reversals = []
-    if reach.beyond_folded > 0.0:
-        reversals.append(False)
-    if reach.beyond_stretched > 0.0:
-        reversals.append(True)
     limits: list[LimitPosition] = []
-    for stretched in reversals:
+    for stretched in (False, True):
+        if (reach.beyond_stretched if stretched else reach.beyond_folded) <= 0.0:
+            continue
         psi, eta = reach.triangle(stretched)
         straight = psi in (0.0, math.pi)
         signs = (1.0,) if straight else (1.0, -1.0)
@@ -172,18 +169,11 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
             theta_2 = theta_1 + directions[2] % TURN
             theta_3 = theta_1 + directions[3]
             theta_4 = theta_1 + directions[4] + math.pi
-            if bar == 2 or straight:
-                branch = 0
-            else:
+            branch = 0
+            if bar != 2 and not straight:
                 branch = int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
-            limit = LimitPosition(
-                theta_2,
-                _wrap(theta_3),
-                _wrap(theta_4),
-                branch,
-                stretched,
-            )
-            limits.append(limit)
+            angles = (theta_2, _wrap(theta_3), _wrap(theta_4))
+            limits.append(LimitPosition(*angles, branch, stretched))
     return tuple(sorted(limits))
 
 
@@ -249,14 +239,10 @@ def choose_range(
 def find_limit_angles(linkage: FourBar, bar: int) -> tuple[float, ...]:
     """Find the angles at which a bar reverses, rad, counter-clockwise from theta_1."""
     theta_1 = linkage.ground_angle
-    if bar == 2:
-        return tuple(limit.theta_2 for limit in limit_positions(linkage))
-    return tuple(
-        sorted(
-            theta_1 + (limit[bar - 2] - theta_1) % TURN
-            for limit in limit_positions(linkage, bar)
-        )
-    )
+    angles = []
+    for limit in limit_positions(linkage, bar):
+        angles.append(theta_1 + (limit[bar - 2] - theta_1) % TURN)
+    return tuple(sorted(angles))
 
 
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
@@ -421,61 +407,46 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     Mechanism and Machine Theory 20 (1985).
     """
     unit = choose_power_of_two(linkage)
-    lengths = dict(
-        zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True)
+    lengths = tuple(length / unit for length in linkage.lengths)
+    least = min(lengths)
+    most = max(lengths)
+    shortest = 1 + lengths.index(least)
+    longest = 1 + lengths.index(most)
+    perimeter = math.fsum(lengths)
+    excess = math.fsum((2.0 * least, 2.0 * most, *(-length for length in lengths)))
+    if abs(excess) <= within * perimeter:
+        excess = 0.0
+    with_input, with_output, opposite = (
+        gap <= within * perimeter for gap in _find_gaps(lengths)
     )
-    shortest = min(lengths, key=lengths.__getitem__)
-    longest = max(lengths, key=lengths.__getitem__)
-    perimeter = math.fsum(lengths.values())
-
-    def balance(bar: int, partner: int) -> float:
-        """Compute the two bars minus the other two; 0 within their rounding."""
-        total = math.fsum(
-            length if k in (bar, partner) else -length for k, length in lengths.items()
-        )
-        if abs(total) <= within * perimeter:
-            return 0.0
-        return total
-
-    # all bars equal: every bar is both, and any other one is its partner
-    surplus = -balance(shortest, longest if longest != shortest else 4) * unit
-    turning = tuple(k for k in (2, 3, 4) if turns_fully(linkage, k))
-
-    def found(barker: int | None, code: str, name: str) -> LinkageType:
-        return LinkageType(surplus, barker, code, name, shortest, longest, turning)
-
-    if math.fsum((*lengths.values(), -2.0 * lengths[longest])) <= TOUCHING * perimeter:
-        return found(
-            None,
-            "structure",
-            f"structure (the {BAR_NAMES[longest]} is as long as the other three)",
-        )
-    if surplus > 0.0:
-        return found(shortest, *_GRASHOF[shortest])
-    if surplus < 0.0:
-        return found(
-            4 + longest,
-            f"RRR{longest}",
-            f"triple rocker (longest: {BAR_NAMES[longest]})",
-        )
-    opposite, with_input, with_output = (balance(1, k) == 0.0 for k in (3, 2, 4))
-    if opposite + with_input + with_output == 3:
-        return found(14, "S3X", "rhombus (triple change point)")
-    if opposite + with_input + with_output == 2:
-        if not opposite:
-            return found(13, "S2X", PARALLELOGRAM)
+    equalities = with_input + with_output + opposite
+    found: tuple[int | None, str, str]
+    if math.fsum((*lengths, -2.0 * most)) <= TOUCHING * perimeter:
+        name = f"structure (the {BAR_NAMES[longest]} is as long as the other three)"
+        found = (None, "structure", name)
+    elif excess < 0.0:
+        found = (shortest, *_GRASHOF[shortest])
+    elif excess > 0.0:
+        name = f"triple rocker (longest: {BAR_NAMES[longest]})"
+        found = (4 + longest, f"RRR{longest}", name)
+    elif equalities == 3:
+        found = (14, "S3X", "rhombus (triple change point)")
+    elif equalities == 2:
         # d + b = a + c and d + c = a + b give d = a;
         # d + b = a + c and d + a = b + c give d = c
-        if with_output:
-            pairs = ("ground and input", "coupler and output")
-        else:
-            pairs = ("ground and output", "input and coupler")
-        return found(13, "S2X", f"kite (equal: {pairs[0]}; {pairs[1]})")
-    return found(
-        8 + shortest,
-        CHANGE_POINT_TYPES[shortest],
-        f"change-point {_GRASHOF[shortest][1]}",
-    )
+        name = PARALLELOGRAM
+        if opposite and with_output:
+            name = "kite (equal: ground and input; coupler and output)"
+        elif opposite:
+            name = "kite (equal: ground and output; input and coupler)"
+        found = (13, "S2X", name)
+    else:
+        name = f"change-point {_GRASHOF[shortest][1]}"
+        found = (8 + shortest, CHANGE_POINT_TYPES[shortest], name)
+    turning = tuple(bar for bar in MOVING_BARS if turns_fully(linkage, bar))
+    barker, code, name = found
+    surplus = -excess * unit
+    return LinkageType(surplus, barker, code, name, shortest, longest, turning)
 
 
 def name_assembly(linkage: FourBar, bar: int, branch: int) -> str:
@@ -509,8 +480,8 @@ def find_miss(linkage: FourBar) -> tuple[float, str] | None:
     exact = classify(linkage)
     if meant.name == exact.name or meant.barker is None or meant.barker < 9:
         return None
-    gaps = _find_gaps(linkage.lengths)
     largest = _NEARLY * math.fsum(linkage.lengths)
+    gaps = _find_gaps(linkage.lengths)
     return max(gap for gap in gaps if gap <= largest), meant.name
 
 
@@ -539,26 +510,23 @@ def list_met_equalities(
     """
     touching = TOUCHING * math.fsum(met)
     bars = tuple(BAR_NAMES.values())
-    pairs = list[tuple[str, str, float]]()
-    for second in range(1, len(met)):
+    pairs = []
+    for second, length in enumerate(met):
         for first in range(second):
-            if abs(met[first] - met[second]) <= touching:
+            if abs(met[first] - length) <= touching:
                 gap = abs(stated[first] - stated[second])
                 if gap > touching:
                     pairs.append((bars[first], bars[second], gap))
                 break
     if pairs:
         return pairs
-    for signs in _EQUALITIES:
-        gap = abs(math.fsum(map(mul, signs, stated)))
-        if abs(math.fsum(map(mul, signs, met))) <= touching < gap:
-            sides = [
-                " + ".join(
-                    bar for bar, sign in zip(bars, signs, strict=True) if sign == side
-                )
-                for side in (-1, 1)
-            ]
-            pairs.append((sides[0], sides[1], gap))
+    gaps = zip(_EQUALITIES, _find_gaps(stated), _find_gaps(met), strict=True)
+    for signs, gap, left in gaps:
+        if left <= touching < gap:
+            sides: dict[int, list[str]] = {-1: [], 1: []}
+            for sign, bar in zip(signs, bars, strict=True):
+                sides[sign].append(bar)
+            pairs.append((" + ".join(sides[-1]), " + ".join(sides[1]), gap))
     return pairs
 
 

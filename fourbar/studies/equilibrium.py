@@ -188,13 +188,12 @@ def _mark_wound(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
     Not marked is what lies beyond a limit or a change point from the first position.
     """
     wound = np.zeros(len(points), dtype=bool)
-    if not curve.scene.counts_turns:
-        return wound
-    passed = curve.reached(points)
-    if curve.sweep is None and not curve.full:
-        passed &= np.sin(points[:, 1]) * curve.at.branch[0] > 0.0
-    places = [curve.place(point).theta_2 for point in points[passed]]
-    wound[passed] = _is_wound(curve, _turn_to(curve, np.array(places)))
+    if curve.scene.counts_turns:
+        passed = curve.reached(points)
+        if curve.sweep is None and not curve.full:
+            passed &= np.sin(points[:, 1]) * curve.at.branch[0] > 0.0
+        theta_2 = curve.theta_1 + curve.count(points[passed, 0])
+        wound[passed] = _is_wound(curve, _turn_to(curve, theta_2))
     return wound
 
 

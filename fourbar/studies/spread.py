@@ -4,7 +4,7 @@ Samples give the spread, and the sensitivities give it to first order.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from fourbar.linkage import require_whole
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, Array
 from fourbar.scene import Scene, command
 from fourbar.solution import find_values, is_scalar, split_parts
-from fourbar.solving import solve, split
+from fourbar.solving import split
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
     LEFT_OUT,
@@ -25,7 +25,7 @@ from fourbar.studies.keys import (
     read_numbers,
     refuse_key,
 )
-from fourbar.studies.study import Study, vary
+from fourbar.studies.study import Study, solve_some, vary
 from fourbar.writing import (
     describe_extent,
     list_names,
@@ -244,14 +244,14 @@ def tolerances(
             has_columns = isinstance(value, np.ndarray) and value.size > len(value)
             return value[:, columns] if has_columns else value
 
-        parts = replace(study, at=study.at.with_arrays(take), motion=study.at)
-        shape = parts.at.angle.shape
+        at = study.at.with_arrays(take)
+        shape = at.angle.shape
         out = {
             name: np.empty(shape if is_scalar(name) else (*shape, 2))
             for name in names
             if name != "theta_2"  # every solution has it
         }
-        solution = solve(parts, out=out)
+        solution = solve_some(study, at, None, out)
         code = solution.status_code
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)

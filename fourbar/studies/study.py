@@ -47,8 +47,6 @@ class Study:
     """Commanded angle and branch (m, n), with speed and acceleration. The latter are
     those of the scene, or (m, 1).
     """
-    motion: Command | None = None
-    """Motion of which `at` has some positions; None: it has all."""
 
     def __len__(self) -> int:
         return len(self.invalid)
@@ -71,41 +69,7 @@ class Study:
 
         Parameters and errors are those of `fourbar.solve`.
         """
-        at = self.at
-        request = SolveRequest.of(self.scene, at, stage, out)
-        results = Results(request)
-        evaluated = None
-        m, n = request.shape
-        block = request.block
-        counts_turns = request.asks_forces and self.scene.counts_turns
-        with np.errstate(all="ignore"):
-            for rows in split(m, max(1, block // n)):
-                begin = self.begin(rows) if counts_turns else None
-                for columns in split(n, block):
-                    count = columns.stop - columns.start
-                    case = self.case(rows, count, side)
-                    if begin is not None:
-                        start = begin.with_arrays(partial(_repeat, count=count))
-                        case = case.begin_at(start)
-                    positions = _take_members(at, rows, columns)
-                    # kept until the next block is evaluated, so that its memory is used
-                    # again
-                    evaluated = evaluate(
-                        case, positions, request.last_stage, request.wanted
-                    )
-                    results.store(case, evaluated, (rows, columns))
-        solution = make_solution(self.columns(), at, results)
-        # what a scene would refuse, and strokes that a cylinder cannot have
-        results.codes[np.isnan(at.angle)] = NOT_ASSEMBLED
-        results.codes[self.invalid] = INVALID
-        for array in results.arrays.values():
-            array[self.invalid] = np.nan
-        return solution
-
-    def columns(self) -> Scene:
-        """Make the scene of all members, each number that varies as a column (m, 1)."""
-        columns = {key: values[:, None] for key, values in self.values.items()}
-        return replace_numbers(self.scene, columns)
+        return solve_some(self, self.at, stage, out, side)
 
     def case(self, rows: slice, count: int, side: int = 0) -> Case:
         """Return the case of some members, each repeated for `count` positions."""
@@ -121,7 +85,7 @@ class Study:
         A motion begins where the member first assembles; NaN: nowhere, or it changes
         its branch.
         """
-        motion = self.motion or self.at
+        motion = self.at
         n = motion.angle.shape[1]
         half, _ = self.case(rows, n).half_angle(_take_members(motion, rows, slice(n)))
         assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(-1, n)
@@ -131,6 +95,49 @@ class Study:
         angle = np.take_along_axis(motion.angle[rows], first[:, None], axis=1)[:, 0]
         start = np.where(begins, angle, np.nan)
         return Command(start, branch[:, 0], 0.0, 0.0, motion.bar)
+
+
+def solve_some(
+    study: Study,
+    at: Command,
+    stage: str | None,
+    out: Mapping[str, Array] | None,
+    side: int = 0,
+) -> Solution:
+    """Evaluate every member at some of its positions, `at`, as `Study.solve` does.
+
+    Effects begin where the whole motion of a member does.
+    """
+    request = SolveRequest.of(study.scene, at, stage, out)
+    results = Results(request)
+    evaluated = None
+    m, n = request.shape
+    block = request.block
+    counts_turns = request.asks_forces and study.scene.counts_turns
+    with np.errstate(all="ignore"):
+        for rows in split(m, max(1, block // n)):
+            begin = study.begin(rows) if counts_turns else None
+            for columns in split(n, block):
+                count = columns.stop - columns.start
+                case = study.case(rows, count, side)
+                if begin is not None:
+                    start = begin.with_arrays(partial(_repeat, count=count))
+                    case = case.begin_at(start)
+                positions = _take_members(at, rows, columns)
+                # kept until the next block is evaluated, so that its memory is used
+                # again
+                evaluated = evaluate(
+                    case, positions, request.last_stage, request.wanted
+                )
+                results.store(case, evaluated, (rows, columns))
+    members = {key: values[:, None] for key, values in study.values.items()}
+    solution = make_solution(replace_numbers(study.scene, members), at, results)
+    # what a scene would refuse, and strokes that a cylinder cannot have
+    results.codes[np.isnan(at.angle)] = NOT_ASSEMBLED
+    results.codes[study.invalid] = INVALID
+    for array in results.arrays.values():
+        array[study.invalid] = np.nan
+    return solution
 
 
 def _take_members(at: Command, rows: slice, columns: slice) -> Command:
