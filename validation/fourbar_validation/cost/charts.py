@@ -173,38 +173,21 @@ def make_figure(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(PICTURE_WIDTH, height), facecolor=PAPER)
-    figure.text(
-        0.02,
-        1.0 - 0.1 / height,
-        statement,
-        fontsize=10.5,
-        weight="bold",
-        color=INK,
-        va="top",
-        wrap=True,
-    )
-    figure.text(
-        0.02,
-        1.0 - 0.52 / height,
-        title,
-        fontsize=TEXT,
-        color=SOFT,
-        va="top",
-    )
+    bold = {"fontsize": 10.5, "weight": "bold", "color": INK, "wrap": True}
+    figure.text(0.02, 1.0 - 0.1 / height, statement, va="top", **bold)
+    below = 1.0 - 0.52 / height
+    figure.text(0.02, below, title, fontsize=TEXT, color=SOFT, va="top")
     return figure
 
 
 def set_axes(axes: Any) -> None:
     """Give logarithmic axes their grid, the size of their texts, and a legend above."""
-    axes.set(xscale="log", yscale="log")
-    axes.set_facecolor(PAPER)
-    axes.grid(visible=True, which="major", color=GRID, lw=0.6)
-    axes.set_axisbelow(True)
+    axes.set(xscale="log", yscale="log", facecolor=PAPER)
+    axes.grid(color=GRID)
     axes.tick_params(which="both", labelsize=TEXT, color=GRID, labelcolor=INK)
     axes.spines[:].set_color(GRID)
     for axis in (axes.xaxis, axes.yaxis):
-        axis.label.set_fontsize(TEXT)
-        axis.label.set_color(INK)
+        axis.label.set(fontsize=TEXT, color=INK)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(
             loc="lower left",
