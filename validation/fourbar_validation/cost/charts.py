@@ -173,7 +173,12 @@ def make_figure(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(PICTURE_WIDTH, height), facecolor=PAPER)
-    bold = {"fontsize": 10.5, "weight": "bold", "color": INK, "wrap": True}
+    bold: dict[str, Any] = {
+        "fontsize": 10.5,
+        "weight": "bold",
+        "color": INK,
+        "wrap": True,
+    }
     figure.text(0.02, 1.0 - 0.1 / height, statement, va="top", **bold)
     below = 1.0 - 0.52 / height
     figure.text(0.02, below, title, fontsize=TEXT, color=SOFT, va="top")

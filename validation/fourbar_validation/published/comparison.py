@@ -119,9 +119,10 @@ def compare_figures(show_all: bool) -> int:
     every = f"{sums.total()} figures"
     total.add_row(every, *(str(sums[one]) for one in FIGURE_VERDICTS))
     console.print(total)
-    unexplained = sum(not is_explained(figure) for figure in differing)
-    reproduced = sum(figure.reproduced() for figure in differing)
-    misprints = len(differing) - reproduced - unexplained
+    explained = [figure for figure in differing if is_explained(figure)]
+    unexplained = len(differing) - len(explained)
+    reproduced = sum(figure.reproduced() for figure in explained)
+    misprints = len(explained) - reproduced
     summary = (
         "A figure is rounded or truncated if ours, rounded or cut to its digits,"
         f" equals it. {len(differing)} figures differ: the errata named reproduce"
