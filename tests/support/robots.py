@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -239,6 +240,14 @@ def read_scene(text, loop=None, speed=3.0, **pose):
 
 AS_DRAWN = MeasureOptions(PoseOptions())
 """A robot is measured in the pose of its file."""
+
+
+def forward(text):
+    """Return the model of a text, and its data where it begins."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
 
 
 def measure(file, scene=None, pose=None, **options):

@@ -9,6 +9,7 @@ import pytest
 import fourbar
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.run.judge import judge
+from tests.support.robots import forward
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.validation.engines.test_applied_effects import ACTING
@@ -38,8 +39,7 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     """
     effects = (ACTING[name],) if name else ()
     text = write_mjcf(crank_rocker(loads=(), effects=effects))
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
+    model, data = forward(text)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     disabled = {

@@ -42,6 +42,7 @@ from tests.support.robots import (
     Planar,
     answer_of,
     file_of,
+    forward,
     judge_path,
     notes_of,
     read_scene,
@@ -102,8 +103,7 @@ def bisect_on_the_couple(text, theta_2, alpha_2):
     """Return MuJoCo's couple on the input, N m, at keyframe 0 moved to an angle by
     Newton steps.
     """
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
+    model, data = forward(text)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     three, four = (model.site(name).id for name in ("B3", "B4"))
     speed = data.qvel[0]

@@ -72,21 +72,31 @@ def write_upright(
     return path
 
 
+@pytest.fixture
+def shown(capsys):
+    """Shows a report, and returns it in one line."""
+
+    def show(report):
+        show_mimic(report)
+        return " ".join(capsys.readouterr().out.split())
+
+    return show
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("sense, pad", [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
 def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     sense,
     pad,
     tmp_path,
-    capsys,
+    shown,
 ):
     report = measure_mimic(
         write_upright(tmp_path, sense=sense, pad=pad), "rocker_j", GRIPPER
     )
     assert math.degrees(report.file.angle) == approx(0.95783, abs=5e-6)
-    show_mimic(report)
     sign = "+" if sense > 0 else "-"
-    printed = " ".join(capsys.readouterr().out.split())
+    printed = shown(report)
     assert f"theta_2 is 90 deg {sign} drive, from 60 to 120 deg" in printed
     # typed into the file, a polynomial turns the rocker as the loop does
     best = report.fitted[3]
@@ -264,7 +274,7 @@ COUPLER_SCENE = Scene(
 """),
 )
 def test_what_the_file_does_not_tell_is_stated_or_left_out(
-    polycoef, angles, error, told, tmp_path, capsys
+    polycoef, angles, error, told, tmp_path, shown
 ):
     """The errors are those of pins B at the intersection of two circles."""
     path = tmp_path / "coupler.xml"
@@ -272,9 +282,8 @@ def test_what_the_file_does_not_tell_is_stated_or_left_out(
     stated = dict(one.split("=") for one in angles.split(",") if one)
     report = measure_mimic(path, "j3", COUPLER_SCENE, angles=stated)
     assert math.degrees(report.file.angle) == approx(float(error), nan_ok=True)
-    show_mimic(report)
-    printed = capsys.readouterr().out
-    assert told in " ".join(printed.split())
+    printed = shown(report)
+    assert told in printed
     assert ("a0 to a4 -0.3616111 -0.8158249 0 0 0" in printed) == (not angles)
     for wrong, reason in (("j3", "theta_2 or theta_3"), ("theta_3", "theta_2.*need")):
         with raises(InputError, match=reason):
@@ -303,7 +312,7 @@ LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="0.02"/>
 """),
 )
 def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
-    millimetres, centres, rest, mimic, error, zero, tmp_path, capsys
+    millimetres, centres, rest, mimic, error, zero, tmp_path, shown
 ):
     """The errors are those of pins B at the intersection of two circles."""
     ground, *moving = 1e-3 * np.array(millimetres.split(), float)
@@ -323,14 +332,13 @@ def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
     assert degrees == approx(float(error), abs=2e-5, nan_ok=True)
     centred = 0.78919 if ground == 0.06 else 1.32753
     assert math.degrees(report.centred) == approx(centred, abs=2e-5)
-    show_mimic(report)
-    assert zero in " ".join(capsys.readouterr().out.split())
+    assert zero in shown(report)
 
 
 @pytest.mark.parametrize("ground", [0.03, 0.04])
 def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
     tmp_path,
-    capsys,
+    shown,
     ground,
 ):
     """A coupler that stays parallel turns by -theta_2 on the crank.
@@ -344,9 +352,7 @@ def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
     bars = FourBar(ground, Bar(0.04, 0.02), Bar(ground, 0.02), Bar(0.04, 0.02))
     report = measure_mimic(path, "pad", replace(GRIPPER, linkage=bars))
     assert report.file.angle <= ROUND_OFF
-    show_mimic(report)
-    told = " ".join(capsys.readouterr().out.split())
-    assert "theta_2 is 90 deg + drive, from 60 to 120 deg" in told
+    assert "theta_2 is 90 deg + drive, from 60 to 120 deg" in shown(report)
 
 
 @pytest.mark.parametrize(
@@ -398,7 +404,7 @@ BEHIND = {"theta_2": "126.2761691 deg"}
     ],
 )
 def test_the_side_of_a_scene_is_that_of_its_drawing_its_range_or_stated(
-    change, angles, told, tmp_path, capsys
+    change, angles, told, tmp_path, shown
 ):
     """The errors are those of pins B at the intersection of two circles."""
     path = tmp_path / "knuckle.xml"
@@ -406,8 +412,7 @@ def test_the_side_of_a_scene_is_that_of_its_drawing_its_range_or_stated(
     drawn = fourbar.from_pins(*PINS)
     scene = replace(drawn, **{"motion": drawn.motion.replace(angle=None), **change})
     report = measure_mimic(path, "knuckle", scene, angles=angles)
-    show_mimic(report)
-    assert told in " ".join(capsys.readouterr().out.split())
+    assert told in shown(report)
     if "other" not in told:
         errors = np.degrees([report.file.angle, report.centred])
         assert errors == approx([1.0203, 0.69427], abs=1e-4)

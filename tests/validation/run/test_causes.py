@@ -596,6 +596,7 @@ WEIGHTS = tuple(
     for number, bar in enumerate(BARS.values(), 2)
 )
 RUBBING = Viscous((("A", 0.2),))
+WOUND = with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, -0.3))
 ARM, FROM_PIN = with_load(arm=PLACE), with_load(from_pin=PLACE)
 AT_PIN = {"from_pin": (0.0, 0.0)}
 DAMPED = replace(SCENE, effects=(Gravity(), Viscous((("O4", 0.2),))))
@@ -611,15 +612,15 @@ OTHER_SCENES = {
     ),
     "the viscous damping 1.3 times ours (fitted)": (DAMPED, SCENE, 1.3),
     "the preload of every torsion spring is missing": (
-        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, -0.3)),
+        WOUND,
         with_torsion((2.0, 0.4, 0.0), (1.0, 1.0, 0.0)),
     ),
     "the rest angle of every torsion spring is missing": (
-        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, -0.3)),
+        WOUND,
         with_torsion((2.0, 0.4, 1.3), (1.0, 1.0, 0.7)),
     ),
     "the torsion springs are taken of degrees: 57.2958 times": (
-        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, -0.3)),
+        WOUND,
         with_torsion(
             (2.0 * math.degrees(1.0), 0.4, 0.5), (math.degrees(1.0), 1.0, -0.3)
         ),

@@ -19,7 +19,15 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     require_loops,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from tests.support.robots import ADAPTIVE, EXCAVATOR, TILT, Planar, file_of, rotation
+from tests.support.robots import (
+    ADAPTIVE,
+    EXCAVATOR,
+    TILT,
+    Planar,
+    file_of,
+    forward,
+    rotation,
+)
 from tests.support.rows import read_rows
 
 
@@ -351,8 +359,7 @@ def test_a_tendon_of_three_hinges_stands_for_parallelograms_if_directions_stay(
 ):
     """Directions are those of MuJoCo in a pose that leaves the tendon its length."""
     text = CHAIN.format(knee=knee, turned=turned)
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
+    model, data = forward(text)
     directions = []
     for hip, knee_turned in ((0.0, 0.0), (0.3, 0.5)):
         data.qpos[:] = hip, knee_turned, -hip - 0.5 * knee * knee_turned
@@ -392,9 +399,7 @@ def test_an_equality_of_a_spatial_tendon_acts_if_its_length_follows_the_bars(
         f'<tendon><spatial name="rope">{path}</spatial></tendon>'
     )
     planar = Planar(on_coupler=ON_COUPLER, ground=ON_GROUND, more=tied)
-    model = mujoco.MjModel.from_xml_string(planar.text())
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = forward(planar.text())
     moved = np.zeros((1, model.nv))
     mujoco.mju_sparse2dense(
         moved, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind

@@ -21,7 +21,7 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     read_equality_force,
 )
 from fourbar_validation.robots.judge_loop import FILE_AT_ONE_STATE
-from tests.support.robots import answer_of, examine_text, measure
+from tests.support.robots import answer_of, examine_text, forward, measure
 from tests.whole.test_docs import blocks, read
 from tests.whole.test_imports import ROOT
 
@@ -36,13 +36,11 @@ flags: without passive forces gravity is not compensated.
 @pytest.mark.parametrize("off", [c for n in range(4) for c in combinations(FLAGS, n)])
 def test_gravity_is_compensated_where_mujoco_does(off):
     flags = " ".join(f'{flag}="disable"' for flag in off)
-    model = mujoco.MjModel.from_xml_string(
+    model, data = forward(
         f"<mujoco><option><flag {flags}/></option><worldbody>"
         '<body gravcomp="0.7"><joint axis="0 1 0"/><geom pos=".1 0 0" size=".1"/>'
         "</body></worldbody></mujoco>"
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     lifted = float(list_lifted_masses(model).sum())
     assert bool(lifted) == bool(data.qfrc_gravcomp.any())
     assert lifted in (0.0, pytest.approx(0.7 * model.body_mass.sum()))
@@ -121,15 +119,13 @@ def test_the_listing_of_the_guide_reads_what_the_harness_reads(monkeypatch):
 
 @pytest.mark.parametrize("scale", [1.0, 0.3])
 def test_a_weld_exerts_force_and_moment_as_the_guide_has_them(scale):
-    model = mujoco.MjModel.from_xml_string(
+    model, data = forward(
         f"""<mujoco><option gravity="0 0 0" tolerance="0"/><worldbody>
         <body name="one" pos=".1 0 0"><freejoint/><geom size=".1"/></body>
         <body name="two" pos=".3 .2 .1" euler="20 40 60"><geom size=".1"/></body>
         </worldbody><equality><weld body1="one" body2="two" torquescale="{scale}"
         solimp="0.9999 0.9999 .001 .5 2" solref=".01 1"/></equality></mujoco>"""
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     force, moment = np.array([1.0, 2.0, 3.0]), np.array([0.3, -0.5, 0.2])
     data.xfrc_applied[1] = [*force, *moment]
     mujoco.mj_forward(model, data)

@@ -19,7 +19,7 @@ from pytest import approx, raises
 
 import fourbar
 from fourbar.errors import InputError
-from tests.support.robots import Planar, read_scene
+from tests.support.robots import Planar, forward, read_scene
 from tests.support.rows import read_rows
 from tests.whole.test_imports import ROOT
 
@@ -267,9 +267,7 @@ def test_what_acts_along_a_tendon_is_named(tendon, actuator, named):
 def test_forces_across_the_plane_are_named_with_their_sizes():
     made = read_scene(FOOT)
     (remark,) = [r for r in made.remarks if "across the plane" in r]
-    model = mujoco.MjModel.from_xml_string(FOOT)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    model, data = forward(FOOT)
     pull = abs(data.xaxis[model.joint("crank").id] @ model.opt.gravity)
     assert f"input {0.15 * pull:.4g} N" in remark
     assert f"output {0.53 * pull:.4g} N" in remark

@@ -7,7 +7,6 @@ import math
 from dataclasses import replace
 from functools import cache
 
-import mujoco
 import numpy as np
 import pytest
 from pytest import approx, raises
@@ -40,6 +39,7 @@ from tests.support.robots import (
     Planar,
     draw_knee,
     file_of,
+    forward,
     make_parallelogram,
     measure,
     read_scene,
@@ -451,9 +451,7 @@ def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset):
     (closure,) = report.closures
     assert not report.notes
     assert closure.gap == approx(0.0, abs=1e-12)
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    _, data = forward(text)
     x, y, z = data.efc_force
     said = " ".join(closure.loop.remarks)
     for words in (
