@@ -52,6 +52,12 @@ def read(tmp_path):
     return read_text
 
 
+def write(heading, *columns):
+    """Write columns in full under a heading."""
+    rows = (",".join(map(repr, row)) for row in np.transpose(columns).tolist())
+    return "\n".join([heading, *rows])
+
+
 def tabulate(angle, angles, torque, form="{:.12g}"):
     """Write angles in deg with torques in N m."""
     rows = [f"{angle} [deg],torque"]
@@ -113,8 +119,7 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
     scene = commanding(4, 115.0, 155.0)
     right = fourbar.solve(scene)
     columns = right.theta_4, -0.5 * right.omega_2, -0.5 * right.omega_3
-    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in np.transpose(columns).tolist()]
-    table = read("\n".join(["theta_4,alpha_2,alpha_3", *rows]), "theta_4")
+    table = read(write("theta_4,alpha_2,alpha_3", *columns), "theta_4")
     (first, *_) = judge_table(scene, table).explanations
     assert first.complete and "(dJ/dt) v is missing" in first.text
 
@@ -265,9 +270,8 @@ def follow_rise(time):
 @pytest.mark.parametrize("lag, side", [(2e-3, "before"), (-5e-3, "after")])
 def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
     time = np.arange(0.0123, 0.79, 0.0517)
-    columns = time, follow_rise(time)[0], follow_rise(time - lag)[3]
-    rows = [f"{t:.4f},{a!r},{b!r}" for t, a, b in np.transpose(columns).tolist()]
-    judgement = judge_table(SERVO, read("\n".join(["time,theta_2,torque", *rows])))
+    columns = time.round(4), follow_rise(time)[0], follow_rise(time - lag)[3]
+    judgement = judge_table(SERVO, read(write("time,theta_2,torque", *columns)))
     (only,) = judgement.explanations
     assert only.complete and f"time {abs(lag):g} s {side} its own" in only.text
 
@@ -316,8 +320,7 @@ def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
     scene = crank_rocker(motion=Motion(theta.tolist(), speed))
     time = (theta - math.radians(start)) / speed
-    rows = np.transpose([time, fourbar.solve(scene).torque]).tolist()
-    text = "\n".join(["time,torque", *(f"{t!r},{number!r}" for t, number in rows)])
+    text = write("time,torque", time, fourbar.solve(scene).torque)
     judgement = judge_table(scene, read(text, law=find_steady(scene)))
     assert judgement.agreeing == 4 and judgement.digits >= "12"
 
@@ -342,8 +345,8 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
     first = scene.linkage.ground_angle + CYLINDER.ends[0][1].angle
     theta = first + np.arccos(cosine) - CYLINDER.ends[1][1].angle
     theta[1] += 1e-6
-    rows = [f"{s!r},{angle!r}" for s, angle in np.transpose([stroke, theta]).tolist()]
-    judgement = judge_table(scene, read("\n".join(["stroke,theta_2", *rows]), "stroke"))
+    table = read(write("stroke,theta_2", stroke, theta), "stroke")
+    judgement = judge_table(scene, table)
     assert [finding.line for finding in judgement.differing] == [3]
     assert judgement.compared == 3 and judgement.table.found_by == "theta_2"
     own = fourbar.solve(scene, "position")

@@ -7,6 +7,7 @@ import html
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ from tests.support.here import judge_here, summary_of
 from tests.support.rows import read_rows
 from tests.support.runs import HERE, ROW, changed, compare_rows
 from tests.support.scenes import bare, crank_rocker
-from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, Refuses
+from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, echo, refuse
 
 NAN = math.nan
 
@@ -164,7 +165,7 @@ def test_what_is_wrong_with_the_inertia_alone_is_a_row(said, verdict, reason):
             answer = super().answer(scene, command)
             return answer if scene.effects else replace(answer, **said)
 
-    engine = Engine("echo", WithoutEffects, EQUIVALENCE)
+    engine = Engine("echo", partial(WithoutEffects, echo), EQUIVALENCE)
     rows = judge("scene", crank_rocker(), [engine]).rows
     (row,) = [row for row in rows if row.quantity == "torque_inertia"]
     assert (row.verdict, row.reason) == (verdict, reason)
@@ -196,7 +197,7 @@ def test_what_is_due_nowhere_is_not_counted_as_held(monkeypatch):
 def test_formulas_without_an_answer_fail():
     scene = crank_rocker()
     commanded = command(scene)
-    answer = Echo().answer(scene, commanded)
+    answer = Echo(echo).answer(scene, commanded)
     positions = fourbar.solve(scene, "position", at=commanded)
     demands = Demands(EQUIVALENCE, ("torque",))
     rows = Comparison(
@@ -233,7 +234,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
 @pytest.mark.slow
 def test_every_form_of_a_report_says_the_same_counts():
     """Rows of the formulas themselves are of both scenes, the others of free bodies."""
-    refused = Engine("echo", Refuses, EQUIVALENCE)
+    refused = Engine("echo", partial(Echo, refuse), EQUIVALENCE)
     summary = summary_of(
         judge_for_report(name, crank_rocker(title=name), engines, draw=False)
         for name, engines in (("good", (FREE_BODY, refused)), ("refused", (refused,)))

@@ -3,6 +3,8 @@
 Silence, NaN and breakdowns must cost the run.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -32,98 +34,85 @@ from tests.support.scenes import crank_rocker
 
 
 class Echo:
-    """Answers with the formulas' own numbers, changed by `spoil`.
+    """Answers with the formulas' own numbers, changed by `spoil` or replaced by what it
+    returns.
 
     Only for tests of the harness.
     """
 
     name = "echo"
 
-    def spoil(self, answer):
-        """Change nothing."""
+    def __init__(self, spoil):
+        self.spoil = spoil
 
     def answer(self, scene, command):
         s = fourbar.solve(scene, at=with_signs(scene.linkage, command))
         numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
-        answer = Answer(
-            "echo",
-            "exact",
-            command,
-            np.array(s.assembled),
-            numbers,
-        )
-        self.spoil(answer)
-        return answer
+        assembled = np.array(s.assembled)
+        answer = Answer("echo", "exact", command, assembled, numbers)
+        return self.spoil(answer) or answer
 
 
-class Rounded(Echo):
-    def spoil(self, answer):
-        for name, values in answer.quantities.items():
-            answer.quantities[name] = values.astype(np.float32)
+def echo(answer):
+    """Change nothing."""
 
 
-class Turned(Echo):
-    def spoil(self, answer):
-        answer.quantities["theta_3"] += 1e-9
+def round_to_single(answer):
+    for name, values in answer.quantities.items():
+        answer.quantities[name] = values.astype(np.float32)
 
 
-class Silent(Echo):
-    def spoil(self, answer):
-        answer.assembled[:] = False
+def turn(answer):
+    answer.quantities["theta_3"] += 1e-9
 
 
-class Refuses(Echo):
-    def answer(self, scene, command):
-        return Answer("echo", "exact", refusal="a declared limit")
+def open_loop(answer):
+    answer.assembled[:] = False
 
 
-class Breaks(Echo):
-    def spoil(self, answer):
-        raise RuntimeError("engine on fire\nsecond line")
+def refuse(answer):
+    return Answer("echo", "exact", refusal="a declared limit")
 
 
-class AnswersAnyway(Echo):
-    """Numbers of its own where the formulas state none."""
-
-    def spoil(self, answer):
-        for values in answer.quantities.values():
-            np.nan_to_num(values, copy=False, nan=7.0)
+def burn(answer):
+    raise RuntimeError("engine on fire\nsecond line")
 
 
-def rows_of(adapter, scene=None, tolerance=EQUIVALENCE, **held):
-    engine = Engine(
-        "echo",
-        adapter,
-        tolerance,
-        **held,
-    )
+def answer_anyway(answer):
+    """Have numbers of its own where the formulas state none."""
+    for values in answer.quantities.values():
+        np.nan_to_num(values, copy=False, nan=7.0)
+
+
+def rows_of(spoil, scene=None, tolerance=EQUIVALENCE, **held):
+    engine = Engine("echo", partial(Echo, spoil), tolerance, **held)
     return judge_by(engine, scene or crank_rocker())
 
 
 def test_a_refusal_or_a_breakdown_is_one_row():
     """Nothing was compared."""
-    for adapter, verdict, reason in (
-        (Refuses, REFUSES, "a declared limit"),
-        (Breaks, FAILS, "RuntimeError: engine on fire second line"),
+    for spoil, verdict, reason in (
+        (refuse, REFUSES, "a declared limit"),
+        (burn, FAILS, "RuntimeError: engine on fire second line"),
     ):
-        ((quantity, row),) = rows_of(adapter).items()
+        ((quantity, row),) = rows_of(spoil).items()
         assert (quantity, row.verdict, row.passed) == ("all", verdict, False)
         assert row.reason.startswith(reason)
 
 
 def test_angles_close_the_loop_to_what_their_engine_declares():
     declared = ErrorBound("stated", "7 digits", 1e-5, conditioned=False)
-    rows = rows_of(Rounded, None, declared)
+    rows = rows_of(round_to_single, None, declared)
     assert rows["closure"].allowed >= 1e-5
     assert not [row for row in rows.values() if row.failed]
 
 
 @pytest.mark.parametrize(
-    "adapter, failing",
-    [(Turned, ["closure", "theta_3"]), (Silent, ["assembled"])],
+    "spoil, failing",
+    [(turn, ["closure", "theta_3"]), (open_loop, ["assembled"])],
 )
-def test_what_fails_with_the_loads_is_not_told_again_of_the_inertia(adapter, failing):
-    rows = rows_of(adapter)
+def test_what_fails_with_the_loads_is_not_told_again_of_the_inertia(spoil, failing):
+    rows = rows_of(spoil)
     assert sorted(name for name, row in rows.items() if row.failed) == failing
     assert "torque_inertia" in rows
 
@@ -161,12 +150,10 @@ AT_REST = 1
 """Position at which bar 4 stands still in its dry pin."""
 
 
-class OffAtTheReversal(Echo):
-    """Everything is off by a thousandth at AT_REST, and nowhere else."""
-
-    def spoil(self, answer):
-        for values in answer.quantities.values():
-            values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
+def miss_the_reversal(answer):
+    """Be off by a thousandth at AT_REST, and nowhere else."""
+    for values in answer.quantities.values():
+        values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
 
 
 def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
@@ -176,7 +163,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
     psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
     motion = Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
     scene = Scene(linkage, motion, effects=(Friction.at(O4=0.5),))
-    rows = rows_of(OffAtTheReversal, scene)
+    rows = rows_of(miss_the_reversal, scene)
     for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]
         noted = "1 position at which dry friction reverses not judged" in row.reason
@@ -201,34 +188,27 @@ NEAR_ITS_LIMIT = next(
 
 
 def test_where_no_digit_is_left_nothing_is_judged():
-    torque = rows_of(Echo, NEAR_ITS_LIMIT)["torque"]
+    torque = rows_of(echo, NEAR_ITS_LIMIT)["torque"]
     assert torque.verdict == UNDECIDED and not torque.passed
     assert "eps/condition" in torque.reason
 
 
-class Elsewhere(Echo):
-    def spoil(self, answer):
-        answer.assembled[5] = False
+def open_at_one(answer):
+    answer.assembled[5] = False
 
 
 def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails():
     thetas = LIMIT + np.array([0.2, 0.3, 0.4, 0.5, 0.6, 1e-12])
-    rows = rows_of(Elsewhere, Scene(ROCKER, Motion(thetas, 1.0)))
+    rows = rows_of(open_at_one, Scene(ROCKER, Motion(thetas, 1.0)))
     assert rows["assembled"].verdict == FAILS
 
 
-class SlightlyOff(Echo):
-    def spoil(self, answer):
-        answer.quantities["torque"] *= 1.0 + 1e-9
+def miss_slightly(answer):
+    answer.quantities["torque"] *= 1.0 + 1e-9
 
 
 def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_it():
-    rows = rows_of(
-        SlightlyOff,
-        None,
-        FULL_ACCURACY,
-        answers_nearby=True,
-    )
+    rows = rows_of(miss_slightly, None, FULL_ACCURACY, answers_nearby=True)
     assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
 
 
@@ -270,12 +250,12 @@ WITHHELD = {
 """Scene and why its forces are no answer; its motion is judged."""
 
 
-@pytest.mark.parametrize("adapter", [Echo, AnswersAnyway])
+@pytest.mark.parametrize("spoil", [echo, answer_anyway])
 @pytest.mark.parametrize("what", WITHHELD)
-def test_an_answer_that_the_formulas_withhold_is_not_compared(what, adapter):
+def test_an_answer_that_the_formulas_withhold_is_not_compared(what, spoil):
     """No agreement, whatever the engine says."""
     scene, reason = WITHHELD[what]
-    rows = rows_of(adapter, scene)
+    rows = rows_of(spoil, scene)
     for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]
         if quantity in FORCE_NAMES:
@@ -288,7 +268,7 @@ def test_an_answer_that_the_formulas_withhold_is_not_compared(what, adapter):
 def test_positions_without_a_value_are_counted_next_to_those_that_were_compared():
     """An antiparallelogram driven by its coupler, through its change point."""
     motion = Motion(np.array([-0.5, -0.3, 0.0, 0.3]), 1.0, branch=-1)
-    rows = rows_of(AnswersAnyway, Scene(PARALLELOGRAM, motion, 3))
+    rows = rows_of(answer_anyway, Scene(PARALLELOGRAM, motion, 3))
     assert rows["torque"].verdict == AGREES
     for quantity in ("torque", "omega_3"):
         row = rows[quantity]

@@ -4,7 +4,6 @@ Motion laws and loads over theta_2.
 """
 
 import math
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -15,17 +14,15 @@ from fourbar.effects import Friction, Gravity, Load, Table
 from fourbar.scene.motion import Law, Rise
 from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
-from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
-from tests.validation.engines.test_applied_effects import ACTING
+from tests.validation.engines.test_applied_effects import ACTING, SIMULATED
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by
 h^2: measured 3e-6 here.
 """
-SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
 LAWS = {
     "periodic": Law(
         (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 3.5, 2.0 * math.pi), 24, "periodic"

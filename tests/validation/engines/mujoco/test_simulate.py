@@ -20,7 +20,6 @@ from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.runner import Lead
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observe_order
-from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.judge_engines import compare_answer
@@ -29,6 +28,7 @@ from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.here import judge_by
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
+from tests.validation.engines.test_applied_effects import SIMULATED as SIMULATION
 from tests.validation.engines.test_engines import commanded
 
 TURN = Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -182,13 +182,6 @@ def hood(links, output=None):
         effects=(fourbar.Gravity(),),
         title="hood",
     )
-
-
-SIMULATION = [
-    replace(engine, order=None)
-    for engine in ENGINES
-    if engine.name == "mujoco-simulated"
-]
 
 
 def judged(scene):
