@@ -253,6 +253,24 @@ step torque | needs a column theta_2
 """Columns of a table, and why it is refused if it is."""
 
 
+COLUMNS = {
+    row[0]: row
+    for row in read_rows("""
+time | time | t [ms] | 1e3 | .1f
+exact | time | time [ms] | 1e3 | .4f
+beyond | beyond | time | 1 | .3f
+late | late | time [s] | 1 | .4f
+rounded | time | time | 1 | .3f
+coarse | time | time | 1 | .1f
+step | time | time [rev] | 1e4 | .0f
+theta_2 | theta_2 | theta_2 | 1 | .15g
+degrees | theta_2 | theta_2 [deg] | 57.29577951308232 | .0f
+omega_2 | omega_2 | omega_2 | 1 | .15g
+alpha_2 | alpha_2 | alpha_2 [deg/s^2] | 57.29577951308232 | .15g
+torque | torque | torque | 1 | .15g
+""")
+}
+"""Name of a column, what is in it, its heading, a factor and how it is written."""
 RISE = fourbar.Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
 SERVO = crank_rocker(motion=Motion(law=RISE), title="Servo")
 
@@ -280,25 +298,21 @@ def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
 def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read):
     time = np.arange(0.0123, 0.79, 0.0517)
     theta, omega, alpha, torque = follow_rise(time)
-    columns = {
-        "time": (time, "t [ms]", 1e3, ".1f"),
-        "exact": (time, "time [ms]", 1e3, ".4f"),
-        "beyond": (time + 0.1, "time", 1.0, ".3f"),
-        "late": (time + 2e-3, "time [s]", 1.0, ".4f"),
-        "rounded": (time, "time", 1.0, ".3f"),
-        "coarse": (time, "time", 1.0, ".1f"),
-        "step": (time, "time [rev]", 1e4, ".0f"),
-        "theta_2": (theta, "theta_2", 1.0, ".15g"),
-        "degrees": (theta, "theta_2 [deg]", 180.0 / math.pi, ".0f"),
-        "omega_2": (omega, "omega_2", 1.0, ".15g"),
-        "alpha_2": (alpha, "alpha_2 [deg/s^2]", 180.0 / math.pi, ".15g"),
-        "torque": (torque, "torque", 1.0, ".15g"),
+    numbers = {
+        "time": time,
+        "beyond": time + 0.1,
+        "late": time + 2e-3,
+        "theta_2": theta,
+        "omega_2": omega,
+        "alpha_2": alpha,
+        "torque": torque,
     }
-    chosen = [columns[name] for name in names.split()]
-    text = ",".join(heading for _, heading, _, _ in chosen) + "\n"
-    for row in range(len(time)):
-        cells = [format(n[row] * x, form) for n, _, x, form in chosen]
-        text += ",".join(cells) + "\n"
+    heads, columns = [], []
+    for _, of, head, factor, form in (COLUMNS[name] for name in names.split()):
+        heads.append(head)
+        columns.append([format(x, form) for x in numbers[of] * float(factor)])
+    rows = [",".join(cells) for cells in zip(*columns, strict=True)]
+    text = "\n".join([",".join(heads), *rows, ""])
     read = partial(read, law=RISE)
     if refused:
         with raises(InputError, match=refused) as caught:
