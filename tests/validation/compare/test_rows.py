@@ -6,6 +6,7 @@ Every form says the same.
 import html
 import math
 import xml.etree.ElementTree as ET
+from collections import defaultdict
 from dataclasses import replace
 from functools import partial
 
@@ -61,35 +62,26 @@ def rows(text):
 
 
 def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named():
-    scenes = {
-        "one": [
-            ("a", "F12", DEGRADED, 1e-3),
-            ("b", "F12", DEGRADED, 2e-4),
-            ("a", "F43", AGREES, 1e-14),
-        ],
-        "two": [
-            ("a", "F12", DEGRADED, 1.0),
-            ("b", "F12", AGREES, 1e-14),
-            ("b", "F43", FAILS, NAN),
-        ],
-        "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
-    }
-    names = ("engine", "quantity", "verdict", "allowed")
-    records = [
-        Record(
-            scene,
-            rows=[
-                changed(scene=scene, **dict(zip(names, row, strict=True)))
-                for row in many
-            ],
-        )
-        for scene, many in scenes.items()
-    ]
+    by_scene = defaultdict(list)
+    for scene, engine, quantity, word, allowed in read_rows("""
+one | a | F12 | degraded | 1e-3
+one | b | F12 | degraded | 2e-4
+one | a | F43 | agrees | 1e-14
+two | a | F12 | degraded | 1
+two | b | F12 | agrees | 1e-14
+two | b | F43 | fails | nan
+three | a | torque | degraded | 0.5
+three | b | torque | refuses | nan
+"""):
+        key = {"scene": scene, "engine": engine, "quantity": quantity}
+        row = changed(**key, verdict=WORDS[word], allowed=float(allowed))
+        by_scene[scene].append(row)
+    records = [Record(scene, rows=rows) for scene, rows in by_scene.items()]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"
     named = "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)"
-    page = page_of(summary, dict.fromkeys(scenes, 2))
+    page = page_of(summary, dict.fromkeys(by_scene, 2))
     for form in (write_summary_page(summary), page):
         assert stated in html.unescape(form) and named in html.unescape(form)
     assert stated not in write_summary_page(summary_of(records[1:2]))
