@@ -319,15 +319,16 @@ def _draw_drive(
         poles_of = f"torque{on_bar} ({_POLE_REASON[bar]})"
     values = getattr(view.sweep, name)
     chart = _Chart(axes, view, unit, {curve_name: values})
-    poles = find_poles(view)
-    chart.plot(values, poles, color=INK, label=symbol)
-    for index in poles:
-        middle = 0.5 * float(chart.over[index] + chart.over[index + 1])
-        axes.axvline(middle, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
-    if poles.size:
+    chart.plot(values, find_poles(view), color=INK, label=symbol)
+    poles = view.poles.get(read_drive_demand(view.sweep).keys.value, [])
+    for pole in poles:
+        place = view.axis.factor * pole
+        axes.axvline(place, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
+    if poles:
         view.note(f"Dotted: poles of the {poles_of}.")
     chart.finish(symbol, f"{what} of the drive{on_bar}", what, sizes=False)
-    if chart.limit is None:  # a clipped axis says its largest value in the caption
+    # a clipped axis says its largest value in the caption
+    if chart.limit is None and name not in view.poles:
         mark_peak(axes, chart.over, chart.factor * values, chart.unit)
 
 

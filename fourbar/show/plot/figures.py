@@ -202,9 +202,11 @@ def draw_figure(
 def _look_between(shown: View) -> None:
     """Add what lies between the positions of the sweep.
 
-    Jumps are drawn where they are, peaks to their height.
+    Jumps and poles are drawn where they are, peaks to their height.
     """
     motion = describe_motion(shown.sweep)
+    panels = motion.panels
+    shown.poles = {name: panels.list_poles(name) for name in panels.growing}
     shown.sweep = motion.solve_with_peaks()
     shown.notes += [
         f"{jumps[0].upper()}{jumps[1:]}."

@@ -51,6 +51,8 @@ class View:
     """The lengths of the bars are written at them."""
     stated: bool = False
     """The scene, or whoever draws it, states the one position."""
+    poles: dict[str, list[float]] = field(default_factory=dict)
+    """Places at which a curve grows without bound, by its name; none for others."""
 
     @property
     def axis(self) -> "Axis":

@@ -38,7 +38,7 @@ from fourbar import (
     solve,
 )
 from fourbar.files import loads
-from fourbar.formulas.mobility import find_intervals
+from fourbar.formulas.mobility import find_intervals, limit_positions
 from fourbar.show import duty, motion_curves, plot
 from fourbar.show.plot import curves, film, freebody, labels, linkage_figure, style
 from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
@@ -424,6 +424,24 @@ def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
     shown = make_view(crank_rocker(drive=BETWEEN_CRANKS))
     stands = np.flatnonzero(np.diff(np.sign(shown.sweep.stroke_speed)))
     assert len(stands) and np.array_equal(curves.find_poles(shown), stands)
+
+
+@pytest.mark.parametrize(
+    "figure, quantity, rings", [("torque", "Torque", 0), ("overview", "Power", 1)]
+)
+def test_a_pole_is_dotted_where_it_is_and_what_grows_has_no_ring(
+    figure, quantity, rings
+):
+    """The power stays bounded where the output, which is driven, stands still."""
+    motion = Motion(Sweep(0.2, 1.5, 5), 10.0)
+    scene = crank_rocker(motion=motion, drive_bar=4)
+    panels = composed(scene, figure).axes
+    (panel,) = (axes for axes in panels if axes.get_title("left").startswith(quantity))
+    crossed = [line.get_xdata() for line in panel.lines if len(line.get_xdata()) == 2]
+    places = np.degrees([limit.theta_2 for limit in limit_positions(scene.linkage, 4)])
+    (pole,) = places[(places > degrees(0.2)) & (places < degrees(1.5))]
+    assert any(ends == approx([pole, pole], rel=1e-6) for ends in crossed)
+    assert [line.get_marker() for line in panel.lines].count("o") == rings
 
 
 @pytest.mark.slow
