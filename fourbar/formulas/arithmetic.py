@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
@@ -19,6 +20,27 @@ U = 2.0**-53
 """Unit round-off of a double."""
 PI_LOW = 1.2246467991473532e-16
 """pi less its double: a constant in longer numbers is no double."""
+
+
+class OfParts(NDArrayOperatorsMixin):
+    """Base class of numbers that are kept as two arrays, of the same kind."""
+
+    def _change(self, change: Any) -> Any:
+        return type(self)(*map(change, vars(self).values()))
+
+    @property
+    def real(self) -> Any:
+        """Real part of both arrays."""
+        return self._change(np.real)
+
+    @property
+    def imag(self) -> Any:
+        """Imaginary part of both arrays."""
+        return self._change(np.imag)
+
+    def conjugate(self) -> Any:
+        """Return the complex conjugate of both arrays."""
+        return self._change(np.conjugate)
 
 
 def make_like(values: Number, model: Number) -> Number:

@@ -13,9 +13,14 @@ from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
-from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.formulas.arithmetic import PI_LOW, Number, split_sum, without_slopes
+from fourbar.formulas.arithmetic import (
+    PI_LOW,
+    Number,
+    OfParts,
+    split_sum,
+    without_slopes,
+)
 from fourbar.linkage import copy_with, list_fields
 
 HAS_LONG_DOUBLES = np.finfo(np.longdouble).nmant > np.finfo(np.float64).nmant
@@ -80,7 +85,7 @@ def _has_numbers(kind: type) -> bool:
     return is_dataclass(kind) and not getattr(kind, "as_given", False)
 
 
-class Pair(NDArrayOperatorsMixin):
+class Pair(OfParts):
     """Unevaluated sums of two arrays of doubles, or of complex ones part by part.
 
     high is the sum as a double.
@@ -94,20 +99,6 @@ class Pair(NDArrayOperatorsMixin):
     def shape(self) -> tuple[int, ...]:
         """Shape of the arrays."""
         return np.shape(self.high)
-
-    @property
-    def real(self) -> "Pair":
-        """Real parts."""
-        return Pair(np.real(self.high), np.real(self.low))
-
-    @property
-    def imag(self) -> "Pair":
-        """Imaginary parts."""
-        return Pair(np.imag(self.high), np.imag(self.low))
-
-    def conjugate(self) -> "Pair":
-        """Return the complex conjugates."""
-        return Pair(np.conjugate(self.high), np.conjugate(self.low))
 
     def like(self, values: Any) -> "Pair":
         """Return doubles as pairs."""

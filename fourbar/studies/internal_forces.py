@@ -130,34 +130,26 @@ class _Beam(NamedTuple):
 
         `before`: without what acts at x itself.
         """
-        N, V, M = (np.zeros(x.shape) for _ in range(3))
         end = x + (-SAME_FOOT if before else SAME_FOOT) * self.length
-        for foot, force, couple in zip(
-            self.foot.T,
-            self.force.T,
-            self.couple.T,
-            strict=True,
-        ):
-            acts = foot[:, None] < end
-            N -= np.where(acts, force.real[:, None], 0.0)
-            V += np.where(acts, force.imag[:, None], 0.0)
-            M += np.where(
-                acts, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0
-            )
+        foot = self.foot[:, :, None]
+        acts = foot < end[:, None]
+        force = np.where(acts, self.force[:, :, None], 0.0)
+        couple = np.where(acts, self.couple[:, :, None], 0.0)
+        arm = x[:, None] - foot
         s = np.clip(x, 0.0, self.length)
         rest = np.maximum(x - self.length, 0.0)
         along = self.pull.real[:, None]
         across = self.pull.imag[:, None]
-        omega = self.omega[:, None]
+        square = np.square(self.omega[:, None])
         alpha = self.alpha[:, None]
+        stretched = self.density * s * (along - 0.5 * square * s)
         sheared = -self.density * s * (across + 0.5 * alpha * s)
-        N += self.density * s * (along - 0.5 * np.square(omega) * s)
-        V += sheared
-        M += (
-            -self.density * np.square(s) * (0.5 * across + alpha * s / 6.0)
-            + sheared * rest
+        bent = -self.density * np.square(s) * (0.5 * across + alpha * s / 6.0)
+        return (
+            (0.0 - force.real.sum(axis=1)) + stretched,
+            force.imag.sum(axis=1) + sheared,
+            (force.imag * arm - couple).sum(axis=1) + (bent + sheared * rest),
         )
-        return N, V, M
 
     def find_largest(self) -> Bending:
         """Find the largest |M|: at a foot, on either side of it, or where V = 0."""
@@ -169,27 +161,24 @@ class _Beam(NamedTuple):
         if self.density > 0.0:
             across = self.pull.imag[:, None]
             bend = 0.5 * self.alpha[:, None]
-            single = self.at(feet)[1] / self.density + feet * (
-                across + bend * feet
-            )  # forces at feet only
+            spread = feet * (across + bend * feet)
+            single = self.at(feet)[1] / self.density + spread  # forces at feet only
             roots = _solve_stable_quadratic(bend, across, -single)
-            after = np.concatenate([feet[:, 1:], feet[:, -1:]], axis=1)
+            before = np.maximum(feet, 0.0)
+            after = np.minimum(
+                np.append(feet[:, 1:], feet[:, -1:], axis=1), self.length
+            )
             for root in roots:
-                inside = (
-                    (root > feet) & (root < after) & (root > 0.0) & (root < self.length)
-                )
+                inside = (root > before) & (root < after)
                 places.append(np.where(inside, root, feet))
                 moments.append(np.where(inside, self.at(places[-1])[2], 0.0))
         x = np.concatenate(places, axis=1)
         M = np.concatenate(moments, axis=1)
-        worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)[:, None]
         finite = np.isfinite(M).all(axis=1)
-        return Bending(
-            *(
-                np.where(finite, np.take_along_axis(rows, worst, axis=1)[:, 0], np.nan)
-                for rows in (M, x)
-            )
-        )
+        worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)
+        rows = np.arange(n)
+        moment = np.where(finite, M[rows, worst], np.nan)
+        return Bending(moment, np.where(finite, x[rows, worst], np.nan))
 
 
 def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
@@ -197,6 +186,11 @@ def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]
     with np.errstate(all="ignore"):
         q = -0.5 * (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
         return q / a, c / q
+
+
+def _join(vectors: Array) -> ComplexArray:
+    """Return vectors, (n, 2), as x + i y, (n,)."""
+    return vectors[:, 0] + 1j * vectors[:, 1]
 
 
 _Item = tuple[Any, Any, Any]
@@ -233,15 +227,10 @@ class _Recorder(Actions):
 
     def pin_couple(self, pin: str, couple: Any) -> None:
         """Record a couple between two bars at their pin."""
-        for bar, sign in zip(PINS[pin], (-1.0, 1.0), strict=True):
-            if bar == self.bar:
-                self.items.append(
-                    (
-                        0.0j if pin == ENDS[bar][0] else self.length + 0.0j,
-                        0.0j,
-                        sign * couple,
-                    )
-                )
+        if self.bar in PINS[pin]:
+            place = 0.0j if pin == ENDS[self.bar][0] else self.length + 0.0j
+            sign = 1.0 if self.bar == PINS[pin][1] else -1.0
+            self.items.append((place, 0.0j, sign * couple))
 
     def pull(self, start: Any, end: Any, force: Any) -> None:
         """Record both forces where they act.
@@ -264,6 +253,7 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
         back = np.conj(state.direction(bar))
         uniform = described.inertia is None and described.centre is None
         terms: tuple[Any, ...] = case.terms
+        pin_forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
         for term in terms:
             if term.key == "gravity" and uniform:
                 gravity = gravity + term.field
@@ -274,31 +264,20 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
                     recorder.place = recorder.place + polar(*term.arm) * back
             term.act(recorder, state)
             recorder.place = 0.0j
-            term.act_known(
-                recorder, {name: getattr(solution, name) for name in PIN_FORCE.values()}
-            )
-        a_A = solution.a_A
-        pin_acceleration = (
-            a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)
-        ) - gravity
-        omega, alpha = (
-            np.zeros(n) + getattr(solution, f"{letter}_{bar}")
-            for letter in ("omega", "alpha")
-        )
+            term.act_known(recorder, pin_forces)
+        pull: Any = -gravity
+        if bar == 3:
+            pull = _join(solution.a_A) + pull
+        omega = np.zeros(n) + getattr(solution, f"omega_{bar}")
+        alpha = np.zeros(n) + getattr(solution, f"alpha_{bar}")
         for term in terms:  # a flywheel turns about the bar's ground pin
-            recorder.items += [
-                (0.0j, 0.0j, -inertia * alpha)
-                for on, inertia in term.added_inertia.items()
-                if on == bar
-            ]
-        a_G = getattr(solution, f"a_G{bar}")
+            if bar in term.added_inertia:
+                recorder.items.append((0.0j, 0.0j, -term.added_inertia[bar] * alpha))
+        G = described.to_centre
+        of_mass = -described.mass * (_join(getattr(solution, f"a_G{bar}")) - gravity)
         inertial = [
-            (
-                described.to_centre,
-                -described.mass * (a_G[:, 0] + 1j * a_G[:, 1] - gravity) * back,
-                0.0,
-            ),
-            (described.to_centre, 0.0j, -described.moment_of_inertia * alpha),
+            (G, of_mass * back, 0.0),
+            (G, 0.0j, -described.moment_of_inertia * alpha),
         ]
         supports = _support(recorder, inertial, solution)
         acting = [*recorder.items, *supports]
@@ -315,7 +294,7 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
             couple,
             uniform,
             density,
-            pin_acceleration * back,
+            pull * back,
             omega,
             alpha,
         )
@@ -335,22 +314,17 @@ def _sum_by_foot(
     couples = list[Array]()
     for place, force, couple in items:
         foot = zero + np.real(place)
-        beside = couple + cross(
-            -force, 1j * np.imag(place)
-        )  # the couple of a force beside the line
-        k = next(
-            (
-                k
-                for k, stated in enumerate(feet)
-                if (np.abs(stated - foot) <= same).all()
-            ),
-            len(feet),
-        )
+        # the couple of a force beside the line
+        beside = couple + cross(-force, 1j * np.imag(place))
+        k = 0
+        while k < len(feet) and (np.abs(feet[k] - foot) > same).any():
+            k += 1
         if k == len(feet):
-            feet = [*feet, foot]
-            forces = [*forces, 0.0j * zero]
-            couples = [*couples, zero]
-        forces[k], couples[k] = forces[k] + force, couples[k] + beside
+            feet.append(foot)
+            forces.append(0.0j * zero)
+            couples.append(zero)
+        forces[k] = forces[k] + force
+        couples[k] = couples[k] + beside
     return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
 
@@ -379,9 +353,8 @@ def _support(
     supports = []
     for pin, x, x_other in zip(ENDS[recorder.bar], ends, ends[::-1], strict=True):
         name = PIN_FORCE[pin]
-        force = getattr(solution, name)
         sign = 1.0 if name[2] == str(recorder.bar) else -1.0
-        along = (sign * (force[:, 0] + 1j * force[:, 1]) * back).real
+        along = (sign * _join(getattr(solution, name)) * back).real
         moments = 0.0
         for place, acting, couple in [*recorder.items, *inertial]:
             moments = moments + cross(place - x_other, acting) + couple

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
+from fourbar.formulas.arithmetic import OfParts
 
 _Rule = Callable[..., tuple[Any, ...]]
 """Partial derivatives of a function by its arguments, from its value and them."""
@@ -48,7 +48,7 @@ STEP_FUNCTIONS = (
 """Functions that are constant between their jumps: they return plain values."""
 
 
-class Sloped(NDArrayOperatorsMixin):
+class Sloped(OfParts):
     """Values (n,) with their slopes by p variables, (p, n) or (p, 1).
 
     A number is equal to a constant only where its slopes vanish too, so that no term is
@@ -63,20 +63,6 @@ class Sloped(NDArrayOperatorsMixin):
     def shape(self) -> tuple[int, ...]:
         """Shape of the values."""
         return self.values.shape
-
-    @property
-    def real(self) -> "Sloped":
-        """Real part of values and slopes."""
-        return Sloped(self.values.real, self.slopes.real)
-
-    @property
-    def imag(self) -> "Sloped":
-        """Imaginary part of values and slopes."""
-        return Sloped(self.values.imag, self.slopes.imag)
-
-    def conjugate(self) -> "Sloped":
-        """Return the complex conjugate of values and slopes."""
-        return Sloped(self.values.conjugate(), self.slopes.conjugate())
 
     def _is_constant(self, constant: Any) -> Any:
         """Mark where the value is that of a constant, (n,).
