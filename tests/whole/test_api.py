@@ -156,7 +156,7 @@ def uses():
             if value is not None:
                 made.setdefault(name, (partial(put, scene, path), value))
     return {
-        name: (lambda x, make=make: fourbar.solve(make(x)), (good,))
+        name: (lambda x, make=make: fourbar.solve(make(x)), good)
         for name, (make, good) in made.items()
     }
 
@@ -202,53 +202,66 @@ def calls():
     }
     return {
         **{
-            name: (getattr(fourbar, name), good)
+            name: (getattr(fourbar, name), *good)
             for names, good in plain.items()
             for name in names
         },
         **{
-            f"{kind.__name__}.at": (partial(act, kind), (good,))
+            f"{kind.__name__}.at": (partial(act, kind), good)
             for kind, good in at_O2.items()
         },
         "coupler_curve": (
             lambda *x: fourbar.coupler_curve(*x[:4], branch=x[4], steps=x[5]),
-            (link, 0.1, 0.1, 0, 1, 8),
+            link,
+            0.1,
+            0.1,
+            0,
+            1,
+            8,
         ),
         "uniform": (
             lambda *x: uniform(*x[:4], per_metre=x[4]),
-            (0.3, 0.1, 0.25, 0.22, 1.0),
+            0.3,
+            0.1,
+            0.25,
+            0.22,
+            1.0,
         ),
         "vary, a value": (
             lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})),
-            (0.1,),
+            0.1,
         ),
         "tolerances": (
             lambda *x: fourbar.tolerances(
                 replace(scene, tolerances=x[0]), samples=x[1], seed=x[2]
             ),
-            ((Tolerance("lengths.input", 1e-4),), 2, 0),
+            (Tolerance("lengths.input", 1e-4),),
+            2,
+            0,
         ),
         **{
-            name: (lambda *x: fourbar.solve(x[0], x[1], at=x[2], side=x[3]), good)
+            name: (lambda *x: fourbar.solve(x[0], x[1], at=x[2], side=x[3]), *good)
             for name, good in {
                 "solve": (scene, "force", fourbar.command(scene), 0),
                 "solve, a study": (study, "force", None, 0),
             }.items()
         },
-        "solve, out": (lambda x: fourbar.solve(scene, out=x), ({"torque": torques},)),
+        "solve, out": (lambda x: fourbar.solve(scene, out=x), {"torque": torques}),
         "solve, out torque": (
             lambda x: fourbar.solve(scene, out={"torque": x}),
-            (torques,),
+            torques,
         ),
-        "FourBar.bar": (link.bar, (3,)),
-        "Law.at": (Law(times, angles).at, (np.array([0.5]),)),
+        "FourBar.bar": (link.bar, 3),
+        "Law.at": (Law(times, angles).at, np.array([0.5])),
         "Solution.to_csv": (
             lambda *x: solution.to_csv(x[0], degrees=x[1], units=x[2]),
-            ("a.csv", True, {}),
+            "a.csv",
+            True,
+            {},
         ),
-        "Solution.to_pandas": (solution.to_pandas, (fourbar.units("mm"),)),
-        "Sensitivity.of": (sensitivity.of, ("torque", "motion.omega_2")),
-        "Sensitivity.value": (sensitivity.value, ("torque",)),
+        "Solution.to_pandas": (solution.to_pandas, fourbar.units("mm")),
+        "Sensitivity.of": (sensitivity.of, "torque", "motion.omega_2"),
+        "Sensitivity.value": (sensitivity.value, "torque"),
     }
 
 
@@ -272,10 +285,10 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     errors = {name for name in public if name.endswith("Error")}
     assert {re.split(r"[.,]", name)[0] for name in table} - OF_OTHERS == public - errors
     holes = []
-    for name, (call, good) in table.items():
+    for name, (call, *good) in table.items():
         call(*good)
         for wrong in WRONG:
-            for arguments in itertools.islice(spoilt(good, wrong), 1, None):
+            for arguments in itertools.islice(spoilt((*good,), wrong), 1, None):
                 try:
                     call(*arguments)
                     if wrong is ALWAYS_WRONG[-1]:

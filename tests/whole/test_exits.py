@@ -201,17 +201,9 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch):
         return replace(solution, torque=solution.torque * (1.0 + 1e-12))
 
     judge_here(monkeypatch)
+    assert LAB(STABILITY) == HOLDS
     monkeypatch.setattr("fourbar_lab.stability.solve", off)
     assert LAB(STABILITY) == FAILED
-
-
-@pytest.mark.slow
-def test_a_run_and_samples_that_hold_are_status_0(tmp_path, monkeypatch):
-    study(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    judge_here(monkeypatch)
-    line = "run scene.toml --engines free-body --no-pictures --out out"
-    assert VALIDATION(line.split()) == LAB(STABILITY) == HOLDS
 
 
 COMMANDS = [
@@ -267,7 +259,6 @@ def test_the_help_says_of_each_command_what_the_command_says(group):
     context = click.Context(group)
     for name, listed in group.listed.items():
         command = group.get_command(context, name)
-        assert command is not None
         assert listed.about == command.get_short_help_str(limit=200)
 
 

@@ -18,7 +18,6 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import fourbar_validation.run.plan
 from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
@@ -83,7 +82,7 @@ def judge_all(suite, out, engines=EXACT, workers=2):
 @pytest.mark.timeout(300)  # every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatch):
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
-        monkeypatch.setattr(fourbar_validation.run.plan, size, 2)
+        monkeypatch.setattr(f"fourbar_validation.run.plan.{size}", 2)
     moody = Engine("moody", Moody, EQUIVALENCE)
     # s; a busy machine is given longer
     monkeypatch.setattr(workers, "SCENE_SECONDS", 2.0 * BUSY)
@@ -399,7 +398,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(jobs, "judge_job", noting)
     for module in ("report.run_summary", "run.plan"):
         monkeypatch.setattr(f"fourbar_validation.{module}.PICTURED", 3)
-    monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
+    monkeypatch.setattr("fourbar_validation.run.run.write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
     without = run(
         Plan(Few(), (*EXACT, blunders), RunOptions(drawn=False)), tmp_path / "without"

@@ -30,7 +30,6 @@ def of_commands():
         context = click.Context(group)
         for name in group.list_commands(context):
             command = group.get_command(context, name)
-            assert command is not None
             for option in sorted(command.params, key=lambda param: param.opts[0]):
                 chosen = (
                     f" {'|'.join(option.type.choices)}"
