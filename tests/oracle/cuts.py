@@ -142,10 +142,7 @@ class Piece(BodyWrenches):
         """Add a couple between two bars at their pin."""
         if self.bar in PINS[pin]:
             length = self.motion.linkage.bar(self.bar).length
-            if ENDS[self.bar][0] == pin:
-                self.place = 0.0
-            else:
-                self.place = length
+            self.place = length * (ENDS[self.bar][1] == pin)
             super().twist_at(pin, couple)
             self.place = 0.0
 
@@ -183,10 +180,7 @@ def free_piece(scene, motion, answer, bar, cut):
             * radius
             * np.hypot(*answer.quantities[PIN_FORCE[pin]].T),
         )
-    if bar == 3:
-        a_pin = motion.swing(2, motion.first_pin[3])
-    else:
-        a_pin = 0.0
+    a_pin = motion.swing(2, motion.first_pin[3]) if bar == 3 else 0.0
     if uniform:
         for start, end in ((0.0, cut), (cut, length)):
             _push_rigid(

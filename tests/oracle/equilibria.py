@@ -27,7 +27,13 @@ from fourbar_validation.compare.pins import (
     state_from_pins,
 )
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import EPS, RANDOM_WALK, WELL_CONDITIONED, K
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    RANDOM_WALK,
+    WELL_CONDITIONED,
+    K,
+    divide,
+)
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
 from fourbar_validation.engines.registry import find_missing
@@ -237,20 +243,12 @@ def _judge_equilibrium(scene, equilibrium):
         return math.inf, {}
     torque, slope, inertia = held
     errors = {
-        "torque": _difference_over_size(torque.value, torque.size),
-        "slope": _difference_over_size(slope.value + equilibrium.slope, slope.size),
+        "torque": divide(abs(torque.value), torque.size),
+        "slope": divide(abs(slope.value + equilibrium.slope), slope.size),
+        "inertia": divide(abs(inertia.value - equilibrium.inertia), inertia.size),
     }
-    errors["inertia"] = _difference_over_size(
-        inertia.value - equilibrium.inertia, inertia.size
-    )
-    part = [
-        K * EPS * x.size / abs(x.value) if x.value else math.inf
-        for x in (slope, inertia)
-    ]
-    if part[0] < 1.0:
-        off = K * EPS * torque.size / abs(slope.value)
-    else:
-        off = math.inf
+    part = [divide(K * EPS * x.size, abs(x.value)) for x in (slope, inertia)]
+    off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else math.inf
     if part[0] < LARGEST_FIRST_ORDER:
         stable = slope.value > 0.0
         if (equilibrium.stability == "stable") != stable or (
@@ -259,22 +257,11 @@ def _judge_equilibrium(scene, equilibrium):
             errors["frequency"] = math.inf
         elif stable and part[1] < LARGEST_FIRST_ORDER:
             frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
-            if equilibrium.frequency is None:
-                apart = math.inf
-            else:
-                apart = abs(equilibrium.frequency - frequency)
+            apart = abs((equilibrium.frequency or math.inf) - frequency)
             errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
         elif equilibrium.frequency is not None and part[1] >= 1.0:
             errors["frequency"] = math.inf  # of an inertia that is rounding
     return off, errors
-
-
-def _difference_over_size(apart, size):
-    if size:
-        return abs(apart) / size
-    if apart == 0.0:
-        return 0.0
-    return math.inf
 
 
 def _derive_torque(scene, bar, angle, branch):

@@ -127,7 +127,7 @@ def _judge_study(question, scene, nominal, keys):
     with np.errstate(all="ignore"):
         solved = fourbar.solve(fourbar.vary(scene, values))
         for number, part in enumerate(parts):
-            changes = {key: part * entry.step for key, entry in stated.items()}
+            changes = {key: part * step for key, (_, step) in stated.items()}
             with suppress(NotAskedError):  # one that never assembles, beside others
                 file = SceneFile(at_places(scene, values[commanded][number]))
                 one = file.move(changes)
@@ -367,7 +367,8 @@ def _compute_expected(scene):
         off.append(changed({key: x for key, x, _ in node}))
         weights.append(math.prod(w for *_, w in node))
     for tolerance in scene.tolerances:
-        h = FIRST_ORDER_STEP * max(abs(numbers[tolerance.key].step), tolerance.width)
+        _, step = numbers[tolerance.key]
+        h = FIRST_ORDER_STEP * max(abs(step), tolerance.width)
         up, down = (changed({tolerance.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng = np.random.default_rng(0)

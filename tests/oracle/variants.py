@@ -7,7 +7,6 @@ import tomllib
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import tomlkit
@@ -94,16 +93,6 @@ def at_places(scene, places):
     return replace(scene, motion=scene.motion.replace(angle=places))
 
 
-class _FileNumber(NamedTuple):
-    """A number that a scene's file states, and what it may be moved by.
-
-    Most of itself, of an angle most of 1 rad, of a coordinate most of the shortest bar.
-    """
-
-    number: float
-    step: float
-
-
 DRAWN_SETTING = "drawn"
 """Setting of rows that judge numbers of a drawing."""
 _ALONG_AXES = (1.0, 1.0j)
@@ -116,15 +105,10 @@ def is_coordinate(key):
 
 
 def find_entry(document, key):
-    """Find the table that holds a number, and its name or index there.
-
-    Raises KeyError if the file leaves it out.
-    """
+    """Find the table that holds a number, and its name or index there."""
     *path, last = [int(part) if part.isdecimal() else part for part in key.split(".")]
     for part in path:
         document = document[part]
-    if isinstance(last, str) and last not in document:
-        raise KeyError(key)
     return document, last
 
 
@@ -146,7 +130,9 @@ class SceneFile:
             self._bars = {bar: pins[j] - pins[i] for bar, (i, j) in ENDS.items()}
 
     def find_stated(self, keys):
-        """Find those of the keys whose numbers the file states.
+        """Find those of the keys whose numbers the file states, and what they may be
+        moved by: most of itself, of an angle most of 1 rad, of a coordinate most of the
+        shortest bar.
 
         Of motion.theta_2 it is the first.
         """
@@ -156,7 +142,7 @@ class SceneFile:
             part = 0.5 + 0.5 * ((index + 1) * _GOLDEN % 1.0)
             with suppress(KeyError):
                 number, size = self._find_number(key)
-                stated[key] = _FileNumber(number, part * size)
+                stated[key] = number, part * size
         return stated
 
     def _find_number(self, key):
@@ -229,9 +215,8 @@ def _read(quantity):
 
 def _change_entry(quantity, change):
     number, _, unit = str(quantity).partition(" ")
-    if unit:
-        return f"{float(number) + change!r} {unit}"
-    return float(number) + change
+    changed = float(number) + change
+    return f"{changed!r} {unit}" if unit else changed
 
 
 def ask_free_bodies(scene, command=None):
