@@ -140,56 +140,56 @@ def test_ninety_digits_answer_the_same(name):
 def slide(scene, place, omega, alpha):
     """Answer a slider-crank by virtual work.
 
-    The motion as functions of time, which are differentiated in many digits. Each
-    displacement tells one unknown: the crank's turn the torque, the rod's turn about A
-    and the slider's along its guide the force at B, the slider's across it the guide's,
-    and those of a bar as a whole the forces at its first pin.
+    The motion as functions of the crank's angle, which are differentiated in many
+    digits. Each displacement tells one unknown: the crank's turn the torque, the rod's
+    turn about A and the slider's along its guide the force at B, the slider's across it
+    the guide's, and those of a bar as a whole the forces at its first pin.
     """
     a, b, e = (mp.mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset"))
-    weight = mp.mpc(0, -mp.mpf(scene["effects"]["gravity"][0]))
-
-    def theta(t):
-        return place + omega * t + alpha * t * t / 2
+    weight = mp.mpc(0, -scene["effects"]["gravity"][0])
+    inertias, arms = [], []
+    for name, length in (("crank", a), ("rod", b)):
+        stated = scene["bars"][name]
+        r, phi = stated.get("centre", (length / 2, 0.0))
+        inertias.append(stated.get("inertia", stated["mass"] * length**2 / 12))
+        arms.append(r * mp.expj(phi))
 
     def psi(angle):
         return mp.asin((e - a * mp.sin(angle)) / b)
 
+    def turn(angle):
+        return mp.expj(angle), mp.expj(psi(angle))
+
+    def find_rates(place_of):
+        first, second = (mp.diff(place_of, place, order) for order in (1, 2))
+        return first, alpha * first + omega**2 * second
+
     def work(force, displaced):
         return mp.re(force * mp.conj(displaced))
 
-    inertias, arms = [], []
-    for name, length in (("crank", a), ("rod", b)):
-        stated = scene["bars"][name]
-        slender = mp.mpf(stated["mass"]) * length**2 / 12
-        r, phi = stated.get("centre", (length / 2, 0.0))
-        inertias.append(stated.get("inertia", slender))
-        arms.append(mp.mpf(r) * mp.expj(phi))
-    centres = (
-        lambda angle: arms[0] * mp.expj(angle),
-        lambda angle: a * mp.expj(angle) + arms[1] * mp.expj(psi(angle)),
-        lambda angle: a * mp.cos(angle) + b * mp.cos(psi(angle)) + mp.mpc(0, e),
-    )
+    u, v = turn(place)
+    growth, alpha_3 = find_rates(psi)
+    torque = inertias[0] * alpha + inertias[1] * alpha_3 * growth
+    ends = {"crank": (arms[0], 0), "rod": (a, arms[1]), "slider": (a, b)}
     p = []
-    for name, centre in zip(("crank", "rod", "slider"), centres, strict=True):
-        acceleration = mp.diff(lambda t, centre=centre: centre(theta(t)), 0, 2)
-        p.append(mp.mpf(scene["bars"][name]["mass"]) * (acceleration - weight))
-    for load in scene.get("loads", ()):
-        p[2] -= mp.mpf(load["force"][0]) * mp.expj(load["force"][1])
-    t3 = inertias[1] * mp.diff(lambda t: psi(theta(t)), 0, 2)
-    torque = inertias[0] * alpha + t3 * mp.diff(psi, place)
-    for force, centre in zip(p, centres, strict=True):
-        torque += work(force, mp.diff(centre, place))
-    arm = mp.expj(psi(place))
-    turned = work(p[1], 1j * arms[1] * arm) + t3
-    F43 = mp.mpc(-p[2].real, (turned - p[2].real * b * arm.imag) / (b * arm.real))
+    for name, along in ends.items():
+        moved, acceleration = find_rates(lambda x, c=along: mp.fdot(c, turn(x)))
+        force = scene["bars"][name]["mass"] * (acceleration - weight)
+        if name == "slider":
+            loads = (load["force"] for load in scene.get("loads", ()))
+            force -= sum(size * mp.expj(angle) for size, angle in loads)
+        torque += work(force, moved)
+        p.append(force)
+    turned = work(p[1], 1j * arms[1] * v) + inertias[1] * alpha_3
+    F43 = mp.mpc(-p[2].real, (turned - p[2].real * b * v.imag) / (b * v.real))
     F32 = F43 - p[1]
     F12 = p[0] - F32
-    numbers = (psi(place), centres[2](place).real, torque, p[2].imag + F43.imag)
+    stroke = mp.re(a * u + b * v)
+    guide_force = p[2].imag + F43.imag
+    answers = {"theta_3": psi(place), "stroke": stroke}
+    answers |= {"torque": torque, "guide_force": guide_force}
     forces = {"F12": F12, "F32": F32, "F43": F43}
-    named = zip(("theta_3", "stroke", "torque", "guide_force"), numbers, strict=True)
-    return {name: float(x) for name, x in named} | {
-        name: [float(x.real), float(x.imag)] for name, x in forces.items()
-    }
+    return answers | {name: [x.real, x.imag] for name, x in forces.items()}
 
 
 @pytest.mark.parametrize("name", SLIDING)
