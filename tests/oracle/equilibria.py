@@ -306,11 +306,9 @@ def _derive_torque(scene, bar, angle, branch):
             compute_outputs(scene, branch, inputs)
             for inputs in (base_inputs, *turned, base_inputs | {f"alpha_{bar}": arb(1)})
         ]
-        held, ahead, behind, pushed = (
-            answer if answer and "torque" in answer else None for answer in answers
-        )
-        if held is None or ahead is None or behind is None or pushed is None:
+        if not all(answer and "torque" in answer for answer in answers):
             return None
+        held, ahead, behind, pushed = answers
         slope = (ahead["torque"] - behind["torque"]) / (2 * step)
         angles = [held.get(f"theta_{k}", base_inputs[commanded]) for k in MOVING_BARS]
         numbers = [held["torque"], slope, pushed["torque"] - held["torque"], *angles]
@@ -330,10 +328,8 @@ def _derive_torque(scene, bar, angle, branch):
             abs(float(value)), float(any(part in name for part in PARTS_OF_ANGLE_NAMES))
         )
         if name == commanded:
-            weight = max(
-                weight,
-                min(_AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / _AT_LIMIT)),
-            )
+            turned = max(abs(float(rate.mid())), 1.0 / _AT_LIMIT)
+            weight = max(weight, 1.0 / turned)
         moved = next(
             (
                 m
@@ -352,11 +348,8 @@ def _derive_torque(scene, bar, angle, branch):
     ].max() >= LARGEST_FIRST_ORDER * float(outputs["condition"]):
         return None
     sizes[2] = max(sizes[2], _sum_inertias(scene))
-    torque, slope, inertia = (
-        Derived(float(x.mid()), float(size))
-        for x, size in zip(numbers[:3], sizes[:3], strict=True)
-    )
-    return torque, slope, inertia
+    pairs = zip(numbers[:3], sizes[:3], strict=True)
+    return [Derived(float(x.mid()), size) for x, size in pairs]
 
 
 def _sum_inertias(scene):

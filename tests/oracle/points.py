@@ -50,9 +50,8 @@ def compare_points(question, scene, solution, reference, least=0.0):
         for ours, kind, arm, at_foot in zip(tables, like, arms, feet, strict=True):
             if name in ours:
                 theirs = join_components((arm + at_foot).real, (arm + at_foot).imag)
-                size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
-                if kind != "B":
-                    size = np.abs(arm) + np.abs(at_foot) + sizes.sum_terms(kind)
+                terms = sum_lengths(link) if kind == "B" else sizes.sum_terms(kind)
+                size = np.abs(arm) + np.abs(at_foot) + terms
                 apart = find_error(kind, ours[name], theirs, size)
                 apart *= find_condition(kind, link, reference)
                 apart = np.nan_to_num(apart, nan=np.inf)
@@ -76,17 +75,11 @@ def move_points(scene, reference):
     """Move a scene's own points as the angles of another derivation have them."""
     link = scene.linkage
     zero = np.zeros(len(reference))
-    theta = {
-        1: zero + link.ground_angle,
-        2: reference.theta_2,
-        3: reference.theta_3,
-        4: reference.theta_4,
-    }
-    speed, growth = {1: zero}, {1: zero}
+    theta, speed, growth = {1: zero + link.ground_angle}, {1: zero}, {1: zero}
     for bar in MOVING_BARS:
-        for rates, name in ((speed, "omega"), (growth, "alpha")):
+        for motion, name in (theta, "theta"), (speed, "omega"), (growth, "alpha"):
             values = getattr(reference, f"{name}_{bar}")
-            rates[bar] = zero if values is None else values
+            motion[bar] = zero if values is None else values
 
     def swing(bar, distance, angle):
         arm = distance * np.exp(1j * (theta[bar] + angle))

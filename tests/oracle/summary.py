@@ -251,12 +251,12 @@ def _summarize_scene(question):
     """
     scene = question.scene
     solution = question.solution
-    listed = isinstance(scene.motion.angle, (float, np.ndarray, FromLimit))
+    listed = isinstance(scene.motion.angle, float | np.ndarray | FromLimit)
     if listed or len(solution) < 2 or scene.motion.free is not None:
         raise NotAskedError("no sweep or motion law that has a summary")
     if any(effect.dry for effect in scene.effects):
         raise NotAskedError("dry friction, whose forces jump between the positions")
-    worst = min(solution.condition.min(), solution.drive_condition.min())
+    worst = np.minimum(solution.condition, solution.drive_condition).min()
     if (solution.status_code != OK).any() or not worst > _LEAST_CONDITION:
         raise NotAskedError("the motion has no forces somewhere, or nearly none")
     return Facts(solution)
