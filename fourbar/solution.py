@@ -94,6 +94,8 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """
     scene: Scene = field(default=None, kw_only=True)  # type: ignore[assignment]
     """Scene that was solved; None for a study."""
+    stated: Scene = field(default=None, compare=False, kw_only=True)  # type: ignore[assignment]
+    """Scene that was solved, or that of a study, whose numbers that vary are (m, 1)."""
     origin: tuple[Any, Any] = field(default=(0.0, 0.0), kw_only=True)
     """Place of O2 in the coordinates of the scene's drawing, m. Of a study (m, 1) each
     where they vary.

@@ -445,6 +445,7 @@ def make_solution(
         acceleration=of_points["a_"],
         ground=(scene.linkage.ground, scene.linkage.ground_angle),
         scene=solved,
+        stated=scene,
         origin=scene.origin,
         lengths=scene.linkage.lengths,
         drive=scene.settled_drive(),

@@ -12,8 +12,9 @@ import numpy as np
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError, expect, needing
 from fourbar.evaluation.case import compute_shown_state
+from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.torque import inertia
-from fourbar.linkage import PIN_FORCE
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.show.driving import Driving, is_once_round, read_drive_demand
@@ -94,55 +95,63 @@ m/s.
 """
 
 
-def shaking_force(solution: Solution) -> Array:
-    """Return the force of the bars on the frame, N, (n, 2), of a study (m, n, 2).
+class _FromOutside(Actions):
+    """Sums over what acts on the bars from outside: loads, weights, a driving force."""
 
-    The force is F21 + F41 = -(F12 + F14), and that of a linear drive or a spring with
-    an end on the ground besides.
+    def pull(self, start: Any, end: Any, force: Any) -> None:
+        """Leave out what acts between two bars, or a bar and the frame."""
+
+    def pin_couple(self, pin: str, couple: Any) -> None:
+        """Leave out what acts between two bars, or a bar and the frame."""
+
+
+def shaking_force(solution: Solution) -> Array:
+    """Return the force of the linkage on the frame, N, (n, 2), of a study (m, n, 2).
+
+    By the momentum of the bars it is what acts on them from outside less the sum of m
+    a_G: the force F21 + F41 = -(F12 + F14), and that of a linear drive or of springs
+    with an end on the ground besides.
     """
-    F12 = _require_quantity(solution, "F12")
-    F14 = _require_quantity(solution, "F14")
-    return -(F12 + F14) + _find_push(solution)
+    return _balance_momentum(solution)[0]
 
 
 def shaking_moment(solution: Solution) -> Array:
-    """Return the moment of bars and drive on the frame about O2, N m, (n,) or (m, n).
+    """Return the moment of the linkage on the frame about O2, N m, (n,) or (m, n).
 
-    The moment is -T - O4 x F14. A linear drive with an end on the ground has its moment
-    in place of -T.
-
-    Couples that effects exert between the bars and ground (pin damping or friction at
-    O2, O4) are not part of it.
+    By the angular momentum of the bars about O2: -T - O4 x F14, and the moments of
+    linear drives, springs and couples that act between bars and ground.
     """
-    F14 = _require_quantity(solution, "F14")
-    length, ground_angle = solution.ground
-
-    def moment(distance: Any, angle: Any, force: Array) -> Array:
-        x = force[..., 0]
-        y = force[..., 1]
-        return np.asarray(distance * (np.cos(angle) * y - np.sin(angle) * x))
-
-    at_O4 = moment(length, ground_angle, F14)
-    if solution.drive is None:
-        of_drive = -_require_quantity(solution, "torque")
-        return of_drive - at_O4
-    of_drive = np.zeros(())
-    for _, place in solution.drive.ends:
-        if place.bar == 1:
-            angle = place.angle + ground_angle
-            of_drive = moment(place.distance, angle, _find_push(solution))
-    return of_drive - at_O4
+    return _balance_momentum(solution)[1]
 
 
-def _find_push(solution: Solution) -> Array:
-    """Return the force of a linear drive on the frame, N, (n, 2)."""
-    ends = () if solution.drive is None else solution.drive.ends
-    sense = sum(sense for sense, place in ends if place.bar == 1)
-    if not sense:
-        return np.zeros((*solution.theta_2.shape, 2))
-    size = _require_quantity(solution, "drive_force")[..., None]
-    direction = _require_quantity(solution, "drive_line")
-    return sense * size * direction
+def _balance_momentum(solution: Solution) -> tuple[Array, Array]:
+    """Return the force on the frame and its moment about O2, by the momentum."""
+    F12 = _require_quantity(solution, "F12")
+    scene = solution.stated.settled()
+    bodies = list_bodies(scene.linkage, scene.effects)
+    state = compute_shown_state(scene, solution.at)
+    outside = _FromOutside(state, bodies).add((*scene.loads, *scene.effects))
+    if scene.drive is not None:
+        scene.drive.act(outside, _require_quantity(solution, "drive_force"))
+    force = np.zeros(F12.shape[:-1], dtype=complex)
+    moment = np.zeros(F12.shape[:-1])
+    first_pins = (
+        0.0j,
+        state.lengths.a * state.direction(2),
+        state.lengths.d * state.direction(1),
+    )
+    for bar, body, pin in zip(MOVING_BARS, bodies, first_pins, strict=True):
+        x, y = np.moveaxis(solution[f"G{bar}"], -1, 0)
+        a_x, a_y = np.moveaxis(solution[f"a_G{bar}"], -1, 0)
+        on_bar = outside.forces.get(bar, 0.0)
+        force += on_bar - body.m * (a_x + 1j * a_y)
+        moment += cross(-on_bar, pin) + outside.moments.get(bar, 0.0)
+        moment -= body.m * (x * a_y - y * a_x) + body.I * solution[f"alpha_{bar}"]
+    has_none = np.isnan(F12).any(axis=-1)
+    moment[has_none] = np.nan
+    vectors = np.stack([force.real, force.imag], axis=-1)
+    vectors[has_none] = np.nan
+    return vectors, moment
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:

@@ -11,7 +11,24 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Bar, FourBar, Gravity, Law, Motion, Scene, Sweep, solve, units, vary
+from fourbar import (
+    Bar,
+    FourBar,
+    Friction,
+    Gravity,
+    Law,
+    Motion,
+    Place,
+    Scene,
+    Springs,
+    Sweep,
+    Torsion,
+    Viscous,
+    solve,
+    units,
+    vary,
+)
+from fourbar.effects import Spring
 from fourbar.linkage import MOVING_BARS
 from fourbar.show.duty import (
     bearing_load,
@@ -43,6 +60,34 @@ def test_shaking_is_the_momentum_that_the_bars_lose(drive):
         moment -= bar.moment_of_inertia * getattr(s, f"alpha_{number}")
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
+
+
+SPRING = Spring(Place(1, (0.05, 0.4)), Place(3, (0.1, 0.2)), 300.0, 0.05)
+WITHIN = {
+    "spring": {"effects": (Gravity(), Springs((SPRING,)))},
+    "torsion": {
+        "effects": (Gravity(), Torsion.at(O2=(3.0, 0.2, 0.0), O4=(2.0, 0.1, 0.5)))
+    },
+    "friction": {"effects": (Gravity(), Viscous.at(O2=0.3), Friction.at(O4=0.2))},
+    "cylinder": {"effects": (Gravity(), Springs((SPRING,))), "drive": CYLINDER},
+}
+
+
+@pytest.mark.parametrize("within", WITHIN.values(), ids=WITHIN)
+def test_what_acts_within_a_linkage_at_rest_leaves_its_weight_on_the_frame(within):
+    motion = Motion(np.linspace(0.3, 1.2, 4), 0.0)
+    s = solve(crank_rocker(loads=(), motion=motion, **within))
+    weights = [-9.81 * bar.mass for bar in s.scene.linkage.moving]
+    moment = sum(
+        weight * s[f"G{bar}"][:, 0]
+        for bar, weight in zip(MOVING_BARS, weights, strict=True)
+    )
+    size = abs(sum(weights))
+    upright = np.array([0.0, sum(weights)])
+    assert shaking_force(s) == approx(np.tile(upright, (4, 1)), abs=ROUND_OFF * size)
+    assert shaking_moment(s) == approx(moment, abs=ROUND_OFF * size)
+    study = solve(vary(s.scene, {"bars.input.mass": [1.0, 2.0]}))
+    assert np.diff(shaking_force(study)[:, 0, 1]) == approx([-9.81])
 
 
 @pytest.mark.parametrize("second", [1.2, -1.2])
