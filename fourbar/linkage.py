@@ -8,7 +8,7 @@ import cmath
 import math
 from collections.abc import Container
 from contextlib import suppress
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from numbers import Integral
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
@@ -289,6 +289,8 @@ def list_declared(kind: Any) -> tuple[DeclaredField, ...]:
 
 @cache
 def _list_declared(kind: type) -> tuple[DeclaredField, ...]:
+    if not is_dataclass(kind):  # a base class, which `help` asks too
+        return ()
     hints = get_type_hints(kind, include_extras=True)
     declared = []
     for one in fields(kind):

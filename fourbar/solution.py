@@ -26,7 +26,7 @@ from fourbar.quantities import (
     Quantities,
     find_derived,
 )
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import load_show
 from fourbar.writing import (
     describe_extent,
@@ -461,14 +461,19 @@ def compute_times(scene: Scene | None, at: Command) -> Array | None:
 
     `scene`: None for a study, whose positions have no time.
     """
-    places = at.places
     _, speed, acceleration = at.stated
-    if scene is None or at.time is not None or len(places) < 2 or speed is None:
+    if scene is None or at.time is not None or speed is None:
         return None
     if np.ptp(speed) != 0.0 or np.any(acceleration) or not np.all(speed):
         return None
-    time: Array = places / np.ravel(speed)[0]
-    time -= time.min()
+    places = at.places
+    swept = places
+    if at.commanded == scene.motion.commanded:
+        swept = command(scene).places
+    if len(swept) < 2:
+        return None
+    speed = np.ravel(speed)[0]
+    time: Array = places / speed - (swept / speed).min()
     return time
 
 

@@ -252,7 +252,11 @@ def read_positions(scene: Scene, text: str) -> Command:
             if name in drawn:
                 return find_positions(scene, name, drawn[name])
         raise InputError("--at", text, "needs a scene that states [pins]")
-    if name not in STATED_POSITIONS or value in EXTREMES:
+    is_column = name not in STATED_POSITIONS or value in EXTREMES
+    if name == "stroke" and scene.drive is not None and scene.drive.has_stroke:
+        ends = {place.bar for _, place in scene.drive.ends}
+        is_column |= ends not in ({1, 2}, {1, 4})  # a stroke that is not commanded
+    if is_column:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")
     likely = {"stroke": "mm", "time": "s"}.get(name, "deg")

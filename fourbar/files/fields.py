@@ -98,6 +98,10 @@ _WAYS = {
         " centre",
     ),
     **dict.fromkeys(
+        ("stroke", "stroke_speed", "stroke_acceleration"),
+        "write it under [motion], as a number or a list; a law is of an angle",
+    ),
+    **dict.fromkeys(
         ("damper", "dampers", "damping", "damping_coefficient"),
         "viscous is damping in the pins; a damper between two points is in MuJoCo, as"
         " the damping of a spatial tendon",

@@ -466,7 +466,7 @@ class SceneBlock(Facts):
             return
         yield self._write_drive_head()
         yield _row("force" if self.linear else "torque", self._write_peak())
-        if self.held:
+        if self.held and self.peak is not None:
             name = "at rest" if self.is_held_at_rest else "range"
             yield _row(name, self._write_held(self.drive.unit))
         yield from self._write_stroke()
@@ -719,7 +719,9 @@ class SceneBlock(Facts):
         if not self.held or np.any(self.solution.at.speed):
             return []
         from_rest = self.motion.from_rest
-        cells = self._cells([from_rest[name] for name in names], unit)
+        has_value = self.motion.panels.has_value
+        sizes = [from_rest[name] if has_value(name) else None for name in names]
+        cells = self._cells(sizes, unit, "unbounded")
         adds = cells != self._write_peaks(names, unit)[0]
         return [("  to move", cells)] if adds else []
 

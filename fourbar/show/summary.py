@@ -225,9 +225,12 @@ class Facts:
         A turn that begins at such a position ends at the same, which is listed once.
         """
         solution = self.solution
-        rows = self._held_rows
+        rows = self._find_held(solution)
         if self.drive is None or not len(rows):
             return []
+        if not np.any(solution.at.speed):  # held between the positions too
+            solution = self.motion.solve_between()
+            rows = self._find_held(solution)
         low = getattr(solution, self.drive.keys.low)
         high = getattr(solution, self.drive.keys.high)
         places = solution.at.places
@@ -243,19 +246,19 @@ class Facts:
             ranges.append(HeldRange(least, most, ends, varies))
         return ranges
 
-    @cached_property
-    def _held_rows(self) -> NDArray[np.intp]:
-        """Rows of the positions at which dry friction holds a pin, (k,)."""
-        low = self.drive and getattr(self.solution, self.drive.keys.low)
+    def _find_held(self, solution: Solution) -> NDArray[np.intp]:
+        """Find the rows of positions at which dry friction holds a pin, (k,)."""
+        low = self.drive and getattr(solution, self.drive.keys.low)
         if self.drive is None or low is None:
             return np.zeros(0, dtype=np.intp)
-        high = getattr(self.solution, self.drive.keys.high)
+        high = getattr(solution, self.drive.keys.high)
         return np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
 
     @cached_property
     def is_held_at_rest(self) -> bool:
         """Return True if nothing moves where dry friction holds a pin."""
-        return not np.any(self.solution.at.part(self._held_rows).speed)
+        rows = self._find_held(self.solution)
+        return not np.any(self.solution.at.part(rows).speed)
 
     @cached_property
     def stroke_limits(self) -> tuple[float, float] | None:

@@ -4,6 +4,7 @@
 """
 
 import inspect
+import pydoc
 import runpy
 from pathlib import Path
 
@@ -95,8 +96,10 @@ def test_nothing_public_changes_unnoticed():
     )
 
 
-def test_all_is_what_dir_shows():
+def test_all_is_what_dir_shows_and_help_explains():
     assert dir(fourbar) == fourbar.__all__
+    for name in fourbar.__all__:
+        assert name in pydoc.render_doc(getattr(fourbar, name))
     names = {}
     exec("from fourbar import *", names)
     assert set(fourbar.__all__) <= set(names)

@@ -19,7 +19,18 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar import Motion, cli, load, mjcf, quantities, save, solve
+from fourbar import (
+    LinearDrive,
+    Motion,
+    Place,
+    Sweep,
+    cli,
+    load,
+    mjcf,
+    quantities,
+    save,
+    solve,
+)
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, INTERRUPTED, DependencyError
 from fourbar.evaluation.case import Case
 from fourbar.mjcf import assembly
@@ -263,6 +274,18 @@ CLASSIFIED = read_rows(r"""
 def test_classify(lengths, line, run):
     code, out, err = run("classify", *lengths.split())
     assert (code, err) == (HOLDS, "") and line.replace(r"\n", "\n") in out
+
+
+def test_a_stroke_that_is_not_commanded_is_found_where_the_column_has_it(run, tmp_path):
+    """Of a cylinder from the ground to the coupler."""
+    drive = LinearDrive(Place(1, (0.29, -1.0)), Place(3, (0.1, -0.26)))
+    scene = crank_rocker(motion=Motion(Sweep(0.3, 1.2, 9), 1.0), drive=drive)
+    stroke = solve(scene).stroke[4]
+    save(scene, tmp_path / "cylinder.toml")
+    at = f"stroke={stroke:.17g} m"
+    code, out, _ = run("analyze", tmp_path / "cylinder.toml", "--at", at)
+    assert code == HOLDS
+    assert f"at theta_2 = {degrees(0.7):.6g} deg" in out
 
 
 def test_classify_says_what_turns_and_how_far(run):

@@ -455,7 +455,8 @@ def test_the_rates_are_the_largest_of_the_bars_that_follow():
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(steps):
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
     sweep = Motion(Sweep(0.2, 1.4, steps) if steps > 1 else 0.2, 0.0)
-    static = solve(crank_rocker(motion=sweep, effects=WEIGHT)).torque
+    fine = Motion(Sweep(0.2, 1.4, 1000) if steps > 1 else 0.2, 0.0)
+    static = solve(crank_rocker(motion=fine, effects=WEIGHT)).torque
     held = crank_rocker(motion=sweep, effects=(*WEIGHT, Friction.at(O2=0.5)))
     low = static.min() - 0.5
     high = static.max() + 0.5
@@ -490,6 +491,17 @@ def test_each_position_at_rest_has_its_own_range():
     assert f"range {', '.join(ranges)}: a pin with dry friction rests" in text
     assert "at theta_2 = 0 deg (B), 10.52 deg (O4), 180 deg (B), 188.7 deg (O4)" in text
     assert "of these positions" not in text and "without bound" not in text
+
+
+def test_what_is_held_or_moved_across_a_pole_has_no_bound():
+    """No couple on the output holds the linkage where bars 2 and 3 are in line."""
+    still = Motion(Sweep(0.2, 1.4, 7), 0.0)
+    held = crank_rocker(
+        motion=still, drive_bar=4, effects=(*WEIGHT, Friction.at(O2=0.5, O4=0.5))
+    )
+    text = block(held)
+    assert "torque grows without bound" in text and "dry friction holds" not in text
+    assert "to move" in text and " GN" not in text
 
 
 def test_a_reversal_of_a_motion_law_is_named_by_its_time():

@@ -22,6 +22,7 @@ from fourbar import (
 )
 from fourbar.formulas.path import compute_state
 from fourbar.quantities import DERIVED_QUANTITIES
+from fourbar.scene import command_at
 from fourbar.show.columns import choose_columns
 from fourbar.show.derived import derive
 from fourbar.show.tables import print_positions
@@ -93,6 +94,10 @@ def test_a_column_that_needs_a_speed_says_so():
 def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     rocker = replace(TURN, motion=Motion(theta_4=Sweep(2.0, 1.7, 3), omega_4=-2.0))
     assert columns(rocker, "time")["time"] == approx([0.0, 0.05, 0.1, 0.15])
+    alone = choose_columns(
+        solve(rocker, at=command_at(rocker, np.array([1.9]))), "time"
+    )
+    assert alone[0].values == approx([0.05])
     growing = Motion(Sweep(0.0, 1.0, 3), 1.0, 0.5)
     with raises(InputError, match="no one speed"):
         columns(replace(TURN, motion=growing), "time")
