@@ -4,7 +4,7 @@ Together they have each effect, drive, branch and kind of motion.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections import UserDict
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -105,7 +105,7 @@ _LIMIT = limit_positions(ROCKER_CRANK_LINKAGE)[0].theta_2
 _REVERSAL = limit_positions(CRANK_ROCKER_LINKAGE, 4)[0].theta_2
 _EIGHT_STEPS = Motion(Sweep(0.1, 3.0, 8), 10.0)
 _RISE = Rise("345", (1.2, 0.4), 0.3, 0.1, steps=24)
-_WRITTEN_SCENES: dict[str, Scene] = {
+_WRITTEN_SCENES: dict[str, Scene | Path] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": _change(motion=_CROSSED_TURN, drive_bar=3),
     "output driven": _change(
@@ -298,33 +298,23 @@ _WRITTEN_SCENES: dict[str, Scene] = {
 }
 
 
-class _FaultScenes(Mapping[str, Scene]):
+class _FaultScenes(UserDict[str, Any]):
     """Scenes by name, those above and those of the files of small scenes.
 
     A file is read when its scene is asked for: a fault may leave it unreadable, and the
     other scenes are judged all the same.
     """
 
-    def __init__(self) -> None:
-        self._files: dict[str, Path] = {
-            f"simulated, {file.stem}": file for file in list_capability_files()
-        }
-
     def __getitem__(self, name: str) -> Scene:
         """Return a scene by its name."""
-        if name in _WRITTEN_SCENES:
-            return _WRITTEN_SCENES[name]
-        return read_scene_files([self._files[name]]).scene(0)
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
-        yield from _WRITTEN_SCENES
-        yield from self._files
-
-    def __len__(self) -> int:
-        """Count the scenes."""
-        return len(_WRITTEN_SCENES) + len(self._files)
+        scene: Scene | Path = self.data[name]
+        if isinstance(scene, Path):
+            return read_scene_files([scene]).scene(0)
+        return scene
 
 
-FAULT_SCENES = _FaultScenes()
+FAULT_SCENES = _FaultScenes(
+    _WRITTEN_SCENES
+    | {f"simulated, {file.stem}": file for file in list_capability_files()}
+)
 """Scenes by the name under which an entry of faults.toml tries its fault."""

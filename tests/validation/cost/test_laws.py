@@ -62,8 +62,9 @@ def test_the_cheapest_within_an_error_is_judged_by_the_quantity_that_is_asked():
 def test_nothing_on_the_front_is_beaten_in_cost_and_error():
     points = [
         point(10.0, 1e-3),
-        point(20.0, 1e-2),
+        point(20.0, 1.5e-3),
         point(30.0, 1e-5),
+        point(35.0, 1e-5),
         point(40.0, math.nan),
         point(50.0, 1e-4),
     ]

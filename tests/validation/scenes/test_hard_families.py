@@ -403,3 +403,11 @@ def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reache
     scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
     row = compare_shipped("quickening", scene, fourbar.command(scene))
     assert row.verdict == AGREES, row
+
+
+@pytest.mark.parametrize("bar", [3, 4])
+def test_a_driven_bar_stands_still_where_its_couple_has_a_pole(bar):
+    (family,) = [one for one in HARD_FAMILIES if one.name == f"pole-T{bar}"]
+    for label, scene in family.scenes():
+        speeds = np.abs(fourbar.solve(scene, "velocity")[f"omega_{bar}"])
+        assert speeds.min() < 1e-7 * speeds.max(), label

@@ -21,6 +21,8 @@ from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.settings import (
     STIFFEST_IMPEDANCE,
     SettingsSearch,
+    _set_settings,
+    read_settings,
 )
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.loop_errors import (
@@ -60,6 +62,17 @@ def paste(text, advice):
             )
         assert element in text
     return text
+
+
+def test_what_is_set_in_a_model_is_read_from_it():
+    model, loop = find_loop(read_robot(FOOT))
+    own = read_settings(model, loop)
+    changes = {"integrator": "implicit", "timestep": 0.01, "iterations": 7}
+    changes |= {"solver": "CG", "tolerance": 1e-3, "solref": (0.1, 0.5)}
+    others = replace(own, solimp=STIFFEST_IMPEDANCE, **changes)
+    assert others.list_changes(own).keys() == {"solimp", *changes}
+    assert read_settings(_set_settings(model, loop, others), loop) == others
+    assert read_settings(model, loop) == own
 
 
 @pytest.mark.slow
