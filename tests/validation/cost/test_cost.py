@@ -66,14 +66,11 @@ def tried(scene):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "integrator, order, steps",
-    [
-        ("Euler", 1.0, (160, 320, 640, 1280)),
-        ("implicitfast", 1.0, (160, 320, 640, 1280)),
-        ("RK4", 4.0, (40, 80, 160, 320)),
-    ],
+    "integrator, order, first",
+    [("Euler", 1.0, 160), ("implicitfast", 1.0, 160), ("RK4", 4.0, 40)],
 )
-def test_each_integrator_shows_its_order(integrator, order, steps):
+def test_each_integrator_shows_its_order(integrator, order, first):
+    steps = [first * 2**k for k in range(4)]
     error = tried(turning())
     settings = replace(BEST, integrator=integrator)
     points = [

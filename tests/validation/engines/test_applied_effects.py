@@ -29,10 +29,28 @@ from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
 
 TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
+SPRINGS = read_rows("""
+1 0.1 -1.5 | 4 0.08 0.2 | 200 0.05 3 |
+2 0.05 0.5 | 3 0.1 0.3 | 50 0.05 1 |
+1 0.15 -0.6 | 4 0.1 0.4 | 0 0 -2 |
+1 0.12 -2 | 2 0.05 0.4 | 30 0 2 |
+1 0 0 | 3 0.1 0.3 | 90 0.15 0 | push
+1 0 0 | 4 0.1 0.3 | 70 0.25 -2 | pull
+""")
+"""Bar and polar place of both ends; stiffness, length, preload; how it acts."""
+
+
+def make_spring(one, other, numbers, acts):
+    places = (map(float, end.split()) for end in (one, other))
+    ends = [Place(int(bar), tuple(polar)) for bar, *polar in places]
+    return Spring(*ends, *map(float, numbers.split()), acts=acts or None)
+
+
 ACTING = {
     "gravity": Gravity(9.81, 0.3),
     "viscous": Viscous.at(
@@ -56,56 +74,8 @@ ACTING = {
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
         (
-            Spring(
-                Place(1, (0.1, -1.5)),
-                Place(4, (0.08, 0.2)),
-                200.0,
-                0.05,
-                3.0,
-            ),
-            Spring(
-                Place(2, (0.05, 0.5)),
-                Place(3, (0.1, 0.3)),
-                50.0,
-                0.05,
-                1.0,
-            ),
-            Spring.gas(
-                Place(1, (0.2, 2.0)),
-                Place(3, (0.05, 1.0)),
-                0.5,
-                0.3,
-                4.0,
-                7.0,
-            ),
-            Spring(
-                Place(1, (0.15, -0.6)),
-                Place(4, (0.1, 0.4)),
-                0.0,
-                preload=-2.0,
-            ),
-            Spring(
-                Place(1, (0.12, -2.0)),
-                Place(2, (0.05, 0.4)),
-                30.0,
-                0.0,
-                2.0,
-            ),
-            Spring(
-                Place(1, (0.0, 0.0)),
-                Place(3, (0.1, 0.3)),
-                90.0,
-                0.15,
-                acts="push",
-            ),
-            Spring(
-                Place(1, (0.0, 0.0)),
-                Place(4, (0.1, 0.3)),
-                70.0,
-                0.25,
-                -2.0,
-                acts="pull",
-            ),
+            *(make_spring(*row) for row in SPRINGS),
+            Spring.gas(Place(1, (0.2, 2.0)), Place(3, (0.05, 1.0)), 0.5, 0.3, 4.0, 7.0),
         )
     ),
     "flywheel": Flywheel(0.02, 2),

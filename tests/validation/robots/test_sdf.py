@@ -235,12 +235,12 @@ def write_drake():
         ("Rb", "rod", B, 0.0),
         ("Ro", "rocker", C, 0.0),
     )
-    joints = (
-        ("O2", "ground", "crank", "Gc", "crank"),
-        ("O4", "ground", "rocker", "Gr", "rocker"),
-        ("A", "crank", "rod", "Ca", "rod"),
-        ("B", "rocker", "rod", "Ro", "Rb"),
-    )
+    joints = read_rows("""
+O2 | ground | crank | Gc | crank
+O4 | ground | rocker | Gr | rocker
+A | crank | rod | Ca | rod
+B | rocker | rod | Ro | Rb
+""")
     nothing = "<mass>0</mass><inertia><ixx>0</ixx><iyy>0</iyy><izz>0</izz></inertia>"
     text = "".join(
         write_link(name, length, "<pose>7 8 9 0 0 1</pose>")

@@ -44,20 +44,15 @@ from tests.support.robots import (
 )
 
 ROBOTS = Path(__file__).parents[5] / "models" / "robots"
-FILES = ["biped_foot", "gripper"]
-TEXTS = {
-    "finger": FINGER,
-    "adaptive": ADAPTIVE,
-    "excavator": EXCAVATOR,
-    "lifted": LIFTED,
-}
 LOOPS = {
-    "finger": ("pip_link-middle", PoseOptions()),
-    "adaptive": ("follower-coupler", PoseOptions(held=("spring_link",))),
-    "excavator": ("bucket_linkage", PoseOptions()),
-    "lifted": ("rod-arm", PoseOptions()),
+    "biped_foot": (read_robot(ROBOTS / "biped_foot.xml"), None),
+    "gripper": (read_robot(ROBOTS / "gripper.xml"), None),
+    "finger": (file_of(FINGER), "pip_link-middle"),
+    "adaptive": (file_of(ADAPTIVE), "follower-coupler"),
+    "excavator": (file_of(EXCAVATOR), "bucket_linkage"),
+    "lifted": (file_of(LIFTED), "rod-arm"),
 }
-"""A loop of each text, and what is asked of it."""
+"""A file and the loop that is asked of it; None: the first."""
 ASKED_TWICE = 1e-6
 """Relative; the solver of the file stops at a tolerance of 1e-8 of its own."""
 RIGID = 1e-8
@@ -66,10 +61,9 @@ RIGID = 1e-8
 
 @cache
 def open_loop(name):
-    closing, options = LOOPS.get(name, (None, PoseOptions()))
-    in_texts = name in TEXTS
-    path = ROBOTS / f"{name}.xml"
-    compiled = compile_robot(file_of(TEXTS[name]) if in_texts else read_robot(path))
+    file, closing = LOOPS[name]
+    options = PoseOptions(held=("spring_link",) if name == "adaptive" else ())
+    compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options)
     loop = next(
         closure.loop
@@ -126,7 +120,7 @@ def ask_again(inside, theta_2, alpha_2):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*FILES, *TEXTS])
+@pytest.mark.parametrize("name", LOOPS)
 def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(name):
     inside, made = open_loop(name)
     theta_2 = float(spread_over_range(inside, made, 3)[-1])
@@ -176,7 +170,7 @@ ROUNDED = 1e-12
 """Relative; 1e-15 as measured, and 4e-10 are from soft to rigid pins."""
 
 
-@pytest.mark.parametrize("name", [*FILES, *TEXTS])
+@pytest.mark.parametrize("name", LOOPS)
 def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     """Multipliers on MuJoCo's mass matrix of the whole robot are the forces of a scene
     of three bars, and of its free bodies.
