@@ -65,6 +65,11 @@ def compare_rows(old, new):
     return compare_runs((old[0], before), (new[0], after))
 
 
+def compare_made_here(old, new):
+    """Two runs that were made alike compared by their rows."""
+    return compare_rows((HERE, old), (HERE, new))
+
+
 def kinds(old, new):
     """Kind of change of each line of two runs, in the order of the table."""
-    return [*compare_rows((HERE, old), (HERE, new)).table.kind]
+    return [*compare_made_here(old, new).table.kind]

@@ -41,7 +41,7 @@ from fourbar_validation.run.judge import judge, judge_for_report
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_here, summary_of
 from tests.support.rows import read_rows
-from tests.support.runs import HERE, ROW, changed, compare_rows
+from tests.support.runs import ROW, changed, compare_made_here
 from tests.support.scenes import bare, crank_rocker
 from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, echo, refuse
 
@@ -244,7 +244,7 @@ def test_every_form_of_a_report_says_the_same_counts():
 
 def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
     def junit(old, new):
-        changes = compare_rows((HERE, old), (HERE, new))
+        changes = compare_made_here(old, new)
         suites = ET.fromstring(render.write_junit_of_changes(changes))
         tags = {
             case.get("name"): [child.tag for child in case]

@@ -17,7 +17,7 @@ from fourbar_validation.regression.engines import list_gone
 from fourbar_validation.regression.record import NOTHING_KNOWN
 from tests.support import runs
 from tests.support.rows import read_rows
-from tests.support.runs import FORMS, HERE, compare_rows, kinds
+from tests.support.runs import FORMS, compare_made_here, compare_rows, kinds
 
 WHY = "Cannot find module 'x'"
 ROW = runs.changed(allowed=1e-9, reason="")
@@ -75,7 +75,7 @@ def compared():
         for run, row in zip(runs, both, strict=True):
             scene = f"case {number}"
             run += [replace(one, scene=scene) for one in (row, beside) if one]
-    return compare_rows(*((HERE, run) for run in runs))
+    return compare_made_here(*runs)
 
 
 @pytest.mark.parametrize("number", range(len(KINDS)))
@@ -124,7 +124,7 @@ def test_settings_are_paired_only_where_each_run_has_one_of_its_own():
     ],
 )
 def test_two_runs_without_a_comparison_in_common_are_no_success(old, new, status):
-    assert compare_rows((HERE, old), (HERE, new)).status == status
+    assert compare_made_here(old, new).status == status
 
 
 def test_of_two_rows_of_one_name_the_worse_counts_in_either_order():
@@ -151,7 +151,7 @@ def test_the_worst_change_comes_first():
         for name, error in errors.items()
     ]
     new[1] = changed(scene="b", verdict=REFUSES, error=NAN)
-    found = compare_rows((HERE, old), (HERE, new))
+    found = compare_made_here(old, new)
     assert [*found.of(Kind.VERDICT_WORSE).scene] == ["c", "a", "d", "b"]
 
 
@@ -239,7 +239,7 @@ def test_the_rule_that_a_row_is_held_to_is_not_stated_as_a_cause():
     rule = f"{EQUIVALENCE.cause}: 50 eps over the condition 0.5"
     for reason, stated in ((rule, f"held to {rule}"), (WHY, WHY)):
         failing = changed(verdict=FAILS, error=1.0, reason=reason)
-        found = compare_rows((HERE, [ROW]), (HERE, [failing]))
+        found = compare_made_here([ROW], [failing])
         text = render.write_differences(found)
         assert f", agrees -> fails: {stated}\n" in text
         assert f", agrees -> fails ({stated});" in text
@@ -253,11 +253,11 @@ def test_a_scene_that_an_engine_newly_refuses_is_one_regression():
         verdict=REFUSES,
         error=NAN,
     )
-    found = compare_rows((HERE, [*old, ROW]), (HERE, [refusal, ROW]))
+    found = compare_made_here([*old, ROW], [refusal, ROW])
     assert found.gone == ["scene scene is newly refused by wg (3 rows)"]
     first = render.write_differences(found).splitlines()[0]
     assert first == f"Gone: {found.gone[0]}" and found.status == FAILED
-    found = compare_rows((HERE, [ROW]), (HERE, [refusal, ROW]))
+    found = compare_made_here([ROW], [refusal, ROW])
     assert found.kinds[Kind.NEW] == 1 and found.status == HOLDS
-    as_before = compare_rows((HERE, [refusal, ROW]), (HERE, [refusal, ROW]))
+    as_before = compare_made_here([refusal, ROW], [refusal, ROW])
     assert not as_before.gone and as_before.status == HOLDS

@@ -56,6 +56,7 @@ from tests.support.runs import (
     HERE,
     ROW,
     changed,
+    compare_made_here,
     compare_rows,
     read_run,
     save_run,
@@ -402,7 +403,7 @@ formulas power | only the identities: the formulas, or what is stated of them
 )
 def test_the_report_says_who_is_at_fault(worse, sentence):
     old, new = disagreeing(worse.split(", "))
-    changes = compare_rows((HERE, old), (HERE, new))
+    changes = compare_made_here(old, new)
     sentence += ", 3 of 3 scenes"
     assert changes.sentences == [sentence]
     for form in FORMS[1:]:
@@ -416,7 +417,7 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first():
     better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
     worst = next(i for i, row in enumerate(new) if row.failed and row.scene == "b")
     new[worst] = replace(new[worst], error=1.0)
-    changes = compare_rows((HERE, better), (HERE, new))
+    changes = compare_made_here(better, new)
     lines = render.write_differences(changes).splitlines()
     groups = [line for line in lines if "scenes, " in line and "rows (" in line]
     in_a, in_b = (
@@ -631,7 +632,7 @@ def test_rows_whose_allowance_grew_are_told():
     line = "scene / engine / torque: 1.0e-14 -> 1.0e-12"
     assert found.status == HOLDS and found.grown == [line]
     assert f"\nAllowed more: {line}\n" in render.write_differences(found)
-    assert not compare_rows((HERE, [ROW]), (HERE, [easier])).grown
+    assert not compare_made_here([ROW], [easier]).grown
 
 
 @pytest.mark.slow

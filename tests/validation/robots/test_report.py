@@ -150,6 +150,10 @@ def test_the_report_is_printed_and_written(tmp_path, capsys):
     assert torque.error in [error.part for error in errors]
 
 
+def describe(scene, joint):
+    return _describe_limit(SimpleNamespace(scene=scene), joint)
+
+
 @pytest.mark.parametrize("ground, grow", [(0.0, True), (90.0, False)])
 @pytest.mark.parametrize("side", [-5.0, 5.0])
 def test_forces_are_said_to_grow_only_where_those_of_rigid_pins_do(ground, grow, side):
@@ -160,7 +164,7 @@ def test_forces_are_said_to_grow_only_where_those_of_rigid_pins_do(ground, grow,
     """
     bars = replace(uniform(4.0, 4.0, 4.0, 4.0), ground_angle=math.radians(ground))
     scene = Scene(bars, Motion(1.0, 1.0), effects=(Gravity(),))
-    told = _describe_limit(SimpleNamespace(scene=scene), math.radians(ground + side))
+    told = describe(scene, math.radians(ground + side))
     assert told.startswith("5 deg from a change point, where ")
     assert told.endswith("forces grow without bound") == grow
 
@@ -170,16 +174,16 @@ def test_a_limit_of_the_bar_that_is_driven_is_told():
     lengths = uniform(9.0, 3.0, 10.0, 8.0)
     limit = math.pi - math.acos((9.0**2 + 8.0**2 - 13.0**2) / (2.0 * 9.0 * 8.0))
     scene = Scene(lengths, Motion(theta_4=2.0, omega_4=1.0))
-    told = _describe_limit(SimpleNamespace(scene=scene), limit + math.radians(2.0))
+    told = describe(scene, limit + math.radians(2.0))
     assert told == "2 deg from a limit position, where forces grow without bound"
-    assert not _describe_limit(SimpleNamespace(scene=scene), limit + 0.4)
+    assert not describe(scene, limit + 0.4)
 
 
 def test_a_small_transmission_angle_is_told_as_well():
     """At theta_2 = 0 the bars b = 10, c = 9 and e = d - a = 1.5 are nearly in line."""
     scene = Scene(uniform(4.5, 3.0, 10.0, 9.0))
     mu = math.degrees(math.acos((100.0 + 81.0 - 2.25) / 180.0))
-    told = _describe_limit(SimpleNamespace(scene=scene), math.radians(3.0))
+    told = describe(scene, math.radians(3.0))
     small = f"a transmission angle of {mu:.2g} deg, whose sine divides the forces"
     assert told == f"3 deg from {small}"
 
