@@ -36,15 +36,10 @@ from fourbar.evaluation.case import Case
 from fourbar.mjcf import assembly
 from fourbar.mjcf.document import write_mjcf_for
 from fourbar.show import tables
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.scenes import balance, crank_rocker
 from tests.support.shares import slow_but
-
-ROOT = Path(__file__).parents[3]
-
-
-MODELS = ROOT / "models"
-
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
 
@@ -456,7 +451,7 @@ def test_the_command_line_starts_light():
     heavy = ["pint", "rich", "matplotlib", "scipy", "mujoco", "pinocchio", "jinja2"]
     program = "import sys, fourbar.cli; print({*sys.argv[1:]} & {*sys.modules})"
     command = [sys.executable, "-c", program, *heavy]
-    assert subprocess.check_output(command, cwd=ROOT, text=True) == "set()\n"
+    assert subprocess.check_output(command, cwd=MODELS.parent, text=True) == "set()\n"
 
 
 SIX_BARS = """\

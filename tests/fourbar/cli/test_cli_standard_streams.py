@@ -5,13 +5,13 @@ Pipes are read to their end.
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from fourbar.cli import status
+from fourbar_validation.places import MODELS
 
-SCENE = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
+SCENE = MODELS / "crank_rocker.toml"
 TEXT = SCENE.read_bytes()
 
 

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,9 +15,9 @@ pytest.importorskip(
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
 from fourbar.edit.exports import evaluate_scene
+from fourbar_validation.places import MODELS
 from tests.support.shares import slow_but
 
-MODELS = Path(__file__).parents[3] / "models"
 BOUNDED = (
     "crank_rocker",
     "drag_link",
@@ -68,7 +67,7 @@ def test_what_grows_without_bound_is_no_number(name):
 @pytest.mark.slow
 def test_a_balanced_drive_has_no_peak_of_rounding():
     """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
-    scene = fourbar.load(MODELS / "capabilities" / "parallelogram.toml")
+    scene = fourbar.load(MODELS / "capabilities/parallelogram.toml")
     gravity_only = replace(scene, effects=(), loads=())
     peaks = evaluate_scene(gravity_only, COMMON, settled=True)["peaks"]
     assert peaks["torque"] == 0.0

@@ -36,9 +36,10 @@ from tornado.websocket import websocket_connect
 
 from fourbar.edit import exports, server, session
 from fourbar.edit.redirect import REDIRECT_ENDING, REDIRECT_PAGE, Redirect
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 
-CRANK_ROCKER = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
+CRANK_ROCKER = MODELS / "crank_rocker.toml"
 HUGE = 100_000_000
 """Bytes of a request that is not taken."""
 OPEN = []

@@ -6,7 +6,6 @@ From an empty scene to a saved file, numbers equal to `analyze`'s.
 import json
 import time
 from math import acos, cos, degrees, hypot, remainder, sin
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +24,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 from fourbar.files import loads
+from fourbar_validation.places import MODELS
 from tests.fourbar.edit.test_server import start
 
 pytestmark = pytest.mark.slow
@@ -38,7 +38,6 @@ PIXELS = 4.0
 
 
 SAVED = "/^saved|is saved/.test(document.getElementById('bench').textContent)"
-MODELS = Path(__file__).parents[3] / "models"
 
 
 class Page:
@@ -389,7 +388,7 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(page, path):
 
 def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(page, path):
     """What does not apply to a stroke is not there once it is commanded."""
-    path.write_text((MODELS / "gallery" / "excavator_bucket.toml").read_text())
+    path.write_text((MODELS / "gallery/excavator_bucket.toml").read_text())
     page.open(path)
     page.choose_stroke()
     page.wait("plain.motion.stroke && document.getElementById('field:motion/side')")

@@ -11,7 +11,6 @@ import struct
 import time
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,16 +30,14 @@ pytest.importorskip(
 from fourbar.edit.exports import evaluate_scene, pack_frame
 from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.edit.session import MOST_KEPT, MOST_SOLVED_ANEW, Session
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.shares import slow_but
 
-ROOT = Path(__file__).parents[3]
+CRANK_ROCKER = MODELS / "crank_rocker.toml"
 
-
-CRANK_ROCKER = ROOT / "models" / "crank_rocker.toml"
-
-BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
-FILES = sorted((ROOT / "models").rglob("*.toml"))
+BUCKET = MODELS / "gallery/excavator_bucket.toml"
+FILES = sorted(MODELS.rglob("*.toml"))
 SHOWN = [path for path in FILES if path.parent.name in ("models", "gallery")]
 
 PIXEL = 1e-3

@@ -6,7 +6,6 @@ The models say what their sources say.
 import re
 from dataclasses import replace
 from math import pi, tau
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,12 +28,13 @@ from fourbar import (
     solve,
 )
 from fourbar.files import dump, load, loads, save, scene_text
+from fourbar_validation.places import MODELS
 from tests.fourbar.test_solving import scenes
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
-MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
+FILES = sorted(MODELS.glob("*.toml"))
 
 
 def facts(scene):
@@ -53,7 +53,7 @@ def facts(scene):
     return (*(repr(part) for part in parts), scene.title, scene.source)
 
 
-@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_models_read_back_and_assemble_everywhere(path):
     scene = load(path)
     assert facts(loads(dump(scene))) == facts(scene)
@@ -116,11 +116,11 @@ def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
 
 def test_every_letter_of_a_title_reads_back():
     title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
-    assert loads(dump(replace(load(MODELS[0]), title=title))).title == title
+    assert loads(dump(replace(load(FILES[0]), title=title))).title == title
 
 
 def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
-    scene = load(MODELS[0])
+    scene = load(FILES[0])
     target = tmp_path / "scene.toml"
     save(scene, target)
     before = target.read_bytes()
@@ -136,7 +136,7 @@ def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
 
 
 def test_what_a_file_cannot_hold_is_refused():
-    scene = load(MODELS[0])
+    scene = load(FILES[0])
     with raises(InputError, match="one effect of each kind"):
         dump(replace(scene, effects=(Gravity(), Gravity())))
     with raises(InputError, match="Unicode"):

@@ -6,7 +6,6 @@ With loads, effects, and a drive on bar 4.
 import re
 from dataclasses import replace
 from math import atan2, cos, dist, remainder, sin, tau
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -37,6 +36,7 @@ from fourbar.linkage import BAR_NAMES
 from fourbar.mjcf import document, write_mjcf_for
 from fourbar.scene import Command
 from fourbar_validation.engines.mujoco.closed_loop import open_model
+from fourbar_validation.places import MODELS
 from tests.support.scenes import crank_rocker, thesis
 
 EXACT = 1e-6
@@ -54,7 +54,7 @@ NEXT_BAR = {
     "coupler": ("coupler",),
     "output": ("output",),
 }
-MATRIX = Path(__file__).parents[3] / "docs" / "examples" / "benchmark.csv"
+MATRIX = MODELS.parent / "docs/examples/benchmark.csv"
 
 
 def acted_on(**changes):

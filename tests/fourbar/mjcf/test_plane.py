@@ -13,16 +13,16 @@ from pytest import approx
 from fourbar import InputError, load
 from fourbar.mjcf import Plane, assembly, write_mjcf
 from fourbar_validation.engines.mujoco.closed_loop import open_model
+from fourbar_validation.places import MODELS
 from tests.support.robots import rotation
 from tests.support.rows import read_rows
-from tests.whole.test_imports import ROOT
 
 AXES = [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -3.0)]
 ORIGIN = (1.0, -2.0, 0.5)
 
 
 def scene():
-    return load(ROOT / "models" / "crank_rocker.toml")
+    return load(MODELS / "crank_rocker.toml")
 
 
 @pytest.mark.parametrize("axis", AXES)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import remainder, tau
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,10 +26,9 @@ from fourbar.show.columns import choose_columns
 from fourbar.show.derived import derive
 from fourbar.show.tables import print_positions
 from fourbar.solution import DEGREES
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.scenes import TURN
-
-MODELS = Path(__file__).parents[3] / "models"
 
 
 def columns(scene, names):
@@ -101,7 +99,7 @@ def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     growing = Motion(Sweep(0.0, 1.0, 3), 1.0, 0.5)
     with raises(InputError, match="no one speed"):
         columns(replace(TURN, motion=growing), "time")
-    cylinder = load(MODELS / "capabilities" / "stroke_input.toml")
+    cylinder = load(MODELS / "capabilities/stroke_input.toml")
     steady = replace(cylinder, motion=cylinder.motion.replace(acceleration=0.0))
     with raises(InputError, match="no one speed"):
         columns(cylinder, "time")

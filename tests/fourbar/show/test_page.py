@@ -5,7 +5,6 @@ import re
 import time
 from dataclasses import replace
 from math import atan2, cos, degrees, pi, remainder, sin
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,14 +17,12 @@ from fourbar.files import loads
 from fourbar.show import animate
 from fourbar.show.duty import compute_energies
 from fourbar.show.tolerances import PAGE_SAMPLES
+from fourbar_validation.places import MODELS
 from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
-
-
-MODELS = Path(__file__).parents[3] / "models"
 
 
 PRINTED_DEG = 6e-4

@@ -4,7 +4,6 @@ import csv
 import io
 import json
 from math import pi, tau
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.shown_units import units, units_of_scene, write_digits
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
@@ -29,7 +29,7 @@ PURE = (
 """Columns without a unit."""
 
 
-MODEL = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
+MODEL = MODELS / "crank_rocker.toml"
 
 
 INCH = 0.0254

@@ -4,7 +4,6 @@ import time
 import tomllib
 from itertools import pairwise
 from math import asin, cos, pi, radians, sin, sqrt, tau
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +32,7 @@ from fourbar.show.duty import list_duty
 from fourbar.show.motion_curves import acts, describe_motion
 from fourbar.show.summary import Facts
 from fourbar.studies.internal_forces import largest_bending
+from fourbar_validation.places import MODELS
 from tests.support.scenes import bare, crank_rocker
 from tests.support.shares import slow_but
 
@@ -48,7 +48,7 @@ SIDES = 1e-5
 """Part of the motion within which both sides of a corner are shown."""
 
 
-WIPER = Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml"
+WIPER = MODELS / "gallery/wiper.toml"
 
 
 CORNERS = tuple(np.radians([0.0, 98.3, 101.3, 104.3, 360.0]))

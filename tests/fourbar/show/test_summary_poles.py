@@ -4,7 +4,6 @@ of the sweep.
 
 from dataclasses import replace
 from math import acos, atan2, degrees, hypot, pi, radians, sin, tau
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +29,7 @@ from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
 from fourbar.show import block, motion_curves, summary
 from fourbar.show.duty import list_duty
+from fourbar_validation.places import MODELS
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.scenes import CYLINDER, crank_rocker
 from tests.support.shares import slow_but
@@ -92,9 +92,7 @@ direction = "0 deg"
 """A toggle clamp whose bars 2 and 3 would be in line at -6e-5 deg."""
 
 
-DIGGER = load(
-    Path(__file__).parents[3] / "models" / "capabilities" / "cylinder_1_4.toml"
-)
+DIGGER = load(MODELS / "capabilities/cylinder_1_4.toml")
 """The cylinder has no lever at one angle of bar 2."""
 
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,10 +28,8 @@ from fourbar.cli import status
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_sensitivity
 from fourbar.studies.keys import list_entries, read_place
+from fourbar_validation.places import MODELS
 from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
-
-MODELS = Path(__file__).parents[3] / "models"
-
 
 EXACT = 1e-10
 """Of the derivative, or of what the quantity would change by if it were proportional to
@@ -42,7 +39,7 @@ the number.
 
 def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
     """Others count by a hundredth of themselves, angles by a degree."""
-    slopes = sensitivity(load(MODELS / "capabilities" / "drawn.toml"))
+    slopes = sensitivity(load(MODELS / "capabilities/drawn.toml"))
     assert slopes.value("A")[0] == pytest.approx([0.095, 0.060])
     longest = max(slopes.solution.scene.linkage.lengths)
     numbers = dict(zip(slopes.keys, slopes.numbers, strict=True))

@@ -40,11 +40,10 @@ from fourbar.files import load, loads
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
+from fourbar_validation.places import MODELS
 from tests.support.scenes import balanced_lamp, bare
 from tests.support.shares import slow_but
 
-ROOT = Path(__file__).parents[3]
-MODELS = ROOT / "models"
 TURN = 2.0 * pi
 M, R, INERTIA = 1.5, 0.04, 0.002
 J = INERTIA + M * R * R
@@ -307,7 +306,7 @@ def test_what_is_balanced_is_indifferent_over_all_that_it_reaches():
     """
     hanging = crank_as_pendulum(DOWN)
     centred = replace(hanging.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0)))
-    square = load(MODELS / "textbook" / "gtdynamics_square.toml")
+    square = load(MODELS / "textbook/gtdynamics_square.toml")
     crossed = replace(square, motion=square.motion.replace(branch=-1))
     assert not equilibrium(square).indifferent
     lamp = equilibrium(balanced_lamp())
@@ -454,7 +453,7 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
 
 @pytest.mark.slow
 def test_the_command_prints_what_python_finds(run):
-    file = MODELS / "problems" / "gz_physics_987.toml"
+    file = MODELS / "problems/gz_physics_987.toml"
     printed = run(str(file))
     for words in (" 0.759439\n", "found between 3600 positions", "stable"):
         assert words in printed
@@ -463,7 +462,7 @@ def test_the_command_prints_what_python_finds(run):
     assert [rest["place"]["theta_2"] for rest in kept["equilibria"]] == places
     assert kept["samples"] == equilibria.samples
     assert kept["positions"]["theta_2"] == equilibria.positions.theta_2.tolist()
-    counterexamples = ROOT / "tests" / "counterexamples"
+    counterexamples = MODELS.parent / "tests/counterexamples"
     printed = run(str(counterexamples / "dry_friction_on_a_crank_at_rest.toml"))
     assert max(map(len, printed.splitlines())) <= BLOCK_WIDTH
     assert "friction alone holds" in printed and "largest without friction: " in printed

@@ -4,7 +4,6 @@ second derivatives, and the moments of one bar about its ground pin.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
@@ -13,11 +12,10 @@ from pytest import approx
 
 from fourbar import internal_forces, load, solve
 from fourbar.show.summary import Facts
+from fourbar_validation.places import MODELS
 
 SCENE = load(
-    Path(__file__).parents[2]
-    / "counterexamples"
-    / "bar_without_drive_beside_a_pole.toml"
+    MODELS.parent / "tests/counterexamples/bar_without_drive_beside_a_pole.toml"
 )
 """A force on bar 3 drives it. It has no lever at two places of the turn."""
 ROUNDED = 1e-13

@@ -6,7 +6,6 @@ Solved back, of every kind of motion.
 import re
 from dataclasses import replace
 from math import acos, cos, pi, radians, sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,6 +41,7 @@ from fourbar.studies.passing import (
     say_nowhere,
     say_range,
 )
+from fourbar_validation.places import MODELS
 from tests.support.scenes import bare, crank_rocker, thesis
 from tests.support.shares import slow_but
 
@@ -67,9 +67,7 @@ DROPPED = crank_rocker(
     motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
     effects=(Gravity(),),
 )
-STROKES = load(
-    Path(__file__).parents[3] / "models" / "capabilities" / "stroke_input.toml"
-)
+STROKES = load(MODELS / "capabilities/stroke_input.toml")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ What a file may not state.
 import json
 import re
 from math import copysign, sqrt
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,10 +34,11 @@ from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.tolerances import describe_parted, write_spreads
 from fourbar.solution import DEGREES
 from fourbar.studies import spread as studied
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
-MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
+MODEL = (MODELS / "crank_rocker.toml").read_text()
 
 
 TABLE = (

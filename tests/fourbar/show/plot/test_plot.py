@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations, cycle, product
 from math import acos, atan2, degrees, hypot, pi, radians, tau
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -43,6 +42,7 @@ from fourbar.show import duty, motion_curves, plot
 from fourbar.show.plot import curves, film, freebody, labels, linkage_figure, style
 from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.scenes import CYLINDER, crank_rocker, thesis
 from tests.support.shares import slow_but
@@ -60,7 +60,7 @@ TOUCH = 1.0
 """Boxes of texts may share this many pixels: a box is wider than its ink."""
 
 
-GALLERY = Path(__file__).parents[4] / "models" / "gallery"
+GALLERY = MODELS / "gallery"
 
 FULL_TURN = Sweep(0.0, 2 * pi, 360)
 CRANK_ROCKER = crank_rocker()
