@@ -128,6 +128,13 @@ PUSHES = [
 ]
 
 
+def embody(linkage, bodies):
+    """Give the moving bars these masses, inertias and centres."""
+    moving = zip(linkage.moving, bodies, strict=True)
+    bars = (Bar(bar.length, *body) for bar, body in moving)
+    return FourBar(linkage.ground, *bars, linkage.ground_angle)
+
+
 def make_scenes():
     """Combine linkages, commanded bars, assemblies, bodies, effects and drives."""
     bodies, acting = cycle(BODIES), cycle(ACTING)
@@ -137,10 +144,6 @@ def make_scenes():
         angles = [low + (high - low) * part for part in (0.03, 0.21, 0.45, 0.7, 0.96)]
         for other in set(MOVING_BARS) - {bar}:
             angles += [limit[bar - 2] for limit in limit_positions(linkage, other)]
-        moving = (
-            Bar(length.length, *body)
-            for length, body in zip(linkage.moving, next(bodies), strict=True)
-        )
         loads, effects = next(acting)
         rates = {f"omega_{bar}": -3.0, f"alpha_{bar}": 7.0, "branch": branch}
         drive = next(drives)
@@ -148,7 +151,7 @@ def make_scenes():
         yield (
             f"{name}, bar {bar}, {branch}",
             Scene(
-                FourBar(linkage.ground, *moving, linkage.ground_angle),
+                embody(linkage, next(bodies)),
                 Motion(**{f"theta_{bar}": angles}, **rates),
                 loads=loads,
                 effects=effects,

@@ -34,14 +34,9 @@ from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import release_at
 from fourbar.scene import Command
 from fourbar_validation.engines.free_body import FreeBody
-from tests.support.scenes import bare
+from tests.support.scenes import bare, crank_rocker
 
-HANGING = FourBar(
-    0.3,
-    Bar(0.1, 0.2),
-    Bar(0.25, 0.5, 0.004, (0.13, 0.3)),
-    Bar(0.22, 0.4),
-)
+HANGING = replace(crank_rocker().linkage, ground_angle=0.0)
 DOWN = Gravity()
 
 

@@ -12,15 +12,12 @@ from pytest import approx
 
 from fourbar import (
     Bar,
-    FourBar,
-    Friction,
     Gravity,
     InputError,
     Load,
     Motion,
     PinFriction,
     Scene,
-    Viscous,
     command,
     solve,
     uniform,
@@ -30,7 +27,7 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import Wrenches, pin_forces
 from fourbar.linkage import PIN_FORCE, PINS
-from tests.support.scenes import bare
+from tests.support.scenes import TURN, bare, crank_rocker
 
 EPS = 2.0**-52
 GROWN = 1e-13
@@ -39,35 +36,16 @@ each.
 """
 
 
-def scene(drive_bar):
-    bars = (
-        Bar(0.1, 0.2, 1e-3, (0.03, 0.4)),
-        Bar(0.25, 0.5, None, (0.1, -0.2)),
-        Bar(0.22, 0.4),
-    )
-    loads = (
-        Load(3, (5.0, 1.0), from_centre=(0.05, 0.3), moment=0.2, frame="bar"),
-        Load(4, (-3.0, 0.5)),
-    )
-    effects = (
-        Gravity(),
-        Viscous.at(O2=0.1, A=0.05, B=0.02),
-        Friction.at(O4=0.03),
-    )
-    motion = Motion(np.linspace(0.1, 6.0, 31), -8.0, 20.0)
-    return Scene(FourBar(0.3, *bars, 0.3), motion, drive_bar, loads, effects)
-
-
 def test_written_into_given_arrays():
-    solution = solve(scene(2))
-    out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
-    part = solve(scene(2), out=out)
+    solution = solve(TURN)
+    out = {"torque": np.empty(25), "F43": np.empty((25, 2))}
+    part = solve(TURN, out=out)
     assert part.torque is out["torque"] and part.F12 is part.theta_3 is None
     for name, array in out.items():
         assert np.array_equal(array, getattr(solution, name))
     for wrong, words in (("torque", r"out\.torque"), ("T2", "T2")):
         with pytest.raises(InputError, match=words):
-            solve(scene(2), out={wrong: np.empty(30)})
+            solve(TURN, out={wrong: np.empty(24)})
 
 
 @pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
@@ -121,7 +99,8 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     """With the couples mu r |F| as loads the forces are the same."""
     friction = PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
     angles = np.linspace(0.1, 6.0, 13)
-    case = replace(scene(drive_bar), motion=Motion(angles, 10.0), loads=())
+    motion = Motion(angles, 10.0)
+    case = crank_rocker(motion=motion, drive_bar=drive_bar, loads=())
     s = solve(replace(case, effects=(Gravity(), friction)))
     largest = max(np.hypot(*s[name].T).max() for name in PIN_FORCE.values())
     assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest

@@ -12,11 +12,11 @@ from fourbar import (
     Load,
     Motion,
     Scene,
-    Viscous,
     equilibrium,
     limit_positions,
     solve,
 )
+from tests.fourbar.test_solving_properties import ACTING, BODIES, embody
 from tests.support.balls import answer_in_balls
 from tests.support.scenes import draw_linkage
 
@@ -29,28 +29,12 @@ ROUNDED_SUM = 2.0**-51
 """Of the sum of four lengths: what is missing of it where each is rounded by four U."""
 
 
-def random_case(seed):
-    rng = np.random.default_rng(seed)
-    bare_one = draw_linkage(rng)
-    bars = []
-    for bar in bare_one.moving:
-        mass, inertia, r, phi = rng.uniform((0, 0, -0.5, -3), (2, 0.1, 0.5, 3)).tolist()
-        bars.append(Bar(bar.length, mass, inertia, (r, phi)))
-    linkage = FourBar(bare_one.ground, *bars, bare_one.ground_angle)
-    loads = (
-        Load(2, (3.0, 0.7), arm=(0.05, 1.0)),
-        Load(3, (2.0, 0.3), from_centre=(0.1, 2.0), moment=0.4, frame="bar"),
-        Load(4, (1.0, 0.9), arm=(0.2, -1.0), moment=-0.3),
-    )
-    viscous = Viscous.at(O2=0.1, A=0.2, B=0.3, O4=0.1)
-    return linkage, loads, (Gravity(), viscous)
-
-
 @pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_digits_are_kept_at_a_stated_distance_from_a_limit(seed, offset):
     """On one side of a limit the linkage assembles, with the torque of balls."""
-    linkage, loads, effects = random_case(seed)
+    linkage = embody(draw_linkage(np.random.default_rng(seed)), BODIES[0])
+    loads, effects = ACTING[1]
     for number in range(1, len(limit_positions(linkage)) + 1):
         drive, branch = 2 + number % 3, 1 - 2 * (number // 2 % 2)
         assembled = []
