@@ -102,7 +102,7 @@ def test_json_and_csv_have_every_key_and_every_digit(name, run):
     rows = read_csv(run("analyze", file, "--csv", "--units", "SI"))
     assert set(CONTRACT) <= set(document)
     for quantity in solution.evaluated():
-        array = getattr(solution, quantity)
+        array = solution[quantity]
         expected = np.where(np.isfinite(array), array, np.nan)  # null for NaN
         printed = np.array(document[quantity], dtype=float)
         assert np.array_equal(printed, expected, equal_nan=True), quantity

@@ -407,13 +407,13 @@ def test_another_command_goes_over_the_same_motion(tmp_path, command):
     ask(session, "command", command=command)
     after = solve(session.now.scene)
     assert after.assembled.all() and np.isfinite(after.drive_force).all()
-    values, places = getattr(before, command), getattr(after, command)
+    values, places = before[command], after[command]
     close = 3e-3 * np.ptp(values)
     assert sorted(places[[0, -1]]) == approx(sorted(values[[0, -1]]), abs=close)
     order = np.argsort(values)
     for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
-        poses = np.unwrap(getattr(before, name))[order]
-        apart = getattr(after, name) - np.interp(places, values[order], poses)
+        poses = np.unwrap(before[name])[order]
+        apart = after[name] - np.interp(places, values[order], poses)
         assert np.abs(np.sin(0.5 * apart)).max() < 1e-3
     assert ask(session, "undo")["text"] == BUCKET.read_text()
 
@@ -520,7 +520,7 @@ def test_the_answer_is_what_analyze_says(session):
     s = solve(loads(session.now.text), "error")
     columns = told["data"]["branches"]["1"]
     for name in ("theta_3", "torque", "torque_error", "power", "F12", "F43", "omega_4"):
-        assert_array_equal(columns[name], getattr(s, name))
+        assert_array_equal(columns[name], s[name])
     assert "\n  torque" in "\n".join(told["data"]["summary"])
     ask(session, "units", units="imperial")
     assert "lbf" in "\n".join(settled(session)["data"]["summary"])

@@ -65,7 +65,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
         assert missed <= BARS * s.force_error, name
     if (start_bar, end_bar) != (1, 2):
         # of bars 3 and 4, so nearly in line, 1e-11 would be left
-        largest = max(np.hypot(*getattr(s, name)[0]) for name in PIN_FORCES)
+        largest = max(np.hypot(*s[name][0]) for name in PIN_FORCES)
         assert s.drive_force_error[0] < 1e-13 * abs(s.drive_force[0])
         assert s.force_error[0] < 1e-13 * largest
 
@@ -95,7 +95,7 @@ def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
     assert s.status == status
     lost = s.status_code != 0
     for name in ("drive_force", "F12", "power"):
-        assert np.isnan(getattr(s, name)[lost]).all(), name
+        assert np.isnan(s[name][lost]).all(), name
     if drive is CROSSES_O2:
         assert s.drive_condition[0] < 1e-15 and s.stroke[0] == approx(0.1)
 

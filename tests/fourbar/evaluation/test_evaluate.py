@@ -130,7 +130,7 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     ours = solve(scene, "error")
     exact = BallArithmetic().answer(scene, commanded)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
-        width, values = getattr(ours, bar), [getattr(ours, q) for q in quantities]
+        width, values = ours[bar], [ours[q] for q in quantities]
         error = np.max(
             [
                 magnitude(value - exact.quantities[q])

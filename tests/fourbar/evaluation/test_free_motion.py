@@ -166,7 +166,7 @@ def test_what_begins_to_move_against_friction_does_so_at_once():
     assert s.alpha_2[0] != 0.0
     assert np.allclose(s.alpha_2, s.alpha_2[1], rtol=1e-5)
     for force in PINS:
-        then = getattr(s, force)
+        then = s[force]
         assert np.allclose(then, then[1], rtol=1e-4, atol=1e-5)
 
 

@@ -42,7 +42,7 @@ def test_written_into_given_arrays():
     part = solve(TURN, out=out)
     assert part.torque is out["torque"] and part.F12 is part.theta_3 is None
     for name, array in out.items():
-        assert np.array_equal(array, getattr(solution, name))
+        assert np.array_equal(array, solution[name])
     for wrong, words in (("torque", r"out\.torque"), ("T2", "T2")):
         with pytest.raises(InputError, match=words):
             solve(TURN, out={wrong: np.empty(24)})

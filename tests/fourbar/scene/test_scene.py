@@ -49,14 +49,14 @@ OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 
 def sine(solution, bar):
     """Between the two moving bars besides it."""
-    first, second = (getattr(solution, f"theta_{number}") for number in OTHERS[bar])
+    first, second = (solution[f"theta_{number}"] for number in OTHERS[bar])
     return np.asarray(np.sin(second - first))
 
 
 def of_bar(solution, bar):
     """What a bar was found to do, as a command."""
     names = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
-    theta, omega, alpha = (np.asarray(getattr(solution, name)) for name in names)
+    theta, omega, alpha = (np.asarray(solution[name]) for name in names)
     signs = np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8)
     linkage = bare(*solution.lengths, solution.ground[1])
     return with_signs(linkage, Command(theta, signs, omega, alpha, bar=bar))
@@ -93,9 +93,9 @@ def test_a_bar_without_limits_has_no_position_from_one():
 def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     theta, omega, alpha = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
     swept = solve(replace(LOADED, motion=Motion(**{omega: 2.0})))
-    angle = getattr(swept, theta)
+    angle = swept[theta]
     assert len(swept) == 361 and np.isfinite(swept.torque).all()
-    assert (getattr(swept, omega) == 2.0).all() and swept.commanded == theta
+    assert (swept[omega] == 2.0).all() and swept.commanded == theta
     assert (np.diff(angle) > 0.0).all()
     assert np.abs(np.diff(swept.theta_2)).max() < 1.0  # continuous
     table = tuple(np.linspace(angle[30], angle[200], 5).tolist())
@@ -103,7 +103,7 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     assert law.bar == bar and law.angle == table
     moved = solve(replace(LOADED, motion=Motion(law=law)))
     assert np.isfinite(moved.torque).all() and moved.time is not None
-    assert getattr(moved, theta)[-1] == approx(table[-1], rel=4 * U)
+    assert moved[theta][-1] == approx(table[-1], rel=4 * U)
     assert abs(moved.omega_2[0]) < 1e-12
     with raises(InputError, match=f"gives {theta}, {omega} and {alpha}"):
         Motion(law=law, theta_2=1.0)
@@ -196,7 +196,7 @@ def make_motion_of_a_law(law):
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     five = replace(LOADED, motion=Motion(np.linspace(0.5, 1.5, 5)))
-    angles = tuple(getattr(solve(five, "position"), f"theta_{bar}"))
+    angles = tuple(solve(five, "position")[f"theta_{bar}"])
     law = Law((0.0, 0.1, 0.3, 0.4, 0.5), **{f"theta_{bar}": angles}, steps=12)
     of_law = replace(LOADED, motion=Motion(law=law))
     of_each = replace(LOADED, motion=make_motion_of_a_law(law))

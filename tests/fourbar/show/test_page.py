@@ -81,7 +81,7 @@ class Page:
         """The page shows these numbers of a position, and draws A and B there."""
         for name in names:
             quantity, _, axis = name.partition("_" if name[0] == "F" else " ")
-            value = getattr(s, quantity)[row]
+            value = s[quantity][row]
             if axis:
                 value = value["xy".index(axis)]
             expected = approx(value, rel=PRINTED)
@@ -91,7 +91,7 @@ class Page:
         drawn = self.pins()
         scale = np.hypot(*drawn["O4"]) / s.scene.linkage.ground
         for pin in ("A", "B"):
-            assert_allclose(drawn[pin], scale * getattr(s, pin)[row], atol=PIXEL)
+            assert_allclose(drawn[pin], scale * s[pin][row], atol=PIXEL)
 
     def play(self, ticks):
         """Play without waiting: frames 50 ms apart, and the row after each."""
@@ -319,7 +319,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     moving = ("v_A", "v_G3", "a_A", "a_G3")
     for (start, stop), name in zip(arrows[[0, 3, 5, 8]], moving, strict=True):
         x, y = stop - start
-        expected = getattr(s, name)[20]
+        expected = s[name][20]
         assert atan2(-y, x) == approx(atan2(*expected[::-1]), abs=0.001), name
     script = "['1', '3'].map(k => parts.label[k])"
     texts = script + ".map(e => e.textContent)"
@@ -352,7 +352,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
     scale = length / float(text.split()[0])
     for name in ("F12", "F32", "F43", "F14"):
         drawn = np.array(page.run(script, name))
-        assert_allclose(drawn, getattr(s, name)[50] * scale, atol=PIXEL)
+        assert_allclose(drawn, s[name][50] * scale, atol=PIXEL)
 
 
 @pytest.mark.slow

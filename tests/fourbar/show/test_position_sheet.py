@@ -136,7 +136,7 @@ def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2,
     beside = Motion(theta_2 + np.array([-1e-5, 1e-5]), 6.0)
     two = solve(Scene(PARALLELOGRAM, beside, effects=(ALONG,)))
     for row, name in zip(rows[1:5], ("F12", "F32", "F43", "F14"), strict=True):
-        mean = getattr(two, name).mean(axis=0)
+        mean = two[name].mean(axis=0)
         assert numbers(row)[:2] == approx(mean, rel=SIX_DIGITS, abs=1e-8)
 
 

@@ -112,22 +112,22 @@ def list_sizes(scene, s):
     speed = s.stroke_speed
     if s.drive is None:
         drive = "torque"
-        speed = getattr(s, f"omega_{s.drive_bar}")
-    curves = {drive: getattr(s, drive), "power": s.power, "speed": speed}
+        speed = s[f"omega_{s.drive_bar}"]
+    curves = {drive: s[drive], "power": s.power, "speed": speed}
     for name in PIN_FORCE.values():
-        curves[name] = np.hypot(*getattr(s, name).T)
+        curves[name] = np.hypot(*s[name].T)
     for bar in MOVING_BARS:
         curves[f"bending_{bar}"] = largest_bending(scene, s, bar).moment
         if not acts(scene):
-            curves |= {n: getattr(s, n) for n in (f"omega_{bar}", f"alpha_{bar}")}
+            curves |= {n: s[n] for n in (f"omega_{bar}", f"alpha_{bar}")}
     return {name: np.abs(values) for name, values in curves.items()}
 
 
 def find_slip(s, pin):
     """Return the relative speed of the two bars at a pin, rad/s."""
     first, second = PINS[pin]
-    turned = getattr(s, f"omega_{second}")
-    return turned if first == 1 else turned - getattr(s, f"omega_{first}")
+    turned = s[f"omega_{second}"]
+    return turned if first == 1 else turned - s[f"omega_{first}"]
 
 
 def scan(scene, ends, *corners):
@@ -184,10 +184,10 @@ def test_facts_are_those_of_a_dense_scan(name):
         if quantity in (*PIN_FORCE.values(), "power", "speed"):
             assert shown[quantity].max() == right
     for bar, (low, high) in facts.angles.items():
-        angles = getattr(dense, f"theta_{bar}")
+        angles = dense[f"theta_{bar}"]
         assert low.value - EXACT <= angles.min() <= angles.max() <= high.value + EXACT
         reached = motion.solve_at(np.array([low.place, high.place]))
-        away = getattr(reached, f"theta_{bar}") - [low.value, high.value]
+        away = reached[f"theta_{bar}"] - [low.value, high.value]
         assert np.abs(np.sin(0.5 * away)).max() < EXACT
         assert facts.bending[bar].peak == panels.find_peak(f"bending_{bar}")
     least = facts.transmission

@@ -80,7 +80,7 @@ STROKES = load(MODELS / "capabilities/stroke_input.toml")
 )
 def test_every_position_with_a_value_is_found_in_rising_order(scene, name):
     solution = solve(scene, "position")
-    values = getattr(solution, name)
+    values = solution[name]
     value = float(values[3:5].mean())
     found = find_positions(scene, name, value)
     solved = getattr(solve(scene, "position", at=found), name)

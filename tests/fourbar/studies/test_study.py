@@ -126,7 +126,7 @@ def test_a_member_is_its_linkage_alone(effects, drive, stage):
         assert single.evaluated() == solution.evaluated()
         assert solution.status[member] == single.status
         for name in single.evaluated():
-            array, expected = getattr(solution, name), getattr(single, name)
+            array, expected = solution[name], single[name]
             assert array.shape == (M, *expected.shape)
             if name.endswith("_error"):
                 assert_allclose(array[member], expected, rtol=BARS, err_msg=name)
@@ -143,7 +143,7 @@ def test_blocks_over_members_and_positions_change_no_digit(size, monkeypatch):
     monkeypatch.setattr("fourbar.solving.POSITIONS_OF_A_BLOCK", size)
     piece = solve(study)
     for name in at_once.evaluated():
-        assert_array_equal(getattr(piece, name), getattr(at_once, name), err_msg=name)
+        assert_array_equal(piece[name], at_once[name], err_msg=name)
 
 
 def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
@@ -172,7 +172,7 @@ def test_a_bad_member_has_a_status_and_disturbs_no_other():
     assert [row[0] for row in solution.status] == said
     for name in solution.evaluated():
         if name != "theta_2":
-            assert np.isnan(getattr(solution, name)[[1, 2, 3, 5]]).all(), name
+            assert np.isnan(solution[name][[1, 2, 3, 5]]).all(), name
     single = solve(vary(plain, {"bars.coupler.mass": 1.0}))
     assert_array_equal(solution.torque[0], single.torque[0])
 
