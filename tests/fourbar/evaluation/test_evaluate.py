@@ -80,11 +80,8 @@ def exactly_one():
     Nothing is rounded but the result.
     """
     bars = FourBar(0.3, Bar(0.1, centre=(0.0, 0.0)), Bar(0.25), Bar(0.22))
-    return Scene(
-        bars,
-        Motion(np.array([0.3, 1.0]), 1.0),
-        loads=(Load(2, (1.0, 0.0), moment=1.0),),
-    )
+    load = Load(2, (1.0, 0.0), moment=1.0)
+    return Scene(bars, Motion([0.3, 1.0], 1.0), loads=(load,))
 
 
 def far_away(angle, ground_angle):
@@ -109,15 +106,13 @@ SCENES |= {
     f"{effect.key} near a limit": near_a_limit(effect)
     for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))
 }
-SCENES |= {
-    name: fault_scenes.FAULT_SCENES[name]
-    for name in (
-        "crank-rocker",
-        "near a limit",
-        "short output",
-        "ends of a spring nearly meet",
-    )
-}
+for name in (
+    "crank-rocker",
+    "near a limit",
+    "short output",
+    "ends of a spring nearly meet",
+):
+    SCENES[name] = fault_scenes.FAULT_SCENES[name]
 
 
 @pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
@@ -126,21 +121,13 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     scene = SCENES[name]
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
-    commanded = command(scene)
     ours = solve(scene, "error")
-    exact = BallArithmetic().answer(scene, commanded)
+    exact = BallArithmetic().answer(scene, command(scene))
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
-        width, values = ours[bar], [ours[q] for q in quantities]
-        error = np.max(
-            [
-                magnitude(value - exact.quantities[q])
-                for value, q in zip(values, quantities, strict=True)
-            ],
-            axis=0,
-        )
-        half_a_digit = 0.5 * np.spacing(
-            np.max([magnitude(value) for value in values], axis=0)
-        )
+        width = ours[bar]
+        largest = np.max([magnitude(ours[q]) for q in quantities], axis=0)
+        missed = [magnitude(ours[q] - exact.quantities[q]) for q in quantities]
+        error, half_a_digit = np.max(missed, axis=0), 0.5 * np.spacing(largest)
         assert (error <= BARS * width).all(), name
         assert (width >= half_a_digit).all()
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
@@ -186,12 +173,8 @@ def test_an_error_bar_grows_with_the_angle(angle):
 
 def test_an_error_bar_at_the_end_of_a_table_of_a_load():
     """The slope of the forces would be taken beyond the table."""
-    table = Table((0.5, 1.0), (1.0, 2.0))
-    load = Load(4, moment=1.0, table=table)
-    scene = Scene(
-        uniform(0.3, 0.1, 0.25, 0.22),
-        Motion(np.array([0.7, 1.0]), 3.0),
-        loads=(load,),
-    )
+    load = Load(4, moment=1.0, table=Table((0.5, 1.0), (1.0, 2.0)))
+    motion = Motion([0.7, 1.0], 3.0)
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion, loads=(load,))
     error = solve(scene, "error").torque_error
     assert np.all((error > 0.0) & (error < 1e-14))

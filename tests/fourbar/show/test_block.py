@@ -43,10 +43,10 @@ from fourbar.show.studies import write_equilibria
 from fourbar.show.summary import Facts
 from fourbar.show.tables import write_cells
 from fourbar.solving import find_last_stage
-from tests.support.scenes import CYLINDER, balanced_lamp, crank_rocker, thesis
+from tests.support.scenes import CYLINDER, balanced_lamp, bare, crank_rocker, thesis
 from tests.support.shares import slow_but
 
-MASSLESS = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+MASSLESS = bare(0.3, 0.1, 0.25, 0.22)
 
 WEIGHT = (Gravity(),)
 
@@ -408,26 +408,16 @@ def test_the_block_has_the_numbers_of_the_facts():
     text = "\n".join(write_block(facts.solution))
     duty = facts.duty
     peak = facts.peak
-    torque, rms, most = (
-        f"{1e3 * number:.4g} mN m"
-        for number in (peak.value, duty.rms_torque, duty.peak_torque)
-    )
-    power, swing, given, back = (
-        f"{number:.4g}"
-        for number in (
-            duty.peak_power,
-            duty.energy_swing,
-            duty.energy_in,
-            duty.energy_out,
-        )
-    )
+    torque, rms, most = 1e3 * np.array([peak.value, duty.rms_torque, duty.peak_torque])
+    rms, power = f"RMS {rms:.4g} mN m", f"{duty.peak_power:.4g} W"
+    swings = f"energy swings by {duty.energy_swing:.4g} J about"
     for words in (
-        f"  torque   peak {torque} at theta_2 = {write(peak.place)}, RMS {rms}\n",
-        f"peak {power} W; {given} J per turn given",
-        f"{back} J taken back",
-        f"\nmotor: at least {most} at 95.49 rpm (RMS {rms}), {power} W\n",
+        f"  torque   peak {torque:.4g} mN m at theta_2 = {write(peak.place)}, {rms}\n",
+        f"peak {power}; {duty.energy_in:.4g} J per turn given",
+        f"{duty.energy_out:.4g} J taken back",
+        f"\nmotor: at least {most:.4g} mN m at 95.49 rpm ({rms}), {power}\n",
         # weights and constant couples give back all that they take
-        f"cycle    mean torque 0 mN m; energy swings by {swing} J about",
+        f"cycle    mean torque 0 mN m; {swings}",
         "rounding changes none of these digits",
     ):
         assert words in text
@@ -445,10 +435,9 @@ def test_the_rates_are_the_largest_of_the_bars_that_follow():
     text = block(Scene(MASSLESS, turn()))
     dense = solve(Scene(MASSLESS, turn(20_000)))
     for name, factor, unit in (("omega", 30.0 / pi, "rpm"), ("alpha", 1.0, "rad/s²")):
-        rates = [dense[f"{name}_{bar}"] for bar in (3, 4)]
-        peaks = [factor * rate[np.abs(rate).argmax()] for rate in rates]
-        words = " ".join(f"{peak:.4g} {unit}" for peak in peaks)
-        assert f"{name} {words} at" in text
+        rates = factor * np.array([dense[f"{name}_3"], dense[f"{name}_4"]])
+        first, second = (rate[np.abs(rate).argmax()] for rate in rates)
+        assert f"{name} {first:.4g} {unit} {second:.4g} {unit} at" in text
 
 
 @pytest.mark.parametrize("steps", [1, 6])
@@ -458,16 +447,15 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     fine = Motion(Sweep(0.2, 1.4, 1000) if steps > 1 else 0.2, 0.0)
     static = solve(crank_rocker(motion=fine, effects=WEIGHT)).torque
     held = crank_rocker(motion=sweep, effects=(*WEIGHT, Friction.at(O2=0.5)))
-    low = static.min() - 0.5
-    high = static.max() + 0.5
     digits = 6
     where = ": dry friction holds"
     if steps > 1:
         digits = 4
         where = " over theta_2 = 11.46 deg to 80.21 deg, a part of it at each"
         assert np.ptp(static) > 0.1
-    low, high = (f"{1e3 * end:.{digits}g} mN m" for end in (low, high))
-    assert f"at rest {low} to {high}{where}" in block(held)
+    low, high = 1e3 * (static.min() - 0.5), 1e3 * (static.max() + 0.5)
+    said = f"at rest {low:.{digits}g} mN m to {high:.{digits}g} mN m{where}"
+    assert said in block(held)
 
 
 @pytest.mark.slow
@@ -550,21 +538,18 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     """The peaks of the motion either way, slow enough for its inertia not to show."""
     effects = (*WEIGHT, PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
     rubbing = {"loads": (SPIKE,), "effects": effects, "drive": CYLINDER}
-    ways = [
-        Facts(solve(scene))
-        for speed in (1e-9, -1e-9)
-        for scene in [crank_rocker(motion=Motion(angle, speed), **rubbing)]
-    ]
-    scene = crank_rocker(motion=Motion(angle, 0.0), **rubbing)
-    lines = write_block(solve(scene), units("N N.m"))
+    at_rest, *ways = (
+        solve(crank_rocker(motion=Motion(angle, speed), **rubbing))
+        for speed in (0.0, 1e-9, -1e-9)
+    )
+    lines = write_block(at_rest, units("N N.m"))
     rows = [line for line in lines if line.startswith("  to move")]
     names = [*PIN_FORCES], ["bending_2", "bending_3", "bending_4"]
+    motions = [Facts(way).motion for way in ways]
     for row, group in zip(rows, names, strict=True):
-        peaks = [
-            max(way.motion.find_peak(name).value for way in ways) for name in group
-        ]
+        sizes = [[motion.find_peak(name).value for motion in motions] for name in group]
         printed = [float(size) for size in re.findall(r"\d[\d.]*", row)]
-        assert printed == approx(peaks, rel=2e-4)
+        assert printed == approx(np.max(sizes, axis=1), rel=2e-4)
     assert "to move" not in block(crank_rocker(motion=Motion(angle, 0.0)))
 
 

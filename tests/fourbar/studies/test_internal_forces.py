@@ -14,7 +14,6 @@ from pytest import approx, raises
 
 from fourbar import (
     Bar,
-    FourBar,
     Gravity,
     InputError,
     Load,
@@ -25,7 +24,7 @@ from fourbar import (
     solve,
 )
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import bare, crank_rocker
 
 ROUNDED = 1e-12
 """Relative to the sum of the terms: some tens of roundings and a division by sin mu,
@@ -33,7 +32,7 @@ which is above 0.6 here.
 """
 
 
-BARE = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22))
+BARE = bare(0.3, 0.1, 0.25, 0.22)
 
 
 AT = Motion(1.0, 0.0)
@@ -41,10 +40,6 @@ AT = Motion(1.0, 0.0)
 
 def solved(scene, bar, stations=None):
     return internal_forces(scene, solve(scene), bar, stations)
-
-
-def load_beam(load, bar=3, stations=None, **parts):
-    return solved(Scene(BARE, AT, loads=(load,), **parts), bar, stations)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +63,7 @@ def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     load = Load(bar, moment=3.0, **json.loads(load))
     point = Point("P", 4, from_pin=(0.05, 0.0))
     x = np.array([0.01, 0.06, 0.12, 0.2])
-    internal = load_beam(load, bar, x, points=(point,))
+    internal = solved(Scene(BARE, AT, loads=(load,), points=(point,)), bar, x)
     length = BARE.bar(bar).length
     M = 3.0 * (x / length - (x > foot))
     assert_allclose(internal.M[0], M, atol=3.0 * ROUNDED)
@@ -136,12 +131,8 @@ def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever():
     """
     linkage = replace(BARE, output=Bar(0.22, 0.4))
     load = Load(4, (8.0, math.radians(-90.0)), from_pin=(0.3, 0.0), frame="bar")
-    scene = Scene(
-        linkage,
-        Motion(1.1, 12.0, 30.0),
-        loads=(load,),
-        effects=(Gravity(9.81),),
-    )
+    motion = Motion(1.1, 12.0, 30.0)
+    scene = Scene(linkage, motion, loads=(load,), effects=(Gravity(9.81),))
     x = np.array([0.2200001, 0.25, 0.29, 0.31, 0.4])
     internal = solved(scene, 4, x)
     assert internal.uniform

@@ -15,8 +15,6 @@ from pytest import approx, raises
 from scipy.stats import norm
 
 from fourbar import (
-    Bar,
-    FourBar,
     Friction,
     Gravity,
     InputError,
@@ -54,25 +52,18 @@ by 1/sqrt(2 N) = 0.016.
 
 
 def spread(*stated, samples=2048, seed=0, **motion):
-    linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
-    case = Scene(
-        linkage,
-        Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)),
-        tolerances=stated,
-    )
-    return tolerances(case, samples, seed)
+    moving = {"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion
+    free = {"loads": (), "effects": (), "tolerances": stated}
+    return tolerances(crank_rocker(motion=Motion(**moving), **free), samples, seed)
 
 
 def test_a_number_that_the_torque_is_proportional_to():
-    omega = Tolerance(
-        "motion.omega_2", 0.3
-    )  # the torque of inertia alone is proportional to its square
-    study = spread(omega)
+    # the torque of inertia alone is proportional to its square
+    study = spread(Tolerance("motion.omega_2", 0.3))
     torque = study.spreads["torque"]
     size = np.abs(torque.nominal)
-    assert_allclose(
-        np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4
-    )
+    most = np.fmax(np.abs(torque.least), np.abs(torque.greatest))
+    assert_allclose(most, 1.0609 * size, rtol=1e-4)
     assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
     assert_allclose(torque.first_order, 2 * 0.03 / sqrt(3) * size, rtol=1e-12)
     assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
@@ -81,10 +72,10 @@ def test_a_number_that_the_torque_is_proportional_to():
 
 
 def test_friction_at_rest_moves_what_it_holds_and_no_torque():
-    stated = {"tolerances": (Tolerance("effects.friction.O2", 0.01),)}
-    rubbing = {"effects": (Gravity(), Friction.at(O2=0.05))}
-    angles = np.array([0.4, 1.9])
-    study = tolerances(crank_rocker(motion=Motion(angles, 0.0), **rubbing, **stated))
+    stated = (Tolerance("effects.friction.O2", 0.01),)
+    effects = Gravity(), Friction.at(O2=0.05)
+    motion = Motion([0.4, 1.9], 0.0)
+    study = tolerances(crank_rocker(motion=motion, effects=effects, tolerances=stated))
     for name, width in (("torque", 0.0), ("torque_low", 0.01), ("torque_high", 0.01)):
         assert_allclose(study.spreads[name].worst, width, rtol=1e-9, atol=1e-12)
         sigma = study.spreads[name].deviation
