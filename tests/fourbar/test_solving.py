@@ -76,13 +76,13 @@ def finite(solution, *names):
     return all(np.isfinite(getattr(solution, name)).all() for name in names)
 
 
-magnitudes = st.floats(-320.0, 308.0).map(
-    lambda exponent: 10.0**exponent
-) | st.sampled_from([0.0, 1.0])
-numbers = st.builds(
-    lambda sign, size: sign * size, st.sampled_from([1.0, -1.0]), magnitudes
-) | st.floats(-10.0, 10.0)
+powers = st.floats(-320.0, 308.0).map(lambda power: 10.0**power)
+magnitudes = powers | st.sampled_from([0.0, 1.0])
+signs = st.sampled_from([1.0, -1.0])
+numbers = st.builds(lambda sign, size: sign * size, signs, magnitudes)
+numbers |= st.floats(-10.0, 10.0)
 sizes = magnitudes | st.floats(0.0, 10.0)
+stiff = sizes.filter(bool)
 angles = st.floats(-7.0, 7.0) | st.sampled_from([0.0, pi, pi / 2]) | numbers
 pairs = st.tuples(numbers, angles)
 per_pin = st.dictionaries(st.sampled_from(list(PINS)), sizes, min_size=1)
@@ -94,22 +94,14 @@ def linkages(draw):
 
     Of a few round numbers, so that bars are equal, or of any size.
     """
-    lengths = [
-        draw(st.sampled_from([1.0, 2.0, 3.0]) | st.floats(0.5, 3.0)) for _ in range(4)
-    ]
+    length = st.sampled_from([1.0, 2.0, 3.0]) | st.floats(0.5, 3.0)
+    lengths = draw(st.lists(length, min_size=4, max_size=4))
     if draw(st.booleans()):  # pairs of equal bars
-        lengths = [
-            lengths[i]
-            for i in draw(st.sampled_from([(0, 1, 0, 1), (0, 0, 1, 1), (0, 1, 1, 0)]))
-        ]
-    longest = lengths.index(max(lengths))
-    lengths[longest] = min(
-        lengths[longest], (1.0 - 1e-12) * (sum(lengths) - lengths[longest])
-    )
-    scale = draw(
-        st.sampled_from([1.0])
-        | st.floats(-300.0, 306.0).map(lambda exponent: 10.0**exponent)
-    )
+        lengths = 2 * lengths[:2]
+    *others, longest = sorted(lengths)
+    closing = min(longest, (1.0 - 1e-12) * sum(others))
+    lengths = draw(st.permutations([*others, closing]))
+    scale = draw(st.just(1.0) | st.floats(-300.0, 306.0).map(lambda power: 10.0**power))
     bars = []
     for length in lengths[1:]:
         mass, inertia = draw(sizes), draw(st.none() | sizes)
@@ -126,18 +118,9 @@ def scenes(draw):
     Magnitudes go from the least double to the greatest.
     """
     linkage = draw(linkages())
-    loads = draw(
-        st.lists(
-            st.builds(
-                Load,
-                st.sampled_from(MOVING_BARS),
-                pairs,
-                from_pin=pairs,
-                moment=numbers,
-            ),
-            max_size=2,
-        )
-    )
+    bars, pins = st.sampled_from(MOVING_BARS), st.sampled_from(list(PINS))
+    load = st.builds(Load, bars, pairs, from_pin=pairs, moment=numbers)
+    loads = draw(st.lists(load, max_size=2))
     ends = [
         st.tuples(numbers, angles).map(partial(Place, bar))
         for bar in draw(st.permutations([1, *MOVING_BARS]))[:2]
@@ -146,34 +129,22 @@ def scenes(draw):
         st.builds(Gravity, numbers, angles),
         per_pin.map(lambda pins: Viscous.at(**pins)),
         per_pin.map(lambda pins: Friction.at(**pins)),
-        st.dictionaries(
-            st.sampled_from(list(PINS)),
-            st.tuples(sizes, sizes),
-            min_size=1,
-            max_size=2,
-        ).map(lambda pins: PinFriction.at(**pins)),
-        st.dictionaries(
-            st.sampled_from(list(PINS)),
-            st.tuples(sizes.filter(bool), angles, numbers),
-            min_size=1,
-        ).map(lambda pins: Torsion.at(**pins)),
-        st.builds(Spring, *ends, sizes.filter(bool), sizes, numbers).map(
+        st.dictionaries(pins, st.tuples(sizes, sizes), min_size=1, max_size=2).map(
+            lambda pins: PinFriction.at(**pins)
+        ),
+        st.dictionaries(pins, st.tuples(stiff, angles, numbers), min_size=1).map(
+            lambda pins: Torsion.at(**pins)
+        ),
+        st.builds(Spring, *ends, stiff, sizes, numbers).map(
             lambda spring: Springs((spring,))
         ),
     ]
     effects = [draw(strategy) for strategy in possible if draw(st.integers(0, 3)) == 0]
-    theta_2 = linkage.ground_angle + np.array(
-        draw(st.lists(angles, min_size=1, max_size=4))
-    )
+    away = draw(st.lists(angles, min_size=1, max_size=4))
     omega_2 = draw(numbers.filter(lambda omega: isfinite(omega * omega)))
-    motion = Motion(theta_2, omega_2, draw(numbers), draw(st.sampled_from([1, -1])))
-    return Scene(
-        linkage,
-        motion,
-        draw(st.sampled_from(MOVING_BARS)),
-        tuple(loads),
-        tuple(effects),
-    )
+    rates = omega_2, draw(numbers), draw(st.sampled_from([1, -1]))
+    motion = Motion(linkage.ground_angle + np.array(away), *rates)
+    return Scene(linkage, motion, draw(bars), tuple(loads), tuple(effects))
 
 
 @pytest.mark.slow
