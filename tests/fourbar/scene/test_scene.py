@@ -32,9 +32,8 @@ from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
-from fourbar.scene import Command, command_at, with_signs
+from fourbar.scene import command_at
 from tests.support.rows import read_rows
-from tests.support.scenes import bare
 from tests.support.shares import slow_but
 
 U = 2.0**-53
@@ -51,15 +50,6 @@ def sine(solution, bar):
     """Between the two moving bars besides it."""
     first, second = (solution[f"theta_{number}"] for number in OTHERS[bar])
     return np.asarray(np.sin(second - first))
-
-
-def of_bar(solution, bar):
-    """What a bar was found to do, as a command."""
-    names = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
-    theta, omega, alpha = (np.asarray(solution[name]) for name in names)
-    signs = np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8)
-    linkage = bare(*solution.lengths, solution.ground[1])
-    return with_signs(linkage, Command(theta, signs, omega, alpha, bar=bar))
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
@@ -113,13 +103,11 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
 def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar):
     free = Free(0.4, 8)
     scene = replace(LOADED, effects=(*LOADED.effects, Viscous.at(O2=0.01)), loads=())
-    start = of_bar(solve(replace(scene, motion=Motion(1.2, 3.0)), "acceleration"), bar)
-    commanded = {
-        f"theta_{bar}": float(start.angle[0]),
-        f"omega_{bar}": float(start.speed[0]),
-        "branch": int(start.branch[0]),
-    }
-    moved = solve(replace(scene, motion=Motion(free=free, **commanded)))
+    start = solve(replace(scene, motion=Motion(1.2, 3.0)), "velocity")
+    names = f"theta_{bar}", f"omega_{bar}"
+    commanded = {name: start[name][0] for name in names}
+    branch = int(np.sign(sine(start, bar)[0]))
+    moved = solve(replace(scene, motion=Motion(free=free, branch=branch, **commanded)))
     same = solve(replace(scene, motion=Motion(1.2, 3.0, free=free)))
     assert len(moved) == len(same) == 9
     assert moved.theta_2 == approx(same.theta_2, abs=1e-9)
@@ -136,13 +124,8 @@ output = "22 cm"
 """
 
 
-STROKE = Motion(
-    stroke=0.3,
-    stroke_speed=0.1,
-    stroke_acceleration=0.2,
-    side="left",
-    branch=-1,
-)
+RATES = {"stroke": 0.3, "stroke_speed": 0.1, "side": "left", "branch": -1}
+STROKE = Motion(stroke_acceleration=0.2, **RATES)
 
 
 @pytest.mark.parametrize(
@@ -153,11 +136,7 @@ STROKE = Motion(
             {"angle": 1.5, "branch": 1},
             Motion(1.5, 2.0, 3.0, 1),
         ),
-        (
-            STROKE,
-            {"acceleration": 0.0},
-            Motion(stroke=0.3, stroke_speed=0.1, side="left", branch=-1),
-        ),
+        (STROKE, {"acceleration": 0.0}, Motion(**RATES)),
         (
             Motion(law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.0, 1.0, 1.5, 1.0))),
             {"law": None},
@@ -169,10 +148,8 @@ STROKE = Motion(
 )
 def test_a_motion_is_replaced_by_what_it_commands(motion, changes, same):
     assert motion.replace() == motion != same == motion.replace(**changes)
-    with raises(
-        TypeError,
-        match="no field 'theta_2' to replace; it has angle, speed, acceleration",
-    ):
+    words = "no field 'theta_2' to replace; it has angle, speed, acceleration"
+    with raises(TypeError, match=words):
         motion.replace(theta_2=1.0)
 
 
@@ -186,20 +163,15 @@ def test_a_motion_reads_by_the_name_of_what_it_commands():
     assert others == (None, None, 0.0, None)
 
 
-def make_motion_of_a_law(law):
-    """State the positions of a law one by one, each with its speed and growth."""
-    angle, speed, acceleration = law.at(law.times())
-    names = Motion(**{f"theta_{law.bar}": 0.0}).names
-    return Motion(**dict(zip(names, (angle, speed, acceleration), strict=True)))
-
-
 @pytest.mark.parametrize("bar", [2, 3, 4])
 def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     five = replace(LOADED, motion=Motion(np.linspace(0.5, 1.5, 5)))
     angles = tuple(solve(five, "position")[f"theta_{bar}"])
     law = Law((0.0, 0.1, 0.3, 0.4, 0.5), **{f"theta_{bar}": angles}, steps=12)
     of_law = replace(LOADED, motion=Motion(law=law))
-    of_each = replace(LOADED, motion=make_motion_of_a_law(law))
+    names = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
+    each = dict(zip(names, law.at(law.times()), strict=True))
+    of_each = replace(LOADED, motion=Motion(**each))
     expected = solve(of_law)
     assert np.array_equal(solve(of_each).torque, expected.torque)
     assert np.array_equal(solve(of_each).F12, expected.F12)
