@@ -25,11 +25,13 @@ from fourbar.files import dump
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES
+from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES, Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.derived import derive
+from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import compute_energies
+from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.plot.film import write_film
 from fourbar.show.plot.style import format_of, shorten_text
 from fourbar.show.plot.symbols import Symbol, list_acting
@@ -40,7 +42,7 @@ from fourbar.show.plot.view import (
     list_sweep,
     set_branch,
 )
-from fourbar.show.shown_units import choose_unit
+from fourbar.show.shown_units import choose_unit, drop_rounding
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.solution import SI, Conversion, Solution
 from fourbar.solving import solve
@@ -186,6 +188,7 @@ def _collect_sweep(
     places = thin_out(swept).places
     name = swept.commanded
     shown = command_at(scene, places)
+    start = _find_start(scene, shown)
     branches = {}
     if solved is not None and not np.array_equal(places, solved.at.places):
         solved = None
@@ -193,6 +196,8 @@ def _collect_sweep(
         if solved is None or sign != motion.branch:
             one = set_branch(scene, sign)
             solution = solve(one, stage, at=command_at(one, places))
+            if start is not None and len(command(scene).angle) == 1:
+                _count_turns_from(start, solution)
         else:
             solution = solved
         branches[str(sign)] = _collect_columns(solution)
@@ -209,11 +214,19 @@ def _collect_sweep(
             "speed": None if isinstance(motion.speed, np.ndarray) else motion.speed,
         },
         "rate": None,
-        "start": _find_start(scene, shown),
+        "start": start,
         "branches": branches,
         "pace": None,
         "positions": len(swept.angle),
     }
+
+
+def _count_turns_from(row: int, solution: Solution) -> None:
+    """Put the angles that are not commanded within (-pi, pi] at one position."""
+    for name in ("theta_2", *ANGLES):
+        angles = getattr(solution, name)
+        if name != solution.commanded and np.isfinite(angles[row]):
+            angles -= math.tau * np.ceil(angles[row] / math.tau - 0.5)
 
 
 def _find_start(scene: Scene, shown: Command) -> int | None:
@@ -300,10 +313,34 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = values
+    if solution.omega_4 is not None:
+        fastest = _drop_rounding(columns, RATES[:3])
+        _drop_rounding(columns, RATES[3:], fastest**2)
+    if solution.F12 is not None:
+        _drop_rounding(columns, PIN_FORCES)
+        sizes = read_drive_demand(solution).sizes
+        idle = sizes <= find_drive_rounding(solution)
+        for name in {"torque", "power", "drive_force"} & columns.keys():
+            columns[name] = np.where(idle, 0.0, columns[name])
     for name in DERIVED_NAMES:
         if name not in CENTRES and (values := derive(solution, name)) is not None:
             columns[name] = values
     return columns
+
+
+def _drop_rounding(
+    columns: dict[str, Any], names: tuple[str, ...], among: float | Array = 0.0
+) -> Array:
+    """Drop what is rounding of the largest of its kind at its position.
+
+    `among`: another of the kind. Returns the largest of each position, (n,).
+    """
+    kind = np.array([columns[name].T for name in names])
+    sizes = np.abs(kind).reshape(-1, kind.shape[-1])
+    largest = np.fmax(np.fmax.reduce(sizes), among)
+    for name, numbers in zip(names, drop_rounding(kind, largest), strict=True):
+        columns[name] = numbers.T
+    return largest
 
 
 def _encode_pictures(

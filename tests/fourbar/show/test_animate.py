@@ -14,10 +14,11 @@ from html.parser import HTMLParser
 from importlib.util import find_spec
 from itertools import pairwise
 from math import nan, pi, radians
+from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_equal
+from numpy.testing import assert_allclose, assert_equal
 from pytest import approx, raises
 
 from fourbar import (
@@ -28,6 +29,7 @@ from fourbar import (
     Motion,
     NotAssembledError,
     Sweep,
+    load,
     solve,
 )
 from fourbar.files import loads
@@ -35,7 +37,8 @@ from fourbar.scene.pictures import LARGEST_PICTURE
 from fourbar.show import animate
 from fourbar.show.plot import film as films
 from fourbar.show.plot import style, view
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.rows import read_rows
+from tests.support.scenes import bare, crank_rocker, thesis
 
 HOSTILE = (
     "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data}"
@@ -43,6 +46,7 @@ HOSTILE = (
 )
 
 
+CAPABILITIES = Path(__file__).parents[3] / "models" / "capabilities"
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAAD0lEQVR4nGP4z8DwHwYBABv2A/0Fj9VPAAAAAElFTkSuQmCC"
 )
@@ -86,6 +90,35 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
     assert data["theta_2"][row] == theta_2 and len(data["theta_2"]) > 300
     torque = data["branches"]["1"]["torque"][row]
     assert torque == solve(thesis(theta_2)).torque[0]
+
+
+def test_a_single_position_has_the_angles_of_its_solution():
+    """The table begins at 0 deg, from where the output of a parallelogram goes on."""
+    motion = Motion(radians(200.0), 3.0)
+    scene = crank_rocker(linkage=bare(0.3, 0.1, 0.3, 0.1), motion=motion)
+    data = animate.collect_page_data(scene, {})
+    assert data["branches"]["1"]["theta_4"][data["start"]] == approx(radians(-160.0))
+
+
+ROUNDING = read_rows("""
+parallelogram | 9 | torque
+parallelogram | 9 | power
+parallelogram | 9 | F12
+antiparallelogram | 6 | omega_3
+antiparallelogram | 18 | alpha_3
+""")
+"""A model, a row of its sweep and what has a number there that is rounding alone."""
+
+
+@pytest.mark.parametrize("model, row, name", ROUNDING)
+def test_what_is_rounding_of_its_kind_is_zero(model, row, name):
+    scene = load(CAPABILITIES / f"{model}.toml")
+    columns = animate.collect_live_data(scene)["branches"][str(scene.motion.branch)]
+    shown = columns[name]
+    solved = getattr(solve(scene), name)
+    assert_allclose(shown, solved, atol=1e-12)
+    here = int(row)
+    assert np.count_nonzero(shown[here]) == np.count_nonzero(solved[here]) - 1
 
 
 RELEASED = crank_rocker(motion=Motion(0.5, 0.0, free=Free(1.8, 90)), drive_bar=2)
