@@ -391,21 +391,16 @@ def commanded(what, branch):
 
     The stroke is that of the cylinder that drives it.
     """
-    value, speed, acceleration = COMMANDED[what]
     if what in CYLINDERS:
         drive, side = CYLINDERS[what]
-        motion = Motion(
-            stroke=value,
-            stroke_speed=speed,
-            side=side,
-            branch=branch,
-        )
-        motion = motion.replace(acceleration=acceleration)
-        return crank_rocker(motion=motion, drive=drive)
-    bar = what[-1]
-    stated = {what: value, f"omega_{bar}": speed, f"alpha_{bar}": acceleration}
-    motion = Motion(**stated, branch=branch)
-    return crank_rocker(motion=motion, drive_bar=int(bar))
+        names = ("stroke", "stroke_speed", "stroke_acceleration")
+        driven = {"drive": drive}
+    else:
+        side, bar = None, what[-1]
+        names = (what, f"omega_{bar}", f"alpha_{bar}")
+        driven = {"drive_bar": int(bar)}
+    stated = dict(zip(names, COMMANDED[what], strict=True))
+    return crank_rocker(motion=Motion(**stated, side=side, branch=branch), **driven)
 
 
 @each_engine

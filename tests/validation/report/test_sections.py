@@ -31,9 +31,14 @@ def judged(scene, verdict):
     return changed(scene=scene, verdict=verdict)
 
 
-def test_every_scene_is_counted_in_its_family_alone():
+def list_holding():
+    """List a row that agrees of each hard scene."""
     hard = Hard()
-    rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
+    return [judged(hard.name(index), AGREES) for index in range(len(hard))]
+
+
+def test_every_scene_is_counted_in_its_family_alone():
+    rows = list_holding()
     table = {row[0]: row for row in collect_hard_cases(rows).rows}
     for family in HARD_FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
@@ -67,8 +72,7 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path):
 
 
 def test_the_report_of_the_hard_suite_has_every_statement_and_every_limit(tmp_path):
-    hard = Hard()
-    rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
+    rows = list_holding()
     parts = collect_sections(rows, tmp_path)
     assert [part.key for part in parts] == ["hard", "engine-limits"]
     assert not list(tmp_path.iterdir())

@@ -812,19 +812,17 @@ def call(folder, text, *options, scene=FEW):
 
 
 @pytest.mark.parametrize(
-    "with_scene, options, words",
+    "scene, options, words",
     [
-        (True, ("--name", "wheel=a"), "ROLE=NAME"),
-        (False, ("--name", "input=input"), "--name needs a SCENE"),
-        (False, (), "no equality that closes a loop"),
+        (FEW, "--name wheel=a", "ROLE=NAME"),
+        (None, "--name input=input", "--name needs a SCENE"),
+        (None, "", "no equality that closes a loop"),
     ],
 )
-def test_what_cannot_be_judged_or_measured_is_refused(
-    with_scene, options, words, tmp_path
-):
+def test_what_cannot_be_judged_or_measured_is_refused(scene, options, words, tmp_path):
     hinge = '<body><joint/><geom size="0.1"/></body>'
     text = f"<mujoco><worldbody>{hinge}</worldbody></mujoco>"
-    process = call(tmp_path, text, *options, scene=FEW if with_scene else None)
+    process = call(tmp_path, text, *options.split(), scene=scene)
     assert words in str(process.exception)
 
 
