@@ -282,6 +282,51 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     assert width == approx(2.0 * most - 2.0 * math.radians(1.0))
 
 
+@pytest.mark.parametrize(
+    ("pin", "low", "high"),
+    [
+        ("O2", -200, 200),
+        ("O2", 0, 400),
+        ("O2", -720, 720),
+        ("A", -100, 100),
+        ("A", -181, 181),
+        ("A", -200, 200),
+        ("O4", -20, 20),
+    ],
+)
+def test_the_range_goes_both_ways_from_the_pose_but_for_at_most_a_turn(pin, low, high):
+    planar = Planar()
+    p = {name: complex(*place) for name, place in planar.pins.items()}
+    turned = np.linspace(-math.tau, math.tau, 20001)
+    at = p["A"] * np.exp(1j * turned)
+    to_o4 = p["O4"] - at
+    distance = abs(to_o4)
+    b, c = abs(p["B"] - p["A"]), abs(p["B"] - p["O4"])
+    # B is to the left of the line from A to O4
+    corner = np.arccos((b**2 + distance**2 - c**2) / (2.0 * b * distance))
+    along = to_o4 / distance * np.exp(1j * corner)
+    lines = {"A": along / np.exp(1j * turned), "O4": at + b * along - p["O4"]}
+    hinge = np.unwrap(np.angle(lines[pin])) if pin in lines else turned
+    hinge = np.degrees(hinge - hinge[len(turned) // 2])
+    outside = turned[(hinge < low) | (hinge > high)]
+    first = max([-math.tau, *outside[outside < 0.0]])
+    last = min([math.tau, *outside[outside > 0.0]])
+    start = max(first, min(0.0, last - math.tau))
+
+    limits = f'range="{math.radians(low)} {math.radians(high)}"'
+    text = planar.text().replace(f'name="{pin}"', f'name="{pin}" {limits}', 1)
+    scene = read_scene(text).scene
+    motion = scene.motion.angle
+    grid = math.radians(0.51)
+    width = min(last - start, math.tau)
+    assert motion.stop - motion.start == approx(width, abs=2.0 * grid)
+    if last - first > math.tau:
+        assert motion.stop - motion.start == approx(math.tau, rel=1e-12)
+    drawn = np.angle(p["A"]) - np.angle(p["O4"]) + scene.linkage.ground_angle
+    away = motion.start - drawn - start
+    assert abs(math.remainder(away, math.tau)) <= grid
+
+
 REVERSED = """
 <mujoco><compiler angle="degree"/><worldbody>
   <body name="crank" euler="0 0 60">

@@ -73,7 +73,7 @@ _DECIMALS_OF_A_DEGREE = 10
 SWEEP_INTERVALS = 120
 """Intervals of the sweep."""
 RANGE_INTERVALS = 720
-"""Intervals in which the ranges of the other hinges are looked for."""
+"""Intervals in each sense in which the ranges of the hinges are looked for."""
 DEFAULT_SPEED = 1.0
 """rad/s, where none is stated."""
 ROUND_OFF_OF_LOADS = 1e-9
@@ -414,38 +414,30 @@ class SceneOfLoop:
         """Follow the loop over the range of the driven hinge.
 
         The range ends where the loop does not assemble or another hinge stops it.
-        Return theta_2 at its ends, rad, and the angle between the bars of each pin at
-        the first of them, rad.
+        Of one longer than a turn, a turn is taken from the pose, or as near to it as
+        the range allows. Return theta_2 at the ends, rad, and the angle between the
+        bars of each pin at the first of them, rad.
         """
         theta_2 = self.loop.angles[1]
         low, high = _find_assembling(linkage, theta_2)
         if stops := self.seen.stops("O2"):
             low = max(low, stops[0] + self.loop.angles[0])
             high = min(high, stops[1] + self.loop.angles[0])
-        if math.isinf(low) and math.isinf(high):
-            low = theta_2
-            high = theta_2 + math.tau
-        a_turn_on = low + math.tau
-        low = max(low, high - math.tau)
-        high = min(high, a_turn_on)
-        reach = np.linspace(low, high, RANGE_INTERVALS + 1)
-        angles = np.union1d(reach, [theta_2])
+        near = min(max(theta_2, low), high)
+        senses = [
+            np.linspace(near, end, RANGE_INTERVALS + 1)
+            for end in (max(low, near - math.tau), min(high, near + math.tau))
+        ]
+        angles = np.unique([*senses, np.full_like(senses[0], theta_2)])
         in_pose = int(np.searchsorted(angles, theta_2))
         betas = self._follow(linkage, angles, in_pose)
         free = (angles >= low) & (angles <= high)
-        stopping = []
+        inside = {}
         for pin, beta in betas.items():
             least, most = self.seen.stops(pin) or (-math.inf, math.inf)
             above = beta >= least - OUTSIDE_A_RANGE
-            inside = above & (beta <= most + OUTSIDE_A_RANGE)
-            if pin != "O2" and not inside[free].all():
-                stopping.append(self._name_hinge(pin))
-            free &= inside
-        if stopping:
-            self.remarks.append(
-                f"the range of {', '.join(sorted(stopping))} ends the motion before"
-                f" that of {self._name_hinge('O2')}"
-            )
+            inside[pin] = above & (beta <= most + OUTSIDE_A_RANGE)
+            free &= inside[pin]
         if not free.any():
             raise InputError(
                 "MJCF",
@@ -453,8 +445,24 @@ class SceneOfLoop:
                 "no position is within the ranges of its hinges",
             )
         first, last = _find_run(free, in_pose)
-        at_start = {pin: float(beta[first]) for pin, beta in betas.items()}
-        return float(angles[first]), float(angles[last]), at_start
+        low, high = angles[[first, last]].tolist()
+        start = max(low, min(near, high - math.tau))
+        stop = min(high, start + math.tau)
+        beside = slice(max(first - 1, 0), last + 2)
+        stopping = [
+            self._name_hinge(pin)
+            for pin, within in inside.items()
+            if pin != "O2" and high - low < math.tau and not within[beside].all()
+        ]
+        if stopping:
+            self.remarks.append(
+                f"the range of {', '.join(sorted(stopping))} ends the motion before"
+                f" that of {self._name_hinge('O2')}"
+            )
+        at_start = {
+            pin: float(np.interp(start, angles, beta)) for pin, beta in betas.items()
+        }
+        return start, stop, at_start
 
     def _follow(
         self,
