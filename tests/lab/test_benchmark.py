@@ -6,7 +6,6 @@ asked twice.
 
 import csv
 import json
-import re
 
 import pytest
 
@@ -14,7 +13,7 @@ from fourbar_lab.benchmark import BENCHMARKED_ENGINES, REFUSED, read_reasons
 from fourbar_lab.cli import status
 from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.engines.environments import read_engines, read_engines_of
-from tests.support.checkout import read
+from tests.support.guests import PLAIN
 
 WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 
@@ -25,12 +24,9 @@ def folder(tmp_path):
 
     The engine of the page, one that is wrong, and the entries of both.
     """
-    (code,) = re.findall(r"```python\n(.*?)```", read("docs/protocol.md"), re.DOTALL)[
-        :1
-    ]
-    assert WRONG[0] in code
-    (tmp_path / "mine.py").write_text(code)
-    (tmp_path / "wrong.py").write_text(code.replace(*WRONG))
+    assert WRONG[0] in PLAIN
+    (tmp_path / "mine.py").write_text(PLAIN)
+    (tmp_path / "wrong.py").write_text(PLAIN.replace(*WRONG))
     (tmp_path / "dead.py").write_text("raise SystemExit('no licence')")
     entries = [
         f'[[engine]]\nname = "{name}"\ncommand = ["python", "{tmp_path / name}.py"]\n'

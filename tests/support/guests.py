@@ -16,8 +16,7 @@ from fourbar_validation import engine
 from fourbar_validation.engines import guests, programs
 from tests.support.checkout import read
 
-PAGE = read("docs/protocol.md")
-(PLAIN,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+(PLAIN,) = re.findall(r"```python\n(.*?)```", read("docs/protocol.md"), re.DOTALL)
 """The page's engine in plain Python."""
 
 

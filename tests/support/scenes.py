@@ -122,12 +122,8 @@ def thesis(theta_2=None):
 
 def change_place(load, change):
     """Return the place of a load changed, in the form in which it is stated."""
-    forms = ("from_pin", "from_centre", "arm")
-    return {
-        form: change(*getattr(load, form))
-        for form in forms
-        if getattr(load, form) is not None
-    }
+    stated = {form: getattr(load, form) for form in ("from_pin", "from_centre", "arm")}
+    return {form: change(*place) for form, place in stated.items() if place}
 
 
 def mirrored(scene):
@@ -138,7 +134,8 @@ def mirrored(scene):
     """
     linkage, motion = scene.linkage, scene.motion
     bars = {}
-    for name, bar in zip(("input", "coupler", "output"), linkage.moving, strict=True):
+    for name in ("input", "coupler", "output"):
+        bar = getattr(linkage, name)
         r, phi = bar.mass_centre
         bars[name] = replace(bar, centre=(r, -phi))
     loads = []

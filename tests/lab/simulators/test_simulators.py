@@ -66,7 +66,7 @@ def find_errors(simulator, **setting):
     """Errors of a simulator's answer, each read back from the protocol's JSON."""
     scene, command = ask_position()
     answer = simulator().at_setting(**setting).answer(scene, command)
-    assert answer.refusal is None, answer.refusal
+    assert answer.refusal is None
     data = json.loads(json.dumps(protocol.answer_to_json(scene, command, answer)))
     return {row.quantity: row.error for row in judge_answers(PROBLEM, data)}
 
@@ -77,11 +77,7 @@ def sealed(monkeypatch):
 
     What a simulator receives is the simulator's own assembly.
     """
-
-    def refused(*_, **__):
-        raise AssertionError("a simulator would receive what the formulas computed")
-
-    monkeypatch.setattr("fourbar.mjcf.document.solve", refused)
+    monkeypatch.delattr("fourbar.mjcf.document.solve")
 
 
 @pytest.mark.usefixtures("sealed")
