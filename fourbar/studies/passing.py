@@ -197,9 +197,9 @@ def _find_nearest_limit(
     out of the range there, +1 or -1.
     """
     limits = []
-    for interval in find_intervals(linkage, bar):
-        for limit, outwards in zip(interval, (-1.0, 1.0), strict=True):
-            if interval[1] - interval[0] < TURN:
+    for low, high in find_intervals(linkage, bar):
+        if high - low < TURN:
+            for limit, outwards in ((low, -1.0), (high, 1.0)):
                 beyond = outwards * math.remainder(angle - limit, TURN)
                 limits.append((limit, beyond, outwards))
     return sorted(limits, key=lambda entry: (abs(entry[1]), entry[1]))[:1]

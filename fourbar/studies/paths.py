@@ -73,16 +73,19 @@ def _measure_path(course: MotionCourse, name: str) -> Path:
         extremes = _list_extremes(points, missed)
         steps = np.unique([extremes - 1, extremes])
         steps = steps[(steps >= 0) & (steps < len(places) - 1)]
-        first, last = places[steps], places[steps + 1]
+        first = places[steps, None]
         inside = np.arange(1, PARTS) / PARTS
-        between = (first[:, None] + (last - first)[:, None] * inside).ravel()
+        between = (first + (places[steps + 1, None] - first) * inside).ravel()
         # all stay: without the others another direction would seem narrower
         places = np.concatenate([places, between])
         points = np.concatenate([points, _locate_point(course, name, between)])
         order = np.argsort(places)
-        places, points = places[order], points[order]
+        places = places[order]
+        points = points[order]
     law = course.scene.motion.law
-    stated = [*course.places[[0, -1]], *([] if law is None else law.time)]
+    stated = course.places[[0, -1]]
+    if law is not None:
+        stated = np.append(stated, law.time)
     return _measure_points(places, points, np.isin(places, stated))
 
 
@@ -175,10 +178,11 @@ def _list_first_ends(heights: Array, stated: NDArray[np.bool_]) -> list[int]:
     the motion or a part of it ends.
     """
     rows = []
+    rounding = SAME_HEIGHT * np.nanmax(np.abs(heights))
     for sizes in (-heights, heights):
-        rounding = SAME_HEIGHT * np.nanmax(np.abs(sizes))
         tied = sizes >= np.nanmax(sizes) - rounding
-        rows.append(int(np.argmax(tied & stated if (tied & stated).any() else tied)))
+        # the first of what is true: where the motion ends, or else any
+        rows.append(int(np.argmax(2 * (tied & stated) + tied)))
     return rows
 
 
@@ -193,25 +197,19 @@ def _measure_points(places: Array, points: Array, stated: NDArray[np.bool_]) -> 
     across = np.array([-along[1], along[0]])
     ends = _list_first_ends(points @ along, stated)
     lengths = (points @ along)[ends]
-    heights = (points @ across)[_list_ends(points @ across)]
-    (x_low, y_low), (x_high, y_high) = (
-        np.nanmin(points, axis=0),
-        np.nanmax(points, axis=0),
-    )
+    heights = points @ across
+    heights = heights[_list_ends(heights)]
+    x_low, y_low = np.nanmin(points, axis=0).tolist()
+    x_high, y_high = np.nanmax(points, axis=0).tolist()
     low, high = sorted(places[ends].tolist())
+    at_ends = np.outer(lengths[[0, 1, 1, 0]], along)
+    at_sides = np.outer(heights[[0, 0, 1, 1]], across)
     return Path(
-        (float(x_low), float(x_high)),
-        (float(y_low), float(y_high)),
+        (x_low, x_high),
+        (y_low, y_high),
         float(heights[1] - heights[0]),
         float(lengths[1] - lengths[0]),
         float(np.arctan2(along[1], along[0])),
         (low, high),
-        np.array(
-            [
-                length * along + height * across
-                for length, height in zip(
-                    lengths[[0, 1, 1, 0]], heights[[0, 0, 1, 1]], strict=True
-                )
-            ]
-        ),
+        at_ends + at_sides,
     )
