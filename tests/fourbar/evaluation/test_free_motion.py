@@ -28,10 +28,12 @@ from fourbar import (
     Torsion,
     release,
     solve,
+    uniform,
 )
 from fourbar.errors import LimitError
 from fourbar.evaluation import free_motion
 from fourbar.evaluation.free_motion import release_at
+from fourbar.formulas.mobility import TURN
 from fourbar.scene import Command
 from fourbar_validation.engines.free_body import FreeBody
 from tests.support.scenes import bare, crank_rocker
@@ -186,6 +188,28 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
     with_it = replace(alone, effects=(DOWN, Springs((proportional,))))
     one, other = (release(each).command.theta_2 for each in (with_it, alone))
     assert np.abs(one - other).max() < 1e-9
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_dry_friction_slows_a_flywheel_evenly_until_it_stands(sense):
+    """Bars without mass: J alpha = -f, and rest after 0.5 s."""
+    linkage, times = bare(0.3, 0.1, 0.25, 0.22), np.linspace(0.0, 1.0, 11)
+    effects = [Flywheel(0.5), Friction.at(O2=0.4)]
+    m = integrate(linkage, effects, 0.3, 0.4 * sense, times)
+    left = np.maximum(0.4 - 0.8 * m.time, 0.0)
+    assert np.abs(m.omega_2 - sense * left).max() < 1e-9
+
+
+@pytest.mark.parametrize("speed", [20.0, -20.0])
+def test_the_input_keeps_its_turns_while_the_output_is_read(speed):
+    """A drag link that falls over is read in bar 4 where bar 2 is near a limit."""
+    linkage = uniform(0.1, 0.15, 0.2, 0.2)
+    released = release(let_go(1.0, speed, 0.6, 120, DOWN, linkage=linkage))
+    assert {*released.command.origin.bar} == {2, 4}
+    turned = np.diff(released.theta_2)
+    even = 0.5 * (released.omega_2[1:] + released.omega_2[:-1]) * np.diff(released.time)
+    assert np.abs(turned - even).max() < 0.02
+    assert abs(released.theta_2[-1] - 1.0) > 1.5 * TURN
 
 
 def test_change_points_of_several_turns_are_noted_when_they_are_passed():
