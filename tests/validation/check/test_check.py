@@ -17,7 +17,7 @@ from fourbar.cli import status as fourbar_status
 from fourbar.effects.load import Table
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.quantities import OK, UNITS, VECTORS
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import Law, Rise
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import Calculation
@@ -191,6 +191,24 @@ def test_whole_degrees_are_positions_that_somebody_chose(angle, half, read):
     """Zeros may be left off: a column has the decimals of its longest number."""
     table = read(f"theta_2 [deg],torque\n10,1.0\n{angle},1.0\n")
     assert table.places_rounding == approx(np.radians(half), rel=1e-9)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.1])
+def test_what_the_digits_of_the_angle_explain_is_no_mistake(factor, read):
+    """They are no positions of the scene: somebody may have chosen whole tenths."""
+    angles = np.radians([30.84, 47.21, 68.77])
+    torque = solve(OURS, at=command_at(OURS, angles)).torque
+    torque[-1] *= factor
+    rows = [
+        f"{angle:.1f},{value:.6g}"
+        for angle, value in zip(np.degrees(angles), torque, strict=True)
+    ]
+    judgement = judge_table(
+        OURS, read("\n".join(["theta_2 [deg],torque", *rows, ""]))
+    )
+    assert judgement.status == FAILED
+    by_digits = "what differs is within half a digit of theta_2"
+    assert (by_digits in judgement.describe_unexplained()) == (factor == 1.0)
 
 
 def solved(change=lambda scene: scene, **commanded):

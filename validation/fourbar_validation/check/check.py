@@ -154,6 +154,12 @@ class Judgement:
         if (atol := self.needed_atol) is not None:
             small = "what differs is small beside the largest of its quantity"
             return f"{small}: --atol {atol:.1e} allows it"
+        table = self.judge.table
+        rounded = replace(table, places_rounding=table.place.rounding)
+        judge = Judge(self.judge.scene, rounded, self.judge.tolerance)
+        if not Judgement(judge).differing:
+            within = f"what differs is within half a digit of {table.found_by}"
+            return f"{within}: print more of its digits"
         what = "the rest" if self.explanations else "it"
         return f"no single known mistake explains {what}"
 
