@@ -35,7 +35,7 @@ from fourbar_validation.compare.rows import say_error, write_csv_rows, write_one
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import (
     ENGINES_FILE,
-    Entry,
+    EngineEntry,
     prepare_program,
     read_engines_of,
 )
@@ -121,7 +121,7 @@ class _MatrixCell:
 class _MatrixRow:
     """One engine in one setting."""
 
-    entry: Entry
+    entry: EngineEntry
     hello: JsonObject = field(default_factory=dict)
     cells: dict[str, _MatrixCell] = field(default_factory=dict)
     slopes: list[tuple[str, dict[str, str]]] = field(default_factory=list)
@@ -158,7 +158,7 @@ class Benchmark:
 
     def __init__(
         self,
-        engines: Iterable[Entry],
+        engines: Iterable[EngineEntry],
         reasons: Mapping[str, str],
         problems: Iterable[str],
         out: Path,
@@ -191,14 +191,14 @@ class Benchmark:
             finally:
                 running.end()
 
-    def _leave_out(self, entry: Entry, reason: str) -> None:
+    def _leave_out(self, entry: EngineEntry, reason: str) -> None:
         row = self.rows.setdefault(KIND.sub("", entry.name), _MatrixRow(entry))
         cell = _MatrixCell(reason=f"not run: {write_one_line(reason)}")
         row.cells = dict.fromkeys(self.problems, cell) | row.cells
 
     def _ask_engine(
         self,
-        entry: Entry,
+        entry: EngineEntry,
         hello: JsonObject,
         setting: str,
         running: Running,

@@ -30,7 +30,7 @@ from fourbar_validation.engines.limits import (
 )
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.runner import Course
+from fourbar_validation.engines.mujoco.runner import RunCourse
 from fourbar_validation.scenes.hard_families import (
     draw_lengths_of_type,
     dress,
@@ -53,7 +53,7 @@ class Measured(NamedTuple):
 
 def _simulated(scene):
     """The simulation itself, whatever its declared limits."""
-    course = Course(scene, command(scene))
+    course = RunCourse(scene, command(scene))
     return simulate._Simulation(RECIPE, course, bounded=False).answer()
 
 

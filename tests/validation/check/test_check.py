@@ -203,9 +203,7 @@ def test_what_the_digits_of_the_angle_explain_is_no_mistake(factor, read):
         f"{angle:.1f},{value:.6g}"
         for angle, value in zip(np.degrees(angles), torque, strict=True)
     ]
-    judgement = judge_table(
-        OURS, read("\n".join(["theta_2 [deg],torque", *rows, ""]))
-    )
+    judgement = judge_table(OURS, read("\n".join(["theta_2 [deg],torque", *rows, ""])))
     assert judgement.status == FAILED
     by_digits = "what differs is within half a digit of theta_2"
     assert (by_digits in judgement.describe_unexplained()) == (factor == 1.0)

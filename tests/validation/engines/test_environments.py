@@ -17,7 +17,7 @@ from fourbar.errors import LONGEST_MESSAGE, DependencyError, InputError
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments
 from fourbar_validation.engines.environments import (
-    Entry,
+    EngineEntry,
     choose_engines,
     fill_table,
     make_environment,
@@ -142,11 +142,11 @@ def test_two_versions_are_judged_side_by_side(tmp_path, monkeypatch):
 )
 def test_an_environment_that_cannot_be_made_is_one_line(stated, words, tmp_path):
     with raises(DependencyError, match=words):
-        make_environment(Entry("none", adapter="a:B", **stated), tmp_path)
+        make_environment(EngineEntry("none", adapter="a:B", **stated), tmp_path)
 
 
 def test_an_engine_without_packages_of_its_own_runs_here(tmp_path):
-    entry = Entry("here", adapter="free-body")
+    entry = EngineEntry("here", adapter="free-body")
     assert make_environment(entry, tmp_path) == sys.executable
 
 
@@ -165,7 +165,7 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
 
     monkeypatch.setattr(environments, "run_to_end", fails_at_pip)
     with raises(DependencyError, match="none: its environment cannot be made"):
-        make_environment(Entry("none", adapter="a:B", requires=("x",)), tmp_path)
+        make_environment(EngineEntry("none", adapter="a:B", requires=("x",)), tmp_path)
     (made, filled) = lines
     assert made[:3] == [sys.executable, "-m", "venv"]
     assert "--without-pip" not in made

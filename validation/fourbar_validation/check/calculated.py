@@ -20,7 +20,7 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.csv_columns import compute_column
-from fourbar_validation.check.judge_table import Column, Judge
+from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import Mistake, Wanted, always
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
 from fourbar_validation.compare.tolerance import EPS, Mask, magnitude
@@ -873,7 +873,7 @@ def find_single_precision(judge: Judge) -> Iterator[Mistake]:
         yield Mistake(text, theirs.get)
 
 
-def _is_single(column: Column) -> Mask:
+def _is_single(column: JudgedColumn) -> Mask:
     """Mark the numbers that single precision holds, or that are off by its rounding."""
     theirs = column.theirs
     factor = column.unit.factor

@@ -23,7 +23,7 @@ from fourbar_validation.check.calculated import (
     Change,
     join,
 )
-from fourbar_validation.check.judge_table import Column, Judge
+from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
     Mistake,
@@ -98,7 +98,7 @@ MOST_ROWS_REORDERED = 1000
 """
 
 
-def find_fitted(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
+def find_fitted(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """List every mistake whose number the table gives, the simplest first."""
     yield from _find_ratios(judge, differing)
     yield from _try_exchanged(judge, differing)
@@ -114,7 +114,7 @@ def find_fitted(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
     yield from _try_motions(judge, moved=moved)
 
 
-def _find_ratios(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
+def _find_ratios(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """Yield columns that are ours times a number, vectors also in other axes."""
     by_text: dict[str, dict[str, Array]] = {}
     for column in differing:
@@ -127,7 +127,7 @@ def _find_ratios(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
         yield Mistake(text, multiples.get, whole=False, times=CARRIED)
 
 
-def _list_multiples(column: Column) -> Iterator[tuple[str, Array]]:
+def _list_multiples(column: JudgedColumn) -> Iterator[tuple[str, Array]]:
     """List what a column may be of ours, the simplest first: its name, its numbers.
 
     As x + i y a vector, or its mirror image, has a complex factor in other axes.
@@ -170,7 +170,7 @@ def _list_axes(
 
 
 def _list_ratios(
-    column: Column, near: float, numbers: int
+    column: JudgedColumn, near: float, numbers: int
 ) -> Iterator[tuple[str, float]]:
     """List what a ratio may be, by its name.
 
@@ -191,7 +191,7 @@ def _list_ratios(
         yield f"every number is {near:.{digits}g} times ours", near
 
 
-def _try_exchanged(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
+def _try_exchanged(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """Try two columns of one unit, each under the name of the other."""
     names = dict.fromkeys(column.quantity for column in differing)
     for one, second in combinations(names, 2):
@@ -205,7 +205,7 @@ _EVERY = slice(None)
 
 
 def _compute_residual(
-    columns: list[Column],
+    columns: list[JudgedColumn],
     mistake: Mistake,
     rows: Any = _EVERY,
 ) -> Array:
@@ -227,7 +227,7 @@ def _compute_residual(
     return np.concatenate(parts)
 
 
-def _try_factors(judge: Judge, differing: list[Column]) -> Iterator[Mistake]:
+def _try_factors(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """Try a moment of inertia, a mass, a load or an effect times a factor.
 
     Damping or friction that the scene leaves out, and a mass centre elsewhere, too.
@@ -353,7 +353,7 @@ def _delay(at: Command, law: Any, time: Array, factor: float) -> Variant:
     return Variant(f"{text} (fitted)", at=moved, names=names, times=CARRIED)
 
 
-def _find_stage(column: Column) -> int:
+def _find_stage(column: JudgedColumn) -> int:
     """Return the number of the stage that computes a quantity."""
     return STAGES.index(STAGE_OF.get(column.quantity, "force"))
 

@@ -92,7 +92,7 @@ class Discrepancy(NamedTuple):
         return self.exact or (self.judged and self.difference <= self.permitted)
 
 
-class Column:
+class JudgedColumn:
     """One quantity of a table, row by row against the formulas."""
 
     def __init__(self, judge: "Judge", key: str) -> None:
@@ -354,7 +354,7 @@ class Judge:
         self.ok = self.right.status_code == OK
         self.drive = COUPLE if scene.drive is None else LINE
         self.sizes = TermSizes(self.scene, self.right)
-        self.columns = {key: Column(self, key) for key in columns}
+        self.columns = {key: JudgedColumn(self, key) for key in columns}
 
     @cached_property
     def holds(self) -> Mask:

@@ -27,7 +27,7 @@ from fourbar_validation.check.fitted import (
     REVERSED,
     find_fitted,
 )
-from fourbar_validation.check.judge_table import Column, Judge
+from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import (
     Mistake,
     Variant,
@@ -382,7 +382,7 @@ class Explanation(NamedTuple):
 @np.errstate(all="ignore")
 def explain(
     judge: Judge,
-    differing: list[Column],
+    differing: list[JudgedColumn],
     wanted: Wanted = always,
 ) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
@@ -419,9 +419,9 @@ def explain(
 def _list_explained(
     judge: Judge,
     mistake: Mistake,
-    differing: list[Column],
+    differing: list[JudgedColumn],
     least: float,
-) -> list[Column]:
+) -> list[JudgedColumn]:
     """List the columns that differ and agree once a mistake is assumed.
 
     Empty if a mistake of the calculation explains fewer than `least`, breaks one that
@@ -464,7 +464,9 @@ def _list_explained(
     return [column for column in judge.columns.values() if column in explained]
 
 
-_SOURCES: tuple[Callable[[Judge, list[Column], Wanted], Iterator[Mistake]], ...] = (
+_SOURCES: tuple[
+    Callable[[Judge, list[JudgedColumn], Wanted], Iterator[Mistake]], ...
+] = (
     lambda judge, differing, wanted: list_column_mistakes(judge.right),
     lambda judge, differing, wanted: find_miscalculated(judge, wanted),
     lambda judge, differing, wanted: list_hypotheses(judge.scene, judge.at, wanted),

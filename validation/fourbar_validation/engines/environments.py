@@ -60,7 +60,7 @@ _DONE = "installed"
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class EngineEntry:
     """One table of engines.toml."""
 
     name: str
@@ -80,12 +80,12 @@ class Entry:
     """
 
 
-def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
+def read_engines(folders: Iterable[Path]) -> dict[str, EngineEntry]:
     """Read engines.toml of these folders, of the package and of the lab, by name.
 
     Raises InputError for what is no entry.
     """
-    entries: dict[str, Entry] = {}
+    entries: dict[str, EngineEntry] = {}
     for folder in dict.fromkeys((*folders, Path(__file__).parent, *LAB_FOLDERS)):
         file = folder / ENGINES_FILE
         if file.is_file():
@@ -94,10 +94,10 @@ def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
     return entries
 
 
-def read_engines_of(file: Path) -> dict[str, Entry]:
+def read_engines_of(file: Path) -> dict[str, EngineEntry]:
     """Read the engines of one file, by name."""
     text = read_text(file, "engines", LARGEST_ENGINES_FILE)
-    entries: dict[str, Entry] = {}
+    entries: dict[str, EngineEntry] = {}
     try:
         for table in tomllib.loads(text).get("engine", []):
             entry = _read_entry(table)
@@ -109,7 +109,7 @@ def read_engines_of(file: Path) -> dict[str, Entry]:
     return entries
 
 
-def _read_entry(table: object) -> Entry:
+def _read_entry(table: object) -> EngineEntry:
     texts = ("name", "adapter", "python", "setting")
     lists = ("command", "requires")
     if not isinstance(table, dict) or not table.get("name"):
@@ -132,10 +132,10 @@ def _read_entry(table: object) -> Entry:
         key: tuple(value) if isinstance(value, list) else value
         for key, value in table.items()
     }
-    return Entry(**stated)
+    return EngineEntry(**stated)
 
 
-def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
+def make_environment(entry: EngineEntry, cache: Path = _CACHE) -> str:
     """Return the interpreter of an engine's environment, which is made once.
 
     Raises DependencyError if pip fails. Engines with the same requirements share it.
@@ -183,7 +183,7 @@ def make_environment(entry: Entry, cache: Path = _CACHE) -> str:
     return str(inside)
 
 
-def prepare_program(entry: Entry, seconds: float | None) -> Program:
+def prepare_program(entry: EngineEntry, seconds: float | None) -> Program:
     """Make an engine's environment; return the program that answers there."""
     python = make_environment(entry)
     if entry.adapter:
@@ -203,7 +203,7 @@ def prepare_program(entry: Entry, seconds: float | None) -> Program:
 
 
 def start_engine(
-    entry: Entry,
+    entry: EngineEntry,
     taken: Collection[str] = (),
     seconds: float | None = None,
     like: Engine | None = None,
@@ -223,7 +223,7 @@ def start_engine(
     return guest.at_setting(**setting) if setting else guest
 
 
-Table = dict[str, Engine | Entry]
+Table = dict[str, Engine | EngineEntry]
 
 
 def fill_table(
@@ -273,7 +273,7 @@ def choose_engines(
     chosen: list[Engine] = []
     for name in filter(wanted.__contains__, table):
         engine = table[name]
-        if isinstance(engine, Entry):
+        if isinstance(engine, EngineEntry):
             taken = {*table, *(one.name for one in chosen)} - {name}
             ours = list_engines().get(engine.adapter)
             engine = start_engine(engine, taken, seconds, like=ours)

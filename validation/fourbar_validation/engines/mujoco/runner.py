@@ -58,7 +58,7 @@ class SteadySegment:
     |omega_2|, and `turning` that of the input, rad/s.
     """
 
-    def __init__(self, course: "Course", segment: Sequence[int]) -> None:
+    def __init__(self, course: "RunCourse", segment: Sequence[int]) -> None:
         self.course = course
         commanded = course.values[list(segment)]
         self.run = choose_run(commanded, course.speed, course.acceleration)
@@ -152,7 +152,7 @@ def count_steps(settings: Settings, most: float, turned: float) -> float:
     return steps
 
 
-class Course:
+class RunCourse:
     """A command run through in time, the input at constant acceleration."""
 
     bar: int | None = 2
@@ -185,7 +185,7 @@ class Course:
         return compute_least_sine(self.scene.linkage, self.command.theta_2, closes)
 
 
-class LawCourse(Course):
+class LawCourse(RunCourse):
     """A motion law of the input.
 
     Flywheel and closure are laid out for its greatest |omega_2| and |alpha_2|.
@@ -417,7 +417,7 @@ throughout; here they are 40 000.
 """
 
 
-class Lead(Course):
+class Lead(RunCourse):
     """A command of another bar or of the stroke, and the input's motion by it."""
 
     def __init__(self, scene: Scene, command: Command) -> None:

@@ -36,10 +36,10 @@ from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
 from fourbar_validation.engines.mujoco.runner import (
-    Course,
     Found,
     LawCourse,
     Lead,
+    RunCourse,
     SimulatedRun,
     clip_angles,
     evaluate_loads,
@@ -117,7 +117,7 @@ class MujocoSimulated:
         return answer
 
 
-def _choose_course(scene: Scene, command: Command) -> Course:
+def _choose_course(scene: Scene, command: Command) -> RunCourse:
     """Choose how a command is run through; LimitError where there is nothing to run."""
     if scene.motion.free is not None:
         raise LimitError("a free motion has no commanded sweep")
@@ -135,10 +135,10 @@ def _choose_course(scene: Scene, command: Command) -> Course:
             "omega_2 or alpha_2 differs from position to position: that is no one"
             " motion through time"
         )
-    return Course(scene, command)
+    return RunCourse(scene, command)
 
 
-def _require_run(course: Course) -> None:
+def _require_run(course: RunCourse) -> None:
     """Raise LimitError where this motion of the input is not simulated."""
     theta_2 = course.of_input.theta_2
     if np.ptp(theta_2) == 0.0:
@@ -181,7 +181,7 @@ class _Simulation:
     def __init__(
         self,
         settings: Settings,
-        course: Course,
+        course: RunCourse,
         *,
         bounded: bool = True,
     ) -> None:

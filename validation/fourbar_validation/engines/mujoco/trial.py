@@ -39,7 +39,7 @@ from fourbar_validation.engines.loop import (
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
-    Course,
+    RunCourse,
     SimulatedRun,
     SteadySegment,
     find_assembled,
@@ -166,7 +166,7 @@ class TrialSetup:
                 "nothing to run through in time: a sweep of theta_2 at omega_2 is"
                 " needed"
             )
-        self.course = course = Course(scene, command)
+        self.course = course = RunCourse(scene, command)
         self.scene = course.scene
         self.command = command
         position = Assembler(
