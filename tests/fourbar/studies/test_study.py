@@ -12,6 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pytest import raises
 
 from fourbar import (
+    Bar,
+    FourBar,
     Free,
     FromLimit,
     Gravity,
@@ -21,6 +23,7 @@ from fourbar import (
     Scene,
     Sweep,
     Tolerance,
+    Torsion,
     command,
     solve,
     uniform,
@@ -243,3 +246,18 @@ def test_a_study_is_given_no_other_positions():
     study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
     with raises(InputError, match="states its own positions"):
         solve(study, at=command(scene()))
+
+
+def test_a_torsion_spring_is_followed_from_where_each_member_begins():
+    """Each member is that linkage alone: two of them assemble later in the sweep."""
+    spring = Torsion.at(A=(10.0, 1.5, 0.0), B=(10.0, -1.5, 0.0))
+    motion = Motion(Sweep(0.0, np.radians(359.0), 80), 1.0, branch=-1)
+    linkage = FourBar(6.0, Bar(4.0, 1.0), Bar(5.0, 1.0), Bar(3.0, 1.0), np.pi)
+    scene = Scene(linkage, motion, effects=(spring,))
+    coupler = [5.0, 2.2, 7.7]
+    study = solve(vary(scene, {"lengths.coupler": coupler}))
+    for row, length in enumerate(coupler):
+        alone = replace(scene, linkage=replace(linkage, coupler=Bar(length, 1.0)))
+        assert study.status[row] == solve(alone).status
+        assert "wound" in study.status[row]
+    assert [status[0] == "ok" for status in study.status] == [False, False, True]
