@@ -244,6 +244,12 @@ def test_a_joint_that_follows_none_is_refused(tmp_path):
         measure_mimic(write(tmp_path), "c", KNEE)
     with raises(InputError, match="no such joint"):
         measure_mimic(write(tmp_path), "knee", KNEE)
+    path = write(tmp_path)
+    path.write_text(
+        path.read_text().replace("<joint joint1", "<joint active='false' joint1")
+    )
+    with raises(InputError, match="the file has no active <joint"):
+        measure_mimic(path, "s", KNEE)
     path = tmp_path / "leg.urdf"
     path.write_text(URDF.replace("<mimic", "<gone"))
     with raises(InputError, match="the file has no <mimic> in its knee"):

@@ -329,6 +329,10 @@ def test_an_equality_of_joints_or_of_a_fixed_tendon_is_a_mimic(tendon, mimic, wo
     assert other.loop is None
     assert words in other.reason
     assert one.loop.other_equalities == (1,)
+    text = text.replace(mimic, mimic.replace("/>", ' active="false"/>'))
+    one, other = report_of(text).closures
+    assert other.reason.startswith("it is switched off in the file")
+    assert one.loop.other_equalities == ()
 
 
 def test_behind_a_slide_that_follows_a_hinge_no_four_bar_stands():

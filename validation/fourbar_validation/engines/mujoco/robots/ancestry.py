@@ -113,7 +113,8 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
     """List the joints that an equality of joints or fixed tendons lets follow others.
 
     A tendon over two joints that is kept at a length, c1 q1 + c2 q2 = a0, lets each of
-    them follow the other. Of two tendons over a joint each the first one follows.
+    them follow the other. Of two tendons over a joint each the first one follows. By an
+    equality that is switched off none follows.
     """
     kind = model.eq_type[equality]
     tied = find_tied_bodies(model, equality)
@@ -124,7 +125,7 @@ def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
         ends, leaders = (list_tendon_joints(model, one) for one in tied)
     else:
         return []
-    if not all(ends.values()):
+    if not all(ends.values()) or not model.eq_active0[equality]:
         return []
     if tied[1] < 0 and len(ends) == 2:
         pairs = zip(ends.items(), reversed(ends.items()), strict=True)

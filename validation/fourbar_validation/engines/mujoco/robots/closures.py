@@ -82,6 +82,7 @@ _SERVE_PLANAR = "MuJoCo or Drake serve it, PMKS+ for a sketch"
 """Tools for mechanisms that are no planar four-bar."""
 _MOST_HOLDS = 5
 """Further choices of joints to hold that are printed."""
+_SWITCHED_OFF = 'it is switched off in the file (active="false", or a <flag>)'
 
 
 def list_closures(
@@ -347,6 +348,8 @@ class _Finder:
     def _describe_mimic(self, number: int, kind: str) -> str:
         """Write which joint follows which, by which polynomial."""
         model = self.model
+        if not model.eq_active0[number]:
+            return _SWITCHED_OFF
         followers = list_followers(model, number)
         if followers:
             joint, leader, numbers = followers[0]
@@ -395,7 +398,7 @@ class _Finder:
     def _list_reasons(self, chain: _Chain) -> Iterator[str]:
         """Say why a closure closes no four-bar; the first reason counts."""
         if not chain.is_active:
-            yield 'it is switched off in the file (active="false", or a <flag>)'
+            yield _SWITCHED_OFF
         if not chain.joints:
             yield "both ends are on one rigid body"
         if self._is_idle(chain):

@@ -107,8 +107,8 @@ def read_joint_equality(
             if tie.joint == joint:
                 return _RestPose(model, tie, scene).describe(theta_2)
     needed = {
-        "MJCF": f'<joint joint1="{name}" joint2="..."> and no equality of a fixed'
-        " tendon over it and one other joint"
+        "MJCF": f'active <joint joint1="{name}" joint2="..."> and no active equality'
+        " of a fixed tendon over it and one other joint"
     }.get(file.kind, f"<mimic> in its {name}")
     raise InputError(
         "--mimic", name, f"follows no other joint: the file has no {needed}"
