@@ -410,6 +410,7 @@ wg 1.2, wg 1.3 | wg 1.2, wg 1.3
 wg 1.2 released | wg released
 wg 1.2, wg 1.2 | wg 1.2, wg 1.2-2
 free-body 2.0 | free-body 2.0
+formulas 2.0 | formulas 2.0
 1.2 | 1.2
 """),
 )

@@ -172,7 +172,7 @@ def name_by_versions(
     """
     guests = [engine for engine in engines if isinstance(engine, Guest)]
     alone = Counter(guest.stated_name for guest in guests)
-    alone.update({*taken} - {guest.name for guest in guests})
+    alone.update({FORMULAS, *taken} - {guest.name for guest in guests})
     versions = Counter((guest.stated_name, guest.version) for guest in guests)
 
     def name(engine: Engine) -> Engine:
