@@ -133,6 +133,9 @@ TWO_MOTORS = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
 UNNAMED = TWO_MOTORS.replace('name="one" ', "")
 NO_NAME = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
 
+COAXIAL = FIVE_BAR.format(more="").replace('pos="0.02 0 0.12"', 'pos="0 0 0"')
+TWICE_COAXIAL = COAXIAL.replace('pos="0 0 0.1"', 'pos="0 0 0"')
+
 
 @pytest.mark.parametrize(
     "text, words",
@@ -147,6 +150,8 @@ NO_NAME = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
         (TWO_MOTORS, "--hold a (or c) makes it a four-bar"),
         (UNNAMED, "driven by 2 motors (on a, two)"),
         (NO_NAME, "--hold b (or c or joint 3)"),
+        (COAXIAL, "freedoms; --hold c (or d) makes it a four-bar"),
+        (TWICE_COAXIAL, "freedoms: no hold makes it a four-bar"),
     ],
 )
 def test_what_to_hold_is_said(text, words):
@@ -597,6 +602,8 @@ def test_a_slide_beside_four_pins_is_to_be_held(cut, by):
     assert loop.lengths == approx(planar.lengths(), rel=1e-12)
     skew = replace(planar, axes={"A": "0 0.1 1"}).text().replace(hinge, slide + hinge)
     guided = planar.text().replace('"O4" axis="0 0 1"', '"O4" type="slide"')
-    for other in (skew, guided):
+    coaxial = replace(planar, pins={**planar.pins, "O4": planar.pins["O2"]})
+    coaxial = coaxial.text().replace(hinge, slide + hinge)
+    for other in (skew, guided, coaxial):
         reason = closure_of(other).reason
         assert "is a slide" in reason and "--hold" not in reason

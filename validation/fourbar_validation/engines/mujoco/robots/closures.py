@@ -6,9 +6,9 @@ no joint parts, or a held one, are one bar.
 """
 
 import math
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, pairwise, permutations
+from itertools import combinations, islice, pairwise, permutations
 
 import mujoco
 import numpy as np
@@ -464,11 +464,8 @@ class _Finder:
         text = f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})"
         coupled = self._find_coupled(chain)
         taken = {joint for other in coupled for joint in other.joints}
-        angle, _ = self._measure_axes(chain)
-        is_planar = angle is not None and angle <= PARALLEL
-        is_four = chain.pins - len(chain.others) == len(PINS)
-        holds = is_four and is_planar and taken.isdisjoint(chain.hinges)
-        if holds and {*chain.others.values()} == {SLIDE}:
+        holds = {*chain.others.values()} == {SLIDE} and taken.isdisjoint(chain.hinges)
+        if holds and self._makes_four_bar(chain, chain.others):
             names = ",".join(name_joint(self.model, one) for one in chain.others)
             text += f"; --hold {names} makes it a four-bar"
         elif chain.hinges:
@@ -529,9 +526,11 @@ class _Finder:
         motors = self._list_motors(chain)
         coupled = self._find_coupled(chain)
         holds = self._list_holds(chain, coupled, freedoms - 1)
-        if not holds:
-            return self._explain_coupling(chain, coupled)
         text = f"{count} and {_spell_count(freedoms, 3)} freedoms"
+        if not holds and coupled:
+            return self._explain_coupling(chain, coupled)
+        if not holds:
+            return f"{text}: no hold makes it a four-bar"
         if len(motors) > 1:
             names = ", ".join(
                 self.model.actuator(actuator).name
@@ -542,8 +541,15 @@ class _Finder:
         first, *others = holds
         text += f"; --hold {first}"
         if others:
-            text += f" (or {' or '.join(others[:_MOST_HOLDS])})"
+            text += f" (or {' or '.join(others)})"
         return f"{text} makes it a four-bar"
+
+    def _makes_four_bar(self, chain: _Chain, held: Iterable[int]) -> bool:
+        """Tell whether a closure makes a four-bar with these joints held as well."""
+        names = [name_joint(self.model, joint) for joint in held]
+        options = replace(self.options, held=(*self.options.held, *names))
+        finder = _Finder(self.posed, options)
+        return finder.describe(chain.number).loop is not None
 
     def _list_others(self, chain: _Chain) -> list[_Chain]:
         """List the other active closures."""
@@ -580,11 +586,13 @@ class _Finder:
         if len(holdable) < count:
             holdable = chain.joints
         taken = {joint for other in coupled for joint in other.joints}
-        return [
+        found = (
             ",".join(name_joint(self.model, joint) for joint in held)
             for held in combinations(holdable, count)
             if not ({*chain.joints} - {*held}) & taken
-        ]
+            and self._makes_four_bar(chain, held)
+        )
+        return [*islice(found, 1 + _MOST_HOLDS)]
 
     def _explain_coupling(self, chain: _Chain, coupled: list[_Chain]) -> str:
         """Say which linkage loops with common bars make."""
@@ -592,7 +600,7 @@ class _Finder:
         kinds = self.model.jnt_type[[*joints]]
         names = ", ".join(other.name for other in coupled)
         moves = "moves" if len(coupled) == 1 else "move"
-        if not coupled or not np.all(kinds == HINGE_JOINT):
+        if not np.all(kinds == HINGE_JOINT):
             return f"{names} {moves} its bars too: no hold makes it a four-bar"
         taken = sum(2 if one.is_pin else 3 for one in (chain, *coupled))
         freedoms = len(joints) - taken
