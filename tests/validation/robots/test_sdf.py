@@ -596,6 +596,9 @@ def test_what_stands_and_what_floats(tmp_path):
     assert "left out of the SDF: plugin" in notes
 
 
+NOWHERE = "<include><uri>model://nowhere</uri>"
+
+
 @pytest.mark.parametrize(
     "old, new, message",
     [
@@ -619,7 +622,8 @@ def test_what_stands_and_what_floats(tmp_path):
             "'cone'.*has no inertia here",
         ),
         (CRANK, CRANK + CRANK, "name of its own"),
-        (CRANK, "<include><uri>model://nowhere</uri></include>", "is not there"),
+        (CRANK, f"{NOWHERE}<name>crank</name></include>", "is not there"),
+        (MODEL, f"{NOWHERE}</include>", "is not there"),
         (f"<mass>{make_bar(A).mass}</mass>", "<mass>-1</mass>", "above 0"),
     ],
 )
@@ -630,6 +634,15 @@ def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, tmp_p
         return
     with raises(fourbar.InputError, match=message):
         compile_text(tmp_path, text)
+
+
+def test_a_model_that_is_missing_and_in_no_loop_is_left_out_and_named(tmp_path):
+    path = tmp_path / "world.sdf"
+    path.write_text(put((CRANK, f"{CRANK}{NOWHERE}</include>")), encoding="utf-8")
+    file = read_robot(path)
+    assert "models that are missing are left out: model://nowhere" in file.notes
+    path.write_text(PLAIN, encoding="utf-8")
+    assert file.text == read_robot(path).text
 
 
 @pytest.mark.slow

@@ -158,7 +158,7 @@ class _RobotReading:
 
     def _convert_sdf(self, root: ET.Element) -> ET.Element:
         """Return an SDF as MJCF; its includes lie in its folder or beside it."""
-        from fourbar_validation.robots.sdf import convert_sdf
+        from fourbar_validation.robots.sdf import MissingModelError, convert_sdf
 
         home = self.path.resolve().parent
 
@@ -168,7 +168,7 @@ class _RobotReading:
                 path = self._find(candidate, (home, home.parent))
                 if path is not None:
                     return self._include(path, name)
-            raise self._refuse(f"<uri>{uri}</uri>", NOT_THERE)
+            raise MissingModelError(self.kind, f"<uri>{uri}</uri>", NOT_THERE)
 
         try:
             root, notes = convert_sdf(root, find)

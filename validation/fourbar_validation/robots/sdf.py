@@ -80,12 +80,17 @@ FindModel = Callable[[str], ET.Element]
 """Function from the URI of an <include> to the <sdf> of that file."""
 
 
+class MissingModelError(InputError):
+    """The file that an <include> names is not there."""
+
+
 def convert_sdf(root: ET.Element, find: FindModel) -> tuple[ET.Element, list[str]]:
     """Return an <sdf> as <mujoco>, and sentences on what it cannot carry.
 
     Parameters
     ----------
-    find : reads the file that an <include> names.
+    find : reads the file that an <include> names. A `MissingModelError` leaves it out,
+        unless a link of it is named elsewhere or nothing that is left closes a loop.
 
     Raises
     ------
@@ -249,6 +254,8 @@ class _Conversion:
         self.constraints: list[tuple[str, ET.Element]] = []
         self.notes: list[str] = []
         self.left_out: set[str] = set()
+        self.missing: dict[str, MissingModelError] = {}
+        """By the URI of an <include>."""
         self.tree: dict[str, tuple[_Edge | None, str]] = {}
         """Joint by which each link hangs on another, and that link."""
         self.names: dict[str, str] = {"": "world"}
@@ -291,6 +298,12 @@ class _Conversion:
             self._add_body(link)
         self.equality = ET.SubElement(mujoco, "equality")
         self._add_closures()
+        if self.missing:
+            if not len(self.equality):
+                raise next(iter(self.missing.values()))
+            self.notes.append(
+                f"models that are missing are left out: {', '.join(self.missing)}"
+            )
         if self.left_out:
             names = ", ".join(sorted(self.left_out))
             self.notes.append(f"left out of the SDF: {names}")
@@ -311,7 +324,11 @@ class _Conversion:
                 self.left_out.add(child.tag)
             if child.tag not in _MEMBERS:
                 continue
-            element = self._include(child) if child.tag == "include" else child
+            try:
+                element = self._include(child) if child.tag == "include" else child
+            except MissingModelError as error:
+                self.missing[_text(child, "uri")] = error
+                continue
             name = element.get("name", "")
             full = _join(scope, name)
             if not name or full in self.members:
@@ -376,7 +393,8 @@ class _Conversion:
         scope = name.rpartition("::")[0]
         short = _shorten(name)
         if name not in self.members:
-            raise _refuse(short, f"is no link, joint, frame or model of {scope}")
+            unknown = _refuse(short, f"is no link, joint, frame or model of {scope}")
+            raise next(iter(self.missing.values()), unknown)
         if (name, asked) in self.pending:
             raise _refuse(short, "is placed relative to itself or attached to itself")
         self.pending.add((name, asked))
