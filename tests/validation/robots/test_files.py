@@ -58,6 +58,13 @@ def test_meshes_beside_it_and_of_the_option_are_read(tmp_path, where):
     assert compile_robot(file).model.nmesh == 1
 
 
+def test_a_complaint_of_mujoco_names_the_element_and_no_line_of_another_text(tmp_path):
+    path = make(tmp_path)
+    path.write_text(path.read_text().replace("<joint ", '<joint ref="high" '))
+    with pytest.raises(InputError, match=r"'ref' Element 'joint'$"):
+        compile_robot(read_robot(path))
+
+
 def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path):
     robot = compile_robot(read_robot(make(tmp_path)))
     body = robot.model.body("arm").id

@@ -4,6 +4,7 @@ What is missing and moves nothing is left out.
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -86,7 +87,9 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
         }
         model = spec.compile()
     except ValueError as error:
-        complaint = " ".join(f"MuJoCo does not compile it: {error}".split())
+        # its lines are those of a text that is written anew, and not of the file
+        stated = re.sub(r", line \d+", "", str(error))
+        complaint = " ".join(f"MuJoCo does not compile it: {stated}".split())
         raise InputError("MJCF", None, complaint) from None
     except RuntimeError:  # "unknown exception": a size that no memory holds
         raise InputError(
