@@ -435,6 +435,13 @@ class SceneBlock(Facts):
         begin = f"released for {write_digits(free.duration)} s, without a drive"
         if self.period is not None:
             begin += f", period {write_digits(self.period)} s"
+        at = self.solution.with_extremes
+        assert at is not None and at.time is not None and at.speed is not None
+        last = max(np.flatnonzero(at.speed), default=0)  # the instant of the stop
+        if last < len(at.time) - 1:
+            place = self._value(float(self.solution.theta_2[-1]), "rad")
+            stop = write_digits(float(at.time[last]))
+            begin += f", at rest from t = {stop} s on, at theta_2{_NBSP}={_NBSP}{place}"
         if not self.solution.change_points:
             return begin
         instants = self.solution.change_points
