@@ -112,7 +112,7 @@ def shaking_force(solution: Solution) -> Array:
     a_G: the force F21 + F41 = -(F12 + F14), and that of a linear drive or of springs
     with an end on the ground besides.
     """
-    return _balance_momentum(solution)[0]
+    return _balance_momentum(solution)[0].copy()
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -121,11 +121,23 @@ def shaking_moment(solution: Solution) -> Array:
     By the angular momentum of the bars about O2: -T - O4 x F14, and the moments of
     linear drives, springs and couples that act between bars and ground.
     """
-    return _balance_momentum(solution)[1]
+    return _balance_momentum(solution)[1].copy()
 
 
 def _balance_momentum(solution: Solution) -> tuple[Array, Array]:
-    """Return the force on the frame and its moment about O2, by the momentum."""
+    """Return the force on the frame and its moment about O2, which the solution keeps.
+
+    Force and moment are those of the momentum of the bars.
+    """
+    kept = vars(solution)
+    if "_on_frame" not in kept:
+        kept["_on_frame"] = _sum_on_frame(solution)
+    on_frame: tuple[Array, Array] = kept["_on_frame"]
+    return on_frame
+
+
+def _sum_on_frame(solution: Solution) -> tuple[Array, Array]:
+    """Sum what acts on the bars from outside, and what their momentum gains."""
     F12 = _require_quantity(solution, "F12")
     scene = solution.stated.settled()
     bodies = list_bodies(scene.linkage, scene.effects)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.polynomial.legendre import leggauss
 
+from fourbar.effects import Springs
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
 from fourbar.scene import command_at
@@ -449,7 +450,14 @@ def _judge_pins(judged):
         judged.add_value("pins", of_pin["peak"], load.peak.value)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
         judged.add("pins", np.abs(wrap_difference(apart)))
-    if judged.scene.drive is None:
+    ends = {
+        end.bar
+        for effect in judged.scene.effects
+        if isinstance(effect, Springs)
+        for spring in effect.springs
+        for end in (spring.start, spring.end)
+    }
+    if judged.scene.drive is None and 1 not in ends:  # pins alone hold the frame
         forces = [judged.own.quantities[name] for name in ("F12", "F14")]
         size = sum(magnitude(force).max() for force in forces)
         if size != 0.0:
