@@ -129,6 +129,7 @@ def _balance_momentum(solution: Solution) -> tuple[Array, Array]:
 
     Force and moment are those of the momentum of the bars.
     """
+    expect("solution", solution, Solution)
     kept = vars(solution)
     if "_on_frame" not in kept:
         kept["_on_frame"] = _sum_on_frame(solution)
