@@ -24,7 +24,8 @@ PATIENCE = 8.0 * BUSY
 ENDLESS_MJCF = """<mujoco><worldbody><replicate count="20000" offset="0.1 0 0">
 <body><joint/><geom size="0.1"/></body></replicate></worldbody></mujoco>"""
 """Bodies that MuJoCo compiles for minutes, in little memory."""
-HELLO = {"id": 1, "engine": "busy", "answers": ["theta_3"], "effects": ["loads"]}
+ACTING = ["gravity", "loads"]
+HELLO = {"id": 1, "engine": "busy", "answers": ["theta_3"], "effects": ACTING}
 BUSY_GUEST = f"""
 import os, sys
 sys.stdin.readline()
