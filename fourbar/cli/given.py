@@ -236,6 +236,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     those that the linkage can have, any other column has its value in the scene's
     motion.
     """
+    from fourbar.effects.linear_drive import LinearDrive
     from fourbar.files.drawn_pins import list_drawn
     from fourbar.quantities.units import half_unit_of_text
     from fourbar.show.located import EXTREMES, locate
@@ -253,9 +254,8 @@ def read_positions(scene: Scene, text: str) -> Command:
                 return find_positions(scene, name, drawn[name])
         raise InputError("--at", text, "needs a scene that states [pins]")
     is_column = name not in STATED_POSITIONS or value in EXTREMES
-    if name == "stroke" and scene.drive is not None and scene.drive.has_stroke:
-        ends = {place.bar for _, place in scene.drive.ends}
-        is_column |= ends not in ({1, 2}, {1, 4})  # a stroke that is not commanded
+    if name == "stroke" and isinstance(scene.drive, LinearDrive):
+        is_column |= not scene.drive.may_be_commanded
     if is_column:
         return locate(scene, name, value)
     unit = {"stroke": "m", "time": "s"}.get(name, "rad")

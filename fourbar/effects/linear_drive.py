@@ -36,6 +36,11 @@ class LinearDrive(Line, ForceDrive):
         return (-1.0, self.start), (1.0, self.end)
 
     @property
+    def may_be_commanded(self) -> bool:
+        """Return True if the stroke turns bar 2 or 4, as between it and the ground."""
+        return {self.start.bar, self.end.bar} in ({1, 2}, {1, 4})
+
+    @property
     def may_be_left_out(self) -> tuple[int, ...]:
         """Return the bars of which one may be left out.
 

@@ -535,18 +535,16 @@ def require_cylinder(drive: "ForceDrive | None") -> "LinearDrive":
     """
     from fourbar.effects.linear_drive import LinearDrive
 
-    bars = set[int]()
     drives = "no cylinder"
     if isinstance(drive, LinearDrive):
-        bars = {drive.start.bar, drive.end.bar}
+        if drive.may_be_commanded:
+            return drive
         drives = f"one from bar {drive.start.bar} to bar {drive.end.bar}"
-    if not isinstance(drive, LinearDrive) or bars not in ({1, 2}, {1, 4}):
-        raise InputError(
-            "motion.stroke",
-            drives,
-            "is of a cylinder ([drive]) between the ground and bar 2 or 4",
-        )
-    return drive
+    raise InputError(
+        "motion.stroke",
+        drives,
+        "is of a cylinder ([drive]) between the ground and bar 2 or 4",
+    )
 
 
 def _find_triangle(linkage: FourBar, drive: "ForceDrive | None") -> _Triangle:

@@ -252,8 +252,12 @@ class _LocatedSearch:
 
 
 def _find_usual_size(values: Array) -> float:
-    """Return the size that nine tenths of the values other than zero do not exceed."""
-    return float(np.percentile(np.abs(values[values != 0.0]), USUAL))
+    """Return the size that nine tenths of the values other than zero do not exceed.
+
+    Where all are zero it is zero.
+    """
+    sizes = np.abs(values[values != 0.0])
+    return float(np.percentile(sizes, USUAL)) if sizes.size else 0.0
 
 
 def write_place(name: str, place: float) -> str:

@@ -165,6 +165,8 @@ REFUSED = read_rows("""
 B_y | 0.6 m | no position has it; B_y goes from 0 to
 omega_4 | 1 rad/s | constant; omega_4 is 1 rad/s
 omega_4 | max | constant; omega_4 is 1 rad/s
+alpha_4 | max | constant; alpha_4 is 0 rad/s
+alpha_4 | 1 rad/s^2 | constant; alpha_4 is 0 rad/s
 tork | 1 N m | --at = .tork.: unknown; did you mean "torque"
 B_y | 0.6 | unit is missing; did you mean "0.6 m"
 B_y | 6 s | --at
@@ -175,9 +177,7 @@ B_x-theta_2 | 1 m | difference is of two columns of one kind
 
 @pytest.mark.parametrize("name, value, words", REFUSED)
 def test_what_no_position_has_is_refused_with_the_range(name, value, words):
-    kind = (
-        NotAssembledError if "omega_4 is" in words or "no pos" in words else InputError
-    )
+    kind = NotAssembledError if "constant" in words or "no pos" in words else InputError
     with raises(kind, match=words):
         locate(parallelogram(), name, value)
 
