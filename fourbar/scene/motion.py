@@ -500,7 +500,20 @@ class Motion:
         stroke_acceleration: float | Array = 0.0,
         side: str | None = None,
     ) -> None:
-        given = locals()
+        given: dict[str, Any] = {
+            "theta_2": theta_2,
+            "omega_2": omega_2,
+            "alpha_2": alpha_2,
+            "theta_3": theta_3,
+            "omega_3": omega_3,
+            "alpha_3": alpha_3,
+            "theta_4": theta_4,
+            "omega_4": omega_4,
+            "alpha_4": alpha_4,
+            "stroke": stroke,
+            "stroke_speed": stroke_speed,
+            "stroke_acceleration": stroke_acceleration,
+        }
         expect("motion.law", law, Law, Rise, Sine, type(None))
         stated = _find_bar("motion", {name: given[name] for name in _NAMES_OF_BARS})
         bar = (stated or 2) if law is None else law.bar

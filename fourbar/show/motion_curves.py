@@ -467,11 +467,11 @@ def compute_bending(solution: Solution) -> dict[int, Bending]:
             compute_bending(solve(scene, at=solution.at.part(rows)))
             for rows in split(count, POSITIONS_OF_A_BLOCK)
         ]
-        return {
-            bar: Bending(*map(np.concatenate, zip(*columns, strict=True)))
-            for bar in MOVING_BARS
-            for columns in [[block[bar] for block in blocks]]
-        }
+        bending = {}
+        for bar in MOVING_BARS:
+            columns = zip(*(block[bar] for block in blocks), strict=True)
+            bending[bar] = Bending(*map(np.concatenate, columns))
+        return bending
     forces = [*compute_pin_loads(solution).values()]
     if solution.drive_force is not None:
         forces.append(np.abs(solution.drive_force))
