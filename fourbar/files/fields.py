@@ -110,7 +110,7 @@ _WAYS = {
 """Ways to state what has no key, by words for it."""
 _TABLE_OF = {
     "ground_angle": "lengths",
-    **dict.fromkeys(("branch", "side", "stroke", "law", "free"), "motion"),
+    **dict.fromkeys(("branch", "side", "law", "free"), "motion"),
     **dict.fromkeys(("theta_2", "omega_2", "alpha_2"), "motion"),
     **dict.fromkeys(("gravity", "viscous", "friction", "pin_friction"), "effects"),
     **dict.fromkeys(("torsion", "springs", "flywheel"), "effects"),
