@@ -174,23 +174,29 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
     assert list_failing(rows) == {"torque"}
 
 
-def test_a_scene_of_which_most_numbers_are_undecided_does_not_hold():
-    """A tolerance wider than a thousandth at every position leaves nothing to decide
-    by.
-    """
-    blind = replace(FORMULAS, condition=np.full(POSITIONS, 1e-14))
-    held = Demands(EQUIVALENCE, ("omega_3", "F12"))
-    compared = Comparison(
-        "",
-        SCENE,
-        make_answer(),
-        blind,
-        held,
-        blind,
-    ).rows()
+@pytest.mark.parametrize(
+    ("condition", "names", "hidden", "failed"),
+    [
+        # no engine, however many quantities it answers, has digits to be judged by
+        (1e-14, ("omega_3", "F12"), (), False),
+        (1e-14, ("torque",), (), False),
+        # an engine's own predicted errors may hide half of what has digits
+        (1.0, ("omega_3", "F12"), ("F12",), False),
+        (1.0, ("omega_3", "F12"), ("F12", "omega_3"), True),
+        (1.0, ("torque",), ("torque",), True),
+    ],
+)
+def test_an_engine_whose_predicted_errors_hide_most_numbers_does_not_hold(
+    condition, names, hidden, failed
+):
+    blind = replace(FORMULAS, condition=np.full(POSITIONS, condition))
+    answer = make_answer(**{name: 3.0 * FORMULAS[name] for name in hidden})
+    held = Demands(EQUIVALENCE, names, lambda name, mask: np.full(POSITIONS, 1e9))
+    compared = Comparison("", SCENE, answer, blind, held, blind).rows()
     rows = {row.quantity: row for row in compared}
-    assert rows["F12"].verdict == UNDECIDED
-    assert rows["undecided"].failed and rows["undecided"].allowed == 0.5
+    assert rows[names[-1]].verdict == UNDECIDED
+    row = rows["undecided"]
+    assert (row.failed, row.verdict == UNDECIDED) == (failed, condition < 1.0)
 
 
 def test_an_error_within_the_rounding_of_theta_2_is_taken_again():

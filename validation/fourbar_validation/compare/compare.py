@@ -5,7 +5,7 @@ The row states the position where the quantity is worst.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -104,7 +104,9 @@ to is compared or the engine answers it.
 """
 _OF_FORCES = (*FORCE_NAMES, *DRY_FRICTION_QUANTITIES)
 _MOST_UNDECIDED = 0.5
-"""Share of the numbers of a scene that are undecided, beyond which it does not hold."""
+"""Share of the numbers of a scene which have digits to decide by, and which the errors
+predicted for an engine may nevertheless leave undecided.
+"""
 _SLOW_DRIVE = 0.1
 """Part of the drive's greatest speed above which a simulation's forces are judged. The
 torque on bar 3 or 4, the force of a cylinder and the pin forces have poles where the
@@ -143,8 +145,12 @@ class _Judged(NamedTuple):
     row: Row
     numbers: int = 0
     """Numbers at positions where both close the loop."""
+    decidable: int = 0
+    """Those to which condition and N leave digits for any engine to be judged by, or at
+    a reversal, where either side is right.
+    """
     decided: int = 0
-    """Those with a verdict, or at a reversal, where either side is right."""
+    """Those of them with a verdict: no error as large as the number is predicted."""
 
 
 @dataclass
@@ -190,21 +196,22 @@ class Comparison:
                 if quantity in names or line in answer.quantities
             }
         rows = [self._compare_assembled()]
-        numbers = 0
-        undecided = 0
+        counted = []
         for name in filter(names.__contains__, STAGE_OF):
             judged = self._compare(name)
             if judged is not None:
                 rows.append(judged.row)
-                numbers += judged.numbers
-                undecided += judged.numbers - judged.decided
+                counted.append(judged[1:])
         rows += [self._unmeasured("watch", FAILS, alarm) for alarm in answer.alarms]
-        if numbers:  # a scene of which most numbers are undecided does not hold
-            reason = f"{undecided} of {numbers} numbers are undecided"
-            share = undecided / numbers
-            rows.append(
-                Row.judged(self._who, "undecided", share, _MOST_UNDECIDED, reason)
-            )
+        numbers, decidable, decided = np.sum([(0, 0, 0), *counted], axis=0).tolist()
+        if numbers:  # an engine whose errors hide most of its numbers does not hold
+            reason = f"{numbers - decided} of {numbers} numbers are undecided"
+            if decidable < numbers:
+                reason += f", {numbers - decidable} where no engine can be judged"
+            most = 1.0 - (1.0 - _MOST_UNDECIDED) * decidable / numbers
+            share = 1.0 - decided / numbers
+            row = Row.judged(self._who, "undecided", share, most, reason)
+            rows.append(row if decidable else replace(row, verdict=UNDECIDED))
         return rows
 
     def closure(self) -> Row:
@@ -348,7 +355,7 @@ class Comparison:
         if not mask.any():
             nowhere = f"{NO_POSITION} this quantity can be compared{note}"
             row = self._unmeasured(quantity, UNDECIDED, nowhere)
-            return _Judged(row, closed, reversals)
+            return _Judged(row, closed, reversals, reversals)
         errors = self._measure(quantity, ours, theirs, mask)
         worst = judge_errors(
             errors, self._predict(quantity, errors), self.demands.method
@@ -363,7 +370,8 @@ class Comparison:
             float(formulas.theta_2[worst.position]),
             worst.condition,
         )
-        return _Judged(row, closed, reversals + worst.decided)
+        decidable = int(np.count_nonzero(errors.decidable))
+        return _Judged(row, closed, reversals + decidable, reversals + worst.decided)
 
     def _measure(
         self, quantity: str, ours: Array, theirs: Array, mask: Mask
