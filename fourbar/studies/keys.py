@@ -1,16 +1,16 @@
 """The numbers of a scene by their keys in its file, and scenes of arrays of them."""
 
 from collections.abc import Collection, Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.place import STATED_PLACES, At, Place
+from fourbar.effects.place import At, Place
 from fourbar.errors import (
     ELSEWHERE,
     InputError,
     expect,
+    list_allowed,
     names_other_mechanism,
     write_in_units,
 )
@@ -44,27 +44,6 @@ from fourbar.scene.numbers import PIN_COORDINATE, Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
-_SAME_FOR_ALL = {
-    "title",
-    "source",
-    "drive",
-    "bar",
-    "branch",
-    "free",
-    "law",
-    "frame",
-    "table",
-    "picture",
-    "acts",
-    "from",
-    "to",
-    "steps",
-    "limit",
-    "offset",
-}
-"""Parts of keys that name no number. They name a word, a whole number, or what has
-another form in a study.
-"""
 _BY_MATERIAL = ("density", "section", "diameter", "mass_per_length")
 """Numbers of a bar that are varied only where the scene states them."""
 _MASS_CENTRE = "centre"
@@ -220,85 +199,11 @@ def command_key(scene: Scene) -> str:
 
 
 def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
-    """Make the error for a key that a study cannot vary."""
+    """Make the error for a key that a study cannot vary; keys like it come first."""
     expect("key", key, str)
-    parts = key.split(".")
-    inner = [name for name in keys if name.startswith(f"{key}.")]
-    if parts[0] == "pins" and not any(name.startswith("pins.") for name in keys):
-        lengths = ", ".join(name for name in keys if name.startswith("lengths."))
-        allowed = f"the scene has no [pins]; it states lengths: {lengths}"
-    elif inner:
-        allowed = "is more than one number; vary " + ", ".join(inner)
-    elif not _SAME_FOR_ALL.isdisjoint(parts):
-        allowed = (
-            "is the same for every member of a study: only numbers vary, theta_2 as"
-            " angles"
-        )
-    elif any(map(names_other_mechanism, parts)):
-        allowed = f"unknown key; {ELSEWHERE}"
-    else:
-        allowed = f"unknown key; {_suggest(key, keys)}"
-    return InputError(key, value, allowed)
-
-
-def _suggest(key: str, keys: list[str]) -> str:
-    """Say which of the keys an unknown one may stand for.
-
-    A number of another meaning is named with its meaning: a coordinate is no distance.
-    """
-    stem, _, last = key.rpartition(".")
-    axis = "xy".find(last)
-    coordinate = f"{stem}.{axis}"
-    of_drawing = stem.startswith("pins.") or f".{DRAWN_WORD}." in coordinate
-    if axis >= 0 and of_drawing:
-        if coordinate in keys:
-            return f'did you mean "{coordinate}"?'
-        key = coordinate
-    place, drawn, _ = key.partition(f".{DRAWN_WORD}.")
-    if drawn:
-        return _suggest_for_drawn(key, place, keys)
-    if axis >= 0 and (pairs := _describe_pairs(f"{stem}.", keys)):
-        return f"no number has the components x and y; it has {pairs}"
-    return _name_closest(key, keys)
-
-
-def _suggest_for_drawn(key: str, place: str, keys: list[str]) -> str:
-    """Say by which numbers a place varies that has no coordinates in the drawing."""
-    forms = [f"{place}.{name}." for name in (*STATED_PLACES, "arm")]
-    if place.endswith(f".{_MASS_CENTRE}"):
-        forms.append(f"{place}.")
-    pairs = "".join(_describe_pairs(form, keys) for form in forms)
-    drawn = [known for known in keys if f".{DRAWN_WORD}." in known]
-    if not any(known.startswith("pins.") for known in keys):
-        reason = "the scene has no [pins], in whose drawing a place has coordinates"
-    elif drawn and not pairs:
-        return _name_closest(key, drawn)
-    else:
-        reason = "here no place has coordinates in the drawing"
-    if pairs:
-        return f"{reason}; it has {pairs}"
-    return reason
-
-
-def _name_closest(key: str, keys: list[str]) -> str:
-    """Name the most similar key, of a list or pair with the same index."""
-    index = key.rpartition(".")[2]
-    alike = [known for known in keys if known.rpartition(".")[2] == index]
-    if index not in ("0", "1") or not alike:
-        alike = keys
-    (close,) = get_close_matches(key, alike, 1, 0.0)
-    return f'did you mean "{close}"?'
-
-
-def _describe_pairs(start: str, keys: list[str]) -> str:
-    """Name the two numbers of a pair with their meaning; empty if there is no pair."""
-    pair = f"{start}0", f"{start}1"
-    if not all(key in keys for key in pair):
-        return ""
-    form = start.split(".")[-2]
-    of_place = form in (*STATED_PLACES, "arm", _MASS_CENTRE)
-    size = "the distance" if of_place else "the magnitude"
-    return f"{pair[0]} ({size}) and {pair[1]} (the angle)"
+    is_elsewhere = any(map(names_other_mechanism, key.split(".")))
+    allowed = ELSEWHERE if is_elsewhere else list_allowed(key, keys)
+    return InputError(key, value, f"is no number of this scene; {allowed}")
 
 
 def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:

@@ -143,7 +143,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
         solve(scene, out={"torque": np.empty(1)})
     with raises(
         InputError,
-        match=r"drive\.from\.bar = .*same for every member",
+        match=r"drive\.from\.bar = .*is no number of this scene",
     ):
         vary(scene, {"drive.from.bar": [2]})
 

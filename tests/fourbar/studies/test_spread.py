@@ -122,13 +122,13 @@ def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_ther
 BAD = read_rows("""
 "lengths.input" = "150 mm" | less than the number itself, 0.1 m
 "lengths.input" = ["40 mm", "sigma"] | three sigma of it must be less
-"lengths.inptu" = "1 mm" | did you mean "lengths.input"
+"lengths.inptu" = "1 mm" | must be among lengths.input
 "lengths.input" = "1 deg" | "deg" does not convert to m
 "lengths.input" = 0.1 | with a unit
 "lengths.input" = ["1 mm", "normal"] | "sigma"]
 "lengths.input" = "0 mm" | > 0
 "bars.input.inertia" = "1 kg m^2" | follows the length
-"bars.input.centre" = "1 mm" | is more than one number
+"bars.input.centre" = "1 mm" | must be among bars.input.centre.0
 "motion.theta_2" = "1 deg" | a commanded value has no tolerance
 """)
 
@@ -159,7 +159,7 @@ INPUT = Tolerance("lengths.input", 5e-5)
     "stated, options, words",
     [
         ((), {}, "states none"),
-        ((Tolerance("lengths.x", 1.0),), {}, "did you mean"),
+        ((Tolerance("lengths.x", 1.0),), {}, "must be among lengths."),
         ((Tolerance("bars.input.inertia", 1.0),), {}, "left out"),
         *(((INPUT,), {"samples": n}, "whole number") for n in (1, 2.5, 10**9)),
         *(((INPUT,), {"seed": x}, "Generator") for x in (-1, True, 1.5, "1", None)),
