@@ -243,10 +243,10 @@ def test_a_longer_number_keeps_its_digits_and_what_a_double_lost_counts():
     decided = decide_half_angles(bars, 1.0, half, [1], theta, lost=lost)
     with mp.workdps(60):
         exact = five(bars, mp.mpf(2.0) + mp.mpf(lost))
-    for number, wanted in zip(decided, exact, strict=False):
-        rounded = float(number[1])
-        error = mp.mpf(rounded) + mp.mpf(float(number[1] - rounded)) - wanted
-        assert abs(error) <= np.finfo(np.longdouble).eps * abs(wanted)
+        for number, wanted in zip(decided, exact, strict=False):
+            rounded = float(number[1])
+            error = mp.mpf(rounded) + mp.mpf(float(number[1] - rounded)) - wanted
+            assert abs(error) <= float(np.finfo(np.longdouble).eps) * abs(wanted)
 
 
 @pytest.mark.parametrize("steps", [-3.0, 3.0])
