@@ -159,5 +159,10 @@ class Else(Right):
     quantities = ("heat",)
 
 
+class Misspelt(Right):
+    name = "misspelt"
+    effects = ("gravity", "spring")
+
+
 class OfAnother(Right):
     name = "free-body"

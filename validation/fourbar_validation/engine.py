@@ -17,7 +17,6 @@ from typing import IO, Any
 
 import numpy as np
 
-from fourbar import effects
 from fourbar.errors import InputError, LimitError
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer, explain_refusal
@@ -28,11 +27,6 @@ from fourbar_validation.engines.registry import list_engines
 from fourbar_validation.places import PACKAGE
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
-_ALL_BUT_CYLINDER = (
-    *effects.list_kinds(),
-    "loads",
-    "drive",
-)
 OURS = frozenset(sys.modules)
 """Modules that were imported before those of the engine."""
 _Factory = Callable[..., Any]
@@ -63,7 +57,7 @@ def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
         "engine": entry,
         "answers": list(engine.answers),
         "commands": list(getattr(adapter, "commands", ("theta_2",))),
-        "effects": [*_ALL_BUT_CYLINDER, "cylinder", "push", protocol.ONE_SIDED],
+        "effects": list(protocol.EFFECT_WORDS[:-1]),
     }
     library = engine.library.removeprefix("py")  # pydrake is of the distribution drake
     try:
@@ -115,7 +109,7 @@ def _open_class(entry: str) -> tuple[_Factory, dict[str, Any]]:
         "answers": getattr(served, "quantities", UNKNOWNS),
         "commands": getattr(served, "commands", ("theta_2",)),
         "effects": [
-            *getattr(served, "effects", _ALL_BUT_CYLINDER),
+            *getattr(served, "effects", protocol.WITH_COUPLES),
             *(["release"] * hasattr(served, "release")),
         ],
         "tolerance": getattr(served, "tolerance", "equivalence"),

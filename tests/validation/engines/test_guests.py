@@ -461,7 +461,12 @@ def test_what_is_not_there_is_refused_in_one_line(entry, part):
 @pytest.mark.usefixtures("hosted")
 @pytest.mark.parametrize(
     "name, reason",
-    [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")],
+    [
+        ("Nameless", "engine"),
+        ("Loose", "tolerance"),
+        ("Else", "answers"),
+        ("Misspelt", "effects = 'spring': must be among gravity, "),
+    ],
 )
 def test_a_hello_that_fails_is_one_failing_row(name, reason):
     by_engine = judged(SCENE, name)

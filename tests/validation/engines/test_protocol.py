@@ -242,6 +242,11 @@ def test_what_an_answer_leaves_out_has_defaults():
     np.testing.assert_array_equal(answer.at.angle, list_positions(THREE).angle)
     assert np.isnan(answer.quantities["F12"][1:]).all()
     assert read_answer({"refusal": "no springs here"}).refusal == "no springs here"
+    # what the command alone decides is no word on whether the loop closes
+    echoed = {"omega_2": [1, 1, 1], "v_A": 3 * [[0, 1]]}
+    closed = read_answer({"answers": {"theta_3": [1, None, 3], **echoed}}).assembled
+    assert closed.tolist() == [True, False, True]
+    assert read_answer({"answers": echoed}).assembled.all()
     with raises(EngineError, match="no licence"):
         read_answer({"error": "no licence"})
 

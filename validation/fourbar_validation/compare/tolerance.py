@@ -130,10 +130,19 @@ POWER = {
 follows from them as 1/s^2.
 """
 _UNITS_OF_FORCES = ("N", "N m", "W")
-OF_THE_INPUT = frozenset(
-    ("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2")
-)
-"""Quantities that the input alone decides: they lose none."""
+OF_THE_COMMAND = {
+    bar: frozenset(
+        (
+            *(f"{quantity}_{bar}" for quantity in ("theta", "omega", "alpha")),
+            *(f"{rate}{point}" for rate in ("", "v_", "a_") for point in points),
+        )
+    )
+    for bar, points in ((2, ("A", "G2")), (3, ()), (4, ("B", "G4")))
+}
+"""Quantities that the command of a bar decides by itself, also where the loop is open:
+they lose no digits.
+"""
+OF_THE_INPUT = OF_THE_COMMAND[2]
 TOUCHING_MARGIN = 32.0 * EPS
 """A loop that closes, or misses, by less than this part of the sum of its lengths does
 so by the rounding of the data, and the engines may differ on whether it closes.
@@ -184,11 +193,7 @@ def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array
     """
     bar = formulas.at.bar
     unit = UNITS[quantity]
-    if bar == 2:
-        decided = OF_THE_INPUT
-    else:
-        decided = frozenset((f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}"))
-    if quantity in decided:
+    if quantity in OF_THE_COMMAND[bar]:
         # a stroke commands the bar as far as its cylinder has a lever
         return np.full(len(formulas), np.asarray(formulas.at.condition) ** POWER[unit])
     condition = find_lever(linkage, bar) * formulas.condition ** POWER[unit]

@@ -27,6 +27,7 @@ from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.description import name_drive
+from fourbar_validation.engines.prediction import predict_for_any_method
 from fourbar_validation.engines.programs import Ask, Program, Running
 from fourbar_validation.engines.registry import SIMULATED_TO_ERROR, Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
@@ -150,6 +151,7 @@ def name_guests(
             positions=tuple(
                 quantity for quantity in hello.answers if quantity in ANGLES
             ),
+            predictor=predict_for_any_method,
             code=hash_files(filter(os.path.isfile, program.command)),
             version=" on ".join(filter(None, (hello.version, hello.device))),
             stated_name=" ".join(words) or stated,
@@ -325,7 +327,7 @@ def _read_hello(data: dict[str, Any]) -> Hello:
         name,
         tuple(quantity for quantity in ANSWERABLE_QUANTITIES if quantity in answers),
         texts("commands", ("theta_2",), COMMANDED_NAMES),
-        texts("effects"),
+        texts("effects", allowed=protocol.EFFECT_WORDS),
         _read_tolerance(data.get("tolerance", EQUIVALENCE.name)),
         text("version"),
         text("code"),

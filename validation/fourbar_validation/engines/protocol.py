@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.effects import list_kinds
 from fourbar.errors import InputError
 from fourbar.files.fields import Entry, SceneFile, Written
 from fourbar.files.scene_file import read_scene
@@ -41,6 +42,7 @@ from fourbar.scene.motion import (
 from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
+from fourbar_validation.compare.tolerance import OF_THE_COMMAND
 
 PROTOCOL = 4
 """Number of the contract; a change that an engine must know of raises it."""
@@ -50,6 +52,10 @@ the command than this answers another question.
 """
 ONE_SIDED = "one_sided"
 """Word of a hello's `effects` for springs that act one way."""
+WITH_COUPLES = (*list_kinds(), "loads", "drive")
+"""Words for all that acts in a linkage which a couple drives."""
+EFFECT_WORDS = (*WITH_COUPLES, "cylinder", "push", ONE_SIDED, "release")
+"""Words that a hello may list in `effects`."""
 DESCRIBED_TABLES = ("lengths", "bars", "drive", "loads", "effects")
 KINDS_OF_COMMAND = (*COMMAND_NAMES.values(), STROKE_COMMAND)
 _OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
@@ -358,7 +364,7 @@ def answer_from_json(
         engine,
         setting,
         read_answered_motion(data.get("at"), command),
-        _read_assembled(data.get("assembled"), quantities, n),
+        _read_assembled(data.get("assembled"), quantities, command),
         quantities,
         predicted=predicted,
         alarms=[require_text("alarms", alarm) for alarm in alarms],
@@ -453,13 +459,18 @@ def _read_values(key: str, value: Any, n: int, *, pairs: bool = False) -> Array:
 def _read_assembled(
     value: Any,
     quantities: dict[str, Array],
-    n: int,
+    command: Command,
 ) -> Any:
-    """Read where the loop closes; left out: wherever there is a value."""
+    """Read where the loop closes; left out: wherever there is a value.
+
+    What the command alone decides has one at every position and tells nothing, unless
+    it is all that is answered.
+    """
+    n = len(command.angle)
     if value is None:
+        telling = quantities.keys() - OF_THE_COMMAND[command.bar] or quantities
         valued = [
-            np.isfinite(array).reshape(n, -1).any(axis=1)
-            for array in quantities.values()
+            np.isfinite(quantities[name]).reshape(n, -1).any(axis=1) for name in telling
         ]
         if valued:
             return np.any(valued, axis=0)
