@@ -1,6 +1,6 @@
 """What drives a linkage, and whether its motion closes."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,28 +74,23 @@ def describe_drive(scene: Scene) -> str:
     return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
-def is_once_round(solution: Solution) -> Any:
-    """Return True if the last position repeats the first; for a study an array (m,).
+def is_once_round(solution: Solution) -> bool:
+    """Return True if the last position repeats the first.
 
     The motion then covers whole turns, of an assembly with a single change point an
     even number of them. Speed and acceleration must repeat too: a motion law may end at
     another speed than it begins with.
     """
     angle = solution.at.angle
-    bar = solution.at.bar
-    if angle.shape[-1] == 1:
-        return np.zeros(angle.shape[:-1], dtype=bool)
-    period = count_turns(solution.lengths, bar)
-    if period.ndim > 1:  # of a study, a column
-        period = period[:, 0]
-    covered = np.abs(angle[..., -1] - angle[..., 0])
-    turns = covered / (2.0 * np.pi * period)
-    is_whole = np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
-    once_round = (turns > 0.5) & is_whole
-    for rate in (solution.at.speed, solution.at.acceleration):
-        if rate is not None and np.shape(rate)[-1:] == angle.shape[-1:]:
-            rates = np.asarray(rate)
-            gap = np.abs(rates[..., -1] - rates[..., 0])
-            repeats = gap <= _SAME_RATE * np.max(np.abs(rates), axis=-1)
-            once_round = once_round & repeats
-    return once_round
+    if len(angle) == 1:
+        return False
+    period = float(count_turns(solution.lengths, solution.at.bar))
+    turns = abs(angle[-1] - angle[0]) / (2.0 * np.pi * period)
+    if turns <= 0.5 or not np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0):
+        return False
+    rates = (solution.at.speed, solution.at.acceleration)
+    return all(
+        abs(rate[-1] - rate[0]) <= _SAME_RATE * np.abs(rate).max()
+        for rate in rates
+        if isinstance(rate, np.ndarray) and rate.size > 1
+    )

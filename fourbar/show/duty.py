@@ -3,7 +3,6 @@
 Bearings and a motor are chosen by them; the JSON of `analyze` has them.
 """
 
-import warnings
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -15,18 +14,15 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.torque import inertia
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import JAMMED, WOUND, Array
+from fourbar.quantities import JAMMED, PIN_FORCES, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
-from fourbar.show.driving import Driving, is_once_round, read_drive_demand
-from fourbar.show.motion_curves import describe_motion
-from fourbar.solution import Conversion, Solution, find_unit_in, where_assembled
+from fourbar.show.driving import is_once_round, read_drive_demand
+from fourbar.show.motion_curves import MotionCurves, describe_motion
+from fourbar.solution import Conversion, Solution, find_unit_in
 
 
 class BearingLoad(NamedTuple):
-    """Load of one pin over a motion.
-
-    Of a study each number is an array (m,). None: the load grows without bound.
-    """
+    """Load of one pin over a motion; None: it grows without bound."""
 
     largest: float | None
     """N."""
@@ -41,7 +37,7 @@ class BearingLoad(NamedTuple):
 class MotorDuty(NamedTuple):
     """Peak and root mean square over a motion, and the energy.
 
-    Of a study each is an array (m,). None: it grows without bound, or is not defined.
+    None: it grows without bound, or is not defined.
     """
 
     peak_torque: float | None
@@ -170,23 +166,14 @@ def _sum_on_frame(solution: Solution) -> tuple[Array, Array]:
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """Return largest and RMS load of pin "O2", "A", "B" or "O4", and the place.
 
-    Of a sweep or a motion law of one scene they are those of the whole motion, whatever
-    its steps, and None where the load grows without bound. Of a list, a released motion
-    or a study they are those of the positions that have a value, of a study arrays
-    (m,).
+    Loads of a sweep or a motion law are those of the whole motion, whatever its steps,
+    and None where they grow without bound. Those of a list or of a released motion are
+    of the positions that have a value.
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
     name = PIN_FORCE[pin]
-    force = _require_quantity(solution, name)
-    if not _is_one_scene(solution):
-        load = np.hypot(force[..., 0], force[..., 1])
-        load = np.where(np.isfinite(load), load, np.nan)
-        worst = np.argmax(np.nan_to_num(load, nan=-1.0), axis=-1)[..., None]
-        theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
-        place = _reduce_to_number(np.take_along_axis(theta_2, worst, axis=-1)[..., 0])
-        return BearingLoad(_reduce(np.nanmax, load), _find_rms(solution, load), place)
-    motion = describe_motion(solution)
+    motion = _describe_loads(solution)
     peak = motion.find_peak(name)
     if peak is None:
         return BearingLoad(None, None, None)
@@ -205,53 +192,37 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     omega takes up the swing of the energy dE = max - min of integral (P - mean P) dt
     with a change of speed of omega dE/(I omega^2).
 
-    Of a sweep or a motion law of one scene all are those of the whole motion, whatever
-    its steps. Of a list or a study they are those of the positions that have a value,
-    the energies by the trapezoidal rule. What grows without bound is None, and so are
-    means and energies of a sweep with an acceleration, which passes its positions at no
-    one speed, and the energies of a motion on a part of which no forces exist.
+    Numbers of a sweep or a motion law are those of the whole motion, whatever its
+    steps. Those of a list are of the positions that have a value, without energies.
+    What grows without bound is None, and so are means and energies of a sweep with an
+    acceleration, which passes its positions at no one speed, and the energies of a
+    motion on a part of which no forces exist.
 
     Returns None where no position has a torque or force of the drive: a released
     linkage, or positions alone.
 
     Parameters
     ----------
-    solution : positions of a sweep or of a motion law, to the stage "force"; or of a
-        study of one.
+    solution : positions of a scene, to the stage "force".
     """
     expect("solution", solution, Solution)
     drive = read_drive_demand(solution)
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    _require_quantity(solution, "power")
-    if _is_one_scene(solution) and describe_motion(solution).panels.located:
-        return _integrate_duty(solution, drive)
-    return _sum_duty(solution, drive)
-
-
-def _is_one_scene(solution: Solution) -> bool:
-    """Return True if the solution is one of a scene, with all that it needs."""
-    quantities = (solution.sin_mu, solution.a_G4, solution.power, solution.F12)
-    complete = all(values is not None for values in quantities)
-    return complete and solution.scene is not None and solution.theta_2.ndim == 1
-
-
-def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
-    """Find the duty over a motion from its curves."""
-    motion = describe_motion(solution)
+    motion = _describe_loads(solution)
     panels = motion.panels
     name = drive.keys.value
-    # over a stretch without forces the energies would be those of a part, unsaid
-    whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
+    kind = "torque" if solution.drive is None else "force"
 
     def find_largest(curve: str) -> float | None:
         peak = motion.find_peak(curve)
         return peak and abs(peak.value)
 
-    peak = find_largest(name)
-    rms = motion.find_rms(name)
+    effort: dict[str, Any] = {"peak_torque": None, "rms_torque": None}
+    effort[f"peak_{kind}"] = find_largest(name)
+    effort[f"rms_{kind}"] = motion.find_rms(name)
     duty = MotorDuty(
-        **_name_effort(solution, peak, rms),
+        **effort,
         peak_speed=find_largest("speed"),
         peak_power=find_largest("power"),
         rms_power=motion.find_rms("power"),
@@ -259,6 +230,8 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
         energy_out=None,
         closed=bool(is_once_round(solution)) and not motion.stretches,
     )
+    # over a stretch without forces the energies would be those of a part, unsaid
+    whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
     second = motion.places_of_second
     if not second or not whole or not panels.has_value("power"):
         return duty
@@ -271,65 +244,25 @@ def _integrate_duty(solution: Solution, drive: Driving) -> MotorDuty:
         return duty
     given = panels.integrate("power")
     surplus = panels.accumulate("power", given / panels.length)
-    mean_torque = None
-    if solution.drive_bar == solution.at.bar:  # none of a drive that exerts a force
-        mean_torque = _find_mean_torque(solution, given / second)
-    return duty._replace(
-        energy_swing=float(np.ptp(surplus)) / second,
-        mean_torque=mean_torque,
-    )
+    duty = duty._replace(energy_swing=float(np.ptp(surplus)) / second)
+    if solution.drive_bar != solution.at.bar:  # or the drive exerts a force
+        return duty
+    # the commanded angle: the integral of the speed would be off by its rule
+    angle = solution.at.angle
+    sense = np.sign(np.mean(np.asarray(solution.at.speed)))
+    turned = sense * abs(angle[-1] - angle[0])
+    return duty._replace(mean_torque=float(given / second / turned))
 
 
-def _sum_duty(solution: Solution, drive: Driving) -> MotorDuty:
-    """Sum up the duty over the positions of a list, or of each member of a study.
-
-    A member of a study that is not closed, or has a position without a value, has NaN
-    for what is about the mean.
-    """
-    values = getattr(solution, drive.keys.value)
-    power = _require_quantity(solution, "power")
-    speed = where_assembled(solution, _require_quantity(solution, drive.speed_key))
-    closed = is_once_round(solution)
-    spans = _compute_spans(solution, power)
-
-    def integrate(part: Array) -> Any:
-        steps = 0.5 * spans * (part[..., :-1] + part[..., 1:])
-        moves = np.isfinite(steps).any(axis=-1)
-        return _find_known(np.where(moves, np.nansum(steps, axis=-1), np.nan))
-
-    work = 0.5 * spans * (power[..., :-1] + power[..., 1:])
-    counts = np.asarray(closed) & np.isfinite(work).all(axis=-1)
-    spans = np.broadcast_to(spans, work.shape)
-    duration = spans.sum(axis=-1)
-    mean = np.full(counts.shape, np.nan)
-    np.divide(work.sum(axis=-1), duration, out=mean, where=counts)
-    surplus = np.cumsum(work - mean[..., None] * spans, axis=-1)
-    # the first position counts with an energy of 0
-    most = surplus.max(axis=-1, initial=0.0)
-    least = surplus.min(axis=-1, initial=0.0)
-    mean_torque = None
-    if counts.any() and solution.drive_bar == solution.at.bar:
-        mean_torque = _find_mean_torque(solution, mean * duration)
-    return MotorDuty(
-        **_name_effort(
-            solution, _reduce(np.nanmax, np.abs(values)), _find_rms(solution, values)
-        ),
-        peak_speed=_reduce(np.nanmax, np.abs(speed)),
-        peak_power=_reduce(np.nanmax, np.abs(power)),
-        rms_power=_find_rms(solution, power),
-        energy_in=integrate(np.maximum(power, 0.0)),
-        energy_out=integrate(np.maximum(-power, 0.0)),
-        closed=bool(closed) if np.ndim(closed) == 0 else closed,
-        mean_torque=mean_torque,
-        energy_swing=_find_known(np.where(counts, most - least, np.nan)),
-    )
-
-
-def _name_effort(solution: Solution, peak: Any, rms: Any) -> dict[str, Any]:
-    """Name peak and RMS of the drive as `MotorDuty` has them."""
-    effort = {"peak_torque": None, "rms_torque": None}
-    kind = "torque" if solution.drive is None else "force"
-    return effort | {f"peak_{kind}": peak, f"rms_{kind}": rms}
+def _describe_loads(solution: Solution) -> MotionCurves:
+    """Describe the motion of one scene by its curves; InputError for a study."""
+    needed = (*PIN_FORCES, "power", "a_G4", "sin_mu")
+    for name in needed:
+        _require_quantity(solution, name)
+    if solution.scene is None or solution.theta_2.ndim > 1:
+        allowed = "must be of one scene: solve members of a study one by one"
+        raise InputError("solution", solution, allowed)
+    return describe_motion(solution)
 
 
 def _require_quantity(solution: Solution, name: str) -> Array:
@@ -342,62 +275,6 @@ def _require_quantity(solution: Solution, name: str) -> Array:
             "was not evaluated: solve up to the stage 'force'",
         )
     return values
-
-
-def _compute_spans(solution: Solution, power: Array) -> Array:
-    """Compute the time between each two positions, s; NaN where nothing moves."""
-    if solution.time is not None:
-        return np.diff(solution.time)
-    speed = getattr(solution, solution.at.names[1])
-    speed = np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
-    spans = np.full(speed.shape, np.nan)
-    np.divide(np.diff(solution.at.places), speed, out=spans, where=speed != 0.0)
-    return np.abs(spans)
-
-
-def _find_mean_torque(solution: Solution, work: Any) -> Any:
-    """Find the mean torque over the angle that the driven bar turns; NaN for no angle.
-
-    `work`: of the drive over the motion, J, of a study (m,). The angle is the commanded
-    one: the integral of the speed would be off by its rule.
-    """
-    angle = np.asarray(solution.at.angle)
-    speed = np.atleast_1d(np.asarray(solution.at.speed))
-    sense = np.sign(speed.mean(axis=-1))
-    turned = sense * np.abs(angle[..., -1] - angle[..., 0])
-    return _reduce_to_number(work / turned)
-
-
-def _find_rms(solution: Solution, values: Array) -> Any:
-    """Return the root mean square over the positions.
-
-    Whole turns count their two equal ends once.
-    """
-    positions = values.shape[-1]
-    is_last = np.arange(positions) == positions - 1
-    is_repeated = is_once_round(solution)[..., None] & is_last
-    once = np.where(is_repeated, np.nan, values)
-    mean_square = _reduce(np.nanmean, np.square(once))
-    return _reduce_to_number(np.sqrt(mean_square))
-
-
-def _reduce(reduce: Any, values: Array) -> Any:
-    """Reduce over the positions that have a value; NaN where none has."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of a member without any
-        return _reduce_to_number(reduce(values, axis=-1))
-
-
-def _find_known(values: Array) -> Any:
-    """Return a number, or of a study an array (m,); None where there is none."""
-    return _reduce_to_number(values) if np.isfinite(values).any() else None
-
-
-def _reduce_to_number(value: Any) -> Any:
-    """Return a number, or of a study an array (m,)."""
-    if np.ndim(value) == 0:
-        return float(value)
-    return value
 
 
 def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:

@@ -154,7 +154,7 @@ class MotionCurves:
         motion = self.scene.motion
         if motion.law is not None:
             return 1.0
-        if not self.is_steady or motion.has_rate_of_each:
+        if not (self.panels.located and self.is_steady):
             return None
         return abs(float(motion.speed or 0.0))
 
