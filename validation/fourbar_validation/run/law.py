@@ -4,10 +4,10 @@ Engines are handed the angles of a law, so that none of them would notice.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial import Polynomial
 
 from fourbar.quantities import Array
 from fourbar.scene.motion import Law, Rise, Sine
@@ -39,14 +39,8 @@ def check_law(question: Question) -> Iterator[Row]:
     command = question.at
     if law is None or command.time is None:
         return
-    if isinstance(law, Rise):
-        restated = _restate_rise(law, command.time)
-    elif isinstance(law, Sine):
-        restated = _restate_sine(law, command.time)
-    elif law.omega is not None:
-        restated = _restate_rates(law, command.time)
-    else:
-        restated = _restate_spline(law, command.time)
+    restate: Any = {Rise: _restate_rise, Sine: _restate_sine, Law: _restate_table}
+    restated = restate[type(law)](law, command.time)
     along = []
     stated = (command.angle, command.speed, command.acceleration)
     for order, (ours, value) in enumerate(zip(restated.rates, stated, strict=True)):
@@ -60,52 +54,61 @@ def check_law(question: Question) -> Iterator[Row]:
     yield question.row("law", error, IDENTITY.factor, restated.reason)
 
 
-def _restate_spline(law: Law, time: Array) -> _Restated:
-    """Restate a table of angles: the piecewise cubic of continuous acceleration.
+def _restate_table(law: Law, time: Array) -> _Restated:
+    """Restate a table by Krogh's polynomial of each piece.
 
-    Each piece is the cubic of Hermite through the table's angles with the speeds at its
-    ends; that it is the law's is decided by the accelerations of neighbouring pieces
-    and by the ends alone.
+    It goes through the angles and rates at both ends of the piece. The speeds of a
+    table of angles are the law's own; that they are right is decided by the
+    accelerations of neighbouring pieces and by the ends alone.
     """
+    from scipy.interpolate import KroghInterpolator
+
     t = np.array(law.time)
-    angle = np.array(law.angle)
-    h = np.diff(t)
-    shortest = float(h.min())
-    rise = np.diff(angle) / h
-    speed = law.at(t)[1]
-    first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
-    last = (-6.0 * rise + 2.0 * speed[:-1] + 4.0 * speed[1:]) / h
-    jerk = (last - first) / h
-    fastest = float(np.abs(rise).max() + np.abs(speed).max())
-    size = fastest + float(np.abs(angle).max()) / shortest
+    speeds = law.at(t)[1] if law.omega is None else law.omega
+    columns = [law.angle, speeds] + [law.alpha] * (law.alpha is not None)
+    steps = np.diff(t)
+    shortest = float(steps.min())
+    after = np.searchsorted(t, time, side="right")
+    piece = np.clip(after - 1, 0, len(steps) - 1)
+    rates = np.zeros((3, len(time)))
+    at_ends = np.zeros((len(steps), 4, 2))
+    for number, step in enumerate(steps.tolist()):
+        ends = np.array([0.0, step])
+        stated = [column[i] for i in (number, number + 1) for column in columns]
+        curve = KroghInterpolator(np.repeat(ends, len(columns)), stated)
+        at_ends[number] = curve.derivatives(ends, 4)
+        here = piece == number
+        rates[:, here] = curve.derivatives(time[here] - t[number], 3)
+    if law.omega is None:
+        fastest = np.abs(np.diff(law.angle) / steps).max() + np.abs(speeds).max()
+        size = float(fastest * shortest + np.abs(law.angle).max())
+        misfit = _find_misfit(law, at_ends, shortest) * shortest / size
+        reason = "the piecewise cubic through the table, its acceleration continuous"
+        return _Restated(rates, size, shortest, reason, misfit)
+    size = 0.0
+    for order, column in enumerate(columns):
+        size += float(steps.max()) ** order * float(np.abs(column).max())
+    size *= law.time[-1] / shortest
+    reason = "the polynomial through angles and rates, piece by piece"
+    return _Restated(rates, size, shortest, reason)
+
+
+def _find_misfit(law: Law, at_ends: Array, shortest: float) -> float:
+    """Return the speed, rad/s, by which the pieces of a table of angles miss a spline.
+
+    `at_ends`: angle and derivatives of each piece at both of its ends, (pieces, 4, 2).
+    """
+    _, speed, acceleration, jerk = np.moveaxis(at_ends, 1, 0)
+    first, last = acceleration.T
     misfits = [(first[1:] - last[:-1]) * shortest]
     if law.ends == "rest":
-        misfits.append(speed[[0, -1]])
+        misfits.append(speed.flat[[0, -1]])
     elif law.ends == "periodic":
-        misfits.append(
-            np.array([speed[0] - speed[-1], (first[0] - last[-1]) * shortest])
-        )
+        misfits.append(speed.flat[0] - speed.flat[[-1]])
+        misfits.append((first[:1] - last[-1:]) * shortest)
     else:  # one cubic through the first two pieces, and through the last two
-        jumps = np.array([jerk[1] - jerk[0], jerk[-1] - jerk[-2]])
-        misfits.append(jumps * shortest * shortest)
-    piece = _find_pieces(t, time)
-    s = time - t[piece]
-    angle = angle[piece]
-    speed = speed[piece]
-    first = first[piece]
-    jerk = jerk[piece]
-    rates = (
-        angle + s * (speed + s * (first / 2.0 + s * jerk / 6.0)),
-        speed + s * (first + s * jerk / 2.0),
-        first + s * jerk,
-    )
-    return _Restated(
-        rates,
-        size * shortest,
-        shortest,
-        "the piecewise cubic through the table, its acceleration continuous",
-        float(np.abs(np.concatenate(misfits)).max()) / size,
-    )
+        misfits.append(np.diff(jerk[[0, 1, -2, -1], 0])[::2] * shortest * shortest)
+    return float(np.abs(np.concatenate(misfits)).max())
 
 
 def _restate_rise(law: Rise, time: Array) -> _Restated:
@@ -136,7 +139,7 @@ def _restate_rise(law: Rise, time: Array) -> _Restated:
     return _Restated(rates, size, shortest, f"the {law.kind} law in another form")
 
 
-def _restate_standard_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
+def _restate_standard_law(kind: str, u: Array) -> Sequence[Array]:
     """Compute a standard law from 0 to 1 and its two derivatives in other forms."""
     if kind == "cycloidal":
         sine = np.sin(np.pi * u)
@@ -146,12 +149,8 @@ def _restate_standard_law(kind: str, u: Array) -> tuple[Array, Array, Array]:
             2.0 * sine * sine,
             4.0 * np.pi * sine * cosine,
         )
-    w = 2.0 * u - 1.0
-    return (
-        (8.0 + 15.0 * w - 10.0 * w**3 + 3.0 * w**5) / 16.0,
-        1.875 * (1.0 - 2.0 * w**2 + w**4),
-        15.0 * (w**3 - w),
-    )
+    curve = Polynomial((8.0, 15.0, 0.0, -10.0, 0.0, 3.0)) / 16.0
+    return [curve.deriv(order)(2.0 * u - 1.0) * 2.0**order for order in range(3)]
 
 
 def _restate_sine(law: Sine, time: Array) -> _Restated:
@@ -161,38 +160,3 @@ def _restate_sine(law: Sine, time: Array) -> _Restated:
     rates = (law.mean + turned.imag, w * turned.real, -w * w * turned.imag)
     size = abs(law.mean) + abs(law.amplitude) * (1.0 + w * time[-1])
     return _Restated(rates, size, 1.0 / w, "the sine of a sum of angles")
-
-
-def _restate_rates(law: Law, time: Array) -> _Restated:
-    """Restate a table with speeds by Krogh's polynomial of each piece."""
-    from scipy.interpolate import KroghInterpolator
-
-    columns = [
-        np.array(column) for column in (law.angle, law.omega, law.alpha) if column
-    ]
-    t = np.array(law.time)
-    steps = np.diff(t)
-    shortest = float(steps.min())
-    size = 0.0
-    for order, column in enumerate(columns):
-        size += float(steps.max()) ** order * float(np.abs(column).max())
-    piece = _find_pieces(t, time)
-    rates = np.zeros((3, len(time)))
-    for number in np.unique(piece).tolist():
-        ends = np.repeat([0.0, steps[number]], len(columns))
-        stated = [column[i] for i in (number, number + 1) for column in columns]
-        curve = KroghInterpolator(ends, stated)
-        here = piece == number
-        rates[:, here] = curve.derivatives(time[here] - t[number], 3)
-    return _Restated(
-        rates,
-        size * law.time[-1] / shortest,
-        shortest,
-        "the polynomial through angles and rates, piece by piece",
-    )
-
-
-def _find_pieces(t: Array, time: Array) -> NDArray[np.intp]:
-    """Find the piece of a table of times in which each time lies, (n,)."""
-    after = np.searchsorted(t, time, side="right")
-    return np.clip(after - 1, 0, len(t) - 2)

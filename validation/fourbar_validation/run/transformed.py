@@ -9,7 +9,7 @@ import cmath
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,17 +84,19 @@ _TRANSFORMED_QUANTITIES = (
     "power",
 )
 """Quantities that are compared, as far as the scene has them."""
-_SCALES = {
-    "m": SCALE,
-    "m/s^2": SCALE,
-    "N": SCALE,
-    "W": SCALE**2,
-    "N m": SCALE**2,
-    "N m/rad": SCALE**2,
-    "N m s/rad": SCALE**2,
-    "kg m^2": SCALE**2,
+_POWERS = {
+    "m": 1,
+    "m/s^2": 1,
+    "N": 1,
+    "W": 2,
+    "N m": 2,
+    "N m/rad": 2,
+    "N m s/rad": 2,
+    "kg m^2": 2,
 }
-"""Factors of numbers where every length and acceleration has SCALE, by their units."""
+"""Powers of the factor of every length and acceleration by which numbers grow, by their
+units.
+"""
 _IN_THE_WORLD = {"ground_angle", "angle", "force", "arm", "direction"}
 """Fields whose angle counts from +x, of a force unless it is of the bar's frame."""
 _WITH_A_COUNTERPART = (
@@ -148,7 +150,7 @@ class _Few:
         }
         return {name: values for name, values in found.items() if values is not None}
 
-    def solve(self, scene: Scene, sense: int = 0, **changed: Any) -> Solution:
+    def solve(self, scene: Scene, sense: int = 1, **changed: Any) -> Solution:
         """Solve another scene at the same positions, the first of which it begins at.
 
         Springs count their turns from there. Some entries of the command are changed.
@@ -158,38 +160,39 @@ class _Few:
         the same in both scenes, the name of the assembly need not be.
 
         `sense`: 1 if the loop lies on the same side at each position, -1 if on the
-        other; 0: of an assembly of the same name.
+        other.
         """
-        command = self.command
-        if sense:
-            signs = with_signs(self.scene.linkage, command).branch
-            command = command._replace(branch=sense * signs, **changed)
-            command = with_signs(scene.linkage, command)
-        else:
-            command = command._replace(**changed)
+        signs = with_signs(self.scene.linkage, self.command).branch
+        command = self.command._replace(branch=sense * signs, **changed)
+        command = with_signs(scene.linkage, command)
         if scene.counts_turns:
             begin: Any = {f"theta_{command.bar}": float(command.angle[0])}
             motion = Motion(**begin, branch=int(command.branch[0]))
             scene = copy_with(scene, motion=motion)
         return solve(scene, "force", at=command)
 
-    def compare(self, theirs: dict[str, Array], parts: Any = None) -> dict[str, Array]:
-        """Compare quantities with those of another scene, in parts of their size.
+    def compare(
+        self,
+        expected: dict[str, Array],
+        theirs: Callable[[str], Array],
+        parts: Any = None,
+    ) -> dict[str, Array]:
+        """Compare what is expected of another scene with its numbers by their names.
 
-        Errors (n,) are returned, times the condition of their quantity.
+        Errors (n,) are returned, in parts of the size of each quantity here, times the
+        condition of the quantity.
 
         `parts`: sizes of the numbers that were summed to these, (q, n).
         """
         terms = TermSizes(self.scene, self.solution)
         errors = {}
-        for i, (name, values) in enumerate(theirs.items()):
-            ours = self.numbers[name]
-            size = terms.scale(name, ours).of_terms
+        for i, (name, values) in enumerate(expected.items()):
+            size = terms.scale(name, self.numbers[name]).of_terms
             if parts is not None:
                 # what cancels within a part is among the terms of the whole
                 size = np.maximum(size, np.maximum(parts[i], terms.sum_terms(name)))
             condition = find_condition(name, self.scene.linkage, self.solution)
-            error = find_error(name, ours, values, size)
+            error = find_error(name, values, theirs(name), size)
             errors[name] = error * np.minimum(condition, 1.0)
         return errors
 
@@ -292,76 +295,50 @@ def _put_bars(linkage: FourBar, bars: Iterable[Bar], **ground: float) -> FourBar
     return copy_with(linkage, **dict(zip(names, bars, strict=True)), **ground)
 
 
-def _convert_numbers(scene: Scene, convert: Callable[[SceneNumber, Any], Any]) -> Scene:
-    """Convert each number of a scene, given with its place, unit and bound."""
-    for number in list_entries(scene).values():
-        if number.place[0] != "motion":
-            value = convert(number, read_number(scene, number))
-            scene = replace_number(scene, number, value)
-    return scene
+def _measure_moved(
+    few: _Few,
+    sense: float = 1.0,
+    turn: float = 0.0,
+    size: float = 1.0,
+) -> dict[str, Array]:
+    """Mirror a scene at the x-axis, turn it about O2, and multiply its lengths.
 
+    What grows with lengths is multiplied too. Angles and couples of a sense have
+    another one in a mirror.
 
-def _measure_mirrored(few: _Few) -> dict[str, Array]:
-    """Mirror at the x-axis: the sine, angles and couples of a sense change signs."""
-
-    def mirror(number: SceneNumber, value: float) -> float:
-        has_sense = number.unit in ("rad", "N m") and number.bound == ANY_NUMBER
-        return -value if has_sense else value
-
-    command = few.command
-    other = few.solve(
-        _convert_numbers(few.scene, mirror),
-        -1,
-        angle=-command.angle,
-        speed=-np.asarray(command.speed),
-        acceleration=-np.asarray(command.acceleration),
-    )
-    theirs = {name: -getattr(other, name) for name in few.numbers}
-    for name in theirs.keys() & {*PIN_FORCES}:
-        theirs[name] = theirs[name] * [-1.0, 1.0]
-    for name in theirs.keys() & {"drive_force", "power"}:
-        theirs[name] = -theirs[name]
-    return few.compare(theirs)
-
-
-def _measure_turned(few: _Few) -> dict[str, Array]:
-    """Turn about O2."""
-    scene = few.scene
-
-    def turn(number: SceneNumber, value: float) -> float:
-        holder = read_place(scene, number.place[: 1 + (number.place[0] != "drive")])
-        of_bar = (
-            getattr(holder, "frame", "world") == "bar" and "arm" not in number.place
-        )
-        turns = number.unit == "rad" and not _IN_THE_WORLD.isdisjoint(number.place)
-        return value + TURNED if turns and not of_bar else value
-
-    other = few.solve(_convert_numbers(scene, turn), angle=few.command.angle + TURNED)
-    theirs = {name: getattr(other, name) for name in few.numbers}
-    for name, values in theirs.items():
-        if name in PIN_FORCES:
-            turned = (values @ [1.0, 1j]) * np.exp(-1j * TURNED)
-            theirs[name] = join_components(turned.real, turned.imag)
-        elif name.startswith("theta"):
-            theirs[name] = values - TURNED
-    return few.compare(theirs)
-
-
-def _measure_scaled(few: _Few) -> dict[str, Array]:
-    """Multiply lengths, and what grows with them, by a power of two.
-
-    Return what differs at all.
+    `sense`: -1 for a mirror. `turn`: rad.
     """
+    scene = few.scene
+    for number in list_entries(scene).values():
+        if number.place[0] == "motion":
+            continue
+        value = read_number(scene, number) * size ** _POWERS.get(number.unit, 0)
+        if number.unit in ("rad", "N m") and number.bound == ANY_NUMBER:
+            value *= sense
+        if number.unit == "rad" and _turns_with_the_ground(scene, number):
+            value += turn
+        scene = replace_number(scene, number, value)
+    at = few.command
+    rates = {name: sense * getattr(at, name) for name in ("speed", "acceleration")}
+    other = few.solve(scene, int(sense), angle=sense * at.angle + turn, **rates)
+    expected = {}
+    for name, values in few.numbers.items():
+        expected[name] = values * size ** _POWERS.get(UNITS[name], 0)
+        if name in PIN_FORCES:
+            turned = (
+                expected[name] @ np.array([1.0, sense * 1j]) * cmath.rect(1.0, turn)
+            )
+            expected[name] = join_components(turned.real, turned.imag)
+        elif name not in ("drive_force", "power"):
+            expected[name] = sense * expected[name] + turn * name.startswith("theta")
+    return few.compare(expected, partial(getattr, other))
 
-    def scale(number: SceneNumber, value: float) -> float:
-        return value * _SCALES.get(number.unit, 1.0)
 
-    other = few.solve(_convert_numbers(few.scene, scale))
-    differences = {}
-    for name, ours in few.numbers.items():
-        theirs = getattr(other, name) / _SCALES.get(UNITS[name], 1.0)
-        differences[name] = magnitude(theirs - ours)
-    return differences
+def _turns_with_the_ground(scene: Scene, number: SceneNumber) -> bool:
+    """Tell whether an angle counts from +x, and not from a line of a bar."""
+    holder = read_place(scene, number.place[: 1 + (number.place[0] != "drive")])
+    of_bar = getattr(holder, "frame", "world") == "bar" and "arm" not in number.place
+    return not of_bar and not _IN_THE_WORLD.isdisjoint(number.place)
 
 
 def _measure_exchanged(few: _Few) -> dict[str, Array]:
@@ -375,13 +352,14 @@ def _measure_exchanged(few: _Few) -> dict[str, Array]:
     angle = command.angle + math.pi if bar == 3 else command.angle
     scene = read_from_other_end(few.scene)
     other = few.solve(scene, -1 if bar == 3 else 1, angle=angle, bar=bar)
-    theirs = {}
-    for name in few.numbers:
-        values = getattr(other, _OTHER_END.get(name, name))
-        if name in ("F32", "F43"):
-            values = -values
-        theirs[name] = values - math.pi if name == "theta_3" else values
-    return few.compare(theirs)
+    expected = {
+        name: -values if name in ("F32", "F43") else values
+        for name, values in few.numbers.items()
+    }
+    expected["theta_3"] = expected["theta_3"] + math.pi
+    return few.compare(
+        expected, lambda name: getattr(other, _OTHER_END.get(name, name))
+    )
 
 
 def read_from_other_end(scene: Scene) -> Scene:
@@ -497,7 +475,9 @@ def _measure_sum(few: _Few, parts: list[tuple[int, Scene]]) -> dict[str, Array]:
         of_parts = [times * getattr(part, name) for times, part in solved]
         totals[name] = np.sum(of_parts, axis=0)
         sizes.append(sum(map(magnitude, of_parts)))
-    return few.compare(totals, sizes)
+    return few.compare(
+        {name: few.numbers[name] for name in totals}, totals.__getitem__, sizes
+    )
 
 
 class _Transformation(NamedTuple):
@@ -513,13 +493,14 @@ class _Transformation(NamedTuple):
 
 TRANSFORMATIONS = {
     "mirrored": _Transformation(
-        _measure_mirrored, "y, angles and couples change their signs"
+        partial(_measure_moved, sense=-1.0), "y, angles and couples change their signs"
     ),
     "turned": _Transformation(
-        _measure_turned, "everything turns with the ground; nothing else changes"
+        partial(_measure_moved, turn=TURNED),
+        "everything turns with the ground; nothing else changes",
     ),
     "scaled": _Transformation(
-        _measure_scaled,
+        partial(_measure_moved, size=SCALE),
         "lengths and accelerations times 2^7, forces times 2^7, couples times 4^7, to"
         " the last digit",
         exact=True,
