@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from fourbar_validation.compare.rows import FAILS, FORMULAS
+from fourbar_validation.compare.rows import FAILS, FORMULAS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
+from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE, Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import describe_run, open_run
 from fourbar_validation.report.scene_record import Record
@@ -98,6 +98,24 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
     assert "worst F32 of c" in summary.headline
     assert summary.headline.endswith(f" It held in {baseline}.")
     assert "It held in" in (tmp_path / "now" / "report.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    "kind, chosen, status",
+    [(Guest, "", 1), (Engine, "mine,other", 1), (Engine, "", 0)],
+)
+def test_an_engine_that_was_asked_for_and_compared_nothing_is_no_success(
+    kind, chosen, status
+):
+    plan = Plan(
+        Few(("a",)), (OF_MINE, kind("other", FreeBody, EQUIVALENCE)), chosen=chosen
+    )
+    summary = plan.summarise()
+    refusal = Row.unmeasured("a", "other", "exact", "all", REFUSES, "no licence")
+    summary.add(Record("a", rows=[ROW, refusal]))
+    words = "NOT CHECKED: other: nothing compared (1 scene): no licence. All 1 comp"
+    assert plan.conclude(summary) == status
+    assert summary.headline.startswith(words) == bool(status) != summary.good
 
 
 @pytest.mark.parametrize("broken", ["", "mine"])

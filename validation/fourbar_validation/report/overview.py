@@ -5,7 +5,7 @@ A few lines say what agrees, how closely, and which engine is at fault if not.
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from operator import itemgetter
 
@@ -191,6 +191,8 @@ class Overview:
         """That run in words."""
         self.declared: dict[str, float] = {}
         """Error that each engine declares, relative to the scale."""
+        self.asked: list[str] = []
+        """Engines that were asked for by name: a run checks each of them."""
         self.listed: dict[str, dict[str, None]] = {}
         """Effects and quantities that the hello of each guest lists, without those that
         were compared.
@@ -213,7 +215,8 @@ class Overview:
                     listed.pop(name, None)
         self._add_agreement(scene.rows)
         self._add_causes(scene)
-        for engine, reason in _list_reasons(scene):
+        named = {*ENGINE_NAMES, *self.declared}
+        for engine, reason in _list_reasons(scene, named):
             self._line(engine).reasons.add(reason)
 
     def _line(self, engine: str) -> OverviewLine:
@@ -322,18 +325,24 @@ class Overview:
         return [line for *_, line in sorted(lines, key=itemgetter(0, 1))]
 
     @property
-    def silent(self) -> list[str]:
+    def silent(self) -> dict[str, str]:
         """Return a line for each engine with nothing to compare, with the reason.
 
         Of several reasons the commonest is stated.
         """
-        lines = []
+        lines = {}
         for line in sorted(self._lines.values(), key=lambda one: one.engine):
             if not line.compared and not line.failed and line.reasons:
                 reason, count = line.reasons.find_commonest()
                 scenes = write_count(count, "scene")
-                lines.append(f"{line.engine}: nothing compared ({scenes}): {reason}")
+                told = f"{line.engine}: nothing compared ({scenes}): {reason}"
+                lines[line.engine] = told
         return lines
+
+    @property
+    def unchecked(self) -> list[str]:
+        """Return the lines of the engines that were asked for in vain."""
+        return [line for name, line in self.silent.items() if name in self.asked]
 
     @property
     def notes(self) -> list[str]:
@@ -359,7 +368,7 @@ class Overview:
             for engine, listed in self.listed.items()
             if listed and self._line(engine).answered
         ]
-        notes += self.silent
+        notes += self.silent.values()
         if self.not_compared:
             total = sum(self.not_compared.values())
             kinds = ", ".join(
@@ -369,7 +378,7 @@ class Overview:
         return notes
 
 
-def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
+def _list_reasons(scene: Record, named: Set[str]) -> Iterable[tuple[str, str]]:
     """List the engines that a scene was not compared with, each with the reason."""
     for row in scene.rows:
         whole = row.verdict == REFUSES and row.quantity == "all"
@@ -378,7 +387,7 @@ def _list_reasons(scene: Record) -> Iterable[tuple[str, str]]:
     refused = {row.engine for row in scene.rows}
     for line in scene.left_out:
         engine, _, reason = line.partition(": ")
-        if engine in ENGINE_NAMES and engine not in refused:
+        if engine in named and engine not in refused:
             yield engine, reason
 
 

@@ -238,14 +238,16 @@ class Summary:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
         words = self._say_first_cause()
         overview = self.overview
-        for heading, lost in (
-            ("WORSE", overview.worse),
-            ("WEAKER RULE", overview.weaker),
-            ("GONE", overview.gone),
+        against = f", against {overview.baseline}"
+        for heading, lost, end in (
+            ("NOT CHECKED", overview.unchecked, ""),
+            ("WORSE", overview.worse, against),
+            ("WEAKER RULE", overview.weaker, against),
+            ("GONE", overview.gone, against),
         ):
             if lost:
                 more = f", and {len(lost) - 1} more" * (len(lost) > 1)
-                head = f"{heading}: {lost[0]}{more}, against {overview.baseline}."
+                head = f"{heading}: {lost[0]}{more}{end}."
                 words = f"{head} {words}"
         return words
 
@@ -301,7 +303,8 @@ class Summary:
 
         All was compared, by no weaker rule, and nothing is gone or got worse.
         """
-        if self.overview.weaker or self.overview.gone or self.overview.worse:
+        of = self.overview
+        if of.unchecked or of.weaker or of.gone or of.worse:
             return False
         return self.counts.status == HOLDS and not self.missing
 

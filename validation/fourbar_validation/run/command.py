@@ -148,4 +148,4 @@ def run_command(**stated: Any) -> int:
                 summary.verdict, list_cases(read_columns(request.out / PARQUET_FILE))
             ),
         )
-    return plan.conclude(summary.counts, worse=worse)
+    return plan.conclude(summary, worse=worse)

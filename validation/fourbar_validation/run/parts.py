@@ -152,4 +152,4 @@ def collect_command(
     with ShownProgress(len(plan.suite)) as progress:
         summary = collect_parts(plan, folders, parts, out, progress)
     print_table(summary, out, verbose=verbose)
-    return plan.conclude(summary.counts)
+    return plan.conclude(summary)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fourbar.errors import FAILED, DependencyError, InputError
-from fourbar_validation.compare.rows import FAILS, Counts, escape_controls
+from fourbar_validation.compare.rows import FAILS, escape_controls
 from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
@@ -199,6 +199,11 @@ class Plan:
         summary.overview.declared = {
             engine.name: engine.tolerance.factor for engine in self.engines
         }
+        summary.overview.asked = [
+            engine.name
+            for engine in self.engines
+            if self.chosen or isinstance(engine, Guest)
+        ]
         guests = [engine for engine in self.engines if isinstance(engine, Guest)]
         summary.stated = {guest.name: guest.version for guest in guests}
         summary.overview.listed = {
@@ -207,14 +212,16 @@ class Plan:
         }
         return summary
 
-    def conclude(self, counts: Counts, *, worse: bool = False) -> int:
+    def conclude(self, summary: Summary, *, worse: bool = False) -> int:
         """Return the exit status of a run.
 
+        Nothing compared is no success, also of one engine that was asked for by name.
         Raises DependencyError if only an engine is missing.
 
         `worse`: whether the run is worse than the one that it is compared with.
         """
-        if counts[FAILS] or worse:
+        counts = summary.counts
+        if counts[FAILS] or worse or summary.overview.unchecked:
             return FAILED
         self.require_engines()
         return counts.status
