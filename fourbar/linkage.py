@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, expect, write_in_units
+from fourbar.errors import ELSEWHERE, InputError, expect, write_in_units
 from fourbar.quantities import PIN_FORCES
 
 Lengths = tuple[float, float, float, float]
@@ -191,8 +191,7 @@ class OneOf(NamedTuple):
 
     def check(self, key: str, value: Any) -> Any:
         """Return the word; InputError for another."""
-        expect(key, value, str)
-        if value not in self.words:
+        if not isinstance(value, str) or value not in self.words:
             allowed = " or ".join(f'"{word}"' for word in self.words)
             raise InputError(key, value, f"must be {allowed}")
         return value
@@ -207,11 +206,25 @@ class OfBar(NamedTuple):
 
     def check(self, key: str, value: Any) -> Any:
         """Return the number of the bar; InputError for another."""
-        *bars, last = self.bars
-        allowed = f"must be {', '.join(map(str, bars))} or {last}"
+        *bars, last = (f"{bar} ({BAR_NAMES[bar]})" for bar in self.bars)
+        allowed = f"must be {', '.join(bars)} or {last}"
         if self.reason:
             allowed = f"{allowed}, {self.reason}"
+        if isinstance(value, int) and value > len(BAR_NAMES):
+            allowed = f"{allowed}: {ELSEWHERE}"
         return require_whole(key, value, self.bars, allowed)
+
+
+class Text(NamedTuple):
+    """Declaration of a text."""
+
+    key: str = ""
+
+    def check(self, key: str, value: Any) -> str:
+        """Return the text; InputError for what is none."""
+        expect(key, value, str)
+        text: str = value
+        return text
 
 
 class Whole(NamedTuple):

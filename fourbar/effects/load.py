@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import Place, PointName, StatedPair
+from fourbar.effects.place import Place, StatedPair
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -33,6 +33,7 @@ from fourbar.linkage import (
     OfBar,
     OneOf,
     Part,
+    Text,
 )
 
 _BEYOND_TURN = 2.0 * PI_LOW
@@ -175,7 +176,7 @@ class Load(Effect):
     _: KW_ONLY
     from_pin: StatedPair = None
     from_centre: StatedPair = None
-    point: Annotated[str | None, PointName()] = None
+    point: Annotated[str | None, Text()] = None
     arm: StatedPair = None
     moment: Annotated[float, Declared("N m")] = 0.0
     frame: Annotated[str, OneOf(FRAMES)] = "world"

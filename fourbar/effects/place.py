@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import (
     angle,
     dot,
@@ -207,18 +207,6 @@ class At(NamedTuple):
         """Return the place; InputError for what is none."""
         place = require_place(key, value)
         return place._replace(bar=OfBar(self.bars).check(f"{key}.bar", place.bar))
-
-
-class PointName(NamedTuple):
-    """Declaration of the name of a point of the scene."""
-
-    key: str = ""
-
-    def check(self, key: str, value: Any) -> str:
-        """Return the name; InputError for what is no text."""
-        expect(key, value, str)
-        name: str = value
-        return name
 
 
 def states_place(kind: Any) -> bool:

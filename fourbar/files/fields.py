@@ -8,7 +8,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, Self
 
 from fourbar.effects.effect import PinRows
@@ -31,7 +31,6 @@ from fourbar.errors import (
 from fourbar.linkage import (
     ANY_NUMBER,
     BAR_NAMES,
-    MOVING_BARS,
     PINS,
     REQUIRED_NUMBER,
     Declared,
@@ -41,28 +40,18 @@ from fourbar.linkage import (
     OfBar,
     OneOf,
     Part,
-    Whole,
     is_within,
     list_declared,
 )
 from fourbar.quantities.units import (
     UNIT_MISSING,
     UnitError,
-    converts,
-    find_unit,
     to_si,
 )
 from fourbar.scene.motion import is_length
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_FIELD = 60
-DIRECTION_WORDS = {
-    "up": "90 deg",
-    "down": "-90 deg",
-    "left": "180 deg",
-    "right": "0 deg",
-}
-"""Words for directions, as the suggestions of an error know them."""
 _FURTHER_PIN = re.compile(r"[C-F]|O_?[5-9]")
 """Pins of more than four bars, as they are usually named."""
 _MEANT = {
@@ -108,18 +97,6 @@ _WAYS = {
     ),
 }
 """Ways to state what has no key, by words for it."""
-_TABLE_OF = {
-    "ground_angle": "lengths",
-    **dict.fromkeys(("branch", "side", "law", "free"), "motion"),
-    **dict.fromkeys(("theta_2", "omega_2", "alpha_2"), "motion"),
-    **dict.fromkeys(("gravity", "viscous", "friction", "pin_friction"), "effects"),
-    **dict.fromkeys(("torsion", "springs", "flywheel"), "effects"),
-}
-"""Tables of keys that are easily written elsewhere."""
-_LIKELY = {"rad": "deg", "m": "mm", "rad/s": "rpm"}
-"""Units that a number without one may have been meant in, other than the SI unit. They
-are suggested where no number beside it has a unit of the kind.
-"""
 PLACES_OF_ENDS = (*STATED_PLACES, "point")
 """Keys of which one states an end of a spring or cylinder, or the point of a force."""
 _KEYS_OF_PLACE = ("bar", *PLACES_OF_ENDS)
@@ -136,13 +113,8 @@ def split_key(key: str) -> list[str | int]:
 class SceneFile:
     """A file that is read, and what one entry of it tells the reader of another."""
 
-    def __init__(self, name: str, document: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        self.document: Mapping[str, Any] = document or {}
-        """Tables of the file, for suggestions."""
-        self.coordinates: dict[str, tuple[float, float]] = {}
-        """x and y of the places (m) and forces that are stated by them, by their keys.
-        """
         self.drawn: dict[str, float] = {}
         """Numbers that the word "drawn" stands for in a motion, by their names."""
         self.bars: dict[str, int] = {}
@@ -202,8 +174,6 @@ class Entry:
         for name in self.value:
             if name not in names:
                 known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
-                if _TABLE_OF.get(name, self.key) != self.key:
-                    known = f"write it under [{_TABLE_OF[name]}]"
                 known = _WAYS.get(name, known)
                 if _is_elsewhere(self.key, self.value, names):
                     known = ELSEWHERE
@@ -221,42 +191,18 @@ class Entry:
             raise self.refuse("must be a text in quotes")
         return self.value
 
-    def choice(self, allowed: Iterable[str]) -> Any:
-        """Read one of a few words."""
-        words = list(allowed)
-        if self.value not in words:
-            quoted = " or ".join(f'"{word}"' for word in words)
-            raise self.refuse(f"{_suggest_word(self.value, words)}must be {quoted}")
-        return self.value
-
-    def whole(self, least: int, most: int) -> int:
-        """Read an integer of a range, both ends included."""
-        if type(self.value) is not int or not least <= self.value <= most:
-            raise self.refuse(f"must be a whole number from {least} to {most}")
-        return self.value
-
-    def bar(self, bars: tuple[int, ...] = MOVING_BARS) -> int:
-        """Read the number of a bar, one of `bars`."""
-        value = self.value
-        if type(value) is not int or value not in bars:
-            *others, last = (f"{bar} ({BAR_NAMES[bar]})" for bar in bars)
-            allowed = f"must be {', '.join(others)} or {last}"
-            if isinstance(value, int) and value > len(BAR_NAMES):
-                allowed = f"{allowed}: {ELSEWHERE}"
-            raise self.refuse(allowed)
-        return value
-
-    def number(self) -> float:
-        """Read a number without a dimension."""
-        if type(self.value) not in (int, float) or not math.isfinite(self.value):
-            allowed = "must be a finite number without a unit, and without quotes"
-            raise self.refuse(allowed)
-        return float(self.value)
+    def check(self, by: Any) -> Any:
+        """Read a value that stands as its declaration has it, like a word or a bar."""
+        try:
+            return by.check(self.key, self.value)
+        except InputError as error:
+            raise self.refuse(error.allowed) from None
 
     def quantity(self, unit: str, bound: str = ANY_NUMBER) -> float:
         """Read a number in `unit`; with unit "1" it has none."""
         if unit == "1":
-            return self.number()
+            number: float = self.check(Declared(unit, bound))
+            return number
         wanted = f"must be {bound} {self.QUANTITY.format(name_unit(unit))}"
         number = self.in_si(unit, wanted)
         if not is_within(number, bound):
@@ -267,9 +213,7 @@ class Entry:
         """Convert a text with a unit to a number in `unit`."""
         value = self.value
         if type(value) in (int, float):
-            like = f"{value:.6g} {self._find_likely_unit(unit)}"
-            missing = f'the unit is missing; did you mean "{like}"? {wanted}'
-            raise self.refuse(missing)
+            raise self.refuse(f"{UNIT_MISSING}; {wanted}")
         if value == "drawn":
             _, _, name = self.key.partition("motion.")
             name = name.partition(".")[0]
@@ -282,34 +226,7 @@ class Entry:
         try:
             return to_si(value, unit)
         except UnitError as error:
-            hint = ""
-            if unit == "rad" and value.casefold() in DIRECTION_WORDS:
-                hint = f'did you mean "{DIRECTION_WORDS[value.casefold()]}"? '
-            elif str(error) == UNIT_MISSING:
-                likely = self._find_likely_unit(unit)
-                hint = f'did you mean "{value.strip()} {likely}"? '
-            elif unit == "kg" and converts(find_unit(value, "m"), "kg/m"):
-                hint = f'did you mean mass_per_length = "{value.strip()}"? '
-            raise self.refuse(f"{error}; {hint}{wanted}") from None
-
-    def _find_likely_unit(self, unit: str) -> str:
-        """Return the unit in which a number without one was probably meant.
-
-        The nearest number of its kind decides, first in the entry's own table, then in
-        those around it.
-        """
-        holder: Any = self.file.document
-        around = [holder]
-        with suppress(LookupError, TypeError):
-            for step in split_key(self.key):
-                holder = holder[step]
-                around.append(holder)
-        for holder in reversed(around):
-            for text in _list_texts(holder):
-                stated = find_unit(text, "")
-                if stated and converts(stated, unit):
-                    return stated
-        return name_unit(unit, _LIKELY.get(unit))
+            raise self.refuse(f"{error}; {wanted}") from None
 
     def declared(self, by: Declared) -> Any:
         """Read a number, or a pair of numbers, as it is declared."""
@@ -331,10 +248,10 @@ class Entry:
             x, y = (self[name].quantity(by.unit) for name in "xy")
             if not math.isfinite(math.hypot(x, y)):
                 raise self.refuse("must have a finite size")
-            self.file.coordinates[self.key] = x, y
             return convert_to_polar(x, y)
         if not isinstance(self.value, list) or len(self.value) != 2:
-            form = f'["1 {by.unit}", "1 {by.pair}"]'
+            one, other = ("1" if unit == "1" else f'"1 {unit}"' for unit in by.units)
+            form = f"[{one}, {other}]"
             if is_polar:
                 form = f"{self.POLAR} {self.COORDINATES}".strip()
                 form = form.format(name_unit(by.unit))
@@ -422,12 +339,8 @@ class Entry:
             return entry.described(by.kind)
         if isinstance(by, Listed):
             return entry.quantities(by.unit)
-        if isinstance(by, Whole):
-            return entry.whole(by.least, by.most)
-        if isinstance(by, OneOf):
-            return entry.choice(by.words)
-        if isinstance(by, OfBar):
-            return entry.bar(by.bars)
+        if not isinstance(by, Declared):
+            return entry.check(by)
         return entry.declared(by)
 
     def _read_rows(self, numbers: Mapping[str, Declared]) -> tuple[Any, ...]:
@@ -461,10 +374,10 @@ class Entry:
                     'from_pin = ["0 m", "0 deg"], the second has its length in place of'
                     " 0"
                 )
-            self["point"].choice(bars)
+            self["point"].check(OneOf((*bars,)))
             if of_bar.value is None:
                 of_bar.value = bars[name]
-        bar = of_bar.bar(allowed_bars)
+        bar = of_bar.check(OfBar(allowed_bars))
         if name is not None and bar != bars[name]:
             raise of_bar.refuse(f"the point {name} is on bar {bars[name]}")
         return Place(bar, **self.numbers(STATED_PLACES), point=name)
@@ -476,17 +389,6 @@ def list_keys(kind: Any) -> tuple[str, ...]:
     for field in list_declared(kind):
         keys += [field.key] if field.key else _KEYS_OF_PLACE
     return (*keys, *getattr(kind, "forms", ()))
-
-
-def _list_texts(holder: Any) -> Iterator[str]:
-    """List the texts of an entry, those of tables and lists within it too."""
-    if isinstance(holder, dict):
-        holder = [*holder.values()]
-    if isinstance(holder, str):
-        yield holder
-    elif isinstance(holder, list):
-        for entry in holder:
-            yield from _list_texts(entry)
 
 
 def convert_to_polar(x: float, y: float) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -44,11 +44,11 @@ from fourbar.formulas.mobility import meet_change_points
 from fourbar.linkage import (
     BAR_NAMES,
     BAR_NUMBERS,
-    MOST_INTERVALS,
     POSITIVE,
     Bar,
-    Declared,
     FourBar,
+    OfBar,
+    OneOf,
 )
 from fourbar.quantities import Array
 from fourbar.quantities.units import half_unit_of_text
@@ -61,6 +61,7 @@ from fourbar.scene.motion import (
     LAW_KINDS,
     SIDES,
     SINE_LAW,
+    STEPS,
     STROKE_COMMAND,
     Free,
     FromLimit,
@@ -128,40 +129,19 @@ _OVER_THETA_2 = (
 _LIKE_A_SWEEP = re.compile(r"\d[^\d]*(\bto\b|\.\.|:|;)\s*-?\d")
 _A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
-_PICTURE = {
-    "scale": Declared("m", POSITIVE, None),
-    "angle": Declared("rad", left_out=0.0),
-    "opacity": Declared("1", left_out=0.5),
-}
-"""Numbers of the picture under the drawing."""
 MOST_POINTS_OF_A_SCENE = 1000
 """Limit of the points, each of which is three columns of every table."""
 
 
-def load(path: str | Path | IO[str] | IO[bytes]) -> Scene:
-    """Read the scene of a TOML file, of standard input (`-`), a pipe or an open file.
+def load(path: str | Path) -> Scene:
+    """Read the scene of a TOML file, of standard input (`-`) or of a pipe.
 
     Raises InputError, in one line with file, key, value and what is allowed, for a file
     that is missing, not a file, too large, not text or not TOML, and for every entry
     that is wrong.
     """
-    if isinstance(path, str | Path):
-        return loads(read_scene_text(path), str(path))
-    if not hasattr(path, "read"):
-        expect("path", path, str, Path)
-    name = getattr(path, "name", None)
-    shown = name if isinstance(name, str) else "stream"
-    content = path.read(LARGEST_SCENE_FILE + 1)
-    if len(content) > LARGEST_SCENE_FILE:
-        allowed = f"must not exceed {LARGEST_SCENE_FILE} bytes"
-        raise InputError("scene file", shown, allowed)
-    if isinstance(content, bytes):
-        try:
-            content = content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            allowed = f"must be UTF-8 text; byte {error.start} is not"
-            raise InputError("scene file", shown, allowed) from None
-    return loads(content.replace("\r\n", "\n"), shown)
+    expect("path", path, str, Path)
+    return loads(read_scene_text(path), str(path))
 
 
 def read_scene_text(path: str | Path) -> str:
@@ -202,7 +182,7 @@ def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:
     """
     shown = _write_name(name)
     try:
-        file = SceneFile(shown, document)
+        file = SceneFile(shown)
         return read_scene(Entry(file, "", document), str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
@@ -277,6 +257,9 @@ def read_scene(document: Entry, folder: str) -> Scene:
         if effect.example and not isinstance(value, dict | list):
             raise effects[key].refuse(f"must be like {effect.example}")
         stated_effects.append(effects[key].described(effect))
+    picture = None
+    if top["picture"].value is not None:  # its file is read when it is shown
+        picture = top["picture"].described(TracedPicture, folder=folder)
     scene = Scene(
         linkage,
         motion,
@@ -289,13 +272,12 @@ def read_scene(document: Entry, folder: str) -> Scene:
         points,
         drive=drive,
         drawing=drawing,
-        picture=_read_traced(top["picture"], folder),
+        picture=picture,
     )
     if drawing is not None:
         scene = choose_assembly(scene, drawing)
     return replace(
         scene,
-        coordinates=tuple(top.file.coordinates.items()),
         met_lengths=None if met == lengths else (lengths, met),
         tolerances=_read_tolerances(top["tolerances"], scene),
     )
@@ -319,9 +301,9 @@ def _read_drive(drive: Entry) -> tuple[int | None, ForceDrive | None]:
     elif not stated:
         return 2, None
     elif stated == {"bar"}:
-        return drive["bar"].bar(), None
+        return drive["bar"].check(OfBar()), None
     elif stated.isdisjoint(PLACES_OF_ENDS):
-        drive["bar"].bar()
+        drive["bar"].check(OfBar())
         raise drive["point"].refuse(_A_POINT)
     return None, drive.described(kind)
 
@@ -338,22 +320,6 @@ def _read_points(points: Entry) -> tuple[Point, ...]:
             entry = points[name]
         read.append(entry.described(Point, name=name))
     return tuple(read)
-
-
-def _read_traced(picture: Entry, folder: str) -> TracedPicture | None:
-    """Read the picture under the drawing; its file is read when it is shown."""
-    if picture.value is None:
-        return None
-    picture.table(("file", "origin", *_PICTURE))
-    pixel = picture["origin"]
-    origin = pixel.value
-    if origin is not None:
-        if not isinstance(origin, list) or len(origin) != 2:
-            raise pixel.refuse("must be a pixel [x, y]")
-        x, y = (pixel.holding(number).number() for number in origin)
-        origin = (x, y)
-    numbers = picture.numbers(_PICTURE)
-    return TracedPicture(picture["file"].text(), origin, folder=folder, **numbers)
 
 
 def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]:
@@ -422,7 +388,7 @@ def _read_motion(
             arguments[name] = stated.quantity(by.unit)
     for name, words in (("branch", BRANCH_OF_NAME), ("side", SIDES)):
         if name in motion.value:
-            arguments[name] = motion[name].choice(words)
+            arguments[name] = motion[name].check(OneOf((*words,)))
     if "free" in entry:
         arguments["free"] = motion["free"].described(Free)
     if "law" in entry:
@@ -435,7 +401,7 @@ def _read_law(entry: Entry) -> Law | Rise | Sine:
     law: Any = Law
     if isinstance(entry.value, dict) and "kind" in entry.value:
         law = Rise
-        if entry["kind"].choice(LAW_KINDS) == SINE_LAW:
+        if entry["kind"].check(OneOf(LAW_KINDS)) == SINE_LAW:
             law = Sine
             numbers = dict(entry.value)
             del numbers["kind"]
@@ -468,7 +434,7 @@ def _read_commanded(entry: Entry, unit: str) -> float | Array | Sweep | FromLimi
     start, stop = (entry[end].quantity(unit) for end in ("from", "to"))
     steps = DEFAULT_STEPS
     if "steps" in value:
-        steps = entry["steps"].whole(1, MOST_INTERVALS)
+        steps = entry["steps"].check(STEPS)
     return Sweep(start, stop, steps)
 
 

@@ -5,7 +5,6 @@ The text reads back bit for bit.
 
 import json
 import re
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from string import Template
@@ -19,9 +18,6 @@ from fourbar.files.drawn_pins import choose_assembly, meet_lengths, read_point
 from fourbar.files.fields import (
     Entry,
     SceneFile,
-    convert_to_polar,
-    split_key,
-    write_declared,
     write_described,
     write_quantity,
 )
@@ -30,7 +26,6 @@ from fourbar.linkage import (
     MOVING_BARS,
     PINS,
     Bar,
-    Declared,
     FourBar,
 )
 from fourbar.quantities import Array
@@ -45,7 +40,6 @@ from fourbar.scene.motion import (
     Sine,
     Sweep,
 )
-from fourbar.scene.pictures import TracedPicture
 from fourbar.studies.keys import OF_A_UNIFORM_BAR, find_misfit, list_entries
 from fourbar.writing import write_text
 
@@ -84,7 +78,6 @@ def dump(scene: Scene) -> str:
     bars = described["bars"]
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
-    _restore_coordinates(described, scene.coordinates)
     pins_or_lengths = _write_lengths(scene, described["lengths"], motion)
     read_back = scene
     if "lengths" in dict(pins_or_lengths):
@@ -99,7 +92,7 @@ def dump(scene: Scene) -> str:
         *(("[loads]", load) for load in described["loads"]),
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(read_back)),
-        ("picture", _write_traced(scene.picture)),
+        ("picture", write_described(scene.picture) if scene.picture else {}),
     ]
     texts = []
     for name, entries in tables:
@@ -109,22 +102,6 @@ def dump(scene: Scene) -> str:
                 lines.append(f"{key} = {_write_toml_value(key, value)}\n")
             texts.append("".join(lines))
     return "\n".join(texts)
-
-
-def _write_traced(picture: TracedPicture | None) -> dict[str, Any]:
-    """Write the picture under the drawing."""
-    if picture is None:
-        return {}
-    origin = picture.origin
-    scale = picture.scale
-    entries = {
-        "file": picture.name,
-        "origin": None if origin is None else [*origin],
-        "scale": None if scale is None else write_quantity(scale, "m"),
-        "angle": write_quantity(picture.angle, "rad"),
-        "opacity": picture.opacity,
-    }
-    return {key: entry for key, entry in entries.items() if entry is not None}
 
 
 def _write_lengths(
@@ -147,24 +124,6 @@ def _write_lengths(
         return [("lengths", lengths)]
     del motion["branch"]
     return [("pins", pins)]
-
-
-def _restore_coordinates(
-    tables: dict[str, Any],
-    coordinates: tuple[tuple[str, tuple[float, float]], ...],
-) -> None:
-    """Write places by x and y again that were read so and are the same still."""
-    for key, (x, y) in coordinates:
-        *into, last = split_key(key)
-        holder: Any = tables
-        with suppress(LookupError, TypeError):
-            for step in into:
-                holder = holder[step]
-            unit = holder[last][0].partition(" ")[2]
-            by = Declared(unit, pair="rad")
-            if holder[last] == write_declared(convert_to_polar(x, y), by):
-                parts = {"x": x, "y": y}.items()
-                holder[last] = {name: write_quantity(z, unit) for name, z in parts}
 
 
 def list_scene_tables(scene: Scene) -> dict[str, Any]:
@@ -304,7 +263,7 @@ def write_new_scene(
     """
     texts = [" ".join(text.split()) for text in lengths]
     stated = dict(zip(BAR_NAMES.values(), texts, strict=True))
-    read = Entry(SceneFile("--lengths", stated), "", stated)
+    read = Entry(SceneFile("--lengths"), "", stated)
     numbers = read.numbers(dict.fromkeys(stated, Bar.numbers["length"]))
     d, *moving = numbers.values()
     a, b, c = map(Bar, moving)
@@ -347,7 +306,7 @@ def _quote(text: str) -> str:
     return json.dumps(f"{inches[1]} in" if inches else text, ensure_ascii=False)
 
 
-_METRIC_EXAMPLES = {
+_EXAMPLES = {
     "pound": "kg",
     "long": "m",
     "per_length": "1",
@@ -355,17 +314,11 @@ _METRIC_EXAMPLES = {
     "force": "10 N",
     "gravity": "9.81 m/s^2",
     "damping": "0.01 N m s/rad",
+    "centre": "100 mm",
+    "place": "50 mm",
+    "moment": "150 N mm",
 }
 """Quantities that the comments of a new file show, and its gravity."""
-_EXAMPLES_IN_UNITS = {
-    unit: {**_METRIC_EXAMPLES, "centre": centre, "place": place, "moment": moment}
-    for unit, centre, place, moment in (
-        ("mm", "100 mm", "50 mm", "150 N mm"),
-        ("cm", "10 cm", "5 cm", "15 N cm"),
-        ("m", "0.1 m", "0.05 m", "0.15 N m"),
-    )
-}
-"""Examples by the unit of the lengths; another unit has those of metres."""
 _IMPERIAL_EXAMPLES = {
     "pound": "lb",
     "long": "in",
@@ -390,11 +343,9 @@ def _fill_in(
 ) -> str:
     """Fill in the template of a new scene file; each bar weighs 1 kg/m or 0.05 lb/in.
 
-    `unit`: of its lengths, in which the comments are too.
+    `unit`: of its lengths; imperial ones have comments in such units.
     """
-    examples = _EXAMPLES_IN_UNITS.get(unit, _EXAMPLES_IN_UNITS["m"])
-    if unit.casefold() in IMPERIAL:
-        examples = _IMPERIAL_EXAMPLES
+    examples = _IMPERIAL_EXAMPLES if unit.casefold() in IMPERIAL else _EXAMPLES
     per_metre = float(examples["per_length"]) / to_si(f"1 {examples['long']}", "m")
     masses = {
         name: repr(float(f"{per_metre * length:.4g}"))

@@ -6,14 +6,21 @@ or below, no other, and what is read there must be a picture of moderate size.
 """
 
 import base64
-import math
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from fourbar.errors import InputError, expect
-from fourbar.linkage import BAR_NAMES, require_bar
+from fourbar.linkage import (
+    AT_LEAST_ZERO,
+    BAR_NAMES,
+    POSITIVE,
+    Declared,
+    Described,
+    Text,
+    require_bar,
+)
 from fourbar.writing import read_bytes
 
 LARGEST_PICTURE = 2_000_000
@@ -81,7 +88,7 @@ class _PictureFile:
 
 
 @dataclass(frozen=True, slots=True)
-class TracedPicture(_PictureFile):
+class TracedPicture(_PictureFile, Described):
     """The picture that lies under the drawing in the workbench.
 
     Parameters
@@ -95,21 +102,18 @@ class TracedPicture(_PictureFile):
     folder : where the scene file is.
     """
 
-    name: str
-    origin: tuple[float, float] | None = None
-    scale: float | None = None
-    angle: float = 0.0
-    opacity: float = 0.5
+    name: Annotated[str, Text("file")]
+    origin: Annotated[tuple[float, float] | None, Declared("1", pair="1")] = None
+    scale: Annotated[float | None, Declared("m", POSITIVE)] = None
+    angle: Annotated[float, Declared("rad")] = 0.0
+    opacity: Annotated[float, Declared("1", AT_LEAST_ZERO)] = 0.5
     folder: str = "."
+    stated_at: ClassVar[str] = "picture"
 
     def __post_init__(self) -> None:
+        Described.__post_init__(self)
         _PictureFile.__post_init__(self)
-        numbers = (*(self.origin or ()), self.scale or 1.0, self.angle, self.opacity)
-        if not all(map(math.isfinite, numbers)):
-            raise InputError("picture", numbers, "must be finite numbers")
-        if self.scale is not None and self.scale <= 0.0:
-            raise InputError("picture.scale", self.scale, "must be positive", unit="m")
-        if not 0.0 <= self.opacity <= 1.0:
+        if self.opacity > 1.0:
             raise InputError("picture.opacity", self.opacity, "must be from 0 to 1")
 
     def read(self) -> tuple[bytes, str]:

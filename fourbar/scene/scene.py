@@ -81,8 +81,6 @@ class Scene:
     drive : a force in place of a torque on a bar: `LinearDrive` or `PointDrive`.
     drawing : the pins as they are drawn, `DrawnPins`: places are shown in its
         coordinates.
-    coordinates : keys of the places that a scene file states by x and y, with these, m;
-        a file is written likewise.
     picture : that lies under the drawing in the workbench.
     met_lengths : lengths that a scene file states and those that are read for them, m,
         if these have an equality that the stated ones miss by rounding.
@@ -102,11 +100,6 @@ class Scene:
     drive: "ForceDrive | None" = None
     drawing: DrawnPins | None = None
     picture: TracedPicture | None = None
-    coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(
-        default=(),
-        repr=False,
-        compare=False,
-    )
     met_lengths: tuple[tuple[float, ...], tuple[float, ...]] | None = field(
         default=None,
         repr=False,

@@ -62,9 +62,5 @@ def test_a_material_that_states_no_mass_is_refused(stated, key):
 
 
 def test_a_scene_file_names_the_bar_whose_material_is_wrong():
-    for stated, words in (
-        ('density = "7850 kg/m^3"', r"bars\.coupler\.density = '7850 kg/m"),
-        ('mass = "0.25 lb/in"', r'mass_per_length = "0\.25 lb'),
-    ):
-        with raises(InputError, match=words):
-            loads(f"{LENGTHS}[bars.coupler]\n{stated}\n")
+    with raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
+        loads(f'{LENGTHS}[bars.coupler]\ndensity = "7850 kg/m^3"\n')

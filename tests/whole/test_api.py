@@ -88,7 +88,7 @@ def list_fields(part):
     return getattr(part, "_fields", ())
 
 
-MADE_ALONG = ("coordinates", "met_lengths", "turns")
+MADE_ALONG = ("met_lengths", "turns")
 """Fields that the package fills itself."""
 
 

@@ -225,7 +225,7 @@ def test_the_default_sweep_holds_the_drawn_position():
     read_rows(r"""
 [pins] | [lengths]\nground = "1 m"\n[pins] | the pins state the lengths
 A = ["0 mm", "100 mm"]\n |  | pins.A: is missing
-"100 mm" | 100 | did you mean "100 mm"
+"100 mm" | 100 | the unit is missing
 "0 mm", "100 mm" | "0 mm", "0 mm" | lies where O2 does
 "100 mm"] | "100 mm", "0 mm"] | must be two coordinates
 [pins] | [motion]\nbranch = "open"\n[pins] | the pins state the assembly

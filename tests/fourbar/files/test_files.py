@@ -179,7 +179,7 @@ def test_a_stroke_is_less_than_the_spring_is_long():
     read_rows("""
 4 in | lb, in, lb in^2, lbf, lbf in | 9.806686
 300 mm | kg, mm, kg m^2, N, N mm | 9.81
-30cm | kg, cm, kg m^2, N, N cm | 9.81
+30cm | kg, mm, kg m^2, N, N mm | 9.81
 2 ft | lb, in, lb in^2, lbf, lbf in | 9.806686
 """),
 )
