@@ -22,23 +22,23 @@ from matplotlib.figure import Figure
 
 import fourbar
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.labels import settle_labels
 from fourbar.show.plot.linkage_figure import (
-    choose_drawing_scale,
+    draw_bar,
     draw_mechanism,
+    draw_pins,
     draw_support,
-    locate_pins,
 )
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     GROUND_LINE,
     INK,
     MUTED,
-    RING_MARK,
     add_dark_form,
     apply_style,
     plot_points,
 )
+from fourbar.show.plot.symbols import pose_of
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
 from fourbar_lab.benchmark import DIFFERENTIATED as LOOP
@@ -320,23 +320,22 @@ def draw_problem(name: str) -> str:
         problem = read_problem(name)
         sliding = problem["mechanism"] == "slider-crank"
         figure = Figure(figsize=LOW if sliding else SIZE, layout="constrained")
-        axes, labels = figure.add_subplot(), Labels()
+        axes = figure.add_subplot()
         if sliding:
-            draw_slider_crank(axes, problem, labels)
+            draw_slider_crank(axes, problem)
         else:
             view = make_view(
                 fourbar.load(PROBLEMS / f"{name}.toml"), SHOWN_AT.get(name)
             )
-            factor, _, size = choose_drawing_scale(view)
-            pins = locate_pins(view, factor)
+            pins = pose_of(view, view.here, 0).pins
             plot_points(axes, [pins["O2"], pins["O4"]], **GROUND_LINE)
             for pin in ("O2", "O4"):
-                draw_support(axes, pins[pin], size, labels)
-            draw_mechanism(axes, view, view.here, 0, labels)
+                draw_support(axes, pins[pin], view.plane.size)
+            draw_mechanism(axes, view, view.here, 0)
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.12)
         axes.set_axis_off()
-        labels.settle(figure)
+        settle_labels(figure)
         drawn = io.StringIO()
         with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
             figure.savefig(
@@ -348,7 +347,7 @@ def draw_problem(name: str) -> str:
     return COORDINATES.sub(lambda part: LONG_NUMBER.sub(r"\1", part.group()), svg)
 
 
-def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> None:
+def draw_slider_crank(axes: Any, problem: dict[str, Any]) -> None:
     """Draw crank, rod, slider and guide at the fifth position."""
     lengths, theta_2 = problem["scene"]["lengths"], problem["command"]["theta_2"][4]
     theta_3, stroke = (problem["answers"][key][4] for key in ("theta_3", "stroke"))
@@ -360,7 +359,7 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
     }
     rod = cmath.rect(lengths["rod"], theta_3)
     assert math.isclose((pins["A"] + rod).imag, level, abs_tol=1e-12)
-    draw_support(axes, pins["O2"], 0.5 * size, labels)
+    draw_support(axes, pins["O2"], 0.5 * size)
     end = 1.3 * (crank + lengths["rod"])
     guide = [complex(-crank, level), complex(end, level)]
     corners = [
@@ -369,17 +368,9 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
     ]
     plot_points(axes, guide, color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)))
     plot_points(axes, corners, color=BAR_COLOURS[4], lw=2.0, zorder=3)
-    for line in (guide, corners):
-        labels.keep_off(axes, *line)
     for bar, (start, stop) in ((2, ("O2", "A")), (3, ("A", "B"))):
-        ends = pins[start], pins[stop]
-        look = {"color": BAR_COLOURS[bar], "lw": 4.5, "solid_capstyle": "round"}
-        plot_points(axes, ends, zorder=4, **look)
-        labels.keep_off(axes, *ends, width=4.5)
-    for pin, point in pins.items():
-        plot_points(axes, point, "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK)
-        name = "$O_2$" if pin == "O2" else f"${pin}$"
-        labels.add(Label(axes, name, point, complex(0.5 * stroke), INK, 9.0, 2.5))
+        draw_bar(axes, bar, [pins[start], pins[stop]])
+    draw_pins(axes, pins, complex(0.5 * stroke))
     if problem["scene"].get("loads"):
         axes.annotate(
             "",

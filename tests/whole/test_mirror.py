@@ -45,7 +45,6 @@ fourbar/studies/test_paths.py | fourbar/show: path_rows
 fourbar/mjcf/test_mjcf.py | document model
 fourbar/show/test_animate.py | fourbar/show/plot: film
 fourbar/show/test_page.py | tolerances
-fourbar/show/plot/test_curves.py | traced_paths
 fourbar/show/plot/test_plot.py | figures freebody labels linkage_figure style
 fourbar/show/plot/test_plot.py | tolerance_figures view
 # a comparison is tested by engines with given answers

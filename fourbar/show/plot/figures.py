@@ -12,7 +12,7 @@ from fourbar.scene import Scene
 from fourbar.show.columns import explain_static
 from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot import curves, freebody, linkage_figure
-from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.labels import settle_labels
 from fourbar.show.plot.style import (
     CAPTION_STYLE,
     TITLE,
@@ -31,14 +31,11 @@ if TYPE_CHECKING:
 
 _LINKAGE_WIDER = [1.15, 1.0]
 """Widths of two columns, of which the left one has the linkage."""
-_DRAWINGS: dict[str, Callable[["Axes", View, Labels], None]] = {
+_PANELS: dict[str, Callable[["Axes", View], None]] = {
     "linkage": linkage_figure.draw_linkage,
     "moving linkage": partial(linkage_figure.draw_linkage, moving=True),
     "coupler": linkage_figure.draw_coupler_curves,
     "centres": linkage_figure.draw_centres,
-}
-"""Panels that are drawn to scale."""
-_CURVES: dict[str, Callable[["Axes", View], None]] = {
     "angles": curves.draw_angles,
     "omega": curves.draw_velocities,
     "alpha": curves.draw_accelerations,
@@ -55,7 +52,7 @@ _CURVES: dict[str, Callable[["Axes", View], None]] = {
     "ratios": curves.draw_speed_ratios,
     "advantage": curves.draw_advantage,
 }
-"""Panels of curves, in the order in which their notes are written."""
+"""Panels, in the order in which their notes are written."""
 
 
 class FigureKind(NamedTuple):
@@ -63,25 +60,20 @@ class FigureKind(NamedTuple):
 
     size: tuple[float, float]
     """Width and height, inches."""
-    paint: Callable[["SubFigure", View, Labels], None]
+    paint: Callable[["SubFigure", View], None]
     needs_speed: bool = False
 
 
-def _draw_panels(
-    figure: "SubFigure", shown: View, labels: Labels, *, rows: list[Any]
-) -> None:
+def _draw_panels(figure: "SubFigure", shown: View, *, rows: list[Any]) -> None:
     """Draw panels by their names, row by row; a name that is repeated is one panel."""
     widths = _LINKAGE_WIDER if len(rows[0]) == 2 else None
     panels = figure.subplot_mosaic(rows, width_ratios=widths)
-    for name, draw_to_scale in _DRAWINGS.items():
+    for name, draw_panel in _PANELS.items():
         if name in panels:
-            draw_to_scale(panels[name], shown, labels)
-    for name, draw_curves in _CURVES.items():
-        if name in panels:
-            draw_curves(panels[name], shown)
+            draw_panel(panels[name], shown)
 
 
-def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_overview(figure: "SubFigure", shown: View) -> None:
     free = shown.scene.motion.free is not None
     # what drives; in a free motion the work of loads and effects
     rows = [["linkage", "linkage", "energy" if free else "drive"]]
@@ -95,12 +87,12 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
             ["angles", "omega", "alpha"],
             ["mu", "mu", "mu"] if free else ["forces", "forces", "mu"],
         ]
-    _draw_panels(figure, shown, labels, rows=rows)
+    _draw_panels(figure, shown, rows=rows)
 
 
-def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_kinematics(figure: "SubFigure", shown: View) -> None:
     rates = [["omega"], ["alpha"]] if shown.moves and not shown.rests else []
-    _draw_panels(figure, shown, labels, rows=[["angles"], *rates])
+    _draw_panels(figure, shown, rows=[["angles"], *rates])
 
 
 def _show(
@@ -234,13 +226,12 @@ def _compose(kind: FigureKind, shown: View) -> "Figure":
 
     figure = Figure(figsize=kind.size, layout="constrained")
     (part,) = figure.subfigures(squeeze=False).ravel()
-    labels = Labels()
-    kind.paint(part, shown, labels)
+    kind.paint(part, shown)
     heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
     part.suptitle(heading, **TITLE)
     caption = textwrap.fill(" ".join(shown.notes), int(kind.size[0] * 18.5))
     if caption:
         part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
     name_powers(figure)
-    labels.settle(figure)
+    settle_labels(figure)
     return figure

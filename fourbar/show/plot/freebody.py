@@ -1,6 +1,5 @@
 """Free-body diagrams of the three moving bars, all forces to one scale."""
 
-import math
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,44 +9,38 @@ from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
-from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.linkage_figure import (
+    draw_bar,
     draw_mass_centre,
+    draw_pins,
     draw_plate,
-    locate_pins,
-    pin_name,
 )
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     FORCE_COLOURS,
-    HEADED,
     INK,
     MUTED,
-    RING_MARK,
+    draw_arrow,
     largest_magnitude,
-    plot_points,
-    split_complex,
-    split_points,
     write_force_name,
     write_labelled_quantity,
+    write_pin_name,
 )
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.shown_units import choose_unit
 from fourbar.show.summary import Facts
-from fourbar.solution import Conversion
+from fourbar.solution import Solution
 from fourbar.studies.internal_forces import internal_forces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-_PANEL, LINE_HEIGHT = 3.4, 0.16
-"""Heights of a bar's panel and of a line of its couples, inches."""
 LABEL_SPACE = 1.3
 """The window is this much wider than what it shows: space for the labels."""
 STATIONS_DRAWN = 401
 """Stations along a bar."""
-WITHOUT_VALUES = "they have a value at none of the positions"
 LEAST_DRAWN_FORCE = 0.02
 """Share of the largest force below which a force is named in the caption only. Its
 arrow would be shorter than its head.
@@ -97,8 +90,7 @@ class FreedBar(Actions):
         self.G = _take_one(described.to_centre * u)
         """Mass centre, from the bar's first pin, m."""
         first, second = ENDS[bar]
-        pins = locate_pins(view)
-        self.pins = {first: 0.0j, second: pins[second] - pins[first]}
+        self.pins = {first: 0.0j, second: _take_one(described.length * u)}
         for pin, arm in self.pins.items():
             of_pin = PIN_FORCE[pin]
             force = complex(*getattr(view.here, of_pin)[0])
@@ -174,39 +166,32 @@ class FreedBar(Actions):
         The first bar gets the opposite couple.
         """
         for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True):
-            self.couple(bar, sense * couple, f" at {pin_name(pin)}")
+            self.couple(bar, sense * couple, f" at {write_pin_name(pin)}")
 
 
-def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
+def draw_free_bodies(figure: "SubFigure", view: View) -> None:
     """Draw the three bars, each freed from its pins, over the couples.
 
     All arrows have one scale.
     """
-    _require_forces(view, "freebody")
+    _require_forces(view.here, "freebody")
     freed = [FreedBar(view, bar) for bar in MOVING_BARS]
-    lines = max(1, *(len(bar.turns) for bar in freed))  # or "no couples"
-    panels, below = figure.subplots(2, 3, height_ratios=[_PANEL, LINE_HEIGHT * lines])
-    sizes = [abs(arrow.force) for bar in freed for arrow in bar.arrows]
-    biggest = max(sizes, default=0.0)
-    longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
-    scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
-    windows = []
-    for bar in freed:
-        points = [*bar.pins.values(), bar.G]
-        for arrow in bar.arrows:
-            points += [arrow.at, arrow.at + scale * arrow.force]
-        places = split_points(points)
-        windows.append(np.array([places.min(axis=0), places.max(axis=0)]))
-    # one window size: the bars, too, are to one scale
-    span = LABEL_SPACE * max(float(np.ptp(window, axis=0).max()) for window in windows)
+    biggest = max(
+        (abs(arrow.force) for bar in freed for arrow in bar.arrows), default=0
+    )
+    longest = max(view.scene.linkage.lengths[1:])
+    scale = 0.75 * longest / biggest if biggest else 0.0
     view.note(f"At {view.at}.")
-    for axes, text, bar, window in zip(panels, below, freed, windows, strict=True):
-        _draw_one(axes, view, bar, scale, biggest, labels)
-        low, high = window.mean(axis=0) + 0.5 * span * np.array([[-1.0], [1.0]])
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        _write_couples(text, view, bar.turns)
-    if scale:
-        _draw_scale(panels[0], scale, biggest, view.units)
+    panels = figure.subplots(1, 3)
+    for axes, bar in zip(panels, freed, strict=True):
+        _draw_one(axes, view, bar, scale, biggest)
+    # one window size: the bars, too, are to one scale
+    span = LABEL_SPACE * max(axes.dataLim.size.max() for axes in panels)
+    for axes in panels:
+        x, y = axes.dataLim.get_points().mean(axis=0) - 0.5 * span
+        axes.set(xlim=(x, x + span), ylim=(y, y + span), xticks=[], yticks=[])
+        axes.set_aspect("equal", adjustable="box")
+        axes.spines[:].set_visible(False)
     view.note(
         "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a"
         " at G (d'Alembert), with which the forces and the moments on each bar add up"
@@ -214,28 +199,25 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     )
 
 
-def _require_forces(view: View, figure: str) -> None:
-    """Raise InputError if the drawn position has no forces."""
-    if not np.isfinite(view.here.F12).all():
-        reason = (
-            f"needs forces, which have no value at {where_in_words(view.here)}:"
-            f" {view.here.status[0]}"
-        )
+def _require_forces(solution: Solution, figure: str) -> None:
+    """Raise InputError if forces have a value at none of the positions."""
+    if solution.F12 is None or not np.isfinite(solution.F12).any():
+        where = "any of the positions"
+        if len(solution) == 1:
+            where = f"{where_in_words(solution)}: {solution.status[0]}"
+        reason = f"needs forces, which have no value at {where}"
         raise InputError("figure", figure, reason)
 
 
-def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> None:
+def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     """Draw N, V and M along each bar.
 
     The position is the one that is stated, or else that of the bar's largest bending
     moment.
     """
     panels = figure.subplots(3, 3, sharex="col")
-    if view.stated:
-        _require_forces(view, "bars")
-    elif view.sweep.F12 is None or not np.isfinite(view.sweep.F12).any():
-        raise InputError("figure", "bars", f"needs forces, and {WITHOUT_VALUES}")
     solution = view.here if view.stated else view.sweep
+    _require_forces(solution, "bars")
     bending = Facts(solution).bending
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
@@ -251,7 +233,7 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
             axes.fill_between(*line, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"${name}$ ({shown})")
-        first_pin = pin_name(FIRST_PIN[bar]).strip("$")
+        first_pin = write_pin_name(FIRST_PIN[bar]).strip("$")
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
         column[2].set_xlabel(f"$x$ from ${first_pin}$ ({unit})")
         largest = "grows without bound; drawn is the largest of these positions,"
@@ -268,99 +250,37 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
 
 
 def _draw_one(
-    axes: "Axes",
-    view: View,
-    freed: FreedBar,
-    scale: float,
-    biggest: float,
-    labels: Labels,
+    axes: "Axes", view: View, freed: FreedBar, scale: float, biggest: float
 ) -> None:
-    """Draw a bar freed from its pins, with the arrows of the forces on it."""
+    """Draw a bar freed from its pins, with the forces on it, and list its couples."""
     bar = freed.bar
-    pins = freed.pins
-    start, end = pins.values()
+    start, end = freed.pins.values()
     middle = 0.5 * end
-    plot_points(
-        axes,
-        [start, end],
-        color=BAR_COLOURS[bar],
-        lw=5.0,
-        alpha=0.45,
-        solid_capstyle="round",
-        zorder=2,
-    )
-    labels.keep_off(axes, start, end, width=5.0)
-    for name, pin in pins.items():
-        plot_points(axes, pin, "o", ms=5.5, mew=1.1, zorder=6, **RING_MARK)
-        labels.add(Label(axes, pin_name(name), pin, middle, MUTED, 8.0, 2.5))
+    draw_bar(axes, bar, [start, end], alpha=0.45, zorder=2)
+    draw_pins(axes, freed.pins, middle, MUTED, 8.0)
     short: list[str] = []
     for arrow in freed.arrows:
         size = abs(arrow.force)
-        value = write_labelled_quantity(size, "N", view.units)
+        text = f"{arrow.text} = {write_labelled_quantity(size, 'N', view.units)}"
         if size < LEAST_DRAWN_FORCE * biggest:
-            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " "))
-            short.append(f"{plain.replace('-', '−')} = {value}")
+            plain = re.sub(r"[$_{}]", "", text.replace("\\,", " "))
+            short.append(plain.replace("-", "−"))
             continue
-        draw_plate(axes, bar, (start, arrow.at, end), labels)
-        tip = arrow.at + scale * arrow.force
-        colour = arrow.colour
+        draw_plate(axes, bar, (start, arrow.at, end))
+        shaft = scale * arrow.force
         ls = "--" if arrow.dashed else "-"
-        axes.annotate(
-            "",
-            split_complex(tip),
-            split_complex(arrow.at),
-            arrowprops={**HEADED, "mutation_scale": 9, "color": colour, "ls": ls},
-            zorder=5,
-            annotation_clip=False,
-        )
-        labels.keep_off(axes, arrow.at, tip)
-        text = f"{arrow.text} = {value}"
-        labels.add(Label(axes, text, tip, arrow.at, colour, 7.5))
+        draw_arrow(axes, arrow.at, arrow.at + shaft, arrow.colour, ls=ls)
+        add_label(axes, text, arrow.at + shaft, shaft, arrow.colour, 7.5)
     if short:
         view.note(f"Too short to draw on bar {bar}: {', '.join(short)}.")
     if view.scene.linkage.bar(bar).mass > 0.0:
-        draw_plate(axes, bar, (start, freed.G, end), labels)
-        draw_mass_centre(axes, freed.G, 6.0)
-        labels.add(Label(axes, f"$G_{bar}$", freed.G, middle, MUTED, 8.0, 3.0))
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_axis_off()
+        draw_plate(axes, bar, (start, freed.G, end))
+        draw_mass_centre(axes, bar, freed.G, freed.G - middle, MUTED)
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
-
-
-def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
-    """Write one line for each couple."""
-    lines = []
-    for couple in couples:
-        size = write_labelled_quantity(abs(couple.moment), "N m", view.units)
-        lines.append(f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} = {size}")
-    axes.set_axis_off()
-    axes.text(
-        0.0,
-        1.0,
-        "\n".join(lines) or "no couples",
-        transform=axes.transAxes,
-        color=INK if lines else MUTED,
-        va="top",
-        size=7.5,
-        linespacing=1.45,
-    )
-
-
-def _draw_scale(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
-    """Draw a round force as a length, under the first panel."""
-    factor, unit = choose_unit(biggest, "N", units)
-    step = 10.0 ** math.floor(math.log10(factor * biggest))
-    fitting = (m * step for m in (5.0, 2.0) if 2.0 * m * step <= factor * biggest)
-    round_force = next(fitting, step) / factor
-    x = axes.get_xlim()[0]
-    y = axes.get_ylim()[0]
-    ends = [x, x + scale * round_force]
-    axes.plot(ends, [y, y], color=INK, lw=2.0, solid_capstyle="butt", clip_on=False)
-    axes.annotate(
-        f"{factor * round_force:g} {unit}",
-        (x, y),
-        xytext=(0, 4),
-        textcoords="offset points",
-        size=7.5,
-        annotation_clip=False,
-    )
+    couples = [
+        f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} ="
+        f" {write_labelled_quantity(abs(couple.moment), 'N m', view.units)}"
+        for couple in freed.turns
+    ]
+    words = "\n".join(couples or ["no couples"])
+    axes.set_xlabel(words, loc="left", size=7.5, linespacing=1.45)

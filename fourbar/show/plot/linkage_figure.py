@@ -3,8 +3,7 @@
 Plots and films draw it alike.
 """
 
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Iterable, Iterator
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.show.derived import derive
-from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     GROUND_LINE,
@@ -21,158 +20,107 @@ from fourbar.show.plot.style import (
     MUTED,
     POINT,
     RING_MARK,
-    Points,
     join_points,
-    largest_magnitude,
     place_legend,
     plot_points,
     split_points,
     write_labelled_quantity,
+    write_pin_name,
 )
-from fourbar.show.plot.symbols import (
-    BARREL,
-    Pose,
-    draw_symbol,
-    draw_vectors,
-    list_acting,
-    place_of,
-)
-from fourbar.show.plot.traced_paths import trace
+from fourbar.show.plot.symbols import draw_symbol, draw_vectors, list_acting, pose_of
 from fourbar.show.plot.view import View
-from fourbar.show.shown_units import choose_unit
 from fourbar.solution import Solution
 from fourbar.studies.paths import measure_paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
-    from matplotlib.path import Path
 
 
 _NAMED_AT = 0.35
 """Part of a bar's length at which its name stands: a mass centre is often mid-bar."""
 _ON_BAR = 1e-3
 """Part of a bar's length below which a point seems to lie on the bar's line."""
+BAR_WIDTH = 4.5
+"""Width of a bar, typographic points."""
+Path = tuple[Array, dict[str, Any]]
+"""Places of a point, (n, 2), m from O2, and the look of its path."""
 
 
-def _label_plane(
-    axes: "Axes", view: View, title: str, factor: float, unit: str
-) -> None:
-    """Label the axes of a drawing to scale, with round numbers of its coordinates."""
-    from matplotlib.ticker import MaxNLocator
-
-    class ShiftedLocator(MaxNLocator):
-        """Ticks at round numbers of the drawing."""
-
-        def __init__(self, shift: float) -> None:
-            super().__init__(nbins="auto", steps=[1, 2, 5, 10])
-            self.shift = shift
-
-        def tick_values(self, vmin: float, vmax: float) -> list[float]:
-            ticks = super().tick_values(vmin + self.shift, vmax + self.shift)
-            return [float(tick) - self.shift for tick in ticks]
-
+def label_plane(axes: "Axes", view: View, title: str) -> None:
+    """Label the axes of a drawing to scale."""
+    unit = view.plane.unit
+    axes.margins(0.08)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
-    for axis, origin in zip((axes.xaxis, axes.yaxis), view.scene.origin, strict=True):
-        if origin == 0.0:
-            continue
-        shift = factor * origin
-
-        def write_tick(value: float, _: Any, shift: float = shift) -> str:
-            return f"{value + shift:.6g}".replace("-", "−")
-
-        axis.set_major_locator(ShiftedLocator(shift))
-        axis.set_major_formatter(write_tick)
 
 
-def locate_pins(view: View, factor: float = 1.0) -> dict[str, complex]:
-    """Locate the pins O2, A, B, O4 at the drawn position, in m times the factor."""
-    return place_of(view.scene.linkage, view.here, 0, factor).pins
+def draw_bar(axes: "Axes", bar: int, ends: Any, **look: Any) -> None:
+    """Draw a bar as a broad line between its pins."""
+    look = {"color": BAR_COLOURS[bar], "lw": BAR_WIDTH, "zorder": 4} | look
+    plot_points(axes, ends, solid_capstyle="round", **look)
+
+
+def draw_pins(
+    axes: "Axes",
+    pins: dict[str, complex],
+    middle: complex,
+    colour: str = INK,
+    size: float = 9.0,
+) -> None:
+    """Draw pins as rings, their names away from the middle."""
+    places = [*pins.values()]
+    plot_points(axes, places, "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK)
+    for name, pin in pins.items():
+        add_label(axes, write_pin_name(name), pin, pin - middle, colour, size)
 
 
 def draw_mechanism(
-    axes: "Axes",
-    view: View,
-    solution: Solution,
-    index: int,
-    labels: Labels,
-) -> list[Any]:
+    axes: "Axes", view: View, solution: Solution, index: int, *, moving: bool = False
+) -> None:
     """Draw bars, pins, mass centres, points and what acts at a position.
 
-    Return what was drawn. Labels are asked for, each away from what it names; whoever
-    calls places them.
+    `moving`: with the arrows of velocity and acceleration.
     """
-    factor, _, size = choose_drawing_scale(view)
-    place = place_of(view.scene.linkage, solution, index, factor)
-    if view.sweep.stroke is not None:
-        shortest = float(np.nanmin(view.sweep.stroke))
-        place = place._replace(barrel=BARREL * factor * shortest)
-    pins = place.pins
-    middle = sum(pins.values()) / 4.0
-    drawn = []
-    for number in MOVING_BARS:
-        start, stop = (pins[pin] for pin in ENDS[number])
-        colour = BAR_COLOURS[number]
-        ends = [start, stop]
-        drawn += plot_points(
-            axes, ends, color=colour, lw=4.5, solid_capstyle="round", zorder=4
-        )
-        labels.keep_off(axes, start, stop, width=4.5)
-        name = _write_bar_name(view, number)
+    scene = view.scene.settled()
+    pose = pose_of(view, solution, index)
+    middle = sum(pose.pins.values()) / 4.0
+
+    def join_to_bar(bar: int, at: complex) -> None:
+        first, second = ENDS[bar]
+        draw_plate(axes, bar, (pose.pins[first], at, pose.pins[second]))
+
+    for bar in MOVING_BARS:
+        start, stop = ends = [pose.pins[pin] for pin in ENDS[bar]]
+        draw_bar(axes, bar, ends)
         named_at = start + _NAMED_AT * (stop - start)
-        labels.add(Label(axes, name, named_at, middle, colour, 9.0, 2.0))
-    joints = [*pins.values()]
-    drawn += plot_points(axes, joints, "o", ms=6.0, mew=1.2, zorder=6, **RING_MARK)
-    for name, point in pins.items():
-        labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
-    for name, path in solution.points.items():
-        here = factor * complex(*path[index])
-        labels.keep_off(axes, here)
-        drawn += _mark_point(axes, name, here, middle, labels)
-    for carrier, corner in _list_off_bars(view, place):
-        first, last = (pins[pin] for pin in ENDS[carrier])
-        drawn += draw_plate(axes, carrier, (first, corner, last), labels)
-    for number in MOVING_BARS:
-        bar = view.scene.linkage.bar(number)
-        if bar.mass == 0.0:
+        name = _write_bar_name(view, bar)
+        add_label(axes, name, named_at, named_at - middle, BAR_COLOURS[bar], 9.0)
+    draw_pins(axes, pose.pins, middle)
+    for point in scene.points:
+        at = pose.point(point.bar, point.place.vector())
+        join_to_bar(point.bar, at)
+        _mark_point(axes, point.name, at, at - middle)
+    for bar in MOVING_BARS:
+        described = scene.linkage.bar(bar)
+        if described.mass == 0.0:
             continue
-        G = place.point(number, bar.to_centre)
-        drawn += draw_mass_centre(axes, G)
-        labels.keep_off(axes, G)
-        beyond = 2.0 * G - middle  # across the bar from its number
-        colour = BAR_COLOURS[number]
-        labels.add(Label(axes, f"$G_{number}$", G, beyond, colour, 8.0, 3.0))
-    for symbol in list_acting(view.scene):
-        drawn += draw_symbol(axes, symbol, place, size, labels)
-    return drawn
-
-
-def _list_off_bars(view: View, place: Pose) -> Iterator[tuple[int, complex]]:
-    """List what may lie off its bar.
-
-    Points, mass centres, and the places where forces, moments and springs act may do
-    so.
-    """
-    for point in view.scene.settled().points:
-        yield point.bar, place.point(point.bar, point.place.vector())
-    for number in MOVING_BARS:
-        bar = view.scene.linkage.bar(number)
-        if bar.mass > 0.0:
-            yield number, place.point(number, bar.to_centre)
-    for symbol in list_acting(view.scene):
-        if symbol.kind in ("force", "push", "moment", "spring"):
-            yield symbol.bar, place.tail(symbol)
+        G = pose.point(bar, described.to_centre)
+        join_to_bar(bar, G)
+        # across the bar from its number
+        draw_mass_centre(axes, bar, G, middle - G, BAR_COLOURS[bar])
+    for symbol in list_acting(scene):
+        if symbol.kind != "gravity":
+            join_to_bar(symbol.bar, pose.tail(symbol))
         if symbol.end is not None:
-            yield symbol.end[0], place.point(*symbol.end)
+            join_to_bar(symbol.end[0], pose.point(*symbol.end))
+        draw_symbol(axes, symbol, pose)
+    if moving:
+        draw_vectors(axes, view, solution, index)
 
 
 def draw_plate(
-    axes: "Axes",
-    bar: int,
-    corners: tuple[complex, complex, complex],
-    labels: Labels,
-) -> list[Any]:
+    axes: "Axes", bar: int, corners: tuple[complex, complex, complex]
+) -> None:
     """Join a point to its bar, from pin to point to pin, as a plate.
 
     Nothing is drawn for a point that lies on the bar.
@@ -183,107 +131,122 @@ def draw_plate(
     first, point, last = corners
     along = (point - first) / (last - first)
     if abs(along.imag) < _ON_BAR and -_ON_BAR < along.real < 1.0 + _ON_BAR:
-        return []
+        return
     colour = BAR_COLOURS.get(bar, MUTED)
-    labels.keep_off(axes, *corners)
-    plate = Polygon(
-        split_points(corners),
-        closed=False,
-        fc=to_rgba(colour, 0.08 if bar > 1 else 0.0),
-        ec=colour,
-        lw=0.8,
-        ls=":",
-        zorder=1.5,
-    )
-    return [axes.add_patch(plate)]
+    face = to_rgba(colour, 0.08 if bar > 1 else 0.0)
+    look = {"fc": face, "ec": colour, "lw": 0.8, "ls": ":", "zorder": 1.5}
+    axes.add_patch(Polygon(split_points(corners), closed=False, **look))
 
 
-def _mark_point(
-    axes: "Axes", name: str, point: complex, shun: complex, labels: Labels
-) -> "list[Line2D]":
-    """Mark a point of the scene by a diamond, and ask for its label."""
-    labels.add(Label(axes, name, point, shun, POINT, 8.5, 2.5))
+def _mark_point(axes: "Axes", name: str, point: complex, away: complex) -> None:
+    """Mark a point of the scene by a diamond, and name it."""
+    add_label(axes, name, point, away, POINT, 8.5)
     look = {**RING_MARK, "mec": POINT}
-    return plot_points(axes, point, "D", ms=4.5, mew=1.2, zorder=8, **look)
+    plot_points(axes, point, "D", ms=4.5, mew=1.2, zorder=8, **look)
 
 
 def draw_mass_centre(
-    axes: "Axes",
-    point: complex,
-    ms: float = 7.0,
-) -> "list[Line2D]":
-    """Draw the quartered circle that marks a mass centre."""
-    quarters: Any = _make_quarters()
-    disc = {"ms": ms, "zorder": 7, "mec": INK, "mew": 0.8, "mfc": "white"}
-    dark = {"ms": ms, "zorder": 7, "mec": "none", "mfc": INK}
-    return [
-        *plot_points(axes, point, "o", **disc),
-        *plot_points(axes, point, marker=quarters, **dark),
-    ]
-
-
-@cache
-def _make_quarters() -> "Path":
+    axes: "Axes", bar: int, point: complex, away: complex, colour: str
+) -> None:
+    """Draw the quartered circle that marks a mass centre, and name it."""
     from matplotlib.path import Path
 
-    return Path.make_compound_path(Path.wedge(0, 90), Path.wedge(180, 270))
+    quarters: Any = Path.make_compound_path(Path.wedge(0, 90), Path.wedge(180, 270))
+    plot_points(axes, point, "o", ms=7.0, zorder=7, mew=0.8, **RING_MARK)
+    plot_points(axes, point, marker=quarters, ms=7.0, zorder=7, mec="none", mfc=INK)
+    add_label(axes, f"$G_{bar}$", point, away, colour)
 
 
-def draw_support(axes: "Axes", pin: complex, size: float, labels: Labels) -> None:
+def draw_support(axes: "Axes", pin: complex, size: float) -> None:
     """Draw the hatched support under a fixed pin."""
     from matplotlib.patches import Polygon, Rectangle
 
-    x = pin.real
-    y = pin.imag
     wide = 1.7 * size
-    foot = y - wide
-    corners = [(x, y), (x - size, foot), (x + size, foot)]
-    triangle = Polygon(corners, closed=True, fc="white", ec=INK, lw=1.0, zorder=3)
-    hatching = Rectangle(
-        (x - wide, foot - 0.8 * size),
-        2.0 * wide,
-        0.8 * size,
-        fc="none",
-        ec=INK,
-        lw=0.0,
-        hatch="//////",
-        zorder=2,
-    )
-    axes.add_patch(triangle)
-    axes.add_patch(hatching)
-    axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
-    for share in (0.5, 1.0, 1.7, 2.1, 2.5):
-        level = complex(x, y - share * size)
-        half = size * (share / 1.7 if share <= 1.7 else 1.7)
-        labels.keep_off(axes, level - half, level + half)
+    left, right, foot = pin.real - wide, pin.real + wide, pin.imag - wide
+    corners = split_points([pin, pin - size - 1j * wide, pin + size - 1j * wide])
+    axes.add_patch(Polygon(corners, fc="white", ec=INK, lw=1.0, zorder=3))
+    place = (left, foot - 0.8 * size)
+    hatched: Any = {"fc": "none", "ec": INK, "lw": 0.0, "hatch": "//////", "zorder": 2}
+    axes.add_patch(Rectangle(place, 2.0 * wide, 0.8 * size, **hatched))
+    axes.plot([left, right], [foot, foot], color=INK, lw=1.0, zorder=3)
 
 
-def _write_bar_name(view: View, number: int) -> str:
+def _write_bar_name(view: View, bar: int) -> str:
     """Write the number of a bar, with its length where dimensions are wanted."""
     if not view.dimensions:
-        return str(number)
-    length = view.scene.linkage.lengths[number - 1]
-    return f"{number}: {write_labelled_quantity(length, 'm', view.units)}"
+        return str(bar)
+    length = view.scene.linkage.lengths[bar - 1]
+    return f"{bar}: {write_labelled_quantity(length, 'm', view.units)}"
 
 
-def choose_drawing_scale(view: View) -> tuple[float, str, float]:
-    """Choose the factor to the unit of length, that unit, and a support's size."""
-    sweep = view.sweep
-    pins = split_points([*locate_pins(view).values()])
-    most = largest_magnitude(sweep.A, sweep.B, sweep.G3, pins)
-    factor, unit = choose_unit(most, "m", view.units)
-    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), pins])
-    extents = np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)
-    size_of_support = 0.03 * factor * float(np.max(extents))
-    return factor, unit, size_of_support
+def draw_linkage(axes: "Axes", view: View, *, moving: bool = False) -> None:
+    """Draw the linkage at the drawn position, over the paths of its points.
+
+    `moving`: with velocities.
+    """
+    draw_frame(axes, view)
+    plane = view.plane
+    if not moving:  # stroke and straightness of paths, as rectangles about them
+        for measured in measure_paths(view.sweep).values():
+            corners = join_points(measured.corners)
+            outline = plane.factor * np.append(corners, corners[0])
+            plot_points(axes, outline, color=POINT, lw=0.6, zorder=2)
+    if view.dimensions:
+        pins = pose_of(view, view.here, 0).pins
+        middle = 0.5 * (pins["O2"] + pins["O4"])
+        add_label(
+            axes, _write_bar_name(view, 1), middle, middle - pins["B"], MUTED, 9.0
+        )
+    draw_mechanism(axes, view, view.here, 0, moving=moving)
+    label_plane(axes, view, f"Linkage at {view.at}, {view.branch_name} branch")
+    place_legend(axes, 3)
 
 
-def pin_name(name: str) -> str:
-    """Write a pin as it is typeset."""
-    return "$" + "_".join(name) + "$"
+def draw_frame(axes: "Axes", view: View) -> None:
+    """Draw what does not move: paths of points, ground line and supports."""
+    _draw_paths(axes, view, _list_paths(view))
+    plane = view.plane
+    pins = pose_of(view, view.here, 0).pins
+    ends = pins["O2"], pins["O4"]
+    plot_points(axes, ends, **GROUND_LINE)
+    for pin in ends:
+        draw_support(axes, pin, plane.size)
 
 
-_COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
+def _draw_paths(axes: "Axes", view: View, paths: Iterable[Path]) -> None:
+    for path, look in paths:
+        look_of_path = {"lw": 1.0, "zorder": 2} | look
+        plot_points(axes, view.plane.place(join_points(path)), **look_of_path)
+
+
+def _list_paths(view: View) -> Iterator[Path]:
+    """List paths of A, B, mass centres and the scene's points.
+
+    The mid-point of a massless coupler stands for its mass centre.
+    """
+    sweep = view.trace()
+    bars = view.scene.linkage
+    centre = 0.5 * (sweep.A + sweep.B)
+    name = "coupler curve of its mid-point"
+    if bars.coupler.mass > 0.0:
+        centre = sweep.G3
+        name = "coupler curve of $G_3$"
+    paths: list[Any] = [
+        (sweep.A, BAR_COLOURS[2], (1, 2), "path of $A$"),
+        (sweep.B, BAR_COLOURS[4], (3, 2), "path of $B$"),
+        (centre, BAR_COLOURS[3], (4, 1.5), name),
+    ]
+    for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
+        if bars.bar(bar).mass > 0.0:
+            name = f"path of $G_{bar}$"
+            paths.append((centre, BAR_COLOURS[bar], (6, 2, 1, 2), name))
+    for name, points in sweep.points.items():
+        paths.append((points, POINT, (3, 1, 1, 1), f"path of {name}"))
+    for path, colour, dashes, name in paths:
+        yield path, {"color": colour, "ls": (0, dashes), "label": name}
+
+
+_COUPLER_LOOKS: tuple[tuple[str, Any], ...] = (
     ("#0072B2", "-"),
     ("#56A0C8", "-"),
     ("#D55E00", "-"),
@@ -295,134 +258,30 @@ _COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
 """Colours and dashes, one after the other."""
 
 
-def draw_linkage(
-    axes: "Axes",
-    view: View,
-    labels: Labels,
-    *,
-    moving: bool = False,
-) -> None:
-    """Draw the linkage at the drawn position, over the paths of its points.
-
-    `moving`: with velocities.
-    """
-    factor, unit, size = choose_drawing_scale(view)
-    draw_paths(axes, view, labels)
-    if not moving:
-        _mark_paths(axes, view, factor, labels)
-    if view.dimensions:
-        pins = locate_pins(view, factor)
-        middle = 0.5 * (pins["O2"] + pins["O4"])
-        name = _write_bar_name(view, 1)
-        labels.add(Label(axes, name, middle, pins["B"], MUTED, 9.0, 2.0))
-    draw_mechanism(axes, view, view.here, 0, labels)
-    if moving:
-        draw_vectors(axes, view, view.here, factor, size)
-    axes.margins(0.08)
-    title = f"Linkage at {view.at}, {view.branch_name} branch"
-    _label_plane(axes, view, title, factor, unit)
-    place_legend(axes, 3)
-
-
-def _mark_paths(axes: "Axes", view: View, factor: float, labels: Labels) -> None:
-    """Draw stroke and straightness of the points' paths as rectangles about them."""
-    for path in measure_paths(view.sweep).values():
-        corners = factor * join_points(path.corners - view.scene.origin)
-        outline = [*corners, corners[0]]
-        plot_points(axes, outline, color=POINT, lw=0.6, zorder=2)
-        labels.keep_off(axes, *outline)
-
-
-def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
-    """Draw what does not move: paths of points, ground line and supports."""
-    factor, _, size = choose_drawing_scale(view)
-    for path, colour, dashes, name in _list_paths(view):
-        scaled = factor * path
-        dashed = (0, dashes)
-        plot_points(axes, scaled, color=colour, ls=dashed, label=name, lw=1.0, zorder=2)
-        labels.keep_off(axes, *scaled[:: max(1, len(path) // 120)])
-    pins = locate_pins(view, factor)
-    ends = pins["O2"], pins["O4"]
-    plot_points(axes, ends, **GROUND_LINE)
-    labels.keep_off(axes, *ends)
-    for pin in ends:
-        draw_support(axes, pin, size, labels)
-
-
-def _list_paths(view: View) -> Iterator[tuple[Points, str, tuple[float, ...], str]]:
-    """List paths of A, B, mass centres and the scene's points.
-
-    An entry has the path, (n,) in m, its colour, dashes and name; the mid-point of a
-    massless coupler stands for its mass centre.
-    """
-    traced = trace(view)
-    sweep = traced.solution
-    bars = view.scene.linkage
-    yield traced.path(sweep.A), BAR_COLOURS[2], (1, 2), "path of $A$"
-    yield traced.path(sweep.B), BAR_COLOURS[4], (3, 2), "path of $B$"
-    centre = 0.5 * (sweep.A + sweep.B)
-    name = "its mid-point"
-    if bars.coupler.mass > 0.0:
-        centre = sweep.G3
-        name = "$G_3$"
-    yield traced.path(centre), BAR_COLOURS[3], (4, 1.5), f"coupler curve of {name}"
-    for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
-        if bars.bar(bar).mass > 0.0:
-            path = traced.path(centre)
-            yield path, BAR_COLOURS[bar], (6, 2, 1, 2), f"path of $G_{bar}$"
-    for name, points in sweep.points.items():
-        yield traced.path(points), POINT, (3, 1, 1, 1), f"path of {name}"
-
-
-def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
+def draw_coupler_curves(axes: "Axes", view: View) -> None:
     """Draw the paths of the scene's points of the coupler.
 
     If it has none, they are of points along its line and off it.
     """
-    factor, unit, _ = choose_drawing_scale(view)
-    pins = locate_pins(view, factor)
     names = [point.name for point in view.scene.points if point.bar == 3]
-    traced = trace(view)
-    curves = _list_coupler_points(traced.solution, names)
-    for (name, points), (colour, dashes) in zip(
-        curves, cycle(_COUPLER_CURVES), strict=False
-    ):
-        plot_points(
-            axes,
-            factor * traced.path(points),
-            color=colour,
-            ls=dashes,
-            label=name,
-            lw=1.8 if name in (*names, "0.5") else 1.1,
-            zorder=3,
-        )
-    faint: dict[str, Any] = {
-        "color": MUTED,
-        "alpha": 0.55,
-        "solid_capstyle": "round",
-        "zorder": 2,
-    }
-    for number in MOVING_BARS:
-        plot_points(axes, [pins[pin] for pin in ENDS[number]], lw=2.5, **faint)
-    A = pins["A"]
-    B = pins["B"]
+    _draw_paths(axes, view, _list_coupler_paths(view.trace(), names))
+    faint: dict[str, Any] = {"color": MUTED, "alpha": 0.55, "zorder": 2}
+    pins = pose_of(view, view.here, 0).pins
+    A, B = pins["A"], pins["B"]
+    for bar in MOVING_BARS:
+        draw_bar(axes, bar, [pins[pin] for pin in ENDS[bar]], lw=2.5, **faint)
     for name in names:
-        here = factor * complex(*view.here.points[name][0])
-        plot_points(axes, [A, here, B], lw=0.8, ls=":", **faint)
-        _mark_point(axes, name, here, A, labels)
-        labels.keep_off(axes, A, here, B)
-    for name, pin in pins.items():
-        plot_points(axes, pin, "o", ms=4.5, mew=1.0, zorder=5, **RING_MARK)
-        if name in ("O2", "O4"):
-            labels.add(Label(axes, pin_name(name), pin, 1e9j, INK, 8.5, 2.0))
-    labels.keep_off(axes, *pins.values())
+        at = view.plane.place(complex(*view.here.points[name][0]))
+        plot_points(axes, [A, at, B], lw=0.8, ls=":", **faint)
+        _mark_point(axes, name, at, at - A)
+    draw_pins(axes, pins, 0.5 * (A + B))
     title = f"Coupler curves, {view.branch_name} branch"
-    if traced.circuit:
-        title = "Coupler curves of the circuit"
-    _label_plane(axes, view, title, factor, unit)
     heading = "point along AB (and off it), in lengths of the coupler"
+    if view.goes_round:
+        title = "Coupler curves of the circuit"
     if names:
         heading = "point of the coupler"
+    label_plane(axes, view, title)
     axes.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -0.14),
@@ -433,48 +292,45 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     view.notes.append(f"The linkage is drawn at {view.at}.")
 
 
-def _list_coupler_points(
-    sweep: Solution,
-    names: list[str],
-) -> Iterator[tuple[str, Array]]:
-    """List the points of the coupler whose paths are drawn, each with its name."""
-    if names:
-        yield from (("$A$", sweep.A), ("$B$", sweep.B))
-        yield from ((name, sweep.points[name]) for name in names)
-        return
+def _list_coupler_paths(sweep: Solution, names: list[str]) -> Iterator[Path]:
+    """List the paths of points of the coupler, with their looks."""
     along = sweep.B - sweep.A
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    for name, u in {"$A$": 0.0, "0.25": 0.25, "0.5": 0.5, "0.75": 0.75}.items():
-        yield name, sweep.A + u * along
-    yield "$B$", sweep.A + along
-    for name, v in {"0.5, +0.5": 0.5, "0.5, −0.5": -0.5}.items():
-        yield name, sweep.A + 0.5 * along + v * across
+    paths = {"$A$": sweep.A}
+    if names:
+        paths |= {"$B$": sweep.B} | {name: sweep.points[name] for name in names}
+    else:
+        for share in (0.25, 0.5, 0.75):
+            paths[str(share)] = sweep.A + share * along
+        middle = sweep.A + 0.5 * along
+        paths["$B$"] = sweep.B
+        paths["0.5, +0.5"] = middle + 0.5 * across
+        paths["0.5, −0.5"] = middle - 0.5 * across
+    looks = cycle(_COUPLER_LOOKS)
+    for (name, path), (colour, dashes) in zip(paths.items(), looks, strict=False):
+        width = 1.8 if name in (*names, "0.5") else 1.1
+        yield path, {"color": colour, "ls": dashes, "label": name, "lw": width}
 
 
 FARTHEST_CENTRE = 1.5
 """Instant centres are drawn up to this multiple of the linkage's size from it."""
 
 
-def draw_centres(axes: "Axes", view: View, labels: Labels) -> None:
+def draw_centres(axes: "Axes", view: View) -> None:
     """Draw the paths of the instant centres I13 and I24 near the linkage."""
-    factor, unit, _ = choose_drawing_scale(view)
-    middle = sum(locate_pins(view).values()) / 4.0
     reach = FARTHEST_CENTRE * max(view.scene.linkage.lengths)
+    marked: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 4.5, "zorder": 6}
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
-        path, here = (
-            join_points(derive(solution, name)) for solution in (view.sweep, view.here)
-        )
-        near = factor * np.where(np.abs(path - middle) <= reach, path, np.nan)
-        label = f"$I_{{{name[1:]}}}$"
-        plot_points(axes, near, color=colour, ls=dashes, lw=1.2, label=label)
-        if np.abs(here - middle) <= reach:
-            plot_points(axes, factor * here, "o", ms=4.5, color=colour, zorder=6)
-    draw_mechanism(axes, view, view.here, 0, labels)
+        line = {"ls": dashes, "lw": 1.2, "label": f"$I_{{{name[1:]}}}$"}
+        for solution, look in ((view.sweep, line), (view.here, marked)):
+            path = derive(solution, name)
+            is_near = np.hypot(*path.T) <= reach
+            near = np.where(is_near[:, None], path, np.nan)
+            _draw_paths(axes, view, [(near, {"color": colour} | look)])
+    draw_mechanism(axes, view, view.here, 0)
     axes.grid(color=MUTED, alpha=0.2)
-    title = f"Instant centres at {view.at}"
-    axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
+    label_plane(axes, view, f"Instant centres at {view.at}")
     place_legend(axes)
-    axes.set_aspect("equal", adjustable="datalim")
     view.note(
-        f"Centres further than {FARTHEST_CENTRE:g} longest bars away are left out.",
+        f"Centres further than {FARTHEST_CENTRE:g} longest bars from O2 are left out.",
     )

@@ -74,6 +74,11 @@ def write_force_name(name: str) -> str:
     return f"$F_{{{name[1:]}}}$"
 
 
+def write_pin_name(name: str) -> str:
+    """Write the name of a pin, or another letter with its index, as it is typeset."""
+    return "$" + "_".join(name) + "$"
+
+
 _AT_EDGE: dict[str, Any] = {"parse_math": False, "x": 0.012, "ha": "left"}
 TITLE: dict[str, Any] = {**_AT_EDGE, "size": 10.5, "weight": "bold"}
 CAPTION_STYLE: dict[str, Any] = {**_AT_EDGE, "size": 6.8, "color": MUTED}
@@ -89,13 +94,15 @@ GROUND_LINE: dict[str, Any] = {
 """The line of the ground."""
 Points = NDArray[np.complex128]
 """Points of a drawing as complex numbers x + iy."""
-HEADED: dict[str, Any] = {
+_HEADED: dict[str, Any] = {
     "arrowstyle": "-|>",
+    "mutation_scale": 10.0,
     "lw": 1.5,
     "shrinkA": 0.0,
     "shrinkB": 0.0,
+    "zorder": 8,
 }
-"""An arrow from end to end."""
+"""Look of an arrow."""
 # else its notes on a home without rights, where it has no cache, go to standard error
 logging.getLogger("matplotlib").addHandler(logging.NullHandler())
 STYLE_FILE = Path(__file__).with_name("fourbar.mplstyle")
@@ -216,15 +223,29 @@ def split_points(points: Any) -> Array:
     return np.stack([np.real(points), np.imag(points)], axis=-1)
 
 
-def join_points(coordinates: Array) -> Points:
+def join_points(coordinates: Any) -> Points:
     """Join coordinates (..., 2) to points."""
-    return np.asarray(coordinates[..., 0] + 1j * coordinates[..., 1])
+    x, y = np.moveaxis(np.asarray(coordinates), -1, 0)
+    return np.asarray(x + 1j * y)
 
 
-def plot_points(axes: "Axes", points: Any, *marks: str, **look: Any) -> list[Any]:
+def plot_points(axes: "Axes", points: Any, *marks: str, **look: Any) -> None:
     """Plot a line through points, or marks at them."""
-    x, y = split_points(np.atleast_1d(points)).T
-    return [*axes.plot(x, y, *marks, **look)]
+    axes.plot(*split_points(np.atleast_1d(points)).T, *marks, **look)
+
+
+def draw_arrow(
+    axes: "Axes", tail: complex, tip: complex, colour: str, **look: Any
+) -> None:
+    """Draw an arrow over the bars, from end to end; none of no length."""
+    from matplotlib.patches import FancyArrowPatch
+
+    if tail == tip:
+        return
+    ends = split_complex(tail), split_complex(tip)
+    look = {**_HEADED, "color": colour, **look}
+    axes.add_patch(FancyArrowPatch(*ends, clip_on=False, **look))
+    axes.update_datalim(ends)
 
 
 def largest_magnitude(*values: Array) -> float:

@@ -8,8 +8,6 @@ acceleration at points.
 
 import cmath
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,22 +20,21 @@ from fourbar.linkage import (
     FIRST_PIN,
     MOVING_BARS,
     Entries,
-    FourBar,
     OfBar,
     list_declared,
 )
 from fourbar.scene import Scene
 from fourbar.show.plot.curves import choose_limit
-from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.style import (
-    HEADED,
     INK,
     MUTED,
+    draw_arrow,
     largest_magnitude,
     plot_points,
-    split_complex,
+    write_pin_name,
 )
-from fourbar.show.plot.view import View, collect_point_vectors
+from fourbar.show.plot.view import Plane, View, collect_point_vectors
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -88,10 +85,6 @@ _ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST_ARROW = 7.0
 """Length of an arrow, in sizes of a support. The largest of the sweep has it; if values
 diverge, all that are as large.
-"""
-BARREL = 0.85
-"""Length of a cylinder's barrel over the shortest stroke of the sweep. The rod is what
-comes out of it.
 """
 COILS = 7
 OPENING = math.radians(250.0)
@@ -211,21 +204,18 @@ def _join_ends(kind: str, name: str, line: Any) -> Symbol:
 
 
 class Pose(NamedTuple):
-    """Position of the linkage in the units of a drawing."""
+    """Position of the linkage in the coordinates of a drawing."""
 
+    plane: Plane
     u: dict[int, complex]
     """Direction of each bar, 1 to 4."""
     pins: dict[str, complex]
-    factor: float
-    """Factor from m to the unit of the drawing."""
     theta_2: float
     torque: float
     """N m; NaN where there is none."""
-    barrel: float = 0.0
-    """Length of what of a cylinder keeps its length."""
 
-    def small(self, pin: str, size: float) -> float:
-        """Shrink the size of what stands around a pin of a short bar.
+    def shrink(self, pin: str) -> float:
+        """Return the size of what stands around a pin, smaller at a short bar.
 
         At full size the symbol would hide the bar.
         """
@@ -234,29 +224,51 @@ class Pose(NamedTuple):
             for first, second in ENDS.values()
             if pin in (first, second)
         ]
+        size = self.plane.size
         return min(size, max(SMALLEST * size, _SHARE * min(lengths)))
 
     def point(self, bar: int, z: complex) -> complex:
         """Place a point given in the frame of a bar."""
-        return self.pins[FIRST_PIN[bar]] + self.factor * z * self.u[bar]
+        return self.pins[FIRST_PIN[bar]] + self.plane.factor * z * self.u[bar]
 
     def tail(self, symbol: Symbol) -> complex:
-        """Place the foot of a load's arrow."""
-        return self.point(symbol.bar, symbol.at) + self.factor * symbol.beyond
+        """Place the foot of a load's arrow; that of gravity stands in a corner."""
+        if symbol.kind == "gravity":
+            return self.plane.corner
+        return self.point(symbol.bar, symbol.at) + self.plane.factor * symbol.beyond
 
 
-@dataclass(slots=True)
-class _Pen:
-    """Draws one symbol at one position, and keeps what it has drawn."""
+def pose_of(view: View, solution: Solution, index: int) -> Pose:
+    """Collect what a drawing needs of one position of a solution."""
+    linkage = view.scene.linkage
+    plane = view.plane
+    angles = {1: linkage.ground_angle}
+    for bar in MOVING_BARS:
+        angles[bar] = float(getattr(solution, f"theta_{bar}")[index])
+    pins = {
+        "O2": 0.0j,
+        "A": complex(*solution.A[index]),
+        "B": complex(*solution.B[index]),
+        "O4": cmath.rect(linkage.ground, linkage.ground_angle),
+    }
+    torque = math.nan
+    if solution.torque is not None:
+        torque = float(solution.torque[index])
+    return Pose(
+        plane,
+        {bar: cmath.rect(1.0, angle) for bar, angle in angles.items()},
+        {pin: plane.place(place) for pin, place in pins.items()},
+        angles[2],
+        torque,
+    )
+
+
+class _Pen(NamedTuple):
+    """Draws one symbol at one position."""
 
     axes: "Axes"
     symbol: Symbol
-    place: Pose
-    size: float
-    """Size of a support."""
-    labels: Labels
-    """Labels of the drawing, which keep off the lines of the symbol."""
-    drawn: list[Any] = field(default_factory=list)
+    pose: Pose
 
     @property
     def colour(self) -> str:
@@ -265,141 +277,94 @@ class _Pen:
 
     def draw_line(self, points: Any, width: float) -> None:
         """Draw a line over the supports and under the bars."""
-        axes = self.axes
-        self.drawn += plot_points(axes, points, color=self.colour, lw=width, zorder=3.5)
-        self.labels.keep_off(axes, *points)
+        plot_points(self.axes, points, color=self.colour, lw=width, zorder=3.5)
 
-    def draw_arrow(self, tail: complex, tip: complex) -> None:
-        """Draw an arrow over the bars."""
-        from matplotlib.patches import FancyArrowPatch
-
-        start = split_complex(tail)
-        end = split_complex(tip)
-        look = {**HEADED, "color": self.colour, "mutation_scale": 10.0}
-        arrow = FancyArrowPatch(start, end, zorder=8, **look)
-        self.drawn.append(self.axes.add_patch(arrow))
-        self.axes.update_datalim([start, end])
-        self.labels.keep_off(self.axes, tail, tip)
-
-    def write(self, text: str, at: complex, away: complex, ring: float = 0.0) -> None:
-        """Write next to a point, or to a ring about it, in a direction from there."""
-        label = Label(self.axes, text, at, at - away, self.colour, 8.0, ring=ring)
-        self.labels.add(label)
-
-    def shrink(self) -> float:
-        """Return the size of what stands around the pin, smaller at a short bar."""
-        pin = self.symbol.pin or FIRST_PIN[self.symbol.bar]
-        return self.place.small(pin, self.size)
+    def write_name(self, at: complex, away: complex) -> None:
+        """Write the name of the symbol next to a point, in a direction from there."""
+        name = self.symbol.name
+        text = write_pin_name(name) if len(name) < 3 else name
+        add_label(self.axes, text, at, away, self.colour)
 
 
-def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Pose:
-    """Collect what symbols need of one position of a solution."""
-    angles = {1: linkage.ground_angle}
-    for bar in MOVING_BARS:
-        angles[bar] = float(getattr(solution, f"theta_{bar}")[index])
-    directions = {bar: cmath.rect(1.0, angle) for bar, angle in angles.items()}
-    pins = {
-        "O2": 0.0j,
-        "A": factor * complex(*solution.A[index]),
-        "B": factor * complex(*solution.B[index]),
-        "O4": factor * cmath.rect(linkage.ground, linkage.ground_angle),
-    }
-    torque = math.nan
-    if solution.torque is not None:
-        torque = float(solution.torque[index])
-    return Pose(directions, pins, factor, angles[2], torque)
+def draw_symbol(axes: "Axes", symbol: Symbol, pose: Pose) -> None:
+    """Draw one symbol at one position."""
+    draw = _draw_between_ends
+    if symbol.end is None:
+        draw = _DRAW.get(symbol.kind, _draw_ring)
+    draw(_Pen(axes, symbol, pose))
 
 
-def draw_symbol(
-    axes: "Axes", symbol: Symbol, place: Pose, size: float, labels: Labels
-) -> list[Any]:
-    """Draw one symbol at one position, and return what was drawn.
-
-    `size`: that of a support.
-    """
-    pen = _Pen(axes, symbol, place, size, labels)
-    if symbol.end is not None:
-        _draw_between_ends(pen, symbol.end)
-    else:
-        _DRAW.get(symbol.kind, _draw_ring)(pen)
-    return pen.drawn
-
-
-def _draw_between_ends(pen: _Pen, other_end: tuple[int, complex]) -> None:
+def _draw_between_ends(pen: _Pen) -> None:
     """Draw a spring as a zigzag, a cylinder as its rod and barrel, and both ends."""
     symbol = pen.symbol
-    place = pen.place
-    start = place.point(symbol.bar, symbol.at)
-    end = place.point(*other_end)
+    pose = pen.pose
+    assert symbol.end is not None
+    ends = start, end = pose.point(symbol.bar, symbol.at), pose.point(*symbol.end)
     if symbol.kind == "spring":
-        pen.draw_line(_draw_zigzag(start, end, 0.6 * pen.size), 1.0)
+        pen.draw_line(_list_coils(start, end, 0.6 * pose.plane.size), 1.0)
     else:
-        along = (end - start) / abs(end - start)
-        pen.draw_line([start, end], 1.2)
-        pen.draw_line(start + np.array([0.1, 1.0]) * place.barrel * along, 4.5)
-        middle = start + 0.5 * place.barrel * along
-        pen.write(f"${symbol.name}$", middle, 1j * along)
-    ends = [start, end]
-    pen.drawn += plot_points(pen.axes, ends, "o", ms=3.5, color=pen.colour, zorder=5.5)
+        along = pose.plane.barrel * (end - start) / abs(end - start)
+        pen.draw_line(ends, 1.2)
+        pen.draw_line([start + 0.1 * along, start + along], 4.5)
+        pen.write_name(start + 0.5 * along, 1j * along)
+    plot_points(pen.axes, ends, "o", ms=3.5, color=pen.colour, zorder=5.5)
 
 
 def _draw_couple(pen: _Pen) -> None:
     """Draw a moment, or the torque of the drive, as an arrow that turns."""
     symbol = pen.symbol
-    place = pen.place
-    text = symbol.name
+    pose = pen.pose
     if symbol.kind == "moment":
-        centre = place.tail(symbol)
-        turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
+        centre = pose.tail(symbol)
+        turn = math.copysign(1.0, symbol.moment) * symbol.sign(pose.theta_2)
     else:
-        centre = place.pins[symbol.pin]
+        centre = pose.pins[symbol.pin]
         if symbol.bar == 3:
-            centre = 0.5 * (place.pins["A"] + place.pins["B"])
-        turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
-        text = f"$T_{symbol.bar}$"
+            centre = 0.5 * (pose.pins["A"] + pose.pins["B"])
+        turn = 1.0 if math.isnan(pose.torque) else float(np.sign(pose.torque))
     if turn == 0.0:
         return
-    radius = SYMBOL_SIZES[symbol.kind] * pen.shrink()
+    radius = SYMBOL_SIZES[symbol.kind] * pose.shrink(FIRST_PIN[symbol.bar])
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
     points = centre + radius * np.exp(1j * angles)
     pen.draw_line(points, 1.5)
     before_last, last = points[-2:]
-    pen.draw_arrow(before_last, last + 2.0 * (last - before_last))
-    pen.write(text, points[20], (points[20] - centre) / radius)
+    draw_arrow(pen.axes, before_last, last + 2.0 * (last - before_last), pen.colour)
+    pen.write_name(points[20], points[20] - centre)
 
 
 def _draw_ring(pen: _Pen) -> None:
     """Draw what acts at a pin or a place as a ring; a torsion spring is a spiral."""
     symbol = pen.symbol
-    place = pen.place
+    pose = pen.pose
     kind = symbol.kind
-    centre = place.pins.get(symbol.pin, place.point(symbol.bar, symbol.at))
+    pin = symbol.pin or FIRST_PIN[symbol.bar]
+    centre = pose.pins.get(symbol.pin, pose.point(symbol.bar, symbol.at))
     relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
-    radius = pen.shrink() * relative
+    radius = pose.shrink(pin) * relative
     inner, turns = (0.3, 2.5) if kind == "torsion" else (1.0, 1.0)
     radii = np.linspace(inner * radius, radius, 90)
     ring = centre + radii * np.exp(1j * np.linspace(0.0, turns * math.tau, 90))
     pen.draw_line(ring, 2.2 if kind == "flywheel" else 1.2)
-    away = cmath.rect(1.0, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
-    pen.write(symbol.name, centre, away, radius)
+    away = cmath.rect(radius, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
+    pen.write_name(centre + away, away)
 
 
 def _draw_force(pen: _Pen) -> None:
     """Draw an arrow of one length at the place where a force acts."""
     symbol = pen.symbol
-    place = pen.place
-    tail = place.tail(symbol)
-    sign = symbol.sign(place.theta_2)
-    if sign == 0.0:
+    pose = pen.pose
+    size = symbol.sign(pose.theta_2) * SYMBOL_SIZES["force"] * pose.plane.size
+    if size == 0.0 or symbol.vector == 0.0:
         return
-    axes = place.u[symbol.bar] if symbol.turns else 1.0
-    towards = axes * symbol.vector / abs(symbol.vector)
-    tip = tail + sign * SYMBOL_SIZES["force"] * pen.size * towards
-    pen.draw_arrow(tail, tip)
-    pen.write(symbol.name, tip, (tip - tail) / abs(tip - tail))
+    axes = pose.u[symbol.bar] if symbol.turns else 1.0
+    tail = pose.tail(symbol)
+    arrow = size * axes * symbol.vector / abs(symbol.vector)
+    draw_arrow(pen.axes, tail, tail + arrow, pen.colour)
+    pen.write_name(tail + arrow, arrow)
 
 
-def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
+def _list_coils(start: complex, end: complex, width: float) -> Any:
     """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
     across = 1j * along / abs(along) * width if along else 0.0
@@ -409,29 +374,8 @@ def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     return start + np.array(shares) * along + np.array(sides) * across
 
 
-def _draw_gravity(pen: _Pen) -> None:
-    """Draw an arrow in the corner, of no length in the plane."""
-    vector = pen.symbol.vector
-    if vector == 0.0:
-        return
-    x, y = split_complex(24.0 * vector / abs(vector))
-    corner: dict[str, Any] = {
-        "xy": (0.95, 0.9),
-        "xycoords": "axes fraction",
-        "textcoords": "offset points",
-        "annotation_clip": False,
-    }
-    style = {**HEADED, "color": pen.colour, "lw": 1.3}
-    pen.drawn += [
-        pen.axes.annotate("", xytext=(-x, -y), arrowprops=style, **corner),
-        pen.axes.annotate(
-            "$g$", xytext=(-x - 8.0, -y), color=pen.colour, size=9.0, **corner
-        ),
-    ]
-
-
 _DRAW = {
-    "gravity": _draw_gravity,
+    "gravity": _draw_force,
     "force": _draw_force,
     "push": _draw_force,
     "moment": _draw_couple,
@@ -440,52 +384,22 @@ _DRAW = {
 """Functions that draw what is neither a ring nor between two ends."""
 
 
-def draw_vectors(
-    axes: "Axes",
-    view: View,
-    solution: Solution,
-    factor: float,
-    size: float,
-) -> Callable[[int], list[Any]]:
-    """Draw the arrows of a solution's first position.
+def draw_vectors(axes: "Axes", view: View, solution: Solution, index: int) -> None:
+    """Draw the arrows of velocity and acceleration at points.
 
     Velocities have one scale for the sweep, and so have accelerations.
-
-    Returns the function that moves them to another position, and returns them.
     """
-    drawn = []
+    plane = view.plane
     for letter, (colour, label) in _ARROWS.items():
         of_sweep = collect_point_vectors(view.scene, view.sweep, letter)
         sizes = [np.hypot(*values.T) for values in of_sweep.values()]
-        if not (top := choose_limit(sizes) or largest_magnitude(*sizes)):
-            continue
+        top = choose_limit(sizes) or largest_magnitude(*sizes)
         vectors = collect_point_vectors(view.scene, solution, letter)
         places = vars(solution) | solution.points
-        feet = np.array([factor * places[name] for name in vectors])
-        shafts = np.array([*vectors.values()])
-        longest = np.maximum(np.hypot(*np.moveaxis(shafts, -1, 0)), top)
-        shafts = LONGEST_ARROW * size * shafts / longest[..., None]
-        tips = (feet + shafts).reshape(-1, 2)
-        axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
-        start = np.zeros((2, len(vectors)))
-        arrows = axes.quiver(
-            *start,
-            *start,
-            color=colour,
-            label=label,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            width=0.0045,
-            zorder=7,
-        )
-        drawn.append((arrows, feet, np.nan_to_num(shafts)))
-
-    def move(index: int) -> list[Any]:
-        for arrows, feet, shafts in drawn:
-            arrows.set_offsets(feet[:, index])
-            arrows.set_UVC(*shafts[:, index].T)
-        return [arrows for arrows, _, _ in drawn]
-
-    move(0)
-    return move
+        for name, values in vectors.items():
+            foot = plane.place(complex(*places[name][index]))
+            shaft = complex(*values[index])
+            if shaft:
+                shaft *= LONGEST_ARROW * plane.size / max(abs(shaft), top)
+            draw_arrow(axes, foot, foot + shaft, colour)
+        axes.plot([], [], color=colour, label=label)

@@ -1,22 +1,26 @@
 """Content of a drawing: the sweep of a scene on one branch, and one position.
 
-The position is shown in detail.
+The position is shown in detail, and the paths of points on the whole circuit.
 """
 
+import cmath
 import math
 import re
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.evaluation.case import compute_shown_state
+from fourbar.formulas.mobility import find_circuit
 from fourbar.formulas.motion import State
+from fourbar.formulas.points import list_circuit
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
-from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.scene.motion import BRANCH_NAMES, Sweep
+from fourbar.show.plot.style import join_points
 from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
@@ -31,6 +35,34 @@ _LEAD = math.radians(60.0)
 """Angle of the drawn position from the start of the longest stretch that assembles,
 rad. In a shorter stretch it is half of the stretch.
 """
+BARREL = 0.85
+"""Length of a cylinder's barrel over the shortest stroke of the sweep. The rod is what
+comes out of it.
+"""
+STEPS_OF_A_PATH = 36_000
+"""Steps along a circuit, a multiple of 4: near a small transmission angle a degree may
+be a long chord.
+"""
+
+
+class Plane(NamedTuple):
+    """Coordinates of a drawing to scale, as complex numbers."""
+
+    factor: float
+    """Factor from m to the unit of the drawing."""
+    unit: str
+    origin: complex
+    """Place of O2, in the unit of the drawing as all that follows."""
+    corner: complex
+    """Place to the upper right of what the linkage reaches."""
+    size: float
+    """Size of a support."""
+    barrel: float
+    """Length of what of a cylinder keeps its length; 0 without a cylinder."""
+
+    def place(self, points: Any) -> Any:
+        """Place points that are given from O2 as complex numbers, m."""
+        return self.origin + self.factor * points
 
 
 @dataclass(slots=True)
@@ -76,6 +108,59 @@ class View:
             return self.axis.words(place)
         theta = f"θ₂ = {math.degrees(float(self.here.theta_2[0])):.4g}°"
         return f"{theta}, t = {place:.4g} s".replace("-", "−")
+
+    @property
+    def plane(self) -> Plane:
+        """Coordinates that hold all positions of the sweep."""
+        sweep = self.sweep
+        bars = self.scene.linkage
+        O4 = cmath.rect(bars.ground, bars.ground_angle)
+        paths = [sweep.A, sweep.B, sweep.G3, *sweep.points.values()]
+        reached = np.concatenate([*map(join_points, paths), [0.0, O4]])
+        reached = reached[np.isfinite(reached)]
+        factor, unit = choose_unit(float(np.abs(reached).max()), "m", self.units)
+        origin = factor * complex(*self.scene.origin)
+        extent = max(np.ptp(reached.real), np.ptp(reached.imag))
+        barrel = 0.0
+        if sweep.stroke is not None:
+            barrel = BARREL * factor * float(np.nanmin(sweep.stroke))
+        size = 0.03 * factor * float(extent)
+        corner = factor * complex(reached.real.max(), reached.imag.max()) + 2.0 * size
+        return Plane(factor, unit, origin, origin + corner, size, barrel)
+
+    @property
+    def goes_round(self) -> bool:
+        """Return True if paths are those of the circuit of the position drawn.
+
+        The input then names no sweep and no list. A sweep, the command of another bar
+        and a motion through time have their own range.
+        """
+        motion = self.scene.motion
+        has_range = isinstance(motion.angle, Sweep | np.ndarray)
+        return motion.commanded == "theta_2" and self.time is None and not has_range
+
+    def trace(self) -> Solution:
+        """Solve the positions that the paths of points run through.
+
+        A circuit ends where it begins, and runs through both branches where the input
+        has limits.
+        """
+        scene = self.scene
+        if self.goes_round:
+            here = self.here
+            number = int(find_circuit(scene.linkage, here.theta_2, here.branch)[0])
+            branch = scene.motion.branch
+            steps = list_circuit(scene.linkage, number, branch, STEPS_OF_A_PATH)
+            theta_2, assembly = (
+                np.append(of_step, of_step[0]) for of_step in steps[:2]
+            )
+            at = Command(theta_2, assembly.astype(np.int8), None, 0.0)
+        elif self.time is not None or isinstance(scene.motion.angle, np.ndarray):
+            return self.sweep
+        else:
+            first, last = self.sweep.at.places[[0, -1]]
+            at = command_at(scene, np.linspace(first, last, STEPS_OF_A_PATH + 1))
+        return solve(scene, "position", at=at)
 
     @property
     def moves(self) -> bool:

@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.labels import add_label, settle_labels
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.writing import write_text
 from fourbar_validation.advise.worst_errors import ERROR_NAMES
@@ -212,7 +212,6 @@ class _WorkPrecision:
         self.quantity = quantity
         self.figure = make_figure(6.0, write_statement(curves, quantity), title)
         self.axes = self.figure.add_axes((0.135, 0.085, 0.84, 0.675))
-        self.labels = Labels()
 
     def draw(self, points: Sequence[CostPoint], **style: Any) -> list[complex]:
         """Draw points, and return their places: ms of a simulated second, and error.
@@ -224,18 +223,10 @@ class _WorkPrecision:
         self.axes.plot(x, y, **style)
         return [*map(complex, x, y)]
 
-    def draw_line(
-        self, points: Sequence[CostPoint], width: float, **style: Any
-    ) -> None:
-        """Draw a line that no name covers."""
-        self.labels.keep_off(self.axes, *self.draw(points, **style), width=width)
-
     def mark(self, point: CostPoint, text: str, **style: Any) -> None:
         """Mark a point, and write next to it where the name covers nothing."""
-        (at,) = self.draw([point], **style)
-        self.labels.keep_off(self.axes, at)
-        shun = complex(0.5 * at.real, at.imag)
-        self.labels.add(Label(self.axes, text, at, shun, INK, TEXT))
+        (at,) = self.draw([point], **{"ls": "none"} | style)
+        add_label(self.axes, text, at, 1.0, INK, TEXT)
 
 
 def draw_work_precision(
@@ -250,9 +241,8 @@ def draw_work_precision(
     picture = _WorkPrecision(curves, quantity, title)
     axes = picture.axes
     front = find_pareto(list_stepped(curves), quantity)
-    picture.draw_line(
+    picture.draw(
         front,
-        8.0,
         lw=8.0,
         solid_capstyle="round",
         solid_joinstyle="round",
@@ -268,7 +258,7 @@ def draw_work_precision(
             label += f", up to {most:.1f} times as long" * (most > _NEAR_FRONT)
         row = [point for point in row if point.error(quantity) < LARGEST_DRAWN_ERROR]
         if row:
-            picture.draw_line(row, 1.8, label=label, **look.style)
+            picture.draw(row, label=label, **look.style)
     default = find_default(curves)
     if default is not None and default.error(quantity) < LARGEST_DRAWN_ERROR:
         star = {"marker": "*", "ms": 16, "mec": INK, "mew": 0.8}
@@ -300,7 +290,7 @@ def draw_work_precision(
         ratio = front[0].seconds_per_revolution / front[0].seconds_per_second
         text += f"; of a revolution: times {ratio:.3g}"
     axes.set_xlabel(text)
-    picture.labels.settle(picture.figure)
+    settle_labels(picture.figure)
     return picture.figure
 
 

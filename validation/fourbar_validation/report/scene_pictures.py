@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.quantities import ANGLES, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
-from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.labels import settle_labels
 from fourbar.show.plot.linkage_figure import draw_linkage
 from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.view import View
@@ -96,16 +96,14 @@ def _draw_best_position(name: str, scene: Scene, solution: Solution) -> str:
     best = int(np.argmax(condition))
     with apply_style():
         figure = Figure(figsize=(3.1, 2.9), layout="constrained")
-        labels = Labels()
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
         axes = figure.subplots()
-        draw_linkage(axes, View(scene, solution, here), labels)
+        draw_linkage(axes, View(scene, solution, here))
         legend = axes.get_legend()
         if legend is not None:  # it is wider than this drawing
             legend.remove()
-        # the arrow of gravity stands above the axes
-        axes.set_title(axes.get_title(loc="left"), pad=22.0)
-        labels.settle(figure)
+        axes.set_title(axes.get_title(loc="left"), pad=6.0)
+        settle_labels(figure)
         svg = write_svg(figure, f"{name} linkage")
     for light, variable in _PLOT_COLOURS.items():
         svg = svg.replace(light, f"var({variable})")

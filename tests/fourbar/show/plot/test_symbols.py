@@ -17,7 +17,6 @@ from fourbar.effects import Load, list_kinds
 from fourbar.files import loads
 from fourbar.show import animate, motion_curves
 from fourbar.show.plot import figures, linkage_figure, symbols, view
-from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.symbols import list_acting
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -57,15 +56,17 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     A spring joins its two points.
     """
     solution = solve(everything)
-    place = symbols.place_of(everything.linkage, solution, index, 1.0)
+    shown = view.make_view(everything)
+    shown.units = fourbar.units("m")
+    pose = symbols.pose_of(shown, solution, index)
     axes = Figure().subplots()
 
     def ends(name):
         (symbol,) = (one for one in list_acting(everything) if one.name == name)
-        labels = Labels()
-        symbols.draw_symbol(axes, symbol, place, 0.01, labels)
-        _, line, _ = labels.lines[0]
-        return line[0], line[-1 if name == "spring" else 1]
+        symbols.draw_symbol(axes, symbol, pose)
+        if name == "spring":
+            return axes.lines[-2].get_xydata()[[0, -1]] @ np.array([1.0, 1.0j])
+        return axes.patches[-1]._posA_posB @ np.array([1.0, 1.0j])
 
     theta_3 = solution.theta_3[index]
     theta_4 = solution.theta_4[index]
@@ -94,8 +95,8 @@ def crowded(everything):
     points = (Point("P", 3, (0.15, 0.7)),)
     shown = view.make_view(replace(everything, linkage=short, points=points))
     axes = Figure().subplots()
-    linkage_figure.draw_mechanism(axes, shown, shown.here, 0, Labels())
-    return axes, shown.here, linkage_figure.choose_drawing_scale(shown)[0]
+    linkage_figure.draw_mechanism(axes, shown, shown.here, 0)
+    return axes, shown.here, shown.plane.factor
 
 
 def test_nothing_at_a_pin_hides_a_bar(crowded):
