@@ -6,37 +6,34 @@ The number is a ratio, a factor, an offset or another order.
 import cmath
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.effects import Friction, Viscous
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import BAR_NAMES
-from fourbar.quantities import FORCE_NAMES, STAGE_OF, STAGES, UNITS, VECTORS, Array
+from fourbar.linkage import BAR_NAMES, PINS, copy_with
+from fourbar.quantities import UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
-from fourbar.scene import Command
-from fourbar_validation.check.calculated import (
-    MISSING,
-    Calculation,
-    Change,
-    join,
-)
+from fourbar.scene import Command, Scene
+from fourbar.studies.keys import replace_numbers
+from fourbar_validation.check.calculated import join
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
     Mistake,
     Variant,
-    predict_variants,
+    drop_remainder,
     state_all,
 )
+from fourbar_validation.check.wrong_scenes import group_numbers, is_place
 from fourbar_validation.compare.tolerance import compute_difference, wrap_difference
 from fourbar_validation.engines.free_body import stack_components
 from fourbar_validation.scenes.bars import list_moving
 
-_Vary = Callable[[float], Variant]
-"""Function of a number that returns the problem in which a number has it."""
 ENOUGH_NUMBERS = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 ENOUGH_DIGITS = 3.0
@@ -51,14 +48,6 @@ NEAR_ENOUGH = 10.0 * CARRIED
 """Factor on what is allowed within which a ratio is looked at more closely: the best
 fit has no more of the rounding of its numbers than that.
 """
-_FACTORS = {
-    0.5: "halved",
-    2.0: "doubled",
-    1e4: "in kg cm^2 taken for kg m^2",
-    1e-4: "10^4 too small",
-    4.0: "m L^2/3, of a slender bar about its end, where m L^2/12 is right",
-}
-"""Factors of a moment of inertia, and the mistake behind each."""
 REVERSED = "sign reversed, or F_ij given for F_ji"
 _AXES = {
     (False, 0.0): "",
@@ -68,10 +57,9 @@ _AXES = {
     (True, 180.0): "x reversed",
 }
 """Names of axes by whether they are mirrored, and their angle, deg."""
-_INERTIA = "moment of inertia"
-LEAST_FACTOR = 1e-9
-"""Least factor. What a smaller one multiplies was left out, which is a mistake of its
-own.
+LEAST_NUMBER = 1e-9
+"""Least fitted number. What a smaller one multiplies was left out, which is a mistake
+of its own.
 """
 NEAR_A_PLAIN_NUMBER = 1e-2
 """Relative distance within which a fitted number is tried as a plain one."""
@@ -85,8 +73,6 @@ which an offset is fitted. Within 2.5 deg of the right one it is a few hundredth
 """
 _TRIED = 37
 """Rows by which the offsets are tried."""
-MOST_FITTED = 3
-"""Quantities to which an offset is fitted, those of the motion first."""
 NEWTON = 9
 """Steps of the fit. It is quadratic; an offset starts within 2.5 deg, and a speed that
 is a sixth of the right one takes eight steps.
@@ -109,9 +95,7 @@ def find_fitted(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake
     )
     if moved:  # another order or zero leaves nothing right that varies
         yield from _try_order(judge)
-    if any(column.quantity in FORCE_NAMES for column in differing):
-        yield from _try_factors(judge, differing)
-    yield from _try_motions(judge, moved=moved)
+    yield from _fit_problems(judge, differing)
 
 
 def _find_ratios(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
@@ -227,189 +211,162 @@ def _compute_residual(
     return np.concatenate(parts)
 
 
-def _try_factors(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
-    """Try a moment of inertia, a mass, a load or an effect times a factor.
+class _Family(NamedTuple):
+    """Problems that differ by numbers, of which those that fit best are looked for."""
 
-    Damping or friction that the scene leaves out, and a mass centre elsewhere, too.
-    Forces and torque are linear in each, so that a unit of it tells the amount.
+    start: tuple[float, ...]
+    make: Callable[..., Variant]
+    """Function of the numbers that returns the problem."""
+
+
+def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
+    """Fit numbers of the scene, the command's speed, its zero and its times.
+
+    Each family is fitted by Gauss and Newton to the columns that differ.
     """
-    columns = [column for column in differing if column.quantity in FORCE_NAMES]
-    # a magnitude is linear in none of them
-    vectors = [column for column in columns if not column.key.startswith("|")]
-    columns = vectors or columns
-    right = Mistake("", judge.right.__getitem__)
-    theirs = _compute_residual(columns, right)
-    if np.count_nonzero(theirs) < ENOUGH_NUMBERS:
+    columns = [column for column in differing if column.size.any()]
+    if not columns:
         return
-    calculation = Calculation(judge.scene, judge.right)
-    parts = dict(calculation.list_factors())
-    units = [Change(name, one) for name, several in parts.items() for one in several]
-    moves: dict[str, list[Array]] = {}
-    for unit in calculation.solve(units):
-        moved = theirs - _compute_residual(columns, unit)
-        moves.setdefault(unit.text, []).append(moved)
-    fitted: list[tuple[str, float, Change]] = []
-    centres = {name: bar.mass_centre for name, bar in list_moving(calculation.scene)}
-    for name, several in moves.items():
-        if not np.isfinite(several).all():
-            continue
-        amounts, *_ = np.linalg.lstsq(np.transpose(several), theirs, rcond=None)
-        for text, these, times in _name_amounts(name, amounts.tolist(), centres):
-            more = np.tensordot(these, np.array(parts[name]), 1)
-            fitted.append((name, times, Change(f"{name} {text}", more)))
-    explained = set()
-    solved = calculation.solve([change for _, _, change in fitted])
-    for (name, times, _), mistake in zip(fitted, solved, strict=True):
-        if name in explained:
-            continue  # by a plain factor
-        yield mistake._replace(times=times)
-        if times == 1.0 and all(
-            (predicted := column.predict(mistake.predict)) is not None
-            and column.explained(predicted)
-            for column in columns
-        ):
-            explained.add(name)
-
-
-def _name_amounts(
-    name: str, amounts: list[float], centres: dict[str, tuple[float, float]]
-) -> Iterator[tuple[str, tuple[float, ...], float]]:
-    """Yield what fitted amounts of something are, those near plain ones first.
-
-    Each comes with the amounts and the factor on what is allowed.
-    """
-    amount, *across = amounts
-    if name in MISSING:
-        if amount > 0.0:
-            text = f"{amount:.6g}, which the scene leaves out (fitted)"
-            yield text, (amount,), CARRIED
+    here = _compute_residual(columns, Mistake("", judge.right.__getitem__))
+    if np.count_nonzero(here) < ENOUGH_NUMBERS:
         return
-    if across:
-        bar = name.partition(":")[0]
-        shift = complex(amount, across[0])
-        r, phi = cmath.polar(cmath.rect(*centres[bar]) + shift)
-        text = f"at {r:.6g} m and {math.degrees(phi):.4f} deg (fitted)"
-        yield text, (shift.real, shift.imag, abs(shift) ** 2), CARRIED
-        return
-    factor = 1.0 + amount
-    if name.endswith(f": {_INERTIA}"):
-        for plain, mistake in _FACTORS.items():
-            if abs(factor / plain - 1.0) < NEAR_A_PLAIN_NUMBER:
-                yield mistake, (plain - 1.0,), 1.0
-                break
-    if amount and factor > LEAST_FACTOR:
-        yield f"{factor:.6g} times ours (fitted)", (amount,), CARRIED
+    scene = state_all(judge.scene)
+    at = drop_remainder(judge.at)
+    families = [*_list_scenes(scene, at), *_list_commands(judge, scene, at, columns)]
+    for family in families:
+        fitted = _fit(columns, family)
+        if fitted is not None and np.abs(fitted).max() > LEAST_NUMBER:
+            yield family.make(*fitted)._replace(times=CARRIED).mistake()
 
 
-def _list_varied(judge: Judge, moved: bool) -> Iterator[_Vary]:
-    """List lengths where angles are stated, speed and times, as functions.
+def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
+    """Fit the numbers of a family; None if no others fit better than its first."""
+    numbers = np.array(family.start)
 
-    Lengths only if all that varies differs.
-    """
-    at = judge.at
-    if moved and any(key.startswith("theta") for key in judge.columns):
-        lengths = {name: bar.length for name, bar in list_moving(judge.scene)}
-        lengths["ground"] = judge.scene.linkage.ground
-        for name, length in lengths.items():
-            yield partial(_stretch, name, length)
+    def measure(numbers: Array) -> Array:
+        return _compute_residual(columns, family.make(*numbers.tolist()).mistake())
+
+    least = math.inf
+    for step in range(NEWTON):
+        here = measure(numbers)
+        size = float(np.sqrt(np.nansum(here * here)))
+        if not size < 0.5 * least:
+            return numbers if step > 1 else None
+        least = size
+        slopes = []
+        for shift in FIT_STEP * np.eye(len(numbers)):
+            less, more = measure(numbers + shift), measure(numbers - shift)
+            # a number that jumps beside the position, as friction does, has no slope
+            smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
+            slopes.append(np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP))
+        known = np.isfinite(here) & np.isfinite(slopes).all(axis=0)
+        matrix = np.transpose(slopes)[known]
+        numbers = numbers - np.linalg.lstsq(matrix, here[known], rcond=None)[0]
+    return numbers
+
+
+def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
+    """List numbers of a scene that may be others, as functions of a factor or value."""
+    groups = group_numbers(scene)
+    fitted = {name: own for name, own in groups.items() if not is_place(scene, own)}
+    lengths = {name: bar.length for name, bar in list_moving(scene)}
+    lengths["ground"] = scene.linkage.ground
+    for name, length in lengths.items():
+        fitted[f"lengths.{name}"] = {f"lengths.{name}": length}
+    for name, group in fitted.items():
+        yield _Family((1.0,), partial(_scale, scene, at, name, group))
+    for name, bar in list_moving(scene):
+        r, phi = bar.mass_centre
+        start = r * math.cos(phi), r * math.sin(phi)
+        yield _Family(start, partial(_move_centre, scene, at, name))
+    for kind in (Viscous, Friction):
+        rows = {
+            row[0]: row[1]
+            for effect in scene.effects
+            if isinstance(effect, kind)
+            for row in effect.rows
+        }
+        for pin in PINS:
+            if pin not in rows:
+                yield _Family((0.0,), partial(_rub, scene, at, kind, rows, pin))
+
+
+def _scale(
+    scene: Scene, at: Command, name: str, group: dict[str, float], factor: float
+) -> Variant:
+    numbers = {key: factor * value for key, value in group.items()}
+    text = f"{name} {factor:.6g} times ours (fitted)"
+    return Variant(text, replace_numbers(scene, numbers), at)
+
+
+def _move_centre(scene: Scene, at: Command, bar: str, x: float, y: float) -> Variant:
+    r, phi = math.hypot(x, y), math.atan2(y, x)
+    numbers = {f"bars.{bar}.centre.0": r, f"bars.{bar}.centre.1": phi}
+    text = f"bars.{bar}.centre at {r:.6g} m and {math.degrees(phi):.4f} deg (fitted)"
+    return Variant(text, replace_numbers(scene, numbers), at)
+
+
+def _rub(
+    scene: Scene, at: Command, kind: Any, rows: dict[str, float], pin: str, k: float
+) -> Variant:
+    """Return the problem with more damping or friction at a pin."""
+    others = [effect for effect in scene.effects if effect.key != kind.key]
+    rubbed = kind.at(**{pin: 0.0})
+    rubbed = copy_with(rubbed, **{rubbed.field: (*rows.items(), (pin, k))})
+    unit = kind.numbers[""].unit
+    text = (
+        f"effects.{kind.key}.{pin} {k:.6g} {unit}, which the scene leaves out (fitted)"
+    )
+    return Variant(text, replace(scene, effects=(*others, rubbed)), at)
+
+
+def _list_commands(
+    judge: Judge, scene: Scene, at: Command, columns: list[JudgedColumn]
+) -> Iterator[_Family]:
+    """List commands that may be others, as functions of a number."""
     if at.speed is not None:
-        yield partial(_hasten, at, at.speed)
+        yield _Family((1.0,), partial(_hasten, scene, at, at.speed))
     law, times = judge.scene.motion.law, judge.table.times
     if law is not None and times is not None:
-        yield partial(_delay, at, law, times[:, 0])
+        yield _Family((0.0,), partial(_delay, scene, at, law, times[:, 0]))
+    if at.moves_stroke:
+        return
+    n = len(at.angle)
+    rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
+    part = at.part(rows)
+    tried = TURN * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
+    wrong = [_turn(scene, part, offset).mistake() for offset in tried.tolist()]
+    residuals = [_compute_residual(columns, one, rows) for one in wrong]
+    misfits = np.mean(np.fmin(np.abs(residuals), 1.0), axis=1)
+    if misfits.min() < PROMISING:
+        start = float(tried[np.argmin(misfits)])
+        yield _Family((start,), partial(_turn, scene, at))
 
 
-def _turn(at: Command, offset: float) -> Variant:
+def _turn(scene: Scene, at: Command, offset: float) -> Variant:
     """Return the problem of angles that are counted from another zero."""
     degrees = math.degrees(math.remainder(offset, TURN))
-    name = at.commanded
     text = (
         f"the angle of the {BAR_NAMES[at.bar]} is measured from another zero:"
-        f" {name} {degrees:+.6g} deg is what they solved"
+        f" {at.commanded} {degrees:+.6g} deg is what they solved"
     )
-    turned = at._replace(angle=at.angle + offset)
-    return Variant(text, at=turned, names=UNITS.keys() - {name}, times=CARRIED)
+    return Variant(text, scene, at._replace(angle=at.angle + offset))
 
 
-def _stretch(name: str, length: float, factor: float) -> Variant:
-    text = f"{name}: length {factor:.6g} times ours (fitted)"
-    return Variant(text, {f"lengths.{name}": factor * length}, times=CARRIED)
-
-
-def _hasten(at: Command, speed: float | Array, factor: float) -> Variant:
+def _hasten(scene: Scene, at: Command, speed: float | Array, factor: float) -> Variant:
     text = f"omega_{at.bar} {factor:.6g} times ours (fitted)"
-    return Variant(text, at=at._replace(speed=factor * speed), times=CARRIED)
+    return Variant(text, scene, at._replace(speed=factor * speed))
 
 
-def _delay(at: Command, law: Any, time: Array, factor: float) -> Variant:
-    """Return the problem of the law at times that are earlier by factor - 1, in s."""
-    lag = factor - 1.0
+def _delay(scene: Scene, at: Command, law: Any, time: Array, lag: float) -> Variant:
+    """Return the problem of the law at times that are earlier by a lag, s."""
     side = "before" if lag > 0.0 else "after"
     text = f"each row has the numbers of the time {abs(lag):.6g} s {side} its own"
     earlier = np.clip(time - lag, law.time[0], law.time[-1])
     angle, speed, acceleration = law.at(earlier)
     moved = at._replace(angle=angle, speed=speed, acceleration=acceleration)
     names = UNITS.keys() - {*at.names}
-    return Variant(f"{text} (fitted)", at=moved, names=names, times=CARRIED)
-
-
-def _find_stage(column: JudgedColumn) -> int:
-    """Return the number of the stage that computes a quantity."""
-    return STAGES.index(STAGE_OF.get(column.quantity, "force"))
-
-
-def _try_motions(judge: Judge, *, moved: bool) -> Iterator[Mistake]:
-    """Try another zero of the angle, other lengths, speed and times.
-
-    Each is fitted by Gauss and Newton. A zero is tried if all that varies differs; it
-    starts where theirs fit best.
-    """
-    scene = state_all(judge.scene)
-    sized = [column for column in judge.columns.values() if column.size.any()]
-    columns = sorted(sized, key=_find_stage)[:MOST_FITTED]
-    stage = STAGES[max(map(_find_stage, columns), default=0)]
-    offsets: list[float] = []
-    numbers = sum(np.count_nonzero(column.where) for column in columns)
-    if moved and numbers >= ENOUGH_NUMBERS and not judge.at.moves_stroke:
-        n = len(judge.at.angle)
-        rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
-        at = judge.at.part(rows)
-        tried = TURN * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
-        turned = [_turn(at, offset) for offset in tried]
-        wrong = predict_variants(scene, at, turned, stage)
-        residuals = [_compute_residual(columns, one, rows) for one in wrong]
-        misfits = np.mean(np.fmin(np.abs(residuals), 1.0), axis=1)
-        if misfits.min() < PROMISING:
-            offsets.append(float(tried[np.argmin(misfits)]))
-    varied: list[_Vary] = [partial(_turn, judge.at) for _ in offsets]
-    varied += _list_varied(judge, moved)
-    fitted = np.ones(len(varied))
-    fitted[: len(offsets)] = offsets
-    if not varied:
-        return
-
-    def list_variants(shifts: tuple[float, ...]) -> list[Variant]:
-        pairs = zip(varied, fitted.tolist(), strict=True)
-        return [vary(number + shift) for vary, number in pairs for shift in shifts]
-
-    least = np.full(len(varied), np.inf)
-    for _ in range(NEWTON):
-        variants = list_variants((0.0, FIT_STEP, -FIT_STEP))
-        wrong = predict_variants(scene, judge.at, variants, stage)
-        residuals = [_compute_residual(columns, one) for one in wrong]
-        here, more, less = np.reshape(residuals, (len(varied), 3, -1)).swapaxes(0, 1)
-        sizes = np.sqrt(np.nansum(here * here, axis=1))
-        if not offsets and not np.any(sizes < 0.5 * least):
-            break  # nothing fits better, or only by rounding
-        least = np.fmin(least, sizes)
-        # a number that jumps beside the position, as friction does, has no slope
-        smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
-        slope = np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP)
-        step = np.nansum(slope * here, axis=1) / np.sum(slope * slope, axis=1)
-        fitted = np.where(
-            np.isfinite(step) & (fitted + step > 0.0), fitted + step, fitted
-        )
-    yield from predict_variants(scene, judge.at, list_variants((0.0,)))
+    return Variant(f"{text} (fitted)", scene, moved, names)
 
 
 def _try_order(judge: Judge) -> Iterator[Mistake]:

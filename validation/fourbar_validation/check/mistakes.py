@@ -3,20 +3,18 @@
 The numbers that each would make are held against the table.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
-from itertools import combinations, permutations
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import Bar
-from fourbar.quantities import FORCE_NAMES, VECTORS, Array
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.check.calculated import (
-    DRY,
     ENOUGH_POSITIONS,
     find_miscalculated,
     find_single_precision,
@@ -30,13 +28,14 @@ from fourbar_validation.check.fitted import (
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import (
     Mistake,
+    Predict,
     Variant,
     Wanted,
     always,
-    predict_variants,
+    drop_remainder,
     state_all,
 )
-from fourbar_validation.scenes.bars import list_moving
+from fourbar_validation.check.wrong_scenes import list_wrong_scenes
 
 _RPM = np.pi / 30.0
 """rad/s of one rev/min."""
@@ -58,6 +57,11 @@ _NEARLY_AT_REST = 1e-18
 _CLOCKWISE = "counted clockwise, with all angles and torques"
 MOST_EXPLANATIONS = 5
 """Explanations that are printed."""
+_WHERE = {
+    " in the pin forces alone": PIN_FORCES,
+    " in what drives alone": tuple({*FORCE_NAMES} - {*PIN_FORCES}),
+}
+"""Quantities in which a mistake may show, by what is added to its text."""
 _BETWEEN = {
     "half a step late: numbers between a position and the one before": 1,
     "half a step early: numbers between a position and the one after": -1,
@@ -75,22 +79,18 @@ def list_column_mistakes(right: Solution) -> Iterator[Mistake]:
         yield Mistake(text, partial(_subtract_angle_of, right, bar), whole=False)
 
 
-def list_hypotheses(
-    scene: Scene,
-    command: Command,
-    wanted: Wanted = always,
-) -> Iterator[Mistake]:
+def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     """List every other problem that may have been solved, the simplest first."""
-    variants = [one for one in _list_variants(scene, command) if wanted(one.text)]
-    shifted: list[Variant] = []
-    if any(wanted(_NAME_DIFFERENCES.format(name)) for name in _DIFFERENCES):
-        shifted += _shift_by_steps(command)
-    if not variants and not shifted:
-        return
-    every = predict_variants(state_all(scene), command, [*shifted, *variants])
-    if shifted:
-        yield from _take_differences(command, every[: len(shifted)])
-    yield from every[len(shifted) :]
+    at = drop_remainder(command)
+    stated = state_all(scene)
+    yield from _take_differences(stated, at)
+    for variant in _list_other_commands(stated, at):
+        yield variant.mistake()
+    for text, other in list_wrong_scenes(stated):
+        mistake = Variant(text, other, at).mistake()
+        yield mistake
+        if text.startswith(("loads", "effects")):
+            yield from mistake.within(_WHERE)
 
 
 def _change_column(
@@ -126,8 +126,8 @@ _SAME_STEP = 1e-6
 """Part of a step by which the steps of a table may differ: the rounding of a file."""
 
 
-def _shift_by_steps(command: Command) -> Iterator[Variant]:
-    """List the positions two steps before to two after those of a table.
+def _take_differences(scene: Scene, command: Command) -> Iterator[Mistake]:
+    """Take speeds and accelerations from the angles at neighbouring rows of a table.
 
     The rows are those of a motion at one speed, at equal steps; else there are none.
     """
@@ -138,106 +138,104 @@ def _shift_by_steps(command: Command) -> Iterator[Variant]:
     changes = np.any(command.acceleration) or np.ptp(speed) != 0.0 or not speed.any()
     if changes or np.ptp(steps) > _SAME_STEP * abs(steps[0]):
         return
+    second = steps[0] / float(speed.flat[0])
+    moved = {}
     for number in _NEAR:
-        yield Variant("", at=command._replace(angle=command.angle + number * steps[0]))
+        at = command._replace(angle=command.angle + number * steps[0])
+        moved[number] = Variant("", scene, at).mistake().predict
+    for name, taken in _DIFFERENCES.items():
+        predict = partial(_divide_differences, moved, taken, second)
+        yield Mistake(f"speeds and accelerations are {name} differences", predict)
 
 
-def _take_differences(command: Command, near: list[Mistake]) -> Iterator[Mistake]:
-    """Take speeds and accelerations from the angles at neighbouring rows of a table."""
-    moved = dict(zip(_NEAR, near, strict=True))
-    speed = np.max(np.asarray(command.speed, dtype=float))
-    second = (command.angle[1] - command.angle[0]) / float(speed)
-    for name, steps in _DIFFERENCES.items():
-
-        def predict(
-            quantity: str, steps: tuple[tuple[int, ...], ...] = steps
-        ) -> Array | None:
-            """Divide differences of an angle by those of the time."""
-            rate, _, bar = quantity.rpartition("_")
-            if rate not in ("omega", "alpha") or command.commanded.endswith(bar):
-                return None
-            order = 1 + (rate == "alpha")
-            taken = steps[order - 1]
-            angles = [moved[number].predict(f"theta_{bar}") for number in taken]
-            turns = np.diff(np.array(angles), axis=0)
-            turns -= TURN * np.rint(turns / TURN)
-            step = second * (taken[1] - taken[0])
-            return np.asarray(np.diff(turns, order - 1, axis=0)[0] / step**order)
-
-        yield Mistake(_NAME_DIFFERENCES.format(name), predict)
+def _divide_differences(
+    moved: Mapping[int, Predict],
+    steps: tuple[tuple[int, ...], ...],
+    second: float,
+    quantity: str,
+) -> Array | None:
+    """Divide differences of an angle by those of the time."""
+    rate, _, bar = quantity.rpartition("_")
+    order = ("omega", "alpha").index(rate) + 1 if rate in ("omega", "alpha") else 0
+    angles = [moved[number](f"theta_{bar}") for number in steps[order - 1]]
+    if not order or angles[0] is None:
+        return None
+    turns = np.diff(np.array(angles), axis=0)
+    turns -= TURN * np.rint(turns / TURN)
+    step = second * (steps[order - 1][1] - steps[order - 1][0])
+    return np.asarray(np.diff(turns, order - 1, axis=0)[0] / step**order)
 
 
-_NAME_DIFFERENCES = "speeds and accelerations are {} differences"
-
-
-def _list_variants(scene: Scene, command: Command) -> Iterator[Variant]:
-    """List the problems that differ by numbers of the scene, or by the command."""
-    yield from _list_other_commands(command)
-    if ground := scene.linkage.ground_angle:
-        at = command
-        if command.moves_stroke:  # its cylinder turns the bar with the ground
-            at = command._replace(angle=command.angle - ground)
-        numbers = {"lengths.ground_angle": 0.0}
-        yield Variant("ground_angle is left out", numbers, at)
-    dry = any(effect.key in DRY for effect in scene.effects)
-    if dry and command.speed is not None:
-        slow = command._replace(speed=_NEARLY_AT_REST * command.speed, acceleration=0.0)
-        text = "no inertial forces (statics), with friction"
-        yield Variant(text, at=slow, names=FORCE_NAMES)
-    yield from _exchange_bars(scene)
-    yield from _move_centres(scene)
-
-
-def _list_other_commands(command: Command) -> Iterator[Variant]:
-    yield Variant(_OTHER_BRANCH, at=command._replace(branch=-command.branch))
+def _list_other_commands(scene: Scene, command: Command) -> Iterator[Variant]:
+    change = partial(_change_command, scene, command)
+    yield change(_OTHER_BRANCH, branch=-command.branch)
     if command.speed is not None:
-        at_rest = command._replace(speed=0.0, acceleration=0.0)
-        yield Variant("no inertial forces (statics)", at=at_rest)
+        yield change("no inertial forces (statics)", speed=0.0, acceleration=0.0)
+        slow = _NEARLY_AT_REST * command.speed
+        text = "no inertial forces (statics), with friction"
+        yield change(text, speed=slow, acceleration=0.0)._replace(names=FORCE_NAMES)
+    if ground := scene.linkage.ground_angle:
+        # a cylinder turns its bar with the ground
+        turned = ground if command.moves_stroke else 0.0
+        linkage = replace(scene.linkage, ground_angle=0.0)
+        level = replace(scene, linkage=linkage)
+        at = command._replace(angle=command.angle - turned)
+        yield Variant("ground_angle is left out", level, at)
     if isinstance(command.origin, StrokeOrigin):
-        yield from _list_other_strokes(command, command.origin)
+        yield from _list_other_strokes(change, command, command.origin)
     else:
-        yield from _list_other_angles(command)
+        yield from _list_other_angles(change, command)
     if len(command.angle) <= ENOUGH_POSITIONS:
         return
     for text, step in _BETWEEN.items():
         motion = (command.angle, command.speed, command.acceleration)
         angle, speed, acceleration = (_shift_by_half(rate, step) for rate in motion)
-        between = command._replace(angle=angle, speed=speed, acceleration=acceleration)
-        if isinstance(command.origin, StrokeOrigin):
-            strokes = _shift_by_half(command.origin.stroke, step)
-            between = between._replace(origin=command.origin._replace(stroke=strokes))
-        yield Variant(text, at=between)
-        yield Variant(f"{text} (forces alone)", at=between, names=FORCE_NAMES)
+        origin = command.origin
+        if isinstance(origin, StrokeOrigin):
+            origin = origin._replace(stroke=_shift_by_half(origin.stroke, step))
+        between = change(
+            text, angle=angle, speed=speed, acceleration=acceleration, origin=origin
+        )
+        yield between
+        yield between._replace(text=f"{text} (forces alone)", names=FORCE_NAMES)
 
 
-def _list_other_angles(command: Command) -> Iterator[Variant]:
+def _change_command(
+    scene: Scene, command: Command, text: str, **fields: Any
+) -> Variant:
+    """Return the problem of another command."""
+    return Variant(text, scene, command._replace(**fields))
+
+
+def _list_other_angles(
+    change: Callable[..., Variant], command: Command
+) -> Iterator[Variant]:
     """List other angles, speeds and accelerations of the commanded bar."""
     name = command.commanded
     angle = command.angle
-    as_degrees = command._replace(angle=np.radians(angle))
-    yield Variant(f"{name} read as degrees", at=as_degrees)
+    yield change(f"{name} read as degrees", angle=np.radians(angle))
     # a whole turn is 6.28 of these degrees
-    in_degrees = command._replace(angle=np.degrees(np.fmod(angle, TURN)))
+    in_degrees = np.degrees(np.fmod(angle, TURN))
     text = f"{name} in radians where degrees were announced"
-    yield Variant(text, at=in_degrees, times=float(np.degrees(1.0)))
+    yield change(text, angle=in_degrees)._replace(times=float(np.degrees(1.0)))
     clockwise = f"{name} {_CLOCKWISE}"
     for text, mirror in ((clockwise, 1.0), (f"{clockwise}, and y reversed", -1.0)):
-        yield Variant(text, at=command._replace(angle=-angle), mirror=mirror)
+        yield change(text, angle=-angle)._replace(mirror=mirror)
     if command.speed is None:
         return
-    bar = command.bar
+    _, omega, alpha = command.names
     for words, factor in _OF_SPEEDS.items():
-        other = command._replace(speed=command.speed * factor)
-        yield Variant(f"omega_{bar} in {words.format('s')}", at=other)
+        yield change(f"{omega} in {words.format('s')}", speed=command.speed * factor)
     if np.any(command.acceleration):
-        steady = command._replace(acceleration=0.0)
-        yield Variant(f"alpha_{bar} is left out", at=steady)
+        yield change(f"{alpha} is left out", acceleration=0.0)
         for words, factor in _DEGREES_TAKEN.items():
-            other = command._replace(acceleration=command.acceleration * factor)
-            yield Variant(f"alpha_{bar} in {words.format('s^2')}", at=other)
+            other = command.acceleration * factor
+            yield change(f"{alpha} in {words.format('s^2')}", acceleration=other)
 
 
-def _list_other_strokes(command: Command, origin: StrokeOrigin) -> Iterator[Variant]:
+def _list_other_strokes(
+    change: Callable[..., Variant], command: Command, origin: StrokeOrigin
+) -> Iterator[Variant]:
     """List accelerations of the bar of a cylinder without one of their two terms.
 
     One term is the acceleration of the stroke times omega over its speed; the other
@@ -252,7 +250,7 @@ def _list_other_strokes(command: Command, origin: StrokeOrigin) -> Iterator[Vari
         f"what stroke_speed adds to alpha_{command.bar} is missing": of_stroke,
     }
     for text, acceleration in alone.items():
-        yield Variant(text, at=command._replace(acceleration=acceleration))
+        yield change(text, acceleration=acceleration)
 
 
 def _shift_by_half(values: Any, step: int) -> Any:
@@ -265,53 +263,6 @@ def _shift_by_half(values: Any, step: int) -> Any:
     ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
     extended = np.concatenate((ends[0], values, ends[1]))
     return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
-
-
-def _exchange_bars(scene: Scene) -> Iterator[Variant]:
-    """Give a bar the mass of another one; exchange mass and inertia of two."""
-    moving = list_moving(scene)
-    for (name, _), (other, second) in permutations(moving, 2):
-        mass = {f"bars.{name}.mass": second.mass}
-        yield Variant(f"{name}: mass of the {other}", mass)
-    for (name, bar), (other, second) in combinations(moving, 2):
-        exchanged = {
-            f"bars.{name}.mass": second.mass,
-            f"bars.{other}.mass": bar.mass,
-            f"bars.{name}.inertia": second.moment_of_inertia,
-            f"bars.{other}.inertia": bar.moment_of_inertia,
-        }
-        text = f"{name} and {other}: mass and inertia are exchanged"
-        yield Variant(text, exchanged)
-
-
-def _move_centres(scene: Scene) -> Iterator[Variant]:
-    every: dict[str, dict[str, float]] = {}
-    for name, bar in list_moving(scene):
-        if not bar.mass:
-            continue
-        for text, (r, phi) in _list_wrong_centres(bar):
-            keyed = {f"bars.{name}.centre.0": r, f"bars.{name}.centre.1": phi}
-            yield Variant(f"{name}: mass centre {text}", keyed)
-            every.setdefault(text, {}).update(keyed)
-    for text, numbers in every.items():
-        yield Variant(f"every bar: mass centre {text}", numbers)
-
-
-def _list_wrong_centres(bar: Bar) -> Iterator[tuple[str, tuple[float, float]]]:
-    """List where mistakes put the mass centre of a bar: distance, angle."""
-    r, phi = bar.mass_centre
-    x = bar.length - r * np.cos(phi)
-    y = r * np.sin(phi)
-    yield (
-        "measured from the wrong pin",
-        (float(np.hypot(x, y)), float(np.arctan2(y, x))),
-    )
-    yield "taken at mid-bar", (bar.length / 2.0, 0.0)
-    if r:
-        yield "turned by 180 deg about the bar's first pin", (r, phi + np.pi)
-    if y:
-        yield "on the other side of the bar's line", (r, -phi)
-        yield "on the bar's line, its angle left out", (r, 0.0)
 
 
 def _is_angular(quantity: str) -> bool:
@@ -394,7 +345,10 @@ def explain(
     least = ENOUGH_EXPLAINED * len(differing)
     found: list[Explanation] = []
     for find in _SOURCES:
-        for mistake in find(judge, differing, wanted):
+        for mistake in find(judge, differing):
+            tried = mistake.fitted or not mistake.whole or wanted(mistake.text)
+            if not tried:
+                continue
             explained = _list_explained(judge, mistake, differing, least)
             if explained:
                 explanation = Explanation(
@@ -464,14 +418,12 @@ def _list_explained(
     return [column for column in judge.columns.values() if column in explained]
 
 
-_SOURCES: tuple[
-    Callable[[Judge, list[JudgedColumn], Wanted], Iterator[Mistake]], ...
-] = (
-    lambda judge, differing, wanted: list_column_mistakes(judge.right),
-    lambda judge, differing, wanted: find_miscalculated(judge, wanted),
-    lambda judge, differing, wanted: list_hypotheses(judge.scene, judge.at, wanted),
-    lambda judge, differing, wanted: find_fitted(judge, differing),
-    lambda judge, differing, wanted: find_single_precision(judge),
+_SOURCES: tuple[Callable[[Judge, list[JudgedColumn]], Iterator[Mistake]], ...] = (
+    lambda judge, differing: list_column_mistakes(judge.right),
+    lambda judge, differing: find_miscalculated(judge),
+    lambda judge, differing: list_hypotheses(judge.scene, judge.at),
+    find_fitted,
+    lambda judge, differing: find_single_precision(judge),
 )
 """Sources of mistakes, the cheapest first: one is asked if none before it explains all.
 """

@@ -1,27 +1,30 @@
-"""Mistakes as hypotheses, and wrong problems that they amount to, solved at once.
+"""Mistakes as hypotheses, and wrong problems that they amount to.
 
-A mistake in what was solved is another number of the scene or another command: one
-member of a study, whose members together take a tenth of the time of one by one.
+A mistake in what was solved is another scene or another command, which the formulas
+solve as they solve the right one.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.effects import Gravity, Table
-from fourbar.quantities import UNITS, VECTORS, Array
+from fourbar.errors import FourBarError
+from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array
 from fourbar.scene import Command, Scene, StrokeOrigin
-from fourbar.studies.keys import list_entries, read_number
-from fourbar.studies.study import Study
+from fourbar.solution import Solution
+from fourbar.solving import solve
 from fourbar_validation.scenes.bars import list_moving, replace_bars
 
 Predict = Callable[[str], Array | None]
 """Function of a quantity that returns the numbers of a mistake; None: it has none."""
 
+_COMPUTED = UNITS.keys() - {*COUPLE[1:], *LINE[1:]}
+"""Quantities that a wrong problem changes: an error and a range are the formulas'."""
 _TURNING = ("rad", "rad/s", "rad/s^2", "N m")
 """Units of what is reversed where angles are counted clockwise."""
 Wanted = Callable[[str], bool]
@@ -56,23 +59,69 @@ class Mistake(NamedTuple):
         """Return True if a number of it was fitted to the table."""
         return self.times > 1.0
 
+    def within(self, parts: Mapping[str, Collection[str]]) -> Iterator["Mistake"]:
+        """List the mistake in some quantities alone, by what is added to its text."""
+        for words, names in parts.items():
+            predict = partial(_predict_some, self.predict, names)
+            yield self._replace(text=f"{self.text}{words}", predict=predict)
+
+
+def _predict_some(
+    predict: Predict, names: Collection[str], quantity: str
+) -> Array | None:
+    return predict(quantity) if quantity in names else None
+
 
 class Variant(NamedTuple):
     """Problem that somebody solved in place of the one that was set."""
 
     text: str
     """Mistake that leads to it."""
-    numbers: Mapping[str, float] = {}
-    """Numbers of the scene that are others, by key."""
-    at: Command | None = None
-    """Other command, if it is another one."""
-    names: Collection[str] = UNITS
+    scene: Scene
+    at: Command
+    names: Collection[str] = _COMPUTED
     """Quantities that were taken from it."""
     times: float = 1.0
     """Factor on what is allowed, where the rounding of an angle is magnified."""
     mirror: float = 0.0
     """Factor on y where angles, their rates and torques are reversed; 0: they are not.
     """
+
+    def mistake(self) -> Mistake:
+        """Return the mistake; the problem is solved when its numbers are asked for."""
+        solved = cache(partial(_solve, self.scene, self.at))
+        predict = partial(self._predict, solved)
+        return Mistake(self.text, predict, times=self.times)
+
+    def _predict(
+        self, solved: Callable[[], Solution | None], quantity: str
+    ) -> Array | None:
+        if quantity == self.at.commanded or quantity not in self.names:
+            return None
+        values = getattr(solved(), quantity, None)
+        if values is None:
+            return None
+        factor: Any = 1.0
+        if self.mirror and quantity in VECTORS:
+            factor = 1.0, self.mirror
+        elif self.mirror and UNITS[quantity] in _TURNING:
+            factor = -1.0
+        return np.asarray(values * factor)
+
+
+def drop_remainder(command: Command) -> Command:
+    """Return a command without what its doubles leave out."""
+    if isinstance(command.origin, StrokeOrigin):
+        return command._replace(origin=command.origin._replace(lost=None))
+    return command.as_doubles()
+
+
+def _solve(scene: Scene, at: Command) -> Solution | None:
+    """Solve a problem; None where there is no such scene."""
+    try:
+        return solve(scene, at=at)
+    except FourBarError:
+        return None
 
 
 class OpenTable(Table):
@@ -95,7 +144,7 @@ def open_tables(scene: Scene) -> Scene:
 
 
 def state_all(scene: Scene) -> Scene:
-    """State every number that a variant may change: bars in full, and gravity."""
+    """State every number that a mistake may change: bars in full, and gravity."""
     bars = {
         name: replace(
             bar,
@@ -109,64 +158,3 @@ def state_all(scene: Scene) -> Scene:
     if not any(isinstance(effect, Gravity) for effect in scene.effects):
         scene = replace(scene, effects=(*scene.effects, Gravity(0.0)))
     return replace_bars(scene, **bars)
-
-
-def predict_variants(
-    scene: Scene,
-    at: Command,
-    variants: Sequence[Variant],
-    stage: str = "force",
-) -> list[Mistake]:
-    """Solve the variants of a scene that states all, to a stage or the end."""
-    entries = list_entries(scene)
-    keys = {key for variant in variants for key in variant.numbers}
-    values = {}
-    invalid = np.zeros(len(variants), dtype=bool)
-    for key in keys:
-        usual = read_number(scene, entries[key])
-        column = [variant.numbers.get(key, usual) for variant in variants]
-        values[key] = np.array(column, dtype=float)
-        invalid |= ~entries[key].holds(values[key])
-    commands = [_leave_out_lost(variant.at or at) for variant in variants]
-    together: Command = _stack(commands, len(at.angle))
-    together = together._replace(bar=at.bar)
-    stage = "position" if at.speed is None else stage
-    wrong = Study(scene, values, invalid, together).solve(stage)
-
-    def predict(member: int, variant: Variant, quantity: str) -> Array | None:
-        values = getattr(wrong, quantity, None)
-        commanded = quantity == at.commanded
-        if values is None or commanded or quantity not in variant.names:
-            return None
-        factor: Any = 1.0
-        if variant.mirror and quantity in VECTORS:
-            factor = 1.0, variant.mirror
-        elif variant.mirror and UNITS[quantity] in _TURNING:
-            factor = -1.0
-        return np.asarray(values[member] * factor)
-
-    return [
-        Mistake(variant.text, partial(predict, member, variant), times=variant.times)
-        for member, variant in enumerate(variants)
-    ]
-
-
-def _leave_out_lost(command: Command) -> Command:
-    """Return a command without what its doubles leave out."""
-    if isinstance(command.origin, StrokeOrigin):
-        return command._replace(origin=command.origin._replace(lost=None))
-    return command.as_doubles()
-
-
-def _stack(values: Sequence[Any], n: int) -> Any:
-    """Stack the fields of m commands and of their origins to (m, n) each.
-
-    A field that is not stated is None.
-    """
-    first = values[0]
-    if first is None:
-        return None
-    if isinstance(first, tuple):
-        fields = zip(*values, strict=True)
-        return type(first)(*(_stack(field, n) for field in fields))
-    return np.stack([np.broadcast_to(value, (n,)) for value in values])

@@ -1,0 +1,235 @@
+"""Scenes that somebody may have solved in place of the one that was set.
+
+A number of a scene, or all numbers under one name, may have another factor; a load may
+act elsewhere; a bar may have what belongs to another.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from fnmatch import filter as choose_names
+from itertools import combinations, permutations
+from typing import Any
+
+from fourbar.effects import Flywheel, Gravity, Load, Springs
+from fourbar.errors import InputError
+from fourbar.linkage import BAR_NUMBERS, MOVING_BARS
+from fourbar.scene import Scene
+from fourbar.studies.keys import list_entries, read_number, replace_numbers
+from fourbar_validation.compare.pins import resolve
+from fourbar_validation.scenes.bars import list_moving
+
+_PLACE_UNITS = ("m", "rad")
+"""Units of numbers that say where and in which direction something acts."""
+_DONE = {0.0: "left out", 2.0: "doubled", -1.0: "reversed"}
+"""Factors on numbers of a scene, and what was done to them."""
+_CENTIMETRES = "m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm"
+_MILLIMETRES = "m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm"
+_D_ALEMBERT = "(d'Alembert's forces put on the side of m a)"
+_INERTIAL = {
+    f"{_CENTIMETRES}: 100 times": (1e2, 1e2),
+    "m a in kg cm/s^2 added to N: 100 times too large": (1e2, 1.0),
+    "I alpha in kg cm^2/s^2 added to N cm: 100 times too large": (1.0, 1e2),
+    f"{_MILLIMETRES}: 1000 times": (1e3, 1e3),
+    "m a in kg mm/s^2 added to N: 1000 times too large": (1e3, 1.0),
+    f"inertial forces with the wrong sign {_D_ALEMBERT}": (-1.0, -1.0),
+}
+"""Factors on m a and I alpha of every bar, by the mistake behind them."""
+Numbers = dict[str, float]
+"""Numbers of a scene by their keys."""
+
+
+def group_numbers(scene: Scene) -> dict[str, Numbers]:
+    """List the numbers of a scene that are not 0, one by one and under one name.
+
+    The name is a key, or the part of it that several have in common. Numbers of a place
+    are put together with those of the same name alone, and the others with all that
+    acts with them.
+    """
+    numbers: Numbers = {}
+    of_places = set()
+    for key, entry in list_entries(scene).items():
+        acts = key.startswith(("bars.", "loads.", "effects."))
+        if acts and (value := read_number(scene, entry)):
+            numbers[key] = value
+            if entry.unit in _PLACE_UNITS:
+                of_places.add(key)
+    groups: dict[str, Numbers] = {}
+    for key in numbers:
+        parts = key.split(".")
+        names = [".".join(parts[:end]) for end in range(len(parts), 0, -1)]
+        which = 2 if parts[0] == "effects" else 1
+        if which < len(parts) - 1:
+            names.append(".".join([*parts[:which], "*", *parts[which + 1 :]]))
+        for name in names:
+            own = choose_names(numbers, name)
+            if key not in of_places:
+                own += choose_names(numbers.keys() - of_places, f"{name}.*")
+            group = {one: numbers[one] for one in numbers if one in own}
+            if group and group not in groups.values():
+                groups[name.removesuffix(".0")] = group
+    return groups
+
+
+def is_place(scene: Scene, group: Numbers) -> bool:
+    """Return whether the numbers of a group say where something acts."""
+    entries = list_entries(scene)
+    return any(entries[key].unit in _PLACE_UNITS for key in group)
+
+
+def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """List scenes in place of one that states every number, by the mistake."""
+    groups = group_numbers(scene)
+    for name, group in groups.items():
+        for factor, done in _DONE.items():
+            other = {key: factor * value for key, value in group.items()}
+            yield f"{name} {done}", replace_numbers(scene, other)
+    if scene.loads and any(name.startswith("effects") for name in groups):
+        bare = replace(scene, loads=(), effects=())
+        yield "loads and effects left out: inertia alone", bare
+    for text, numbers in _list_wrong_numbers(scene):
+        yield text, replace_numbers(scene, numbers)
+    yield from _list_wrong_loads(scene)
+    yield from _list_other_effects(scene)
+    for bar in MOVING_BARS:
+        if scene.drive is None and bar != scene.drive_bar:
+            text = f"the torque acts on bar {bar} instead of bar {scene.drive_bar}"
+            yield text, replace(scene, drive_bar=bar)
+
+
+def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
+    """List other numbers of bars and of gravity."""
+    (gravity,) = (one for one in scene.effects if isinstance(one, Gravity))
+    moving = list_moving(scene)
+    for text, (by_mass, by_inertia) in _INERTIAL.items():
+        numbers = {"effects.gravity.0": gravity.magnitude / by_mass}
+        for name, bar in moving:
+            numbers[f"bars.{name}.mass"] = by_mass * bar.mass
+            numbers[f"bars.{name}.inertia"] = by_inertia * bar.moment_of_inertia
+        yield text, numbers
+    if not gravity.magnitude:
+        along_y = {"effects.gravity.0": 9.81, "effects.gravity.1": -math.pi / 2.0}
+        yield "gravity along -y is included though the scene has none", along_y
+    with_ground = gravity.angle + scene.linkage.ground_angle
+    yield "gravity is taken along -y", {"effects.gravity.1": -math.pi / 2.0}
+    yield "gravity is turned with the ground", {"effects.gravity.1": with_ground}
+    every: dict[str, Numbers] = {}
+    for name, bar in moving:
+        r, phi = bar.mass_centre
+        x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
+        steiner = bar.mass * r * r
+        about_pin = bar.moment_of_inertia + steiner
+        wrong = {
+            "inertia about the pin used as the inertia about G": {"inertia": about_pin},
+            "inertia about G used as the inertia about the pin": {
+                "inertia": bar.moment_of_inertia - steiner
+            },
+            "mass centre measured from the wrong pin": {
+                "centre.0": math.hypot(x, y),
+                "centre.1": math.atan2(y, x),
+            },
+            "mass centre taken at mid-bar": {
+                "centre.0": bar.length / 2.0,
+                "centre.1": 0.0,
+            },
+        }
+        for text, numbers in wrong.items():
+            keyed = {f"bars.{name}.{key}": value for key, value in numbers.items()}
+            yield f"bars.{name}: {text}", keyed
+            every.setdefault(text, {}).update(keyed)
+    for text, numbers in every.items():
+        yield f"bars.*: {text}", numbers
+    for (name, _), (other, second) in permutations(moving, 2):
+        yield f"bars.{name}: mass of the {other}", {f"bars.{name}.mass": second.mass}
+    for (name, bar), (other, second) in combinations(moving, 2):
+        text = f"bars.{name} and bars.{other}: mass and inertia are exchanged"
+        yield (
+            text,
+            {
+                f"bars.{name}.mass": second.mass,
+                f"bars.{other}.mass": bar.mass,
+                f"bars.{name}.inertia": second.moment_of_inertia,
+                f"bars.{other}.inertia": bar.moment_of_inertia,
+            },
+        )
+
+
+def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """Let each load, and every load, act elsewhere or in another direction."""
+    every: dict[str, list[Load]] = {}
+    for number, load in enumerate(scene.loads):
+        for text, changes in _list_changes(scene, load).items():
+            try:
+                other = replace(load, **changes)
+            except InputError:
+                continue
+            loads = list(scene.loads)
+            loads[number] = other
+            yield (
+                f"loads.{number} (bar {load.bar}): {text}",
+                replace(scene, loads=tuple(loads)),
+            )
+            every.setdefault(text, list(scene.loads))[number] = other
+    if len(scene.loads) > 1:
+        for text, loads in every.items():
+            yield f"loads.*: {text}", replace(scene, loads=tuple(loads))
+    for name, bar in list_moving(scene):
+        for effect in scene.effects:
+            if isinstance(effect, Gravity):
+                lifted = -effect.magnitude * bar.mass, effect.angle
+                lift = Load(BAR_NUMBERS[name], lifted)
+                text = f"the weight of bar {lift.bar} is missing"
+                yield text, replace(scene, loads=(*scene.loads, lift))
+
+
+def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
+    """List the fields of a load that may be others, by the mistake."""
+    changes: dict[str, dict[str, Any]] = {}
+    if load.table is not None:
+        changes["its table is left out"] = {"table": None}
+    if load.force is None:
+        return changes
+    nowhere = dict.fromkeys(("from_pin", "from_centre", "point", "arm"))
+    length = scene.linkage.bar(load.bar).length
+    places: dict[str, dict[str, Any]] = {
+        "its force acts at G of the bar": {"from_centre": (0.0, 0.0)},
+        "its force acts at the first pin of the bar": {"from_pin": (0.0, 0.0)},
+        "its force acts at the second pin of the bar": {"from_pin": (length, 0.0)},
+        "its place is measured from G, not from the bar's first pin": {
+            "from_centre": load.from_pin
+        },
+        "its place is measured from the bar's first pin, not from G": {
+            "from_pin": load.from_centre
+        },
+    }
+    for text, place in places.items():
+        if None not in place.values():
+            changes[text] = {**nowhere, **place}
+    if load.frame == "bar":
+        changes["its direction is kept"] = {"frame": "world"}
+    else:
+        changes["its direction turns with the bar"] = {"frame": "bar"}
+    if load.arm is not None:
+        size, direction = load.force
+        arm_x, arm_y = resolve(*load.arm)
+        x, y = resolve(size, direction)
+        text = "its arm is measured from the bar's first pin, not from G"
+        moment = load.moment + arm_x * y - arm_y * x
+        changes[text] = {**nowhere, "from_pin": (0.0, 0.0), "moment": moment}
+    return changes
+
+
+def _list_other_effects(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """List scenes with a flywheel on another bar, or springs that act both ways."""
+    for number, effect in enumerate(scene.effects):
+        others: dict[str, Any] = {}
+        if isinstance(effect, Flywheel):
+            bar = {2: 4, 4: 2}[effect.bar]
+            others[f"the flywheel is on bar {bar}"] = replace(effect, bar=bar)
+        if isinstance(effect, Springs):
+            both = tuple(replace(spring, acts=None) for spring in effect.springs)
+            others["the springs act both ways"] = Springs(both)
+        for text, other in others.items():
+            effects = list(scene.effects)
+            effects[number] = other
+            yield text, replace(scene, effects=tuple(effects))
