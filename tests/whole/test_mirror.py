@@ -66,7 +66,7 @@ validation/report/test_sections.py | hard_picture
 validation/engines/mujoco/test_simulate.py | defaults monitor
 validation/run/test_released.py | validation/engines/mujoco: forward
 validation/check/test_check.py | calculated csv_columns fitted
-validation/check/test_check.py | judge_table mistakes theirs variants
+validation/check/test_check.py | judge_table mistakes theirs variants wrong_scenes
 validation/robots/test_check_mjcf.py | differences guard judge_loop
 validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
 validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: examine seen
