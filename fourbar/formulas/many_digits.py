@@ -1,20 +1,17 @@
-"""Numbers of mpmath, in which the formulas run as they stand.
+"""The half angle in many digits, where doubles cannot decide if the loop closes.
 
-In them it is decided whether the loop closes beside a limit position, and error bars
-are found where long doubles are no longer than doubles.
+Few positions need it.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from mpmath import MPContext, mp, mpf
 
-from fourbar.formulas.arithmetic import OfParts, make_like
+from fourbar.formulas.arithmetic import make_like
 from fourbar.formulas.position import (
     TOUCHING,
     HalfAngle,
-    half_angle,
+    compute_factors,
     loop,
     reorder_lengths,
 )
@@ -25,99 +22,64 @@ WORKING_DIGITS = 120
 _RESIDUE = 1e-55
 """Relative part that so many digits leave of a factor which is zero at the limit.
 """
-_DIGITS: Any = MPContext()
-_DIGITS.dps = WORKING_DIGITS
-_convert = np.frompyfunc(_DIGITS.convert, 1, 1)
 
 
-class ManyDigits(OfParts):
-    """Array of numbers of mpmath, made of these or of doubles, complex ones too."""
+def exact_half_angle(
+    linkage: FourBar,
+    theta_2: float,
+    remainder: Any,
+    unit: Any = 1.0,
+    member: int = 0,
+    bar: int = 2,
+    lost: float = 0.0,
+) -> HalfAngle:
+    """Compute the half angle of `formulas.position.half_angle` in numbers of mpmath.
 
-    def __init__(self, numbers: Any) -> None:
-        self.numbers: Any = np.asarray(_convert(numbers))
+    The field `root_sign` is left at 1: doubles decide it.
 
-    def _change(self, change: Any) -> "ManyDigits":
-        return ManyDigits(_FUNCTIONS[change](self.numbers))
+    Parameters
+    ----------
+    theta_2 : rad.
+    remainder : what theta_2 as a double leaves out of the angle meant (rad, mpmath),
+        where that is known (`Command.remainder`). A position beyond the limit then does
+        not assemble, however near.
+    unit : of the lengths, m.
+    member : index into numbers of the linkage that are arrays.
+    bar : from which the loop is read; theta_2 is its angle.
+    lost : what a theta_2 that was computed leaves out as a double, rad.
+    """
+    from mpmath import mp, mpf
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the array."""
-        return np.shape(self.numbers)
+    def own(number: Any) -> Any:
+        return mpf(float(number[member] if np.ndim(number) else number))
 
-    def like(self, values: Any) -> "ManyDigits":
-        """Return doubles as such numbers."""
-        return ManyDigits(values)
-
-    def as_doubles(self) -> Any:
-        """Return the nearest doubles, complex if a number is."""
-        is_complex = any(isinstance(one, _DIGITS.mpc) for one in self.numbers.flat)
-        return self.numbers.astype(complex if is_complex else float)
-
-    def __getitem__(self, index: Any) -> "ManyDigits":
-        return ManyDigits(self.numbers[index])
-
-    def __array_ufunc__(
-        self,
-        function: Any,
-        method: str,
-        *inputs: Any,
-        **options: Any,
-    ) -> Any:
-        if function in _OF_DOUBLES:
-            return function(*map(_take_doubles, inputs))
-        numbers = map(_take_numbers, inputs)
-        result = np.asarray(_FUNCTIONS.get(function, function)(*numbers))
-        return ManyDigits(result) if result.dtype == object else result
-
-    def __array_function__(
-        self,
-        function: Any,
-        types: Any,
-        args: Sequence[Any],
-        options: Any,
-    ) -> Any:
-        if function is np.where:
-            mask, x, y = args
-            return ManyDigits(np.where(mask, _take_numbers(x), _take_numbers(y)))
-        return function(*map(_take_doubles, args))
-
-
-def _take_numbers(number: Any) -> Any:
-    if isinstance(number, ManyDigits):
-        return number.numbers
-    return _convert(number)
-
-
-def _take_doubles(number: Any) -> Any:
-    if isinstance(number, ManyDigits):
-        return number.as_doubles()
-    return number
-
-
-def _divide(x: Any, y: Any) -> Any:
-    return x / y if y else x * _DIGITS.inf
-
-
-def _take_root(x: Any) -> Any:
-    return _DIGITS.sqrt(x) if x >= 0 else _DIGITS.nan
-
-
-_OF_DOUBLES = (np.sign, np.isnan, np.isfinite, np.frexp, np.copysign)
-"""Functions of the doubles alone."""
-_FUNCTIONS: dict[Any, Any] = {
-    np.divide: np.frompyfunc(_divide, 2, 1),
-    np.sqrt: np.frompyfunc(_take_root, 1, 1),
-    np.sin: np.frompyfunc(_DIGITS.sin, 1, 1),
-    np.cos: np.frompyfunc(_DIGITS.cos, 1, 1),
-    np.tan: np.frompyfunc(_DIGITS.tan, 1, 1),
-    np.arctan2: np.frompyfunc(_DIGITS.atan2, 2, 1),
-    np.rint: np.frompyfunc(_DIGITS.nint, 1, 1),
-    np.fmod: np.frompyfunc(lambda x, y: x - y * int(x / y), 2, 1),
-    np.real: np.frompyfunc(lambda x: x.real, 1, 1),
-    np.imag: np.frompyfunc(lambda x: x.imag, 1, 1),
-    np.conjugate: np.conjugate,
-}
-"""Functions that NumPy does not have of such numbers, and those of `OfParts`."""
+    with mp.workdps(WORKING_DIGITS):
+        d, a, b, c = (
+            own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths)
+        )
+        h = (
+            mpf(theta_2)
+            + mpf(lost)
+            - own(linkage.ground_angle)
+            + (0 if remainder is None else remainder)
+        ) / 2
+        if bar == 4:
+            h -= mp.pi / 2
+        s = mp.sin(h)
+        k = mp.cos(h)
+        lengths = loop(d, a, b, c)
+        half = compute_factors(lengths, s * s, k * k, s * k)
+        size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
+        least, most = (
+            (-TOUCHING * size, 0)
+            if remainder is None
+            else (-_RESIDUE * size, _RESIDUE * size)
+        )
+        outer, inner = (
+            0 * factor if least <= factor <= most else factor
+            for factor in (half.outer, half.inner)
+        )
+        return half._replace(outer=outer, inner=inner)
 
 
 def decide_half_angles(
@@ -132,60 +94,38 @@ def decide_half_angles(
 ) -> HalfAngle:
     """Return the half angles with those at an index recomputed in many digits.
 
-    Each number is rounded once, to the kind of number that it replaces. The field
-    `root_sign` stays: doubles decide it.
+    Each number is rounded once, to the kind of number that it replaces.
 
-    Parameters
-    ----------
-    unit : of the lengths, m.
-    half : half angles of `formulas.position.half_angle`.
-    theta_2 : angles of the bar from which the loop is read, rad.
-    remainder : what theta_2 as a double leaves out of the angle meant (rad, mpmath),
-        where that is known (`Command.remainder`). A position beyond the limit then does
-        not assemble, however near.
-    lost : what a theta_2 that was computed leaves out as a double, rad.
+    `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others
+    see `exact_half_angle`.
     """
+    flat = np.ravel(theta_2)
     shape = np.shape(theta_2)
-
-    def take(number: Any) -> ManyDigits:
-        return ManyDigits(np.broadcast_to(number, shape).ravel()[index])
-
-    own_unit = take(unit)
-    reordered = reorder_lengths(bar, linkage.lengths)
-    lengths = loop(*(take(length) / own_unit for length in reordered))
-    psi = take(theta_2) + take(lost) - take(linkage.ground_angle)
-    if remainder is not None:
-        psi = psi + ManyDigits(remainder)
-    exact = half_angle(lengths, psi, opposite=bar == 4)
-    d, a, b, c, _, _ = lengths
-    size = 2.0 * (a + b + c + d) * np.sqrt(exact.inner + (b - c) * (b - c))
-    least = -TOUCHING * size
-    most = 0.0 * size
-    if remainder is not None:
-        most = _RESIDUE * size
-        least = -most
-    mask = np.zeros(np.size(theta_2), dtype=bool)
+    left_out = np.broadcast_to(lost, shape).ravel().tolist()
+    mask = np.zeros(flat.shape, dtype=bool)
     mask[index] = True
+    high, low = np.zeros((2, 5, flat.size))
+    for i in index:
+        *numbers, _ = exact_half_angle(
+            linkage,
+            float(flat[i]),
+            remainder,
+            unit,
+            i,
+            bar,
+            left_out[i],
+        )
+        for row, value in enumerate(numbers):
+            high[row, i] = float(value)
+            low[row, i] = float(value - high[row, i])
+    *numbers, root_sign = half
     mask = mask.reshape(shape)
-
-    def spread(doubles: Any) -> Any:
-        full = np.zeros(np.size(theta_2))
-        full[index] = doubles
-        return full.reshape(shape)
-
-    decided = []
-    for name, number in half._asdict().items():
-        if name == "root_sign":
-            decided.append(number)
-            continue
-        value = getattr(exact, name)
-        if name in ("outer", "inner"):
-            value = np.where((least <= value) & (value <= most), 0.0, value)
-        rounded = _take_doubles(value)
-        rest = spread(_take_doubles(value - rounded))
-        new = make_like(spread(rounded), number) + rest
-        decided.append(np.where(mask, new, number)[()])
-    return HalfAngle(*decided)
+    rows = zip(numbers, high.reshape(5, *shape), low.reshape(5, *shape), strict=True)
+    decided = (
+        np.where(mask, make_like(rounded, number) + rest, number)[()]
+        for number, rounded, rest in rows
+    )
+    return HalfAngle(*decided)._replace(root_sign=root_sign)
 
 
 def limit_remainder(
@@ -203,6 +143,8 @@ def limit_remainder(
         cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d);
     likewise as the loop is read from another bar, whose angle theta_2 then is.
     """
+    from mpmath import mp, mpf
+
     with mp.workdps(WORKING_DIGITS):
         d, a, b, c = map(mpf, reorder_lengths(bar, linkage.lengths))
         theta_1 = mpf(linkage.ground_angle) + (mp.pi if bar == 4 else 0)

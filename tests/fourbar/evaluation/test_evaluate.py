@@ -115,11 +115,11 @@ for name in (
     SCENES[name] = fault_scenes.FAULT_SCENES[name]
 
 
-@pytest.mark.parametrize("kind", ["long doubles", "numbers of mpmath"])
+@pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
 @pytest.mark.parametrize("name", SCENES)
 def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     scene = SCENES[name]
-    if kind == "numbers of mpmath":
+    if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     ours = solve(scene, "error")
     exact = BallArithmetic().answer(scene, command(scene))
@@ -135,7 +135,7 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", families.FAMILY_DRAWERS)
-def test_error_bars_hold_with_numbers_of_mpmath(family, monkeypatch):
+def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     tally = stability.judge_samples(family, range(3))

@@ -10,10 +10,9 @@ import pytest
 from pytest import approx
 
 from fourbar.formulas.arithmetic import power_of_two
-from fourbar.formulas.many_digits import decide_half_angles, limit_remainder
-from fourbar.formulas.mobility import find_limit_angles
+from fourbar.formulas.many_digits import decide_half_angles, exact_half_angle
 from fourbar.formulas.path import prepare_path
-from fourbar.formulas.position import half_angle, loop, reorder_lengths
+from fourbar.formulas.position import half_angle, loop
 from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage
@@ -151,8 +150,7 @@ def test_the_half_angle_in_many_digits_is_rounded_once(offset):
             bars, theta_2 = draw_linkage(rng), float(rng.uniform(-3.0, 3.0))
             beyond = None if offset is None else mp.mpf(offset) * theta_2
             psi = mp.mpf(theta_2) + (beyond or 0) - mp.mpf(bars.ground_angle)
-            near = prepare_path(bars.lengths, bars.ground_angle).half_angle(theta_2)
-            half = decide_half_angles(bars, 1.0, near, [0], theta_2, beyond)
+            half = exact_half_angle(bars, theta_2, beyond)
             for ours, exact in zip(half[:5], five(bars, psi), strict=True):
                 assert abs(ours - exact) <= U * abs(exact)
 
@@ -200,13 +198,11 @@ def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
     decided = decide_half_angles(bars, path.unit, half, *asked)
     assert decided.root_sign == half.root_sign == 1.0
     for n in range(5):
-        for index in (1, 4):
-            with mp.workdps(60):
-                psi = mp.mpf(float(theta[index])) - mp.mpf(0.4) + (remainder or 0)
-                d, a, b, c = reorder_lengths(bar, bars.lengths)
-                exact = five(uniform(d, a, b, c), psi - (mp.pi if bar == 4 else 0))
-            unit = 1.0 if n < 3 else path.unit**2
-            assert decided[n][index] == float(exact[n] / unit)
+        exact = [
+            float(exact_half_angle(bars, angle, remainder, path.unit, bar=bar)[n])
+            for angle in theta[[1, 4]].tolist()
+        ]
+        assert decided[n][[1, 4]].tolist() == exact
         kept = [np.delete(values[n], [1, 4]) for values in (decided, half)]
         assert np.array_equal(*kept)
         close = abs(decided[n] - half[n]).max()
@@ -234,34 +230,3 @@ def test_the_factor_that_changes_less_gives_the_other_its_digits(psi, lengths):
 def test_the_power_of_two_above_a_number():
     assert power_of_two(np.array([0.3, 3.0])).tolist() == [0.5, 4.0]
     assert power_of_two(0.3) == 0.5
-
-
-def test_a_longer_number_keeps_its_digits_and_what_a_double_lost_counts():
-    bars, theta, lost = bare(0.3, 0.1, 0.25, 0.22), np.array([1.0, 2.0]), 1e-12
-    path = prepare_path(bars.lengths, 0.0)
-    half = path.half_angle(theta.astype(np.longdouble))
-    decided = decide_half_angles(bars, 1.0, half, [1], theta, lost=lost)
-    with mp.workdps(60):
-        exact = five(bars, mp.mpf(2.0) + mp.mpf(lost))
-        for number, wanted in zip(decided, exact, strict=False):
-            rounded = float(number[1])
-            error = mp.mpf(rounded) + mp.mpf(float(number[1] - rounded)) - wanted
-            assert abs(error) <= float(np.finfo(np.longdouble).eps) * abs(wanted)
-
-
-@pytest.mark.parametrize("steps", [-3.0, 3.0])
-def test_bars_that_miss_a_limit_by_rounding_touch_there(steps):
-    """Three roundings beyond the limit; in many digits the limit itself is met."""
-    bars = bare(0.3, 0.25, 0.2, 0.13)
-    (limit, *_) = find_limit_angles(bars, 2)
-    remainder = limit_remainder(bars, limit, limit, 0.0, 2)
-    path = prepare_path(bars.lengths, 0.0)
-    met = decide_half_angles(bars, 1.0, path.half_angle(limit), [0], limit, remainder)
-    beyond = limit - steps * U  # the loop closes above it
-    half = path.half_angle(beyond)
-    touching = decide_half_angles(bars, 1.0, half, [0], beyond)
-    outside = decide_half_angles(bars, 1.0, half, [0], beyond, mp.mpf(0))
-    assert min(met.outer, met.inner) == 0.0
-    assert (min(touching.outer, touching.inner) > 0.0) == (steps < 0.0)
-    assert min(touching.outer, touching.inner) >= 0.0
-    assert (min(outside.outer, outside.inner) < 0.0) == (steps > 0.0)
