@@ -70,7 +70,7 @@ gravity | gravitiy | effects.gravitiy | did you mean "gravity"?
 { O2 = | { O3 = | effects.viscous.O3 | O2, A, B, O4
 "0.1 m" | "48 kg" | lengths.input | 48 kg | does not convert to m
 "3 N" | "3 kg" | loads[0].force[0] | 3 kg | N
-"10 rad/s" | "10 Hz" | motion.omega_2 | 10 Hz | did you mean "10 rev/s"?
+"10 rad/s" | "10 Hz" | motion.omega_2 | 10 Hz | "Hz" is not known
 "0.01 N m s/rad" | "0.01 N m s" | effects.viscous.O2 | N m s/rad
 "0.1 m" | 9 in | line 4, column | in quotes, like "9 in"
 "0.1 m" | 0.1 | lengths.input | 0.1 | with a unit
@@ -91,7 +91,7 @@ force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n |  | loads[0] | force
 ["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force[1] | no finite number
 force = ["3 N", "40 deg"] | torque = "1 N m" | loads[0].torque | "moment"?
 "60 deg" | "60" | motion.theta_2 | the unit is missing
-"60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known; did you mean "60 deg"?
+"60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known
 [[loads]] | [loads] | loads | [[loads]]
 "60 deg" | "0 deg to 360 deg" | motion.theta_2 | steps = 360 }
 [drive] | [drive]\ntorque = "5 N m" | drive.torque | is a load | motion.free

@@ -258,18 +258,6 @@ def test_what_is_no_number_of_the_dimension_is_refused(text, unit):
 5 lb | N | 5 lbf
 5 lbf | kg | 5 lb
 3 oz in | N m | 3 ozf in
-5 Hz | rad/s | 5 rev/s
-5 RPM | rad/s | 5 rpm
-5 Newton | N | 5 newton
-2 N m | N m/rad | 2 N m/rad
-5 1/s | rad/s | 5 rad/s
-5 1/min | rad/s | 5 rev/min
-5 kg cm2 | kg m^2 | 5 kg cm^2
-1 m/s2 | m/s^2 | 1 m/s^2
-30 cms | m | 30 cm
-300 MM | m | 300 mm
-5 pounds | N | 5 lbf
-0,3 m | m | 0.3 m
 """),
 )
 def test_what_may_have_been_meant_is_one(text, unit, meant):
@@ -299,16 +287,7 @@ def test_every_prefix_is_its_power_of_ten(prefix):
     assert to_si(f"3 {prefix}N", "N") == float(3 * Fraction(10) ** PREFIXES[prefix])
 
 
-@pytest.mark.parametrize(
-    "text, plain",
-    read_rows("""
-84 rad/s cw | -84 rad/s
-84 rpm CW | -84 rpm
-5 rpm ccw | 5 rpm
--5 N m cw | 5 N m
--5 rpm ccw | -5 rpm
-"""),
-)
-def test_a_sense_of_turning_is_a_sign(text, plain):
-    with raises(UnitError, match=f'positive: "{plain}"'):
+@pytest.mark.parametrize("text", ["84 rad/s cw", "5 rpm CCW", "-5 rpm clockwise"])
+def test_a_sense_of_turning_is_a_sign(text):
+    with raises(UnitError, match="counter-clockwise is positive"):
         to_si(text, "rad/s")

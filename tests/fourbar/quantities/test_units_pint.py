@@ -47,7 +47,7 @@ def test_what_is_no_length_is_refused(quantity, sentence):
 
 def test_hertz_are_no_speed():
     """pint converts 10 Hz to 10 rad/s, a sixth of the speed that is meant."""
-    with raises(InputError, match=r'did you mean "10\.0 rev/s"'):
+    with raises(InputError, match='"Hz" is not known'):
         Motion(0.0, 10.0 * ureg.hertz)
 
 
