@@ -13,7 +13,6 @@ All three vanish at change points alone.
 """
 
 import math
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +36,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solving import solve
+from fourbar.studies.course import MotionCourse
 from fourbar.studies.passing import say_nowhere
 from fourbar.studies.sloped import Sloped, take_slopes
 
@@ -83,11 +83,9 @@ class _Sizes(Actions):
             self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
 
     def moment_about_pin(self, bar: int, moment: Any) -> None:
-        super().moment_about_pin(bar, moment)
         self.size = self.size + np.abs(moment) * self.fastest
 
     def pin_couple(self, pin: str, couple: Any) -> None:
-        super().pin_couple(pin, couple)
         self.size = self.size + np.abs(couple) * self.fastest
 
 
@@ -122,48 +120,42 @@ class CircuitCurve:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.case = scene, Case.of(scene)
         at, linkage = of_input(scene), scene.linkage
-        self.case = self.case.begin_with(at) if scene.counts_turns else self.case
+        self.scene, self.case = scene, Case.of(scene)
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
         """The lengths by a unit near them. No product of them leaves the range of
         doubles.
         """
-        number = find_circuit(linkage, at.theta_2, at.branch)
-        if (number < 0).all():
+        numbers = find_circuit(linkage, at.theta_2, at.branch)
+        if (numbers < 0).all():
             raise NotAssembledError(say_nowhere(scene))
-        self.circuit = circuits(linkage)[number[number >= 0][0]]
+        if scene.counts_turns:  # from the first position on
+            assembly = np.full_like(at.branch, at.branch[0])
+            self.case = self.case.begin_with(at._replace(branch=assembly))
+        self.number = int(numbers[numbers >= 0][0])
+        """Index of the circuit."""
+        circuit = circuits(linkage)[self.number]
         self.full = turns_fully(linkage)
         singular = change_points(linkage)
-        self.branch = int(at.branch[0]) if singular else self.circuit.branches[0]
+        self.branch = int(at.branch[0]) if singular else circuit.branches[0]
         """Branch of a row without limits."""
         turns = int(count_turns(linkage.lengths, 2)) if self.full else 1
         self.period = turns * TURN
         """Angle of the whole row, rad."""
         self.positions = turns * POSITIONS_OF_A_BRANCH
         """Number of positions of the row."""
-        self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
-        self.centre = 0.5 * (self.low + self.high)
-        self.swing = 0.5 * (self.high - self.low)
-        """Half width of the range of psi, rad."""
+        self.low, self.high = (end - self.theta_1 for end in circuit.theta_2)
         self.at = at
-        self.sweep: tuple[float, float] | None = None
-        """Least and greatest theta_2 of a sweep or a law, rad."""
-        self.middle = self.low + math.pi
-        """Place of psi within half a period of which theta_2 is counted, rad."""
-        self.half = math.inf
-        """Distance from there to the ends of the sweep; inf: it has none."""
+        self.start = -self.theta_1 if self.full else self.low
+        """Least psi of a sweep or a law, else where psi is counted from, rad."""
+        self.extent = math.inf
+        """Extent of theta_2 in a sweep or a law, rad; inf: there is none."""
         if isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None:
-            first = float(at.theta_2.min())
-            last = float(at.theta_2.max())
-            self.sweep = (first, last)
-            extent = last - first
-            self.middle = first + 0.5 * min(extent, self.period) - self.theta_1
-            if extent < self.period:
-                self.half = 0.5 * extent
-        elif self.full:
-            self.middle = 0.5 * self.period - self.theta_1
+            self.start = float(at.theta_2.min()) - self.theta_1
+            self.extent = float(np.ptp(at.theta_2))
+        self.middle = self.start + 0.5 * min(self.extent, self.period)
+        """Place of psi within half a period of which theta_2 is counted, rad."""
         self.grid = np.linspace(0.0, self.period, self.positions, endpoint=False)
         """Places of the samples in the row: limits and change points lie between."""
         self.grid += 0.5 * self.period / self.positions
@@ -179,42 +171,30 @@ class CircuitCurve:
     def inside(self, psi: Array) -> NDArray[np.bool_]:
         """Mark where psi lies in the sweep, if one is stated."""
         apart = np.abs(_measure_apart(psi, self.middle, self.period))
-        return np.asarray(apart <= self.half + AT_END_OF_SWEEP)
+        return np.asarray(apart <= 0.5 * self.extent + AT_END_OF_SWEEP)
 
-    def reached(self, points: Array) -> NDArray[np.bool_]:
-        """Mark the points that the sweep passes, all of them without a sweep.
+    def reached(self, tau: Array) -> NDArray[np.bool_]:
+        """Mark the places that the sweep passes, all of them without a sweep.
 
         The others have the same theta_2 on the other side of a limit or change point
         at which the sweep does not arrive.
         """
-        if self.sweep is None:
-            return np.ones(len(points), dtype=bool)
-        sines = np.sin(points[:, 1])
-        passed = np.zeros(len(points), dtype=bool)
-        for low, high, sign in self._runs:
-            apart = _measure_apart(points[:, 0], 0.5 * (low + high), TURN)
-            within = np.abs(apart) <= 0.5 * (high - low) + AT_END_OF_SWEEP
-            passed |= within & (sign * sines >= -AT_END_OF_SWEEP)
-        return passed
+        if self.extent == math.inf:
+            return np.ones(len(tau), dtype=bool)
+        swept = MotionCourse(self.scene, "position").solution
+        points = np.stack([swept.theta_2 - self.theta_1, swept.branch], axis=1)
+        passes = self._holds(swept.theta_2, swept.branch)
+        places = self.tau(points)
+        steps = _measure_apart(np.diff(places), 0.0, self.period)
+        middles = places[:-1] + 0.5 * steps
+        apart = np.abs(_measure_apart(tau[:, None], middles, self.period))
+        within = apart <= 0.5 * np.abs(steps) + AT_END_OF_SWEEP
+        return np.asarray((within & passes[1:] & passes[:-1]).any(axis=1))
 
-    @cached_property
-    def _runs(self) -> list[tuple[float, float, int]]:
-        """Ranges of psi that the sweep passes with one sign of sin mu.
-
-        The sign changes at a limit or a change point between two positions.
-        """
-        places = self.at.theta_2 - self.theta_1
-        signs = find_signs(self.scene.linkage, self.at.angle, self.at.branch)
-        between = np.array([self.low, self.high, *self.singular[:, 0]])
-        changes = np.flatnonzero(np.diff(signs)) + 1
-        runs = []
-        for run in np.split(np.arange(len(signs)), changes):
-            psi = places[run].tolist()
-            for end in {run[0], run[-1]} - {0, len(signs) - 1}:
-                away = _measure_apart(between, places[end], TURN)
-                psi.append(places[end] + away[np.argmin(np.abs(away))])
-            runs.append((min(psi), max(psi), int(signs[run[0]])))
-        return runs
+    def _holds(self, theta_2: Array, branch: Any) -> NDArray[np.bool_]:
+        """Mark the positions that assemble in this circuit."""
+        numbers = find_circuit(self.scene.linkage, theta_2, branch)
+        return np.equal(numbers, self.number)
 
     def points(self, tau: Array) -> Array:
         """Return psi and mu, (n, 2), at places of the row."""
@@ -223,7 +203,8 @@ class CircuitCurve:
             psi = self.low + tau
             sign = self.sign(psi)
         else:
-            psi = self.centre - self.swing * np.cos(tau)
+            centre = 0.5 * (self.low + self.high)
+            psi = centre - 0.5 * (self.high - self.low) * np.cos(tau)
             sign = np.where(tau <= math.pi, 1.0, -1.0)
         return np.stack([psi, sign * transmission_angle(self.ratios, psi)], axis=1)
 
@@ -232,7 +213,8 @@ class CircuitCurve:
         psi = self.low + np.remainder(points[:, 0] - self.low, self.period)
         if self.full:
             return np.asarray(psi - self.low)
-        part = np.arccos(np.clip((self.centre - psi) / self.swing, -1.0, 1.0))
+        away = 0.5 * (self.low + self.high) - psi
+        part = np.arccos(np.clip(2.0 * away / (self.high - self.low), -1.0, 1.0))
         is_open = np.sin(points[:, 1]) >= 0.0
         return np.asarray(np.where(is_open, part, TURN - part))
 
@@ -242,29 +224,27 @@ class CircuitCurve:
         return np.full(psi.shape, self.branch * root_sign)
 
     def samples(self) -> Array:
-        """Sample the row within the sweep and at its ends on each branch, (n, 2)."""
-        points = self.points(self.grid)
-        within = points[self.inside(points[:, 0])]
-        if self.sweep is None or self.half == math.inf:
-            return within
-        psi = np.array(self.sweep) - self.theta_1
-        mu = transmission_angle(self.ratios, psi)
-        on_circuit = np.remainder(psi - self.low, TURN) < self.high - self.low
-        on_circuit &= np.abs(np.sin(mu)) > AT_END_OF_SWEEP
-        psi = psi[on_circuit]
-        mu = mu[on_circuit]
-        signs = [self.sign(psi)] if self.full else [1.0, -1.0]
-        ends = [np.stack([psi, sign * mu], axis=1) for sign in signs]
-        return np.concatenate([within, *ends])
+        """List places of the row in the sweep, and its ends on each branch, (n,)."""
+        places = self.grid
+        if self.extent < self.period:
+            psi = self.start + np.array([0.0, self.extent])
+            sines = np.sin(transmission_angle(self.ratios, psi))
+            on_circuit = self._holds(self.theta_1 + psi, self.branch)
+            psi = psi[on_circuit & (sines > AT_END_OF_SWEEP)]
+            for sign in (1.0, -1.0):
+                ends = np.stack([psi, np.full(psi.shape, sign)], axis=1)
+                places = np.append(places, self.tau(ends))
+        places = np.unique(places)
+        return places[self.inside(self.points(places)[:, 0])]
 
-    def order(self, points: Array) -> NDArray[np.intp]:
-        """Return the indices of the points in the sweep, in order along the row.
+    def order(self, tau: Array) -> NDArray[np.intp]:
+        """Return the indices of the places in the sweep, in order along the row.
 
         A row that goes round begins where theta_2 is counted from.
         """
-        along = self.count(points[:, 0]) if self.full else self.tau(points)
-        order = np.argsort(along, kind="stable")
-        return order[self.inside(points[order, 0])]
+        psi = self.points(tau)[:, 0]
+        order = np.argsort(self.count(psi) if self.full else tau, kind="stable")
+        return order[self.inside(psi[order])]
 
     def state(self, points: Array) -> State:
         """Compute positions with their derivatives along the curve."""
@@ -319,7 +299,7 @@ class CircuitCurve:
         )
 
 
-def _measure_apart(psi: Array, middle: float, period: float) -> Array:
+def _measure_apart(psi: Array, middle: float | Array, period: float) -> Array:
     """Return how far psi lies from a middle, within half a period."""
     away = psi - middle
     return away - period * np.rint(away / period)

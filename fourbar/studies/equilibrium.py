@@ -13,7 +13,7 @@ Fundamentals of Vibrations, ch. 2.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, Self
@@ -22,11 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.mobility import (
-    ANGLE_FROM_LIMITS,
-    TURN,
-    turns_fully,
-)
+from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
@@ -39,7 +35,7 @@ from fourbar.quantities import (
     Array,
 )
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import DEFAULT_STEPS, Motion
+from fourbar.scene.motion import Motion
 from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -159,17 +155,17 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = _list_ranges(curve, curve.level)
+        level = _list_ranges(curve, curve.level, _A_RANGE + 1)
         samples = curve.samples()
-        points, sizes = _find_zeros(curve, samples)
-        order = curve.order(points)
-        order = order[~_mark_wound(curve, points[order])]
+        places, sizes = _find_zeros(curve, samples)
+        order = curve.order(places)
+        order = order[~_mark_wound(curve, places[order])]
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
-            held = _list_ranges(curve, partial(_holds, curve), points[order])
+            held = _list_ranges(curve, partial(_holds, curve), 1, places[order])
         found = []
-        for point, size in zip(points[order], sizes[order], strict=True):
-            found.append(_describe_equilibrium(curve, point, float(size), held))
+        for place, size in zip(places[order], sizes[order], strict=True):
+            found.append(_describe_equilibrium(curve, place, float(size), held))
         positions = _solve_at_rest(curve)
         return Equilibria(
             tuple(found),
@@ -182,15 +178,16 @@ def equilibrium(scene: Scene) -> Equilibria:
         )
 
 
-def _mark_wound(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
-    """Mark points at which a torsion spring is wound beyond half a turn from its rest.
+def _mark_wound(curve: CircuitCurve, tau: Array) -> NDArray[np.bool_]:
+    """Mark places at which a torsion spring is wound beyond half a turn from its rest.
 
     Not marked is what lies beyond a limit or a change point from the first position.
     """
-    wound = np.zeros(len(points), dtype=bool)
+    wound = np.zeros(len(tau), dtype=bool)
     if curve.scene.counts_turns:
-        passed = curve.reached(points)
-        if curve.sweep is None and not curve.full:
+        points = curve.points(tau)
+        passed = curve.reached(tau)
+        if curve.extent == math.inf and not curve.full:
             passed &= np.sin(points[:, 1]) * curve.at.branch[0] > 0.0
         theta_2 = curve.theta_1 + curve.count(points[passed, 0])
         wound[passed] = _is_wound(curve, _turn_to(curve, theta_2))
@@ -202,12 +199,11 @@ def _is_wound(curve: CircuitCurve, theta_2: Array) -> NDArray[np.bool_]:
 
     The spring is followed from the scene's first position that assembles.
     """
-    stated = curve.at
-    assembled = solve(curve.scene, "position", at=stated).assembled
-    angles = np.concatenate([stated.theta_2[assembled][:1], theta_2])
-    branch = np.full(angles.shape, stated.branch[0], dtype=np.int8)
-    followed = solve(curve.scene, "force", at=Command(angles, branch, 0.0, 0.0))
-    return np.asarray(followed.status_code[1:] == WOUND)
+    branch = np.full(theta_2.shape, curve.at.branch[0], dtype=np.int8)
+    state = curve.case.at(Command(theta_2, branch, 0.0, 0.0))
+    springs = [term for term in curve.case.terms if term.counts_turns]
+    codes = np.array([spring.status(state, branch) for spring in springs])
+    return np.asarray((codes == WOUND).any(axis=0))
 
 
 def _turn_to(curve: CircuitCurve, theta_2: Array) -> Array:
@@ -216,7 +212,7 @@ def _turn_to(curve: CircuitCurve, theta_2: Array) -> Array:
     Without a sweep an input that turns fully is turned the other way round where a
     torsion spring would be wound.
     """
-    if curve.sweep is not None or not curve.full or not curve.scene.counts_turns:
+    if curve.extent < math.inf or not curve.full or not curve.scene.counts_turns:
         return theta_2
     back = np.copysign(curve.period, theta_2 - curve.at.theta_2[0])
     return np.where(_is_wound(curve, theta_2), theta_2 - back, theta_2)
@@ -227,25 +223,20 @@ def _solve_at_rest(curve: CircuitCurve) -> Solution:
 
     For a single position, or a released linkage, these are those of the circuit.
     """
-    scene = curve.scene
     at = curve.at
     if len(at.theta_2) == 1:
-        if turns_fully(scene.linkage):
-            theta_2 = default_places(replace(scene, motion=Motion()))
-        else:
-            low, high = curve.circuit.theta_2
-            margin = min(ANGLE_FROM_LIMITS, 0.25 * (high - low))
-            theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
+        of_circuit = replace(curve.scene, motion=Motion())
+        theta_2 = default_places(of_circuit, float(at.theta_2[0]))
         branch = np.full(theta_2.shape, at.branch[0], dtype=np.int8)
         at = Command(theta_2, branch, 0.0, 0.0)
     at = Command(at.theta_2, at.branch, 0.0, 0.0, origin=at.origin)
     turned = at._replace(angle=_turn_to(curve, at.theta_2))
-    return replace(solve(scene, "force", at=turned), theta_2=at.theta_2, at=at)
+    return replace(solve(curve.scene, "force", at=turned), theta_2=at.theta_2, at=at)
 
 
 def _describe_equilibrium(
     curve: CircuitCurve,
-    point: Array,
+    tau: float,
     size: float,
     held: list[_CircuitRange],
 ) -> Equilibrium:
@@ -253,10 +244,12 @@ def _describe_equilibrium(
 
     `size`: of the terms of Q about there. `held`: the ranges that friction holds.
     """
-    state = curve.state(point[None])
+    places = np.array([tau])
+    points = curve.points(places)
+    state = curve.state(points)
     bar = 4 if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
-    along_curve = float(curve.slope(point[None])[0])
+    along_curve = float(curve.slope(points)[0])
     moving = _drop_standing_bar(curve.lengths, state.k)
     inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
     slope = along_curve / square
@@ -268,19 +261,18 @@ def _describe_equilibrium(
     if stability == "stable" and J > 0.0:
         frequency = math.sqrt(-slope / J) / TURN
     ends = None
-    tau = curve.tau(point[None])[0]
     for part in reversed(held):
         if np.remainder(tau - part.low, curve.period) <= part.width:
             ends = part.ends
     return Equilibrium(
-        curve.place(point),
+        curve.place(points[0]),
         stability,
         f"theta_{bar}",
         slope,
         J,
         frequency,
         ends,
-        bool(curve.reached(point[None])[0]),
+        bool(curve.reached(places)[0]),
     )
 
 
@@ -299,104 +291,95 @@ def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
 
 
 class _Grid(NamedTuple):
-    """Points of the row, and the pairs of neighbours between which Q has a value."""
+    """Places of the row, and which of them are neighbours."""
 
     curve: CircuitCurve
-    points: Array
+    places: Array
     Q: Array
-    """Generalised force at each point."""
+    """Generalised force at each place."""
     size: Array
     """Sum of its absolute terms there or at a neighbour, whichever is larger."""
     idle: NDArray[np.bool_]
     """True where Q is nothing."""
-    first: NDArray[np.intp]
-    """Index of the first point of each pair."""
-    second: NDArray[np.intp]
-    tau: Array
-    """Place in the row of the first point of each pair, rad."""
     gap: Array
-    """Distance to the second, rad."""
+    """Distance to the next place along the row, rad."""
+    near: NDArray[np.bool_]
+    """True where no gap of the sweep lies between."""
 
     @classmethod
-    def of(cls, curve: CircuitCurve, points: Array) -> Self:
-        """Pair neighbouring points along the row, but not across a gap of the sweep."""
-        tau = curve.tau(points)
-        first = np.argsort(tau, kind="stable")
-        second = np.roll(first, -1)
-        gap = np.remainder(tau[second] - tau[first], curve.period)
+    def of(cls, curve: CircuitCurve, places: Array) -> Self:
+        """Pair neighbouring places along the row, but not across a gap of the sweep."""
+        places = np.sort(places)
+        gap = np.remainder(np.roll(places, -1) - places, curve.period)
         near = gap < 2.5 * curve.period / curve.positions
-        first = first[near]
-        second = second[near]
+        points = curve.points(places)
         size = curve.size(points)
-        around = size.copy()
-        np.maximum.at(around, first, size[second])
-        np.maximum.at(around, second, size[first])
+        after = np.where(near, np.roll(size, -1), 0.0)
+        before = np.roll(np.where(near, size, 0.0), 1)
+        size = np.maximum(size, np.maximum(before, after))
         Q = curve.generalized_force(points)
-        idle = np.abs(Q) <= ROUND_OFF_OF_Q * around
-        return cls(curve, points, Q, around, idle, first, second, tau[first], gap[near])
+        idle = np.abs(Q) <= ROUND_OFF_OF_Q * size
+        return cls(curve, places, Q, size, idle, gap, near)
 
     def locate(
         self,
-        values: Array,
         compute: Callable[[Array], Array],
         among: NDArray[np.bool_] | bool = True,
     ) -> tuple[Array, Array, Array]:
-        """Locate where a function changes its sign between neighbours.
+        """Locate where a function of points changes its sign between neighbours.
 
-        Return the points, (k, 2), and Q and its size at the first neighbour, (k,).
+        Return the places, and Q and its size at the first neighbour, (k,) each.
 
-        Parameters
-        ----------
-        values : of the function at the points of the grid.
-        among : marks the pairs that may have such a place; one where Q is nothing has
-            none.
+        `among`: marks the pairs that may have such a place; one where Q is nothing has
+        none.
         """
-        chosen = among & (values[self.first] * values[self.second] < 0.0)
-        chosen &= ~self.idle[self.first] & ~self.idle[self.second]
-        first = self.first[chosen]
-        tau = self.tau[chosen]
+        values = compute(self.curve.points(self.places))
+        chosen = among & self.near & (values * np.roll(values, -1) < 0.0)
+        chosen &= ~self.idle & ~np.roll(self.idle, -1)
+        low = self.places[chosen]
+        sides = values[chosen]
 
         def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
-            return np.asarray(compute(self.curve.points(tau)) * values[first] > 0.0)
+            return np.asarray(compute(self.curve.points(tau)) * sides > 0.0)
 
-        _, after = bisect(has_sign_of_start, tau, tau + self.gap[chosen])
-        return self.curve.points(after), self.Q[first], self.size[first]
+        _, after = bisect(has_sign_of_start, low, low + self.gap[chosen])
+        places = np.remainder(after, self.curve.period)
+        return places, self.Q[chosen], self.size[chosen]
 
 
-def _find_zeros(curve: CircuitCurve, points: Array) -> tuple[Array, Array]:
+def _find_zeros(curve: CircuitCurve, samples: Array) -> tuple[Array, Array]:
     """Find the zeros of Q between samples: where its sign changes or its size is least.
 
     A sample without Q may itself be a zero; with another one beside it, it is in a
-    range where Q is nothing. Returned are psi and mu, (n, 2), and the sum of the
-    absolute terms of Q about each, (n,).
+    range where Q is nothing. Returned are the places, (n,), and the sum of the absolute
+    terms of Q about each, (n,).
     """
-    grid = _Grid.of(curve, points)
-    pairs = np.stack([grid.first, grid.second])
-    alone = grid.idle.copy()
-    alone[pairs[:, grid.idle[pairs].all(axis=0)]] = False
+    grid = _Grid.of(curve, samples)
+    both_idle = grid.near & grid.idle & np.roll(grid.idle, -1)
+    alone = grid.idle & ~both_idle & ~np.roll(both_idle, 1)
     # at an end of the sweep nothing beyond shows a sign
-    ending = alone & (np.bincount(pairs.ravel(), minlength=len(points)) == 1)
-    zeros = points[ending]
+    ending = alone & (grid.near != np.roll(grid.near, 1))
+    zeros = grid.places[ending]
     sizes = grid.size[ending]
 
-    points = points[~alone]
-    grid = _Grid.of(curve, points)
-    one_sign = grid.Q[grid.first] * grid.Q[grid.second] > 0.0
-    least, Q_beside, size = grid.locate(curve.slope(points), curve.slope, one_sign)
-    Q = curve.generalized_force(least)
+    grid = _Grid.of(curve, grid.places[~alone])
+    one_sign = grid.Q * np.roll(grid.Q, -1) > 0.0
+    least, Q_beside, size = grid.locate(curve.slope, one_sign)
+    Q = curve.generalized_force(curve.points(least))
     touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
     zeros = np.concatenate([zeros, least[touches]])
     sizes = np.concatenate([sizes, size[touches]])
 
-    points = np.concatenate([points, least[(Q * Q_beside < 0.0) & ~touches]])
-    grid = _Grid.of(curve, points)
-    crossed, _, size = grid.locate(grid.Q, curve.generalized_force)
-    continuous = np.abs(curve.generalized_force(crossed)) <= _A_JUMP * size
+    turns_back = least[(Q * Q_beside < 0.0) & ~touches]
+    grid = _Grid.of(curve, np.concatenate([grid.places, turns_back]))
+    crossed, _, size = grid.locate(curve.generalized_force)
+    Q = curve.generalized_force(curve.points(crossed))
+    continuous = np.abs(Q) <= _A_JUMP * size
     zeros = np.concatenate([zeros, crossed[continuous]])
     sizes = np.concatenate([sizes, size[continuous]])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
-        near = np.abs(np.sin(0.5 * (zeros - point))) < _AT_CHANGE_POINT
-        apart = ~near.all(axis=1)
+        away = np.abs(np.sin(0.5 * (curve.points(zeros) - point)))
+        apart = (away >= _AT_CHANGE_POINT).any(axis=1)
         zeros = zeros[apart]
         sizes = sizes[apart]
     return zeros, sizes
@@ -444,12 +427,15 @@ def _find_moves(curve: CircuitCurve, positions: Solution) -> NDArray[np.int8]:
 def _list_ranges(
     curve: CircuitCurve,
     holds: Callable[[Array], NDArray[np.bool_]],
-    points_held: Array | None = None,
+    least: int,
+    known: Sequence[float] | Array = (),
 ) -> list[_CircuitRange]:
     """List the ranges within the sweep in which a condition holds, along the row.
 
-    `points_held`: points at which the condition is known to hold; None: it is that Q
-    is nothing, and a few samples are no range.
+    Parameters
+    ----------
+    least : samples in a row that are a range.
+    known : places at which the condition holds, besides those of the grid.
     """
 
     def there(tau: Array) -> NDArray[np.bool_]:
@@ -458,13 +444,9 @@ def _list_ranges(
         inside[inside] = holds(points[inside])  # a load may have no value beyond
         return inside
 
-    tau = curve.grid
+    tau = np.append(curve.grid, known)
     inside = there(tau)
-    least = _A_RANGE + 1
-    if points_held is not None:
-        least = 1
-        tau = np.concatenate([tau, curve.tau(points_held)])
-        inside = np.concatenate([inside, np.ones(len(points_held), dtype=bool)])
+    inside[len(curve.grid) :] = True
     order = np.argsort(tau)
     tau = tau[order]
     inside = inside[order]
@@ -486,7 +468,8 @@ def _list_ranges(
     highs, _ = bisect(there, tau[stops], tau[stops + 1])
     ranges = []
     for low, high in zip(lows, highs, strict=True):
-        points = curve.points(low + np.array([0.0, 0.5, 1.0]) * (high - low))
+        places = low + np.array([0.0, 0.5, 1.0]) * (high - low)
+        points = curve.points(places)
         one = curve.place(points[0])
         stop = curve.place(points[2])
         if curve.full and stop.theta_2 < one.theta_2:
@@ -494,6 +477,6 @@ def _list_ranges(
         ends = (one, stop)
         if not curve.full and one.branch == stop.branch == -1:
             ends = (stop, one)
-        is_reached = bool(curve.reached(points).any())
+        is_reached = bool(curve.reached(places).any())
         ranges.append(_CircuitRange(ends, low, high - low, is_reached))
     return ranges

@@ -37,6 +37,7 @@ from fourbar import (
 )
 from fourbar.cli import status
 from fourbar.files import load, loads
+from fourbar.formulas.mobility import find_intervals
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
@@ -320,6 +321,7 @@ def test_what_is_balanced_is_indifferent_over_all_that_it_reaches():
         assert not equilibria.found
         first, last = (end.theta_2 for end in equilibria.indifferent[0])
         assert reached is None or last - first == approx(reached)
+        assert reached != TURN or 0.0 <= first < TURN
     first, last = (degrees(end.theta_2) for end in lamp.indifferent[0])
     assert (first, last) == approx((-40.0, 60.0), abs=1e-9)
 
@@ -415,8 +417,23 @@ def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
         s = solve(replace(scene, motion=swept), "position")
         assert s.assembled.all()
         psi_and_mu = np.stack([s.theta_2, s.theta_4 - s.theta_3], axis=1)
-        assert (curve.reached(psi_and_mu) == (low == 150.0)).all()
+        places = curve.tau(psi_and_mu)
+        assert (curve.reached(places) == (low == 150.0)).all()
         assert low != 150.0 or {*np.sign(s.sin_mu)} == {1.0, -1.0}
+
+
+def test_a_coarse_sweep_reaches_what_it_passes_in_its_circuit_and_no_more():
+    """It leaves the range of theta_2 at one end, and begins again at the other."""
+    linkage = bare(0.876, 0.455, 0.276, 0.398)
+    first, last = linkage_range = find_intervals(linkage)[0]
+    assert len(find_intervals(linkage)) == 1
+    sweep = Sweep(last - 0.5, first + TURN + 0.5, 1)
+    curve = CircuitCurve(Scene(linkage, Motion(sweep)))
+    psi = np.linspace(*linkage_range, 402)[1:-1]
+    passed = (psi < first + 0.5) | (psi > last - 0.5)
+    for branch in (1, -1):
+        points = np.stack([psi, np.full(psi.shape, branch)], axis=1)
+        assert_array_equal(curve.reached(curve.tau(points)), passed & (branch == 1))
 
 
 def test_equilibria_are_printed_in_the_units_of_the_file(run):
