@@ -69,8 +69,10 @@ def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
 def test_within_what_is_allowed_no_prediction_is_needed_and_no_number_fails():
     worst = judge_quantity(1e-15, 9e-15, 0.0)
     assert (worst.position, worst.verdict, worst.decided) == (1, AGREES, 3)
-    worst = judge_quantity(np.nan, 0.0, allowed=np.ones(2))
-    assert (worst.position, worst.verdict, worst.reason[:3]) == (0, FAILS, "NaN")
+    for allowed, verdict in ((0.9, FAILS), (1.0, UNDECIDED)):
+        worst = judge_quantity(np.nan, 0.0, allowed=np.full(2, allowed))
+        assert (worst.position, worst.verdict) == (0, verdict)
+        assert worst.reason.startswith("NaN") == (verdict == FAILS)
 
 
 @pytest.mark.parametrize(

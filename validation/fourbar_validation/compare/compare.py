@@ -485,8 +485,13 @@ class Errors:
 
     @cached_property
     def judged(self) -> Mask:
-        """Positions that have a verdict: an error that is no number needs no digits."""
-        return self.decidable | (self.mask & ~np.isfinite(self.error))
+        """Positions that have a verdict.
+
+        An error that is no number needs no digits; but where round-off is as large as
+        the number itself, none is as good as any.
+        """
+        missing = ~np.isfinite(self.error) & (self.allowed < 1.0)
+        return self.decidable | (self.mask & missing)
 
     @cached_property
     def beyond(self) -> Mask:
@@ -554,12 +559,12 @@ def judge_errors(
     )
     at = int(np.where(candidates, used, -1.0).argmax())
     error = float(errors.error[at])
-    if math.isnan(error):
-        verdict = FAILS
-        why = "NaN"
-    elif not errors.judged[at]:
+    if not errors.judged[at]:
         verdict = UNDECIDED
         why = errors.explain_undecided(at)
+    elif math.isnan(error):
+        verdict = FAILS
+        why = "NaN"
     elif predicted is None or not beyond[at]:
         verdict = FAILS if beyond[at] else AGREES
         why = errors.explain(at)
