@@ -488,6 +488,7 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
 
 BROKEN = fail(mine(engine=FORMULAS, quantity="force_sum"))
 ALONE = fail(mine(quantity="a_G3"), 0.5)
+NAMED = fail(mine(engine="named", quantity="F12"))
 ALONE_TOO = replace(ALONE, engine="two")
 
 
@@ -496,7 +497,10 @@ ALONE_TOO = replace(ALONE, engine="two")
     [
         ([], {"alpha_3": ["mine", "two"]}, {FORMULAS}),
         ([OF_MINE, BROKEN], {}, {FORMULAS}),
-        ([fail(OF_MINE), BROKEN], {}, {FORMULAS, "mine"}),
+        ([fail(OF_MINE), BROKEN], {}, {FORMULAS}),
+        ([fail(OF_MINE), replace(BROKEN, quantity="status")], {}, {FORMULAS, "mine"}),
+        ([fail(OF_MINE), NAMED, BROKEN], {}, {FORMULAS, "named"}),
+        ([fail(mine(quantity="energy"))], {"F12": ["mine", "two"]}, {FORMULAS}),
         ([OF_MINE], {}, {"mine"}),
         ([OF_MINE, ALONE_TOO, BROKEN], {}, {FORMULAS, "mine", "two"}),
     ],
@@ -504,10 +508,12 @@ ALONE_TOO = replace(ALONE, engine="two")
 def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
     rows, against, wrong
 ):
-    """At an angular acceleration on which two agree, or in a sum of forces of which
-    torque and pin forces are confirmed.
+    """At an angular acceleration on which two agree, or in a sum of forces unless a
+    known mistake explains its own; a free motion follows from its forces.
     """
-    summary = summary_of([record_of("a", [*rows, ALONE], against=against)])
+    named = {"named": ["gravity is left out"]}
+    record = record_of("a", [*rows, ALONE], against=against, causes=named)
+    summary = summary_of([record])
     assert {cause.engine for cause in summary.overview.causes} == wrong
 
 

@@ -14,9 +14,10 @@ from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
 from fourbar_validation.engines.pinocchio import PinocchioReleased
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
-from fourbar_validation.run.judge import judge, judge_for_report
+from fourbar_validation.run.judge import judge, judge_for_report, make_question
 
 
 def falling(coupler=0.15):
@@ -74,6 +75,13 @@ def find_spread_by_energy(scene, solution, instant, engine):
 def row(rows, engine, quantity):
     (found,) = (row for row in rows if (row.engine, row.quantity) == (engine, quantity))
     return found
+
+
+def test_engines_that_agree_on_a_released_linkage_against_fourbar_name_it():
+    question = make_question("falling", falling(), ENGINES)
+    question.solution = replace(question.solution, F14=-question.solution.F14)
+    failed = {row.quantity for row in free._compare_forces(question) if row.failed}
+    assert failed == question.against.keys() == {"F14"}
 
 
 @pytest.mark.slow

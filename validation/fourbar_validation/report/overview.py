@@ -72,6 +72,8 @@ _BY_REASON = {
     NO_POSITION: "at no position that can be judged",
 }
 """Those that the reason tells."""
+_FREE_MOTION = ("theta_2", "omega_2", "energy")
+"""Quantities that are compared of a released linkage's motion."""
 _DOES_NOT_APPLY = "where a check does not apply"
 
 
@@ -395,20 +397,23 @@ def _list_ours(scene: Record) -> set[str]:
     """List the quantities in which fourbar itself is wrong.
 
     Engines agree with each other against it, or one that alone answers the quantity is
-    among these. By itself it is believed where equations of fourbar do not hold, whose
-    torque and pin forces agree with its own: then accelerations are wrong.
+    among these. By itself it is believed where equations of fourbar do not hold, unless
+    its torque or pin forces differ by a known mistake. A free motion follows from the
+    forces.
     """
     witnesses = {name for names in scene.against.values() for name in names}
     rows = [row for row in scene.rows if row.engine != FORMULAS]
-    if any(row.engine == FORMULAS and row.failed for row in scene.rows):
+    ours = {row.quantity for row in scene.rows if row.engine == FORMULAS and row.failed}
+    if ours - {"status"}:  # which is that of the free bodies
         forces = [row for row in rows if _find_group(row) in OVERVIEW_GROUPS[:2]]
         failing = {row.engine for row in forces if not row.passed}
-        witnesses |= {row.engine for row in forces} - failing
+        explained = {engine for engine, causes in scene.causes.items() if causes}
+        witnesses |= {row.engine for row in rows} - (failing & explained)
     answered = Counter(row.quantity for row in rows if row.compared)
-    return {*scene.against} | {
-        row.quantity
+    return {*scene.against, *(_FREE_MOTION if scene.against else ())} | {
+        _name_whole(row)
         for row in rows
-        if row.failed and row.quantity in UNITS and answered[row.quantity] == 1
+        if row.failed and _name_whole(row) in UNITS and answered[row.quantity] == 1
         if row.engine in witnesses
     }
 

@@ -19,7 +19,6 @@ from fourbar.effects import Friction, Gravity, Load
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import UNKNOWNS, Array
 from fourbar.scene import Command, Scene, with_signs
-from fourbar.solution import Solution
 from fourbar_validation.compare.answer import ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
@@ -52,6 +51,7 @@ from fourbar_validation.engines.registry import (
     make_demands,
 )
 from fourbar_validation.report.scene_record import Timing
+from fourbar_validation.run.judge_engines import find_agreement
 from fourbar_validation.run.question import Question, select_positions, take_member
 
 FORWARD = {
@@ -215,37 +215,41 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     driven_ones = []
     for prescribed, indices in _prescribe(held, command):
         at = select_positions(command, indices)
-        driven = Question(name, prescribed, at, output=question.output)
-        driven_ones.append((driven, take_member(solution, indices)))
+        driven = Question(
+            name, prescribed, at, question.engines, output=question.output
+        )
+        driven.solution = take_member(solution, indices)
+        driven_ones.append(driven)
+    rows: list[Row] = []
     for engine in question.engines:
         if (
             engine.tolerance == EQUIVALENCE
             and "theta_3" in engine.answers
             and not engine.missing()
         ):
-            rows = partial(_keep_worst_forces, engine, driven_ones)
-            yield from question.attempt(rows, engine.name, "forces")
+            compare = partial(_keep_worst_forces, engine, driven_ones)
+            rows += question.attempt(compare, engine.name, "forces")
+    for driven in driven_ones:
+        question.against |= find_agreement(driven, rows)
+    yield from rows
 
 
 def _keep_worst_forces(
     engine: Engine,
-    driven: list[tuple[Question, Solution]],
+    driven: list[Question],
 ) -> list[Row]:
     """Compare what one engine answers to each part of the motion.
 
     Keep the worst row of each quantity.
     """
     return keep_worst(
-        row
-        for question, solution in driven
-        for row in _compare_forces_by(engine, question, solution)
+        row for question in driven for row in _compare_forces_by(engine, question)
     )
 
 
 def _compare_forces_by(
     engine: Engine,
     driven: Question,
-    solution: Solution,
 ) -> list[Row]:
     """Compare what one engine answers to the motion as a prescribed one."""
     answer = driven.answer(engine)
@@ -258,7 +262,7 @@ def _compare_forces_by(
     # the formulas are conditioned by the angle that is independent there, an engine by
     # theta_2
     conditioned = replace(
-        solution,
+        driven.solution,
         condition=reference.condition,
         drive_condition=reference.drive_condition,
         drive_bar=2,
