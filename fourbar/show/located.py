@@ -1,12 +1,9 @@
 """Positions of a scene's motion at which a column has a value.
 
-Between the places of a grid a column that changes its side of the value passes it, and
-one that comes nearest to it there may touch it. A column that changes its side by a
-jump does not have the value.
+A place of a grid at which a column is larger or less than beside it is moved to the
+extreme that is there. Between two places a column that changes its side of the value
+then passes it; one that changes its side by a jump does not have the value.
 """
-
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -85,6 +82,7 @@ class _LocatedSearch:
         if "1" not in (self.unit, column.divisor):
             self.unit = f"({column.unit})/({column.divisor})"
         self.values = where_assembled(self.course.solution, column.values)
+        self.is_extreme = np.zeros(len(self.values), dtype=bool)
 
     def _read(self, places: Array) -> Array:
         """Return the column at places in an array of any shape."""
@@ -92,56 +90,73 @@ class _LocatedSearch:
         column = read_column(solution, self.name)
         return where_assembled(solution, column.values).reshape(np.shape(places))
 
-    def _gap(self, places: Array) -> Array:
-        """Return the gaps at places in an array of any shape."""
-        return self._measure_gaps(self._read(places))
+    def _gap(self, places: Array, value: Array | float) -> Array:
+        """Return how far the column at places is from values, in an array of any shape.
 
-    def _measure_gaps(self, values: Array) -> Array:
-        """Return how far values lie from the one sought, of angles modulo a turn."""
-        gaps = values - self.value
-        if self.unit == "rad":
-            gaps = np.angle(np.exp(1j * gaps))
-        return np.asarray(gaps)
+        Angles are counted modulo a turn.
+        """
+        return self._wrap(self._read(places) - value)
 
-    def _minimize(self, function: Callable[..., Array], rows: Any, *side: Array) -> Any:
-        """Locate the least values of a function about places of the course."""
+    def _wrap(self, gaps: Array) -> Array:
+        return np.angle(np.exp(1j * gaps)) if self.unit == "rad" else gaps
+
+    def _locate_extremes(self) -> None:
+        """Move places at which the column is larger or less than beside to extremes."""
         from scipy.optimize.elementwise import find_minimum
 
-        bracket = tuple(self.places[rows + shift] for shift in (-1, 0, 1))
-        located = {"xatol": LOCATED * self.course.span, "xrtol": 0.0}
-        return find_minimum(function, bracket, args=side, tolerances=located)
+        rises = np.sign(np.diff(self.values))
+        turns = (rises[:-1] != 0.0) & (rises[1:] * rises[:-1] <= 0.0)
+        rows = 1 + np.flatnonzero(turns)
+        sides = -rises[rows - 1]
+        located = find_minimum(
+            lambda places, side, value: side * self._gap(places, value),
+            tuple(self.places[rows + shift] for shift in (-1, 0, 1)),
+            args=(sides, self.values[rows]),
+            tolerances={"xatol": LOCATED * self.course.span, "xrtol": 0.0},
+        )
+        rows = rows[located.success]
+        self.places[rows] = located.x[located.success]
+        self.values[rows] += (sides * located.f_x)[located.success]
+        self.is_extreme[rows] = True
 
     def locate(self, text: str) -> Command:
         """Locate the positions that have a value, in the order of the motion."""
-        self.value = 0.0 if text in EXTREMES else self._read_value(text)
+        value = 0.0 if text in EXTREMES else self._read_value(text)
         finite = self.values[np.isfinite(self.values)]
         if not finite.size:
             raise NotAssembledError(f"--at {self.name}: it has no value in this motion")
-        if np.ptp(finite) <= CONSTANT * np.abs(finite).max():
-            raise self._refuse(text, "it is constant", finite)
         # the largest value may stand beside a pole
-        usual = _find_usual_size(finite)
+        sizes = np.abs(finite[finite != 0.0])
+        self.usual = float(np.percentile(sizes, USUAL)) if sizes.size else 0.0
+        if np.ptp(finite) <= CONSTANT * np.abs(finite).max():
+            raise self._refuse(text, "it is constant")
+        self._locate_extremes()
+        extent = float(np.percentile(np.abs(finite - np.median(finite)), USUAL))
         if text in EXTREMES:
-            place, value = self._find_extreme(EXTREMES[text])
-            if abs(value) > UNBOUNDED_BEYOND * usual:
-                raise self._refuse(text, "it has none", finite)
-            return self.course.command(np.array([place]))
-        gaps = self._measure_gaps(self.values)
-        gaps[np.abs(gaps) <= CONSTANT * max(usual, abs(self.value))] = 0.0
+            sided = EXTREMES[text] * self.values
+            row = int(np.nanargmin(sided))
+            if abs(self.values[row]) > UNBOUNDED_BEYOND * self.usual:
+                raise self._refuse(text, "it has none")
+            # the first of equal ones
+            ties = self.is_extreme & (sided <= sided[row] + TOUCHES * extent)
+            row = min([row, *np.flatnonzero(ties).tolist()])
+            return self.course.command(self.places[row : row + 1])
+        gaps = self._wrap(self.values - value)
+        room = np.full(len(gaps), CONSTANT * max(self.usual, abs(value)))
+        room[self.is_extreme] = TOUCHES * extent
+        gaps[np.abs(gaps) <= room] = 0.0
         zeros = gaps == 0.0
         if (zeros[1:] & zeros[:-1]).any():
-            raise self._refuse(text, "it is constant there", finite)
-        extent = float(np.percentile(np.abs(finite - np.median(finite)), USUAL))
-        touches, brackets = self._find_touches(gaps, extent)
-        passed, jumps = self._find_crossings(gaps, brackets)
-        found = np.concatenate([self.places[zeros], touches, passed])
+            raise self._refuse(text, "it is constant there")
+        passed, jumps = self._find_crossings(gaps, value)
+        found = np.concatenate([self.places[zeros], passed])
         if not found.size:
             why = "no position has it"
             if jumps.size:
                 places = drop_rounding(np.sort(jumps), self.course.span).tolist()
                 jumped = [write_place(self.commanded, place) for place in places]
                 why = f"it jumps over it at {self.commanded} = {', '.join(jumped)}"
-            raise self._refuse(text, why, finite)
+            raise self._refuse(text, why)
         found = np.sort(found)
         if self.places[0] > self.places[-1]:
             found = found[::-1]
@@ -156,38 +171,8 @@ class _LocatedSearch:
         hint = f'the unit is missing; did you mean "{text} {name_unit(self.unit)}"?'
         raise InputError("value", f"{self.name}={text}", hint)
 
-    def _find_touches(self, gaps: Array, extent: float) -> tuple[Array, list[Array]]:
-        """Find where the column turns round at the value, or beyond it.
-
-        A place beyond it is returned as two intervals, on each of which the column
-        passes the value.
-        """
-        sides = np.sign(gaps)
-        before, here, after = np.abs([gaps[:-2], gaps[1:-1], gaps[2:]])
-        # between two places a curve goes no farther beyond them than they are apart
-        in_reach = here <= np.maximum(before, after) - here
-        nearest = (here <= before) & (here <= after) & in_reach
-        alike = (sides[1:-1] == sides[:-2]) & (sides[1:-1] == sides[2:])
-        rows = 1 + np.flatnonzero(nearest & alike & (sides[1:-1] != 0.0))
-        if not rows.size:
-            return np.empty(0), []
-        least = self._minimize(
-            lambda places, side: side * self._gap(places), rows, sides[rows]
-        )
-        ends = np.array([self.places[rows - 1], least.x, self.places[rows + 1]])
-        beyond = ends[:, least.f_x < -TOUCHES * extent]
-        at = np.abs(least.f_x) <= TOUCHES * extent
-        return least.x[at], [beyond[:2], beyond[1:]]
-
-    def _find_crossings(
-        self,
-        gaps: Array,
-        brackets: list[Array],
-    ) -> tuple[Array, Array]:
-        """Find where the column passes the value, and where it jumps over it.
-
-        `brackets`: further intervals on which it changes its side, (2, k) each.
-        """
+    def _find_crossings(self, gaps: Array, value: float) -> tuple[Array, Array]:
+        """Find where the column passes the value, and where it jumps over it."""
         from scipy.optimize.elementwise import find_root
 
         before = gaps[:-1]
@@ -196,12 +181,9 @@ class _LocatedSearch:
         if self.unit == "rad":  # half a turn away it changes its side, too
             crosses &= np.abs(after - before) < np.pi
         rows = np.flatnonzero(crosses)
-        intervals = [np.stack([self.places[rows], self.places[rows + 1]]), *brackets]
-        low, high = np.concatenate(intervals, axis=1)
-        if not low.size:
-            return low, low
-        root = find_root(self._gap, (low, high))
-        change = np.abs(self._gap(high) - self._gap(low))
+        interval = self.places[rows], self.places[rows + 1]
+        root = find_root(self._gap, interval, args=(value,))
+        change = np.abs(after - before)[rows]
         left = np.abs(root.f_bracket[1] - root.f_bracket[0])
         steady = (root.f_x == 0.0) | (left <= JUMP * change)
         return root.x[steady], root.x[~steady]
@@ -222,42 +204,18 @@ class _LocatedSearch:
                 kept.append(row)
         return places[kept]
 
-    def _refuse(self, text: str, why: str, values: Array) -> NotAssembledError:
+    def _refuse(self, text: str, why: str) -> NotAssembledError:
         """Make the error of a value that no position has, with the column's range."""
-        located = np.array([self._find_extreme(side)[1] for side in EXTREMES.values()])
-        ends = dict.fromkeys(drop_rounding(located, np.abs(values).max()).tolist())
-        usual = _find_usual_size(values)
+        located = np.array([np.nanmin(self.values), np.nanmax(self.values)])
+        largest = np.abs(located).max()
+        ends = dict.fromkeys(drop_rounding(located, largest).tolist())
         start = f"--at {self.name} = {text}: {why}"
-        if np.abs(located).max() > UNBOUNDED_BEYOND * usual:
+        if largest > UNBOUNDED_BEYOND * self.usual:
             return NotAssembledError(f"{start}, and grows without bound")
         unit = "" if self.unit == "1" else self.unit
         extent = write_in_units(unit, *ends, between=" to ")
         word = "is" if len(ends) == 1 else "goes from"
         return NotAssembledError(f"{start}; {self.name} {word} {extent}")
-
-    def _find_extreme(self, side: float) -> tuple[float, float]:
-        """Find the place and the value of the column's extreme on this side.
-
-        `side`: one of `EXTREMES`.
-        """
-        row = int(np.nanargmin(side * self.values))
-        place = self.places[row]
-        value = self.values[row]
-        around = self.values[row - 1 : row + 2]
-        if 0 < row < len(self.values) - 1 and np.isfinite(around).all():
-            least = self._minimize(lambda places: side * self._read(places), row)
-            place = least.x
-            value = side * least.f_x
-        return float(place), float(value)
-
-
-def _find_usual_size(values: Array) -> float:
-    """Return the size that nine tenths of the values other than zero do not exceed.
-
-    Where all are zero it is zero.
-    """
-    sizes = np.abs(values[values != 0.0])
-    return float(np.percentile(sizes, USUAL)) if sizes.size else 0.0
 
 
 def write_place(name: str, place: float) -> str:

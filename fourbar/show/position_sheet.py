@@ -32,7 +32,7 @@ LABEL_WIDTH, _CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
 _NUMBER_LABEL = 22
 """Width of the label of a number that stands alone."""
-ROUNDING_OF_PLACE = 2.0**-26
+ROUNDING_OF_PLACE = 2.0**-23
 """rad; to the root of round-off the place of a largest value is located, at which a
 rate is zero. A number that changes its sign within it is shown as zero.
 """

@@ -115,6 +115,16 @@ def test_the_least_and_the_greatest_value_are_located(name, value, place):
     assert found == approx([radians(float(place))], abs=TOUCHED)
 
 
+def test_the_first_of_equal_extremes_is_located():
+    """A law that goes back as it came is as fast then as on its way out."""
+    assert locate(loads(DWELL), "v_B", "max").time == approx([0.5], abs=TOUCHED)
+
+
+def test_an_extreme_halfway_between_two_places_of_the_grid_is_located():
+    scene = parallelogram('{ from = "0 deg", to = "180 deg", steps = 2001 }')
+    assert locate(scene, "B_y", "0.5 m").places == approx([pi / 2], abs=TOUCHED)
+
+
 def test_a_spring_that_seldom_pushes_has_a_least_force():
     """O4 and A come nearer than 0.31 m within 7 deg alone, and are 0.3 m apart at 0."""
     (springs,) = parallelogram().effects
