@@ -74,8 +74,8 @@ def _show_report(report: RobotReport) -> None:
             "in an SDF a further joint or <drake:ball_constraint>."
         )
     for closure in report.closures:
-        remarks = () if closure.loop is None else closure.loop.remarks
-        for remark in remarks:
+        loop = closure.loop
+        for remark in () if loop is None else (*loop.chosen, *loop.remarks):
             print_sentence(f"note: {closure.name}: {remark}")
     for note in report.notes:
         print_sentence(f"note: {note}")

@@ -698,7 +698,7 @@ class _Finder:
         groups = groups[at_ground:] + groups[:at_ground]
         joints = joints[at_ground:] + joints[:at_ground]
         # the ground lies between the joints at the end and at the beginning
-        driven, remarks = self._choose_driven([joints[0], joints[-1]], chain)
+        driven, chosen = self._choose_driven([joints[0], joints[-1]], chain)
         if driven != joints[0]:
             groups[1:] = reversed(groups[1:])
             joints.reverse()
@@ -770,11 +770,12 @@ class _Finder:
                 " pin by two sites"
             )
         closures, others = self._sort_equalities(loop)
-        remarks += _describe_offset(self.posed, closures, loop, normal)
+        remarks = _describe_offset(self.posed, closures, loop, normal)
         return replace(
             loop,
             closures=closures,
             other_equalities=others,
+            chosen=tuple(chosen),
             remarks=tuple(remarks),
         )
 

@@ -30,10 +30,12 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.quantities import Array
+from fourbar.scene import find_signs
 from fourbar.scene.motion import OPEN
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.free_body_closure import close
@@ -78,8 +80,6 @@ CLOSED = 1e-15
 """m or rad; residual of the closure at which a state is closed: a stiff constraint
 turns 1e-12 m into 1e-6 N. Steps end before it where rounding leaves more.
 """
-NEARLY_CLOSED = 1e-9
-"""The same of a state on the way to the one that is asked for."""
 _CLOSING_STEPS = 50
 RESIDUAL_OF_AN_OPEN_LOOP = 1e-6
 """Residual above which the loop does not close at a position, m or rad."""
@@ -200,11 +200,17 @@ class LoopInside:
         self.basis = np.zeros((model.nv, len(self.passive)))
         self.basis[self.passive, range(len(self.passive))] = 1.0
         self.basis[self.lead] = -self.turn[self.lead] * self.turn[self.passive]
-        self._last = loop.qpos.copy()
-        self._rates = self._find_first_rates()
-        """Turn of the hinges that follow by that of the commanded bar, at the last
-        pose.
-        """
+        ground, *moving = loop.met
+        self.linkage = FourBar(ground, *map(Bar, moving), ground_angle=loop.angles[0])  # type: ignore[misc]
+        first, second = (loop.angles[one - 1] for one in FOLLOWING[bar])
+        self.signs = np.array([1 if math.sin(second - first) > 0.0 else -1], np.int8)
+        """Sign of the sine of the angle between the bars that follow in the pose."""
+        self.assembly: NDArray[np.int8] | int = branch
+        if not is_in_line(loop.angles, bar):
+            at_pose = np.array([loop.angles[bar - 1]])
+            self.assembly = find_signs(self.linkage, at_pose, self.signs, bar)
+        self._theta = np.array(loop.angles)
+        """theta_1 to theta_4 at the last pose, with their whole turns, rad."""
         self.bearers = BearerForces(self.model)
         self._bars = list_bars(model, loop)
         self.flywheel = 0.0
@@ -299,92 +305,38 @@ class LoopInside:
             return self.angle(qpos)
         return float(qpos[self.model.jnt_qposadr[self.joint]])
 
-    def _move(self, qpos: Array, motion: Array) -> None:
-        """Move the hinges of the loop by a motion, (nv,)."""
-        qpos[self.addresses] += motion[self.moving]
-
-    def _turn_to(self, qpos: Array, angle: float) -> None:
-        """Bring the commanded bar to an angle; the hinges that follow stay."""
-        address = self.model.jnt_qposadr[self.model.dof_jntid[self.lead]]
-        qpos[address] = self.loop.qpos[address]
-        qpos[address] += self.turn[self.lead] * (angle - self.angle(qpos))
-
     def close(self, wanted: float) -> Array | None:
         """Return the pose at an angle of the commanded bar, or None if it is open.
 
-        The loop is followed from the last pose in strides. A stride begins as the one
-        before it went on, so that the motion passes a change point smoothly.
+        The bars are followed from the last pose in strides, so that whole turns of the
+        hinges count, and through change points as a scene does.
         """
-        qpos = self._last.copy()
-        rates = self._rates
-        start = self.angle(qpos)
+        start = self._theta[self.bar - 1]
         strides = max(math.ceil(abs(wanted - start) / _STRIDE), 1)
-        stride = (wanted - start) / strides
-        for number in range(1, strides + 1):
-            before = qpos.copy()
-            self._move(qpos, self.basis @ (rates * stride))
-            self._turn_to(qpos, start + number * stride)
-            on_the_way = number < strides
-            if not self.close_gap(qpos, NEARLY_CLOSED if on_the_way else CLOSED):
-                return self._jump(wanted)
-            if stride:
-                rates = self._read_turns(qpos - before) / stride
-        self._last = qpos.copy()
-        self._rates = rates
-        return qpos
+        angles = np.linspace(start, wanted, strides + 1)
+        signs = find_signs(self.linkage, angles, self.assembly, self.bar)
+        qpos = self._follow(angles, signs)
+        return qpos if self.close_gap(qpos) else None
 
-    def _read_turns(self, change: Array) -> Array:
-        """Return the turns of the hinges that follow in a change of pose, (k,), rad."""
-        joints = self.model.dof_jntid[self.passive]
-        return np.asarray(change[self.model.jnt_qposadr[joints]])
+    def _follow(self, angles: Array, signs: NDArray[np.int8]) -> Array:
+        """Return the pose at the last of some angles of the commanded bar, (nq,).
 
-    def _jump(self, wanted: float) -> Array | None:
-        """Return the pose at an angle of the commanded bar to which no motion leads.
-
-        The assembly is that of the loop's pose; None if the loop is open.
-        """
-        qpos = self._assemble(wanted, self._pose_sine)
-        if qpos is None:
-            return None
-        self._turn_to(qpos, wanted)
-        if not self.close_gap(qpos):
-            return None
-        self._last = qpos.copy()
-        self._rates = self._find_rates(qpos)
-        return qpos
-
-    @property
-    def _pose_sine(self) -> float:
-        """Sine of the angle between the bars that follow in the loop's pose."""
-        first, second = (self.loop.angles[one - 1] for one in FOLLOWING[self.bar])
-        return math.sin(second - first)
-
-    def _assemble(self, wanted: float, sign: float) -> Array | None:
-        """Return the pose at an angle of the commanded bar in an assembly, (nq,).
-
-        Each hinge but the driven one turns by less than half a turn. None if the loop
-        is open. `sign`: of the sine of the angle from the first bar that follows to the
-        second.
+        Angles at which the loop is open are passed over. `signs`: of the sine of the
+        angle from the first bar that follows to the second.
         """
         loop = self.loop
-        bar = self.bar
-        ground, crank, coupler, output = loop.lengths
-        moving = (Bar(crank), Bar(coupler), Bar(output))
-        linkage = FourBar(ground, *moving, loop.angles[0])
-        branch = np.array([math.copysign(1.0, sign)]).astype(np.int8)
-        closed = close(linkage, np.array([wanted]), branch, bar)
-        if not closed.assembled[0]:
-            return None
-        turned = {1: 0.0, bar: wanted - loop.angles[bar - 1]}
-        for one, theta in zip(FOLLOWING[bar], closed.theta[:, 0].tolist(), strict=True):
-            turned[one] = math.remainder(theta - loop.angles[one - 1], math.tau)
+        closed = close(self.linkage, angles, signs, self.bar).theta
+        theta = np.full((len(angles), len(loop.angles)), loop.angles[0])
+        theta[:, self.bar - 1] = angles
+        theta[:, [bar - 1 for bar in FOLLOWING[self.bar]]] = closed.T
+        path = [self._theta, *theta[np.isfinite(closed[0])]]
+        self._theta = np.unwrap(path, axis=0)[-1]
+        self._theta[self.bar - 1] = angles[-1]
+        turned = self._theta - loop.angles
         qpos = loop.qpos.copy()
         for pin, joint in loop.hinges.items():
-            first, second = PINS[pin]
-            turn = turned[second] - turned[first]
-            if pin != "O2":
-                turn = math.remainder(turn, math.tau)
-            qpos[self.model.jnt_qposadr[joint]] += loop.senses[pin] * turn
+            first, second = (turned[bar - 1] for bar in PINS[pin])
+            qpos[self.model.jnt_qposadr[joint]] += loop.senses[pin] * (second - first)
         return qpos
 
     def reflect(self) -> Array | None:
@@ -392,9 +344,8 @@ class LoopInside:
 
         None where it does not close.
         """
-        qpos = self._assemble(self.loop.angles[self.bar - 1], -self._pose_sine)
-        if qpos is None:
-            return None
+        angle = np.array([self.loop.angles[self.bar - 1]])
+        qpos = self._follow(angle, -self.signs)
         # put together anew, no spring is wound by more than half a turn
         for joint in {*self.loop.hinges.values()} - {self.joint}:
             address = self.model.jnt_qposadr[joint]
@@ -410,25 +361,7 @@ class LoopInside:
         _, jacobian = self._evaluate_closure(qpos)
         return _solve_least_squares(jacobian @ self.basis, -jacobian @ self.step)
 
-    def _find_first_rates(self) -> Array:
-        """Return the turns as of `_find_rates` in the pose of the loop, (k,).
-
-        Where the bars that follow are in line there, motions of both assemblies pass
-        through it: the turns are those to a pose a stride away, on the side of the line
-        where the sine has the sign of the branch.
-        """
-        loop = self.loop
-        if is_in_line(loop.angles, self.bar):
-            angle = loop.angles[self.bar - 1]
-            stride = math.copysign(_STRIDE, math.sin(angle - loop.angles[0] + _STRIDE))
-            if self.bar == 4:
-                stride = -stride
-            after = self._assemble(angle + stride, self.branch)
-            if after is not None:
-                return self._read_turns(after - loop.qpos) / stride
-        return self._find_rates(loop.qpos)
-
-    def close_gap(self, qpos: Array, enough: float = CLOSED) -> bool:
+    def close_gap(self, qpos: Array) -> bool:
         """Move the hinges that follow until the closure's residual is least.
 
         Return whether the loop is then closed.
@@ -442,10 +375,10 @@ class LoopInside:
                 break
             least = size
             best = qpos.copy()
-            if size <= enough:
+            if size <= CLOSED:
                 break
             turns = _solve_least_squares(jacobian @ self.basis, -residual)
-            self._move(qpos, self.basis @ turns)
+            qpos[self.addresses] += (self.basis @ turns)[self.moving]
         # axes that are not parallel leave a gap
         skew = self.loop.misaligned * max(self.loop.lengths)
         rounding = GAP_OF_ROUNDING * self.loop.rounding

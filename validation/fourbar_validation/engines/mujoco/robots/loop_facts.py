@@ -105,10 +105,12 @@ class RobotLoop:
     """The same before the loops were closed, m."""
     other_equalities: tuple[int, ...] = ()
     """Active equalities that act on its moving bars and are no closure of it."""
+    chosen: tuple[str, ...] = ()
+    """Why its driven hinge is taken, where neither a motor nor an option tells."""
     remarks: tuple[str, ...] = ()
-    rounding: float = 0.0
-    """Sum by which the lengths of its scene differ from its own, m. They differ where
-    the digits of the file cannot tell the linkage from one with a change point.
+    read_lengths: tuple[float, ...] = ()
+    """Lengths of its scene, m; empty where they are its own. They differ where the
+    digits of the file cannot tell the linkage from one with a change point.
     """
 
     @property
@@ -125,6 +127,16 @@ class RobotLoop:
     def angles(self) -> tuple[float, ...]:
         """theta_1 to theta_4 in the pose, rad."""
         return tuple(map(cmath.phase, self.lines))
+
+    @property
+    def met(self) -> tuple[float, ...]:
+        """Lengths of ground, input, coupler and output as they are read, m."""
+        return self.read_lengths or self.lengths
+
+    @property
+    def rounding(self) -> float:
+        """Sum by which the lengths that are read differ from its own, m."""
+        return sum(abs(x - y) for x, y in zip(self.met, self.lengths, strict=True))
 
     @property
     def longest(self) -> float:

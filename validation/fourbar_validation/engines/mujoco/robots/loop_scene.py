@@ -125,7 +125,7 @@ def make_loop_scene(
     """Make a scene from a loop in its pose; errors as of `read_loop_scene`."""
     made = SceneOfLoop(compiled, posed, loop)
     scene = made.describe(DEFAULT_SPEED if speed is None else speed, title, source)
-    remarks = [*loop.remarks, *made.remarks]
+    remarks = [*loop.chosen, *loop.remarks, *made.remarks]
     if speed is None:
         remarks.append(
             f"a speed of {DEFAULT_SPEED:g} rad/s is taken; --speed states another"
@@ -153,15 +153,15 @@ def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
 def write_pose(
     model: mujoco.MjModel,
     loop: RobotLoop,
-    qpos: Array,
+    qpos: Array | None,
 ) -> str:
     """Write the hinges of a loop in a pose as the value of --pose.
 
-    The digits close the loop to 1e-8 of its bars. The text is empty where a hinge would
-    be outside its range.
+    The digits close the loop to 1e-8 of its bars. The text is empty without a pose, and
+    where a hinge would be outside its range.
     """
     hinges = sorted(loop.hinges.values())
-    if not {*hinges}.isdisjoint(find_outside(model, qpos)):
+    if qpos is None or not {*hinges}.isdisjoint(find_outside(model, qpos)):
         return ""
     parts = []
     for joint in hinges:
@@ -322,8 +322,7 @@ class SceneOfLoop:
                 "lengths read as equal within the digits of the file:"
                 f" {'; '.join(equal)}"
             )
-            changes = (abs(x - y) for x, y in zip(stated, met, strict=True))
-            self.loop = replace(self.loop, rounding=math.fsum(changes))
+            self.loop = replace(self.loop, read_lengths=met)
         return met
 
     @property
@@ -509,9 +508,7 @@ class SceneOfLoop:
                 f" not tell the assembly: it closed to the {BRANCH_NAMES[branch]} one"
             )
             reflected = reflect(self.model, self.loop)
-            if reflected is not None and (
-                pose := write_pose(self.model, self.loop, reflected)
-            ):
+            if pose := write_pose(self.model, self.loop, reflected):
                 text += f"; --pose {pose} closes to the other"
             self._remark(text)
         return branch

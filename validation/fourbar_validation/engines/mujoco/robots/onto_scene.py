@@ -18,6 +18,7 @@ import numpy as np
 from fourbar.effects import Gravity
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import find_circuit
+from fourbar.linkage import ENDS
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
@@ -25,14 +26,9 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
     list_closing,
     name_body,
-    name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.closures import (
-    choose_loop,
-    find_closures,
-    find_loops,
-)
+from fourbar_validation.engines.mujoco.robots.closures import find_loops
 from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
     compile_robot,
@@ -43,7 +39,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
     FLAT,
     SITE_ROLES,
-    PoseOptions,
     RobotFile,
     RobotLoop,
     is_in_line,
@@ -190,30 +185,37 @@ def _fit(
     scene: Scene,
     options: MeasureOptions,
 ) -> tuple[float, LoopOfScene]:
-    """Return by how much the lengths of the nearest loop miss a scene, and the loop."""
+    """Return by how much the lengths of the nearest loop miss a scene, and the loop.
+
+    A loop is driven at either end unless a joint is stated.
+    """
     posed = pose_robot(compiled.model, options.pose)
     loops = find_loops(posed, options.pose, options.loop)
-    ways = [way for loop in loops for way in _list_ways(posed, loop, options.pose)]
+    ways = [*loops]
+    if options.pose.drive is None:
+        ways = [way for one in loops for way in (one, one.seen_from_other_end())]
     model = posed.model
-    wanted = {role: name for role, name in options.names.items() if role in BAR_ROLES}
-    bodies = {role: _find_body(model, name) for role, name in wanted.items()}
-    fitting = [way for way in ways if not _count_misnamed(model, way, bodies)]
-    if not fitting:
-        stated = ", ".join(f"{role}={name}" for role, name in wanted.items())
-        bars = "; ".join(_write_bars(model, way) for way in ways)
-        raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
-    names = [model.body(body).name for body in range(model.nbody)]
+    names = [name_body(model, body) for body in range(model.nbody)]
+    wanted = {}
+    for role, name in options.names.items():
+        if role in BAR_ROLES and name not in names:
+            listed = ", ".join(names[1:])
+            raise InputError("--name", name, f"no such body; the file has: {listed}")
+        if role in BAR_ROLES:
+            wanted[role] = names.index(name)
     usual = {role: names.index(role) for role in BAR_ROLES if role in names}
 
-    def rank(way: RobotLoop) -> tuple[float, int]:
+    def rank(way: RobotLoop) -> tuple[int, float, int]:
         missed = ALIKE * round(miss_lengths(scene, way) / ALIKE)
-        return missed, _count_misnamed(model, way, usual)
+        misnamed = _count_misnamed(model, way, wanted)
+        return misnamed, missed, _count_misnamed(model, way, usual)
 
-    loop = min(fitting, key=rank)
-    # one of its pins on the ground is a hinge, by which it is found again
-    ground = loop.hinges.get("O2", loop.hinges.get("O4", -1))
-    pose = replace(options.pose, drive=name_joint(model, ground))
-    loop, robot = close_onto(scene, posed, loop, pose)
+    loop = min(ways, key=rank)
+    if _count_misnamed(model, loop, wanted):
+        stated = ", ".join(f"{role}={names[body]}" for role, body in wanted.items())
+        bars = "; ".join(_write_bars(model, way) for way in ways)
+        raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
+    loop, robot = close_onto(scene, posed, loop)
     described = SceneOfLoop(compiled, robot, loop)
     described.meet_lengths()
     turned = find_turn(scene, described.loop)
@@ -228,26 +230,6 @@ def _fit(
         as_it_is=not loop.held,
     )
     return miss_lengths(scene, loop), found
-
-
-def _list_ways(
-    posed: PosedRobot, loop: RobotLoop, pose: PoseOptions
-) -> list[RobotLoop]:
-    """List a loop as it is driven, and from its other end unless a joint is stated."""
-    if pose.drive is not None:
-        return [loop]
-    pose = replace(pose, drive=name_joint(posed.model, loop.hinges["O2"]))
-    driven = choose_loop(find_closures(posed, pose), loop.name)
-    return [driven, driven.seen_from_other_end()]
-
-
-def _find_body(model: mujoco.MjModel, name: str) -> int:
-    """Find a body by its name; an InputError lists what the file has."""
-    names = [name_body(model, body) for body in range(model.nbody)]
-    if name not in names:
-        listed = ", ".join(names[1:])
-        raise InputError("--name", name, f"no such body; the file has: {listed}")
-    return names.index(name)
 
 
 def _count_misnamed(
@@ -267,127 +249,74 @@ def _write_bars(model: mujoco.MjModel, loop: RobotLoop) -> str:
 
 
 def close_onto(
-    scene: Scene,
-    posed: PosedRobot,
-    loop: RobotLoop,
-    pose: PoseOptions,
+    scene: Scene, posed: PosedRobot, loop: RobotLoop
 ) -> tuple[RobotLoop, PosedRobot]:
     """Return a loop seen from the scene's side, and the robot in that assembly.
+
+    Gravity tells the side, or else the pose does. A pose of the other assembly, or one
+    that tells none, is closed onto that of the scene.
 
     Raises
     ------
     InputError : gravity tells that the pose is of the other assembly, from which the
         linkage does not move into that of the scene.
     """
-    sides = (loop, loop.seen_from_behind())
     bar = command(scene).bar
-    in_front, from_behind = (_fits_gravity(scene, posed, side) for side in sides)
-    if loop.is_flat(bar):
-        behind = from_behind and not in_front
-        return _close_flat(scene, posed, loop, pose, behind)
-    behind = is_seen_from_behind(scene, loop.angles)
-    if in_front == from_behind:
-        if not behind:
-            return loop, posed
-        seen = replace(sides[1], remarks=(*loop.remarks, _BEHIND))
-        return seen, posed
-    if behind == from_behind:
-        return sides[behind], posed
-    return _move_over(scene, posed, loop, pose, not behind)
-
-
-def _sample_loop(
-    posed: PosedRobot, loop: RobotLoop, pose: PoseOptions, behind: bool
-) -> RobotLoop:
-    """Return a loop, driven as it is, in another pose and seen from one side."""
-    sampled = choose_loop(find_closures(posed, pose), loop.name)
-    if sampled.hinges.get("O2") != loop.hinges.get("O2"):
-        sampled = sampled.seen_from_other_end()
-    return sampled.seen_from_behind() if behind else sampled
-
-
-def _move_over(
-    scene: Scene,
-    posed: PosedRobot,
-    loop: RobotLoop,
-    pose: PoseOptions,
-    behind: bool,
-) -> tuple[RobotLoop, PosedRobot]:
-    """Return a loop of the other assembly of a scene, moved into that of the scene.
-
-    Raises
-    ------
-    InputError : the linkage does not move from one to the other.
-    """
-    wanted = BRANCH_NAMES[scene.motion.branch]
-    other = BRANCH_NAMES[-scene.motion.branch]
-    seen = loop.seen_from_behind() if behind else loop
-    text = (
-        f"the pose of {loop.name} closes to the {other} assembly and the scene names"
-        f" the {wanted} one (seen so that gravity points as in the scene)"
-    )
-    advice = "state a pose of that one"
-    reflected = reflect(posed.model, seen, command(scene).bar)
+    sides = (loop, loop.seen_from_behind())
+    fits = [_fits_gravity(scene, posed, side) for side in sides]
+    is_told = fits[0] != fits[1]
+    is_flat = loop.is_flat(bar)
+    by_pose = not is_flat and is_seen_from_behind(scene, loop.angles)
+    behind = fits[1] if is_told else by_pose
+    seen = sides[behind]
+    if behind == by_pose and not is_flat:
+        told_by = (_BEHIND,) * (behind and not is_told)
+        return replace(seen, remarks=(*loop.remarks, *told_by)), posed
+    if is_flat and is_in_line(loop.angles, bar):
+        posed = move_to(posed, _leave_flat(scene, posed, seen))
+        seen = _place(seen, posed)
+    ways = [(seen, posed)]
+    reflected = reflect(posed.model, seen, bar)
     if reflected is not None:
         there = move_to(posed, reflected)
-        moved = _sample_loop(there, loop, pose, behind)
-        before, after = find_circuits(scene, [seen.angles, moved.angles])
-        if before == after:
-            remark = f"{text}: it is moved there"
-            return replace(moved, remarks=(*moved.remarks, remark)), there
-        if other_pose := write_pose(posed.model, seen, reflected):
-            advice = f"give --pose {other_pose}"
-    raise InputError("--pose", None, f"{text}: {advice}")
-
-
-def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
-    """Return the circuits of a scene's linkage in which a loop stands, (n,).
-
-    `angles`: theta_1 to theta_4 of the loop, (n, 4), rad.
-    """
-    theta_1, theta_2, theta_3, theta_4 = np.transpose(angles)
-    branches = np.where(np.sin(theta_3 - theta_4) > 0.0, OPEN, CROSSED).astype(np.int8)
-    angle = theta_2 - theta_1 + scene.linkage.ground_angle
-    circuits: list[int] = find_circuit(scene.linkage, angle, branches).tolist()
-    return circuits
-
-
-def _close_flat(
-    scene: Scene,
-    posed: PosedRobot,
-    loop: RobotLoop,
-    pose: PoseOptions,
-    behind: bool,
-) -> tuple[RobotLoop, PosedRobot]:
-    """Close a loop whose pose does not tell its assembly onto that of a scene."""
-    loop = _sample_loop(posed, loop, pose, behind)
-    if is_in_line(loop.angles, command(scene).bar):
-        posed = move_to(posed, _leave_flat(scene, posed, loop))
-        loop = _sample_loop(posed, loop, pose, behind)
-    ways = [(miss_output(scene, loop.angles), loop, posed)]
-    reflected = reflect(posed.model, loop, command(scene).bar)
-    if reflected is not None:
-        other_pose = move_to(posed, reflected)
-        other = _sample_loop(other_pose, loop, pose, behind)
-        ways.append((miss_output(scene, other.angles), other, other_pose))
-    missed, loop, posed = min(ways, key=lambda way: way[0])
-    text = (
-        f"{name_following(command(scene).bar)} are in line in the pose before closing,"
-        " which does not tell the assembly: "
-    )
-    if missed <= FLAT:
-        name = BRANCH_NAMES[scene.motion.branch]
-        text += f"the loop is closed onto the {name} one of the scene"
+        ways.append((_place(seen, there), there))
+    branch = scene.motion.branch
+    wanted = BRANCH_NAMES[branch]
+    if is_flat:
+        moved, robot = min(ways, key=lambda way: miss_output(scene, way[0].angles))
+        text = (
+            f"{name_following(bar)} are in line in the pose before closing, which does"
+            " not tell the assembly: "
+        )
+        found = f"the loop is closed onto the {wanted} one of the scene"
+        if miss_output(scene, moved.angles) > FLAT:
+            found = "no pose that was tried closes onto that of the scene"
+        text += found
     else:
-        text += "no pose that was tried closes onto that of the scene"
-    return replace(loop, remarks=(*loop.remarks, text)), posed
+        moved, robot = ways[-1]
+        text = (
+            f"the pose of {loop.name} closes to the {BRANCH_NAMES[-branch]} assembly"
+            f" and the scene names the {wanted} one (seen so that gravity points as in"
+            " the scene)"
+        )
+        before, after = find_circuits(scene, [seen.angles, moved.angles])
+        if reflected is None or before != after:
+            advice = "state a pose of that one"
+            if other_pose := write_pose(posed.model, seen, reflected):
+                advice = f"give --pose {other_pose}"
+            raise InputError("--pose", None, f"{text}: {advice}")
+        text += ": it is moved there"
+    return replace(moved, remarks=(*loop.remarks, text)), robot
 
 
-def _leave_flat(
-    scene: Scene,
-    posed: PosedRobot,
-    loop: RobotLoop,
-) -> Array:
+def _place(loop: RobotLoop, posed: PosedRobot) -> RobotLoop:
+    """Return a loop of a robot in another pose."""
+    placed = replace(loop, qpos=posed.data.qpos.copy())
+    lines = tuple(map(LoopFrame(placed, posed.data).line, ENDS))
+    return replace(placed, lines=lines, stated_lines=lines)
+
+
+def _leave_flat(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> Array:
     """Return a pose at an angle of the scene at which the bars are not in line."""
     commanded = command(scene)
     inside = LoopInside(posed.model, loop, bar=commanded.bar)
@@ -420,6 +349,18 @@ def _fits_gravity(
         return False
     difference = of_robot / sizes[0] - wanted / sizes[1]
     return bool(np.linalg.norm(difference) <= _SAME_DIRECTION)
+
+
+def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
+    """Return the circuits of a scene's linkage in which a loop stands, (n,).
+
+    `angles`: theta_1 to theta_4 of the loop, (n, 4), rad.
+    """
+    theta_1, theta_2, theta_3, theta_4 = np.transpose(angles)
+    branches = np.where(np.sin(theta_3 - theta_4) > 0.0, OPEN, CROSSED).astype(np.int8)
+    angle = theta_2 - theta_1 + scene.linkage.ground_angle
+    circuits: list[int] = find_circuit(scene.linkage, angle, branches).tolist()
+    return circuits
 
 
 def miss_lengths(scene: Scene, loop: RobotLoop) -> float:
