@@ -200,8 +200,8 @@ class LoopInside:
         self.basis = np.zeros((model.nv, len(self.passive)))
         self.basis[self.passive, range(len(self.passive))] = 1.0
         self.basis[self.lead] = -self.turn[self.lead] * self.turn[self.passive]
-        ground, *moving = loop.met
-        self.linkage = FourBar(ground, *map(Bar, moving), ground_angle=loop.angles[0])  # type: ignore[misc]
+        crank, coupler, output = map(Bar, loop.met[1:])
+        self.linkage = FourBar(loop.met[0], crank, coupler, output, loop.angles[0])
         first, second = (loop.angles[one - 1] for one in FOLLOWING[bar])
         self.signs = np.array([1 if math.sin(second - first) > 0.0 else -1], np.int8)
         """Sign of the sine of the angle between the bars that follow in the pose."""
