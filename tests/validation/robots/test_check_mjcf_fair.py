@@ -267,11 +267,10 @@ def measure_rocker(scene, drawn, theta_4, branch):
 
 
 @pytest.mark.parametrize("branch, behind", [("open", False), ("crossed", True)])
-def test_angles_to_which_no_motion_leads_are_named(branch, behind):
+def test_angles_to_which_no_motion_leads_are_measured(branch, behind):
     theta_4 = solve(BARE, "position").theta_4
     here = np.linspace(theta_4.min() + 0.05, theta_4.max() - 0.05, 3)
     said = measure_rocker(BARE, BARE, np.concatenate([here, -here]), branch)
-    assert "at 3 of 6 positions, O4 = -106.8 to -99.78 deg, the loop is in its" in said
     assert ("its plane is seen from behind" in said) == behind
 
 

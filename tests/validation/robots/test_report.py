@@ -3,23 +3,19 @@
 import csv
 import io
 import math
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from fourbar.effects import Gravity
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
-    Influence,
     MeasureOptions,
-    RobotMeasurement,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
@@ -93,7 +89,7 @@ def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
 
 
 def test_what_has_no_answer_is_no_number_of_a_sentence():
-    """Of the file as it is MuJoCo loses the motion, and held less firmly too."""
+    """Of the file as it is MuJoCo loses the motion."""
     missing, found = WorstState(math.inf), WorstState(0.1, "F12", 0.5, 0.5)
     before = TriedSettings(SETTINGS, {}, found, missing, math.inf, 1e-5)
     changes = {"timestep": "0.0001"}
@@ -102,11 +98,6 @@ def test_what_has_no_answer_is_no_number_of_a_sentence():
     (loop,) = measured().loops
     *_, reached, _, _ = describe_advice(loop, advice)
     assert reached == "error none -> 0.1, gap none -> 0.1 mm, 10 -> 20 us a step"
-    lost = replace(loop, influence=Influence(math.inf, math.inf))
-    measurement = RobotMeasurement((lost,), ())
-    sentences = [one for one in describe_measurement(measurement) if type(one) is str]
-    assert "a tenth of which has no errors to compare" in sentences[1]
-    assert not any(" inf" in one for one in sentences)
 
 
 def test_a_page_holds_sentences_tables_and_elements():
@@ -154,38 +145,14 @@ def describe(scene, joint):
     return _describe_limit(SimpleNamespace(scene=scene), joint)
 
 
-@pytest.mark.parametrize("ground, grow", [(0.0, True), (90.0, False)])
-@pytest.mark.parametrize("side", [-5.0, 5.0])
-def test_forces_are_said_to_grow_only_where_those_of_rigid_pins_do(ground, grow, side):
-    """The bars of a rhombus in line hang along gravity, or across it.
-
-    Along it no moment about a pin asks for a force across the bars; across it the
-    moments of output and coupler ask for opposite ones.
-    """
-    bars = replace(uniform(4.0, 4.0, 4.0, 4.0), ground_angle=math.radians(ground))
-    scene = Scene(bars, Motion(1.0, 1.0), effects=(Gravity(),))
-    told = describe(scene, math.radians(ground + side))
-    assert told.startswith("5 deg from a change point, where ")
-    assert told.endswith("forces grow without bound") == grow
-
-
 def test_a_limit_of_the_bar_that_is_driven_is_told():
     """Driven by its output, whose limits are those of 2 and 3 in line, near 3 + 10."""
     lengths = uniform(9.0, 3.0, 10.0, 8.0)
     limit = math.pi - math.acos((9.0**2 + 8.0**2 - 13.0**2) / (2.0 * 9.0 * 8.0))
     scene = Scene(lengths, Motion(theta_4=2.0, omega_4=1.0))
     told = describe(scene, limit + math.radians(2.0))
-    assert told == "2 deg from a limit position, where forces grow without bound"
+    assert told == "2 deg from a limit position, beyond which the loop does not close"
     assert not describe(scene, limit + 0.4)
-
-
-def test_a_small_transmission_angle_is_told_as_well():
-    """At theta_2 = 0 the bars b = 10, c = 9 and e = d - a = 1.5 are nearly in line."""
-    scene = Scene(uniform(4.5, 3.0, 10.0, 9.0))
-    mu = math.degrees(math.acos((100.0 + 81.0 - 2.25) / 180.0))
-    told = describe(scene, math.radians(3.0))
-    small = f"a transmission angle of {mu:.2g} deg, whose sine divides the forces"
-    assert told == f"3 deg from {small}"
 
 
 @pytest.mark.parametrize(
@@ -202,8 +169,7 @@ def test_advice_begins_with_what_was_reached(solref, error, reached, said):
     changes, error = {"solref": solref} if solref else {}, float(error)
     worst = WorstState(error, "F12", 0.5, 0.5)
     tried = TriedSettings(SETTINGS, changes, worst, WorstState(0.0), 0.0, 1e-6)
-    without = math.inf if reached else 0.4 * error
-    advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None, ("knee",), without)
+    advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None)
     assert advice.reached == bool(reached)
     loop = SimpleNamespace(
         refusal="too many steps", scene=SCENE, turned=0.0, joint="knee"
@@ -213,7 +179,5 @@ def test_advice_begins_with_what_was_reached(solref, error, reached, said):
     assert first.startswith(said)
     no_part = any("No part of the range" in str(block) for block in others)
     assert no_part == (error == 0.1)
-    held = any("knee (frictionloss) holds it back" in str(block) for block in others)
-    assert held == no_part
     decides = "F12 at single states decides, at knee = 28.65 deg"
     assert (decides in others) == math.isfinite(error)

@@ -242,29 +242,12 @@ def _remark(
     remark = next((text for part, text in _REMARKS.items() if part in key), "")
     if key == "closure.by" and "tendon" not in (ours, theirs):
         return ""
-    if "{whose}" in remark:
-        remark = remark.format(**_describe_what_acts(key, ours, theirs))
     if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
         power = math.log10(abs(theirs)) - math.log10(abs(ours))
         tens = round(power)
         if tens and abs(power - tens) <= _TENFOLD and not key.startswith("option"):
             return f"10^{tens} times: units? {remark}"
     return str(remark)
-
-
-def _describe_what_acts(
-    key: str, ours: Value | None, theirs: Value | None
-) -> dict[str, str]:
-    """Say what acts at a pin or along a tendon, where, and which of both lacks it."""
-    if not np.any(ours or 0.0):
-        whose = " that the scene does not have"
-    elif not np.any(theirs or 0.0):
-        whose = " that the file does not have"
-    else:
-        whose = ", of another size than in the scene"
-    if key.startswith("pins."):
-        return {"force": "couple", "place": "at this pin", "whose": whose}
-    return {"force": "force", "place": "along this tendon", "whose": whose}
 
 
 def write_value(value: Value | None) -> str:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
-import numpy as np
 
 from fourbar.errors import write_count
 from fourbar.formulas.mobility import (
@@ -18,10 +17,8 @@ from fourbar.formulas.mobility import (
     find_intervals,
     turns_fully,
 )
-from fourbar.formulas.transmission import transmission_extremes
 from fourbar.quantities import PIN_FORCES, UNITS
-from fourbar.scene import Command, Scene, command
-from fourbar.solving import solve
+from fourbar.scene import command
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import (
     UNDECIDED,
@@ -35,7 +32,6 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     RobotMeasurement,
     SettingsAdvice,
     TriedSettings,
-    measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import name_following
 from fourbar_validation.report.sentences import make_words_table, print_sentence
@@ -76,14 +72,6 @@ NEAR_A_LIMIT = math.radians(10.0)
 """Angle of the driven bar from a limit position or a change point within which a
 report names it: beyond a change point of a parallelogram forces are then six times
 those of its rectangle.
-"""
-_APPROACH = (1e-3, 1e-5)
-"""Angles of the driven bar from a limit position or a change point at which forces are
-compared, rad.
-"""
-_GROWTH = 3.0
-"""Ratio of those forces from which they grow without bound: beside a limit position
-static ones go as the inverse root of the angle, to ten times.
 """
 STATES_FILE = (
     "loop",
@@ -280,20 +268,12 @@ def _write_left_out(left_out: float, *, lengths_are_read: bool) -> str:
 def _write_held(loop: LoopMeasurement) -> str:
     """Write what holds the other joints, what keeps the speed, and what is off."""
     text = "no other degree of freedom is held"
-    keeps = "; through time (once the loop has settled) armature keeps the speed of"
-    through = f"{keeps} {loop.joint}"
     if loop.held:
         are = "degree of freedom is" if loop.held == 1 else "degrees of freedom are"
-        text = f"{loop.held} other {are} held: at single states by generalized forces"
-        through = ", through time (once the loop has settled) by armature"
-    if loop.influence is not None:
-        changes = "has no errors to compare"
-        if math.isfinite(loop.influence.worst):
-            changes = (
-                f"changes the errors by {loop.influence.worst:.1g} of the largest,"
-                f" {loop.influence.median:.1g} in the median"
-            )
-        text += f"{through}, a tenth of which {changes}"
+        text = (
+            f"{loop.held} other {are} held: at single states by generalized forces,"
+            " through time (once the loop has settled) by armature"
+        )
     if loop.as_it_is:
         return f"{text}; contacts, joint limits and other motors act as in the file"
     return f"{text}; contacts, joint limits and motors are off"
@@ -315,8 +295,8 @@ def _describe_worst_near_limits(
 def _describe_limit(loop: LoopMeasurement, angle: float) -> str:
     """Say how near the scene's commanded bar is to a place where errors are large.
 
-    Such a place is a limit, a change point or a small transmission angle of the input.
-    The text is empty beyond NEAR_A_LIMIT. `angle`: rad.
+    Such a place is a limit or a change point. The text is empty beyond NEAR_A_LIMIT.
+    `angle`: rad.
     """
     scene = loop.scene
     linkage = scene.linkage
@@ -327,48 +307,11 @@ def _describe_limit(loop: LoopMeasurement, angle: float) -> str:
         limits = [end for ends in find_intervals(linkage, bar) for end in ends]
         open_beyond = "beyond which the loop does not close"
         places += [(limit, f"a limit position, {open_beyond}") for limit in limits]
-    places = [(at, _say_growth(scene, angle, at, kind)) for at, kind in places]
-    mu = transmission_extremes(linkage)
-    for at, smallest in (
-        (mu.theta_2_least, mu.least),
-        (mu.theta_2_greatest, math.pi - mu.greatest),
-    ):
-        if bar == 2 and 0.0 < smallest < NEAR_A_LIMIT:
-            kind = f"a transmission angle of {math.degrees(smallest):.2g} deg, whose"
-            places.append((at, f"{kind} sine divides the forces"))
     near = [(abs(math.remainder(angle - at, math.tau)), kind) for at, kind in places]
     distance, kind = min(near, default=(math.inf, ""))
     if distance > NEAR_A_LIMIT:
         return ""
     return f"{round(math.degrees(distance), 6):.2g} deg from {kind}"
-
-
-def _say_growth(scene: Scene, angle: float, place: float, kind: str) -> str:
-    """Say that forces grow without bound towards a place, where those of rigid pins do.
-
-    The scene is asked on the side of the place on which an angle lies, at the speed of
-    its position nearest to the angle. `kind`: what is said of the place otherwise.
-    """
-    away = math.remainder(angle - place, math.tau)
-    stated = command(scene)
-    nearest = int(np.argmin(np.abs(stated.angle - angle)))
-    rates = (0.0 if stated.speed is None else stated.speed, stated.acceleration)
-    speed, acceleration = (
-        np.broadcast_to(rate, stated.angle.shape)[nearest] for rate in rates
-    )
-    at = Command(
-        angle - away + np.copysign(_APPROACH, away),
-        np.full(len(_APPROACH), stated.branch[nearest]),
-        speed,
-        acceleration,
-        stated.bar,
-    )
-    solution = solve(scene, "force", at=at)
-    sizes = [measure_sizes(getattr(solution, name)) for name in PIN_FORCES]
-    far, close = np.max(sizes, axis=0)
-    if close > _GROWTH * far:
-        return f"{kind.partition(',')[0]}, where forces grow without bound"
-    return kind
 
 
 def _describe_vanishing(errors: Sequence[InsideError]) -> Iterator[ReportBlock]:
@@ -467,13 +410,6 @@ def _describe_deciding(
         )
     elif not advice.reached and math.isfinite(advice.best.error):
         yield "No part of the range was found in which it is within the wanted error."
-    if advice.without_friction < 0.5 * advice.best.error:
-        yield (
-            f"The dry friction of {', '.join(advice.rubbing)} (frictionloss) holds it"
-            f" back: without it the error would be {advice.without_friction:.2g}."
-            " MuJoCo's is soft: it opposes a motion in full only where the joint turns"
-            " fast enough for its acceleration"
-        )
 
 
 def _write_tried(tried: TriedSettings) -> tuple[str, ...]:

@@ -230,18 +230,6 @@ class InsideAnswer:
 
 
 @dataclass(frozen=True, slots=True)
-class Influence:
-    """Largest changes of the errors of torque and pin forces, relative."""
-
-    worst: float
-    """Change at the worst state, over the scale of the quantity. Infinite without an
-    answer.
-    """
-    median: float
-    """Median of the changes over the states, over the same scale."""
-
-
-@dataclass(frozen=True, slots=True)
 class TornState:
     """State of the largest gap under a motor's torque."""
 
@@ -332,12 +320,6 @@ class SettingsAdvice:
     """Widest range of the driven joint found, rad, in which the best combination is
     within the wanted error. None where it is so everywhere, or in no range tried.
     """
-    rubbing: tuple[str, ...] = ()
-    """Hinges of the loop with dry friction."""
-    without_friction: float = math.inf
-    """Error of the best combination without this friction; infinite if it was not
-    asked.
-    """
 
     @property
     def reached(self) -> bool:
@@ -399,10 +381,6 @@ class LoopMeasurement:
     through_time: InsideAnswer | None
     refusal: str
     """Why it was not simulated; empty where it was."""
-    influence: Influence | None
-    """Change of the errors if the joints are held a tenth as firmly. None where it was
-    not simulated.
-    """
     torn: list[TornState]
     advice: SettingsAdvice | None
     as_it_is: bool

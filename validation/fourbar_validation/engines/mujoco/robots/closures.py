@@ -27,9 +27,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_closing,
     list_followers,
     list_joints,
-    list_joints_between,
     list_motors,
-    list_tendon_joints,
     list_tied_joints,
     name_body,
     name_joint,
@@ -324,7 +322,8 @@ class _Finder:
         reason = next(self._list_reasons(chain), "")
         if not reason:
             try:
-                loop = self._make_loop(chain)
+                other = self._make_loop(chain, from_other_end=True)
+                loop = replace(self._make_loop(chain), from_other_end=other)
             except _NoFourBarError as error:
                 reason = str(error)
         first, second = find_ends(model, self.before, number)
@@ -365,35 +364,16 @@ class _Finder:
                 f"{follower} follows {name_joint(model, leader)}, polycoef "
                 f"{polynomial}: no loop is closed ({advice})"
             )
+        if kind == "tendon":
+            return (
+                "a tendon equality is no pin; where it stands for rods that are not in"
+                " the file, a body for each, closed by a <connect>, makes loops of them"
+            )
         if kind != "joint":
-            more = self._describe_parallel(number) if kind == "tendon" else ""
-            return f"a {kind} equality is no pin{more}"
+            return f"a {kind} equality is no pin"
         joint = int(model.eq_obj1id[number])
         rest = float(model.eq_data[number, 0])
         return f"{name_joint(model, joint)} is kept at {rest:.6g} of its rest"
-
-    def _describe_parallel(self, number: int) -> str:
-        """Say so where an equality keeps the direction of a chain's last body.
-
-        The tendon's length is then the sum of the turns of all joints of the chain.
-        """
-        model = self.model
-        factors = list_tendon_joints(model, int(model.eq_obj1id[number]))
-        if not factors or model.eq_obj2id[number] >= 0:
-            return ""
-        bodies: list[int] = model.jnt_bodyid[[*factors]].tolist()
-        last = max(bodies)
-        bearer = find_parent(model, min(bodies))
-        turns = np.array([*factors.values()])[:, None] * self.data.xaxis[[*factors]]
-        is_chain = {*list_joints_between(model, bearer, last)} == {*factors}
-        are_hinges = (model.jnt_type[[*factors]] == HINGE_JOINT).all()
-        if not (is_chain and are_hinges and np.allclose(turns, turns[0])):
-            return ""
-        return (
-            f": it keeps the direction of {name_body(model, last)} against"
-            f" {name_body(model, bearer)}, as parallelograms do whose rods are not in"
-            " the file; a body for each rod, closed by a <connect>, makes loops of them"
-        )
 
     def _list_reasons(self, chain: _Chain) -> Iterator[str]:
         """Say why a closure closes no four-bar; the first reason counts."""
@@ -682,8 +662,12 @@ class _Finder:
         """List (joint, actuator) of what takes a control and acts on a chain."""
         return [motor for motor in list_motors(self.model) if motor[0] in chain.joints]
 
-    def _make_loop(self, chain: _Chain) -> RobotLoop:
-        """Lay a closed chain of four pins out as ground, input, coupler and output."""
+    def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
+        """Lay a closed chain of four pins out as ground, input, coupler and output.
+
+        About the normal of its plane the driven joint turns its bar counter-clockwise.
+        `from_other_end`: the input is the bar that the driven joint does not turn.
+        """
         data = self.data
         joints: list[int | None] = [*chain.joints]
         groups: list[tuple[int, ...]]
@@ -699,7 +683,7 @@ class _Finder:
         joints = joints[at_ground:] + joints[:at_ground]
         # the ground lies between the joints at the end and at the beginning
         driven, chosen = self._choose_driven([joints[0], joints[-1]], chain)
-        if driven != joints[0]:
+        if (driven != joints[0]) != from_other_end:
             groups[1:] = reversed(groups[1:])
             joints.reverse()
         at_pins = zip(PINS, joints, strict=True)
@@ -710,8 +694,10 @@ class _Finder:
             pin: 1.0 if self._find_root(joint) in bodies[PINS[pin][1]] else -1.0
             for pin, joint in hinges.items()
         }
-        # about it the driven joint turns bar 2 counter-clockwise
-        normal = sides["O2"] * find_mean_axis(data, hinges.values())
+        normal = find_mean_axis(data, hinges.values())
+        turns_ground = self._find_root(driven) in bodies[1]
+        if (data.xaxis[driven] @ normal > 0.0) == turns_ground:
+            normal = -normal
         places = {
             (bar, pin): data.xanchor[joint].copy()
             for pin, joint in hinges.items()

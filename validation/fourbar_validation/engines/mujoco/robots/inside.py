@@ -271,15 +271,12 @@ class LoopInside:
         if armature > _DRIVING * (others + inertia):
             self.flywheel = armature
 
-    def _hold_others(self, heavy: float) -> tuple[mujoco.MjModel, float]:
-        """Return a model whose armatures hold the other joints, and their size, kg m^2.
-
-        `heavy`: the size over the robot's largest inertia.
-        """
+    def _hold_others(self) -> tuple[mujoco.MjModel, float]:
+        """Return a model whose armatures hold the other joints, their size, kg m^2."""
         model = copy(self.model)
         inertias = model.dof_M0.copy()
         inertias[self.lead] -= self.flywheel
-        armature = heavy * float(inertias.max())
+        armature = HEAVY * float(inertias.max())
         model.dof_armature[self.held] += armature
         return model, armature
 
@@ -690,13 +687,11 @@ class LoopInside:
         answer.in_line = tuple(in_line)
         return answer
 
-    def answer_through_time(
-        self, motion: LoopMotion, heavy: float = HEAVY
-    ) -> InsideAnswer:
+    def answer_through_time(self, motion: LoopMotion) -> InsideAnswer:
         """Step the whole robot through the angles.
 
         Timestep, integrator and solver are those of the file. Each joint that is held,
-        and the commanded bar, gets an armature of `heavy` times the robot's largest
+        and the commanded bar, gets an armature of HEAVY times the robot's largest
         inertia. The couple that a state asks for acts on the bar until the next, so
         that its speed is kept.
         """
@@ -708,7 +703,7 @@ class LoopInside:
         answer = InsideAnswer()
         _, omega, alpha = next(motion.states())
         angles = sorted(motion.angle, reverse=omega < 0.0)
-        model, armature = self._keep_speeds(heavy)
+        model, armature = self._keep_speeds()
         data = mujoco.MjData(self.model)
         timestep = float(model.opt.timestep)
         state = self.state(angles[0], omega)
@@ -764,9 +759,9 @@ class LoopInside:
             raise LimitError(OTHER_ASSEMBLY)
         return answer
 
-    def _keep_speeds(self, heavy: float) -> tuple[mujoco.MjModel, float]:
+    def _keep_speeds(self) -> tuple[mujoco.MjModel, float]:
         """Return a model whose armatures keep speeds, and that of the commanded bar."""
-        model, armature = self._hold_others(heavy)
+        model, armature = self._hold_others()
         if self.flywheel:
             return model, self.flywheel
         if self.joint is not None:
@@ -817,7 +812,7 @@ class LoopInside:
         The other joints are held. A state is the one of the largest gap on the way from
         each angle; of a motion that MuJoCo loses there is none.
         """
-        model, _ = self._hold_others(HEAVY)
+        model, _ = self._hold_others()
         # the motor may meet the stops of the file
         model.opt.disableflags &= ~(LIMITS_OFF & ~self.given.opt.disableflags)
         steps = max(round(seconds / model.opt.timestep), 1)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from fourbar.linkage import BAR_NAMES, ENDS, MOVING_BARS, PINS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 
@@ -113,6 +113,9 @@ class RobotLoop:
     digits of the file cannot tell the linkage from one with a change point.
     """
 
+    from_other_end: "RobotLoop | None" = None
+    """The loop with its output for its input, in the same plane."""
+
     @property
     def joint(self) -> int:
         """Joint that is driven; pin O2 of a loop as its file has it is a hinge."""
@@ -161,31 +164,6 @@ class RobotLoop:
             lines=tuple(line.conjugate() for line in self.lines),
             stated_lines=tuple(line.conjugate() for line in self.stated_lines),
             senses={pin: -sense for pin, sense in self.senses.items()},
-        )
-
-    def seen_from_other_end(self) -> "RobotLoop":
-        """Return the loop with its output for its input."""
-        pins = dict(zip(PINS, reversed(PINS), strict=True))
-        bars = {1: 1, 2: 4, 3: 3, 4: 2}
-
-        def exchange(lines: tuple[complex, ...]) -> tuple[complex, ...]:
-            ground, crank, coupler, output = lines
-            return -ground, output, -coupler, crank
-
-        return replace(
-            self,
-            cut=None if self.cut is None else pins[self.cut],
-            bodies={bar: self.bodies[other] for bar, other in bars.items()},
-            hinges={pins[pin]: joint for pin, joint in self.hinges.items()},
-            senses={
-                pins[pin]: sense if pin in ENDS[1] else -sense
-                for pin, sense in self.senses.items()
-            },
-            points={
-                (bars[bar], pins[pin]): at for (bar, pin), at in self.points.items()
-            },
-            lines=exchange(self.lines),
-            stated_lines=exchange(self.stated_lines),
         )
 
     def describe_lengths(self) -> str:

@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import groupby
 
@@ -20,15 +20,12 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
-    Influence,
     InsideAnswer,
     LoopMeasurement,
     LoopMotion,
     MeasureOptions,
     RobotMeasurement,
     TornState,
-    divide,
-    measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
@@ -43,10 +40,7 @@ from fourbar_validation.engines.mujoco.robots.drive import (
     LoopDrive,
     find_cylinder,
 )
-from fourbar_validation.engines.mujoco.robots.inside import (
-    HEAVY,
-    LoopInside,
-)
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     SETTINGS_OF_AN_SDF,
     RobotFile,
@@ -54,7 +48,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
 from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
-    find_circuits,
     find_loop_of_scene,
     find_turn,
 )
@@ -74,8 +67,6 @@ as far as it does.
 """
 WHOLE_TURN = math.tau * (1.0 - 1e-9)
 """rad; motions state their ends with twelve digits."""
-_LIGHTER = 0.1
-"""Factor on what holds the other joints, to see what it matters."""
 
 
 def measure_loops(
@@ -180,7 +171,6 @@ def measure_loop(
     scales = states.scales(inside.lever)
     through: InsideAnswer | None = None
     refusal = ""
-    influence: Influence | None = None
     closing = motion
     if not motion.varies:
         closing = motion._replace(angle=_find_longest_run(states))
@@ -188,9 +178,6 @@ def measure_loop(
         if not np.any(motion.speed) or len(closing.angle) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(closing)
-        if not briefly and not inside.flywheel:
-            lighter = inside.answer_through_time(closing, HEAVY * _LIGHTER)
-            influence = _compare_at_same_angles(through, lighter, scales)
     except LimitError as error:
         refusal = str(error)
     torn: list[TornState] = []
@@ -206,8 +193,6 @@ def measure_loop(
             )
         search = SettingsSearch(inside, closing, share)
         advice = search.advise(options.error, found.file)
-    remarks += _describe_noslip(inside, motion, states, scales)
-    remarks += _describe_other_circuit(inside, found.scene, states)
     remarks += _describe_findings(inside, states, through)
     ties = (describe_equality(inside.model, one) for one in loop.other_equalities)
     return LoopMeasurement(
@@ -224,7 +209,6 @@ def measure_loop(
         scales,
         through,
         refusal,
-        influence,
         torn,
         advice,
         inside.as_it_is,
@@ -239,25 +223,6 @@ def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
     angles = sorted({*closed, *states.open})
     runs = groupby(angles, key=closed.__contains__)
     return max((tuple(run) for is_closed, run in runs if is_closed), key=len)
-
-
-def _describe_other_circuit(
-    inside: LoopInside, scene: Scene, states: InsideAnswer
-) -> Iterator[str]:
-    """Say where the loop is in a circuit to which no motion leads from its pose."""
-    theta_1 = inside.loop.angles[0]
-    angles = [(theta_1, *row.bars[:3]) for row in states.rows]
-    here, *circuits = find_circuits(scene, [inside.loop.angles, *angles])
-    rows = zip(states.rows, circuits, strict=True)
-    joints = [row.joint for row, circuit in rows if circuit not in (here, -1)]
-    if joints:
-        ends = (min(joints), max(joints))
-        places = " to ".join(f"{math.degrees(end):.4g}" for end in ends)
-        yield (
-            f"at {len(joints)} of {len(circuits)} positions, {inside.name} ="
-            f" {places} deg, the loop is in its other circuit: no motion leads there"
-            " from its pose"
-        )
 
 
 def _describe_findings(
@@ -296,6 +261,12 @@ def _describe_findings(
         )
         name = name_joint(model, joint)
         yield f"the stops of joint {name!r}, at {ends} deg, are not met"
+    if noslip := int(model.opt.noslip_iterations):
+        yield (
+            f"torque and pin forces are those of mj_forward with the file's {noslip}"
+            " noslip_iterations; the forces that hold other joints are those of"
+            " mj_inverse, which knows nothing of them"
+        )
     rows = [*states.rows, *(through.rows if through is not None else ())]
     unreached = [row for row in rows if math.isnan(row.soft.torque)]
     if unreached:
@@ -305,36 +276,6 @@ def _describe_findings(
             f"nothing on {what} gives the commanded acceleration at {inside.name} ="
             f" {', '.join(places)} deg"
         )
-
-
-def _describe_noslip(
-    inside: LoopInside,
-    motion: LoopMotion,
-    states: InsideAnswer,
-    scales: Mapping[str, float],
-) -> Iterator[str]:
-    """Say what a second solver of dry friction changes, if the file has one."""
-    options = inside.model.opt
-    iterations = int(options.noslip_iterations)
-    rubs = inside.model.dof_frictionloss.any() or inside.model.tendon_frictionloss.any()
-    if not iterations or not (rubs or inside.contacts):
-        return
-    options.noslip_iterations = 0
-    without = inside.answer_states(motion)
-    options.noslip_iterations = iterations
-    change = _compare_at_same_angles(states, without, scales).worst
-    text = (
-        "torque and pin forces are those of mj_forward with the file's"
-        f" noslip_iterations of {iterations}, which solve dry friction again and leave"
-        " the loop's force as it was: at single states they change the errors by"
-        f" {change:.1g} of the largest"
-    )
-    if inside.held:
-        text += (
-            "; the forces that hold other joints are those of mj_inverse, which knows"
-            " nothing of them"
-        )
-    yield text
 
 
 def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
@@ -390,27 +331,3 @@ def _take_span(
     places = np.linspace(low, high, POSITIONS_OF_A_LOOP) - joints[0]
     angles = np.sort(motion.angle[0] + sense * places)
     return motion._replace(angle=tuple(angles.tolist())), cut
-
-
-def _compare_at_same_angles(
-    one: InsideAnswer,
-    other: InsideAnswer,
-    scales: Mapping[str, float],
-) -> Influence:
-    """Return by how much the errors of two runs differ at the same angles.
-
-    An error is that at its run's own state: the motions differ too, and near a limit
-    position the forces with them. `scales`: those of the errors, N m and N.
-    """
-    if one.lost or other.lost:
-        return Influence(math.inf, math.inf)
-    worst = 0.0
-    median = 0.0
-    count = min(len(one.rows), len(other.rows))
-    first = one.differences()
-    second = other.differences()
-    for name, scale in scales.items():
-        changes = measure_sizes(first[name][:count] - second[name][:count])
-        worst = max(worst, divide(float(changes.max()), scale))
-        median = max(median, divide(float(np.median(changes)), scale))
-    return Influence(worst, median)

@@ -7,9 +7,8 @@ closure is then closed onto the assembly of the scene.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -76,8 +75,6 @@ _BEHIND = (
     "its plane is seen from behind, where it is in the assembly of the scene; gravity"
     " does not tell the side"
 )
-_MOST_SITES = 12
-"""Sites of which two are tried as the pin that closes a loop."""
 ALIKE = 1e-6
 """Difference of logarithms of lengths below which two ways round fit a scene alike."""
 _SAME_DIRECTION = 1e-6
@@ -120,80 +117,60 @@ def find_loop_of_scene(
     """Find the loop whose lengths are nearest to those of a scene, as the scene has it.
 
     Where nothing closes a loop two sites may be its fourth pin: those that are named,
-    those called B3 and B4, or the pair that fits best. Nothing is then exerted there.
+    or those called B3 and B4. Nothing is then exerted there.
 
     Raises
     ------
     InputError : there is no such loop, or it stands in the other assembly.
     """
-    fits: list[tuple[float, LoopOfScene]] = []
-    refused: list[InputError] = []
-    compiled = compile_robot(file)
-    for variant in _list_variants(file, compiled.model, options.names):
-        robot = compiled if variant is file else compile_robot(variant)
-        try:
-            fits.append(_fit(variant, robot, scene, options))
-        except InputError as error:
-            refused.append(error)
-    if not fits:
-        raise refused[0]
-    _, best = min(fits, key=lambda fit: fit[0])
-    if best.file is file:
-        return best
-    model = best.robot.model
-    model.eq_active0[best.loop.equality] = 0
+    closed = _close_by_sites(file, options.names)
+    found = _fit(closed, scene, options)
+    if closed is file:
+        return found
+    loop = found.loop
+    model = found.robot.model
+    model.eq_active0[loop.equality] = 0
     # a tendon holds the pin in its place
     others = tuple(
         number
-        for number in best.loop.other_equalities
+        for number in loop.other_equalities
         if model.eq_type[number] != mujoco.mjtEq.mjEQ_TENDON
     )
-    return replace(best, loop=replace(best.loop, other_equalities=others))
+    return replace(found, file=file, loop=replace(loop, other_equalities=others))
 
 
-def _list_variants(
-    file: RobotFile, model: mujoco.MjModel, names: Mapping[str, str]
-) -> Iterator[RobotFile]:
-    """Yield the file, or one for each pair of sites that may close a loop in it."""
+def _close_by_sites(file: RobotFile, names: Mapping[str, str]) -> RobotFile:
+    """Return a file in which two sites are pin B, where nothing closes a loop."""
+    model = compile_robot(file).model
     if list_closing(model):
-        yield file
-        return
+        return file
     sites = [model.site(number).name for number in range(model.nsite)]
-    stated = [names.get(role, role) for role in SITE_ROLES]
-    pairs: list[Sequence[str]] = [stated]
-    if not {*stated} <= {*sites}:
-        for role, name in names.items():
-            if role in SITE_ROLES and name not in sites:
-                listed = ", ".join(filter(None, sites)) or "none"
-                raise InputError(
-                    "--name", f"{role}={name}", f"no such site; the file has: {listed}"
-                )
-        named = [name for name in sites if name]
-        pairs = [*combinations(named[:_MOST_SITES], 2)]
-    if not pairs:
+    for role, name in names.items():
+        if role in SITE_ROLES and name not in sites:
+            listed = ", ".join(filter(None, sites)) or "none"
+            raise InputError(
+                "--name", f"{role}={name}", f"no such site; the file has: {listed}"
+            )
+    stated = {f"site{i}": names.get(r, r) for i, r in enumerate(SITE_ROLES, 1)}
+    if not {*stated.values()} <= {*sites}:
         raise InputError("MJCF", None, _NOTHING_CLOSES[file.kind])
-    for first, second in pairs:
-        closed = ET.fromstring(file.text)
-        equality = ET.SubElement(closed, "equality")
-        ET.SubElement(equality, "connect", name="B", site1=first, site2=second)
-        yield replace(file, text=ET.tostring(closed, encoding="unicode"))
+    closed = ET.fromstring(file.text)
+    equality = ET.SubElement(closed, "equality")
+    ET.SubElement(equality, "connect", stated, name="B")
+    return replace(file, text=ET.tostring(closed, encoding="unicode"))
 
 
-def _fit(
-    file: RobotFile,
-    compiled: CompiledRobot,
-    scene: Scene,
-    options: MeasureOptions,
-) -> tuple[float, LoopOfScene]:
-    """Return by how much the lengths of the nearest loop miss a scene, and the loop.
+def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
+    """Return the loop of a file whose lengths are nearest to those of a scene.
 
     A loop is driven at either end unless a joint is stated.
     """
+    compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options.pose)
     loops = find_loops(posed, options.pose, options.loop)
     ways = [*loops]
     if options.pose.drive is None:
-        ways = [way for one in loops for way in (one, one.seen_from_other_end())]
+        ways = [way for one in loops for way in (one, one.from_other_end or one)]
     model = posed.model
     names = [name_body(model, body) for body in range(model.nbody)]
     wanted = {}
@@ -219,7 +196,7 @@ def _fit(
     described = SceneOfLoop(compiled, robot, loop)
     described.meet_lengths()
     turned = find_turn(scene, described.loop)
-    found = LoopOfScene(
+    return LoopOfScene(
         file,
         compiled,
         robot,
@@ -229,7 +206,6 @@ def _fit(
         scene,
         as_it_is=not loop.held,
     )
-    return miss_lengths(scene, loop), found
 
 
 def _count_misnamed(

@@ -132,10 +132,8 @@ class SettingsSearch:
         best = self._find_cheapest(wanted)
         tried = len(self.tried)
         within = None
-        without = math.inf
         if best.error > wanted:
             within = self.find_range(best.settings, wanted)
-            without = self._measure_without_friction(best.settings)
         model = self.inside.given
         joints = model.dof_jntid[self.rubbing].tolist()
         return SettingsAdvice(
@@ -147,8 +145,6 @@ class SettingsSearch:
             tried,
             _write_elements(file, self.inside.loop, best, model, joints),
             within,
-            tuple(name_joint(model, joint) for joint in joints),
-            without,
         )
 
     def _answer(
@@ -207,18 +203,6 @@ class SettingsSearch:
                 ends = [row.joint for row in states.rows if row.angle in (low, high)]
                 return min(ends), max(ends)
         return None
-
-    def _measure_without_friction(self, settings: RobotSettings) -> float:
-        """Return the error that settings would have without dry friction in the loop.
-
-        Where no hinge of the loop has any, the error is infinite: none is gained.
-        """
-        if not self.rubbing:
-            return math.inf
-        model = copy(self.inside.given)
-        model.dof_frictionloss[self.rubbing] = 0.0
-        search = SettingsSearch(self.inside.with_model(model), self.motion)
-        return search.measure(settings).error
 
     def measure(
         self, settings: RobotSettings, wanted: float = math.inf
