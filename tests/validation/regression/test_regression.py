@@ -31,6 +31,7 @@ from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import MODELS
 from fourbar_validation.regression import record, render, rules
+from fourbar_validation.regression.changes import Kind
 from fourbar_validation.regression.history import (
     HISTORY,
     _name_runs,
@@ -156,14 +157,14 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
 
 TABLE, TIMINGS, ABOUT = "results.csv", "timings.csv", "record.json"
 DAMAGE = read_rows(r"""
-results.csv | (.*\n){2}\Z | | 2 rows of 4
-results.csv | \n([\s\S]*)\Z | \n\1\1 | 8 rows of 4
-results.csv | .*engine 1.*\n | | 3 rows of 4
-results.csv | 1e-15 | 1e-16 | 4 rows of 4, and not the SHA-256
-results.csv | \A[\s\S]* | ÿ | no rows that can be read
-timings.csv | 3[.]0 | 3.1 | 1 row of 1
+results.csv | (.*\n){2}\Z | | states 4 rows
+results.csv | \n([\s\S]*)\Z | \n\1\1 | states 4 rows
+results.csv | .*engine 1.*\n | | states 4 rows
+results.csv | 1e-15 | 1e-16 | states 4 rows and the SHA-256
+results.csv | \A[\s\S]* | ÿ | is missing, damaged
+timings.csv | 3[.]0 | 3.1 | states 1 rows
 timings.csv |  |  | is missing
-results.parquet | \Z | | is not of this run
+results.parquet | \Z | | or of another run: record.json states no rows
 record.json | "K": "50.0" | "K": "51.0" | is damaged
 record.json | "sha256" | "sha257" | is damaged
 record.json | "rows" | "raws" | is damaged
@@ -324,7 +325,7 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
     file = tmp_path / "results.parquet"
     assert pq.read_table(file)["error"].null_count == 1
     file.write_bytes(b"no columns")
-    with raises(InputError, match="is damaged: no rows that can be read of 2"):
+    with raises(InputError, match="states 2 rows"):
         read_run(tmp_path)
     (tmp_path / ABOUT).unlink()
     with raises(InputError, match="is not a table written by"):
@@ -484,7 +485,7 @@ def test_rows_that_answer_another_question_are_named_first_and_not_compared(
         return compare_rows(old, made(rows, before | scenes))
 
     changes = compare_with(row, OTHER)
-    assert changes.not_compared == [why] and changes.status == HOLDS
+    assert changes.name_whole(Kind.NOT_COMPARED) == [why] and changes.status == HOLDS
     for form in FORMS[1:]:
         assert told in html.unescape(form(changes))
     assert compare_with(replace(row, verdict=FAILS)).regressed
@@ -631,7 +632,7 @@ def test_rows_whose_allowance_grew_are_told():
     found = compare_rows((NOTHING_KNOWN, [ROW]), (NOTHING_KNOWN, [hard]))
     line = "scene / engine / torque: 1.0e-14 -> 1.0e-12"
     assert found.status == HOLDS and found.grown == [line]
-    assert f"\nAllowed more: {line}\n" in render.write_differences(found)
+    assert f"Allowed more: {line}\n" in render.write_differences(found)
     assert not compare_made_here([ROW], [easier]).grown
 
 

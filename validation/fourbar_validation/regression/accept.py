@@ -114,9 +114,9 @@ def report_differences(
         raise InputError(
             "OLD",
             str(old),
-            f"shares {differences.shared} of {differences.rows} rows with the new run,"
-            " fewer than half of what it was asked for: name a run of the same suite,"
-            " or compare a part of it with --only and --engines",
+            f"shares {differences.shared} of {len(differences.table)} rows with the new"
+            " run, fewer than half of what it was asked for: name a run of the same"
+            " suite, or compare a part of it with --only and --engines",
         )
     return differences.status
 
@@ -183,9 +183,13 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
     differences = find_differences(accepted, run, {})
     weakened = [*map(str, differences.weakened)]
     left_out = differences.name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
+    left_out += differences.name_whole(Kind.NOT_RUN)
     for what, why in (
         (weakened, "is held to weaker rules than"),
-        (left_out + differences.not_run, "leaves out what was judged in"),
+        (
+            left_out + differences.name_whole(Kind.NOT_RUN),
+            "leaves out what was judged in",
+        ),
     ):
         if what:
             more = f", and {len(what) - 1} more" * (len(what) > 1)

@@ -149,11 +149,6 @@ class Differences:
         return self.table.kind.value_counts().reindex([*Kind], fill_value=0)
 
     @property
-    def rows(self) -> int:
-        """Return how many rows there are."""
-        return len(self.table)
-
-    @property
     def regressed(self) -> int:
         """Return how many rows and rules a run fails for."""
         return len(self.of(*REGRESSIONS)) + len(self.weakened)
@@ -172,7 +167,7 @@ class Differences:
     @property
     def shared(self) -> int:
         """Return how many rows stand in both runs, whatever question they answer."""
-        return self.rows - len(self.of(*_OF_ONE_RUN))
+        return len(self.table) - len(self.of(*_OF_ONE_RUN))
 
     @property
     def nothing(self) -> bool:
@@ -187,38 +182,25 @@ class Differences:
         is then of another suite.
         """
         missing = self.of(Kind.NOT_RUN, Kind.ENGINE_GONE, Kind.SCENE_GONE)
-        return 2 * self.shared < self.rows - len(missing)
+        return 2 * self.shared < len(self.table) - len(missing)
 
     @property
     def status(self) -> int:
         """Exit status: 1 on a regression, and where nothing was compared."""
         return FAILED if self.regressed or self.nothing else HOLDS
 
+    def name_whole(self, *kinds: Kind) -> list[str]:
+        """Name what is missing, not run or not compared as a whole, by its kinds."""
+        counts = self.of(*kinds).why.value_counts(sort=False)
+        few = counts[:MOST_ONE_BY_ONE].items()
+        lines = [f"{name} ({write_count(n, 'row')})" for name, n in few]
+        more = counts[MOST_ONE_BY_ONE:]
+        return lines + [f"{len(more)} more ({more.sum()} rows)"] * bool(len(more))
+
     @property
     def gone(self) -> list[str]:
         """Name what is missing as a whole: engines, scenes, and scenes now refused."""
         return self.name_whole(*WHOLE)
-
-    def name_whole(self, *kinds: Kind) -> list[str]:
-        """Name what is missing as a whole, by the kinds of WHOLE."""
-        lines = self.of(*kinds)
-        name = "scene " + lines.scene + " is newly refused by " + lines.engine
-        scenes = "scene " + lines.scene + " is gone"
-        engines = "engine " + lines.engine + " is gone"
-        name = name.mask(lines.kind == Kind.SCENE_GONE, scenes)
-        return _name(name.mask(lines.kind == Kind.ENGINE_GONE, engines))
-
-    @property
-    def not_run(self) -> list[str]:
-        """Name the scenes and engines that the new run was not asked for."""
-        lines = self.of(Kind.NOT_RUN)
-        run = lines.scene.isin(self.table[self.table.verdict_new != ""].scene)
-        return [*_name("scene " + lines.scene[~run]), *_name(lines.engine[run])]
-
-    @property
-    def not_compared(self) -> list[str]:
-        """Name the scenes and settings of rows that answer different questions."""
-        return _name(self.of(Kind.NOT_COMPARED).why)
 
     @property
     def grown(self) -> list[str]:
@@ -280,15 +262,6 @@ def _count_new_rows(lines: "DataFrame") -> Counts:
     return counts
 
 
-def _name(names: "Series[str]") -> list[str]:
-    """Count rows by name; of more than MOST_ONE_BY_ONE names the others are one."""
-    counts = names.value_counts(sort=False)
-    few = counts[:MOST_ONE_BY_ONE].items()
-    lines = [f"{name} ({write_count(n, 'row')})" for name, n in few]
-    more = counts[MOST_ONE_BY_ONE:]
-    return lines + [f"{len(more)} more ({more.sum()} rows)"] * bool(len(more))
-
-
 def write_fault_sentence(worse: set[str], exact: set[str]) -> str:
     """Say which engine is at fault in a scene.
 
@@ -338,7 +311,7 @@ def compare_runs(
     ]
     if suites[0] != suites[1] and not (before.scenes or after.scenes):
         notes += [
-            f"{differences.counterparts.total} of {differences.rows} rows are compared:"
+            f"{differences.counterparts.total} of {len(table)} rows are compared:"
             " the others are of one run alone",
             f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and neither run"
             " says what they ask: a scene that changed cannot be named, rows are"
@@ -383,7 +356,10 @@ def _classify_rows(
     before: About,
     after: About,
 ) -> None:
-    """Add `why` two rows are not compared, their kind, the cause and the severity."""
+    """Add the kind of change of each line, its cause and its severity.
+
+    Added too is `why` two rows are not compared, or what is missing with them.
+    """
     in_old = table.verdict_old != ""
     in_new = table.verdict_new != ""
     fails = table.verdict_new == FAILS
@@ -438,6 +414,15 @@ def _classify_rows(
     )
     table["fails"] = fails
     table["since"] = ""
+    scenes = "scene " + table.scene
+    told = {
+        Kind.ENGINE_GONE: "engine " + table.engine + " is gone",
+        Kind.SCENE_GONE: scenes + " is gone",
+        Kind.REFUSED: scenes + " is newly refused by " + table.engine,
+        Kind.NOT_RUN: table.engine.where(table.scene.isin(table.scene[in_new]), scenes),
+    }
+    for kind, names in told.items():
+        table["why"] = table.why.mask(table.kind == kind, names)
     growth = new / np.fmax(old, table.round_off)
     table["grown"] = growth.where(in_old & in_new, 1.0)
 
@@ -469,16 +454,14 @@ _NOT_SURROUNDINGS = {"suite", "scenes of", "chosen", "guests"}
 
 def _list_surroundings(old: About, new: About) -> list[tuple[str, str, str]]:
     """List what the runs were made with if it differs: what, old and new."""
-    pairs = []
-    both = [({"commit": old.commit}, {"commit": new.commit})]
-    both *= bool(old.commit and new.commit)
-    both += [
-        (old.versions, new.versions),
-        ({"machine": old.machine}, {"machine": new.machine}),
-        (old.settings, new.settings),
-    ]
-    for before, after in both:
-        for what in sorted((before.keys() | after.keys()) - _NOT_SURROUNDINGS):
-            stated = before.get(what, "not recorded"), after.get(what, "not recorded")
-            pairs.append((what, *stated))
+    before, after = (
+        {"commit": about.commit, **about.versions, "machine": about.machine}
+        | about.settings
+        for about in (old, new)
+    )
+    pairs = (
+        (what, before.get(what) or "not recorded", after.get(what) or "not recorded")
+        for what in dict.fromkeys((*before, *after))
+        if what not in _NOT_SURROUNDINGS
+    )
     return [pair for pair in pairs if pair[1] != pair[2]]

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 
 def pair_engines(
-    old: tuple[About, "DataFrame | None"],
-    new: tuple[About, "DataFrame | None"],
+    old: tuple[About, "DataFrame"],
+    new: tuple[About, "DataFrame"],
 ) -> tuple[dict[str, str], list[str]]:
     """Pair the engines that have other names in the two runs, and say so.
 
@@ -49,23 +49,11 @@ def pair_engines(
     return pairs, notes
 
 
-def list_gone(before: About, after: About) -> list[str]:
-    """Name the engines that a run was asked for, as far as the records say, and lacks.
-
-    Engines that --engines chose before need not be asked for again.
-    """
-    pairs, _ = pair_engines((before, None), (after, None))
-    lacking = [name for name in before.engines if name not in after.engines]
-    if after.settings.get("chosen") != "":
-        lacking = [name for name in lacking if name in before.guests_by_option]
-    return [f"engine {name}" for name in lacking if name not in pairs]
-
-
-def _list_recorded(run: tuple[About, "DataFrame | None"]) -> list[str]:
+def _list_recorded(run: tuple[About, "DataFrame"]) -> list[str]:
     """List the engines of a run in the order of its record."""
     about, rows = run
-    names = about.engines if rows is None else [*about.engines, *rows.engine.unique()]
-    return [name for name in dict.fromkeys(names) if name != FORMULAS]
+    names = dict.fromkeys([*about.engines, *rows.engine.unique()])
+    return [name for name in names if name != FORMULAS]
 
 
 def _name_version(about: About, engine: str) -> tuple[str, str]:

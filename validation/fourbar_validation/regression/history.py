@@ -6,9 +6,10 @@ versions in columns of their own (`version_mujoco`).
 """
 
 import hashlib
+import io
 import json
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,56 +38,45 @@ def append(file: Path, run: Recorded) -> None:
     A run with the same date and rows is appended once. InputError if the file is
     damaged or no such table.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    import pandas
 
-    table = _tabulate_run(run)
+    lines = _tabulate_run(run)
     if file.exists():
         with name_damage("--to", file, _NO_HISTORY):
-            data = pa.BufferReader(file.read_bytes())
-            old = pq.read_table(data, page_checksum_verification=True)
-            if table["run"][0].as_py() in set(old["run"].to_pylist()):
+            data = io.BytesIO(file.read_bytes())
+            old = pandas.read_parquet(data, page_checksum_verification=True)
+            if (old["run"] == lines["run"][0]).any():
                 return
-            table = pa.concat_tables([old, table], promote_options="default")
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+            lines = pandas.concat([old, lines], ignore_index=True)
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(file, sink.getvalue().to_pybytes())
+    packed = lines.to_parquet(compression="zstd", write_page_checksum=True)
+    write_bytes(file, packed)
 
 
-def _tabulate_run(run: Recorded) -> Any:
-    """Return the rows and times of a run; a text that recurs is kept once."""
+def _tabulate_run(run: Recorded) -> "DataFrame":
+    """Return the rows and times of a run, with what it was made with."""
     import pandas
-    import pyarrow as pa
 
     about = run.about
     times = run.times().assign(quantity=TIME)
     lines = pandas.concat([run.frame(), times], ignore_index=True)
-    digest = _hash(f"{about.date}\n{lines.to_csv()}")
-    hashes = {
-        scene: _hash(json.dumps(entries, sort_keys=True))
-        for scene, entries in about.scenes.items()
-    }
     stated = {
-        "run": digest,
+        "run": _hash(f"{about.date}\n{lines.to_csv()}"),
         "date": about.date,
         "commit": about.commit,
         "machine": about.machine,
         "settings": json.dumps(about.settings, sort_keys=True),
     }
     stated |= {f"version_{name}": text for name, text in about.versions.items()}
-    ratios = lines.pop("times_formulas").astype(float)
+    hashes = {
+        scene: _hash(json.dumps(entries, sort_keys=True))
+        for scene, entries in about.scenes.items()
+    }
+    ratios = lines.pop("times_formulas")
     lines["scene_hash"] = [hashes.get(scene, "") for scene in lines.scene]
     lines["times_formulas"] = ratios
     of_run = pandas.DataFrame(stated, index=lines.index)
-    lines = pandas.concat([of_run, lines], axis=1)
-    word = pa.dictionary(pa.int32(), pa.string())
-    kinds = {
-        name: pa.float64() if kind.kind == "f" else word
-        for name, kind in lines.dtypes.items()
-    }
-    table = pa.Table.from_pandas(lines, pa.schema(kinds), preserve_index=False)
-    return table.replace_schema_metadata()
+    return pandas.concat([of_run, lines], axis=1)
 
 
 def _hash(text: str) -> str:
@@ -179,31 +169,51 @@ def draw_row(history: "DataFrame", row: Any) -> str:
     `row`: line of the table of differences. Empty if no run has a number.
     """
     same = [history[name] == getattr(row, name) for name in WITHOUT_SETTING]
-    lines = history[np.logical_and.reduce(same)].tail(MOST_RUNS_DRAWN - 1)
-    labels = [f"{run.date[:10]}\n{run.commit[:7]}" for run in lines.itertuples()]
-    errors = np.array([*lines.error, row.error_new], dtype=float)
-    allowed = np.array([*lines.allowed, row.allowed_new], dtype=float)
+    lines = history[np.logical_and.reduce(same)]
+    this = {"date": "this run", "commit": "", "error": row.error_new}
+    lines = [*lines.to_dict("records"), this | {"allowed": row.allowed_new}]
+    errors = np.array([line["error"] for line in lines], dtype=float)
     if not np.any(errors > 0.0):
         return ""
+    allowed = [line["allowed"] for line in lines]
+    runs = [(line["date"], line["commit"]) for line in lines]
+    return _draw_panels("row", runs, {"error / scale": {row.engine: errors}}, allowed)
+
+
+def _draw_panels(
+    name: str,
+    runs: Sequence[tuple[str, str]],
+    panels: Mapping[str, Mapping[str, Any]],
+    allowed: Any,
+) -> str:
+    """Draw numbers of engines over runs, on panels by their labels.
+
+    `runs`: date and commit of each. `allowed`: of the first panel.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.6, 2.6), layout="constrained")
-    axes = figure.subplots()
-    places = np.arange(len(errors))
-    axes.plot(places, allowed, color=ALLOWED, lw=1.1, ls=(0, (5, 2)), label="allowed")
-    axes.plot(places, errors, label="error", **choose_style(row.engine).line)
-    _label_runs(axes, [*labels, "this run"])
-    axes.set_ylabel("error / scale")
-    axes.legend(frameon=False, fontsize=8)
-    return write_svg(figure, "row")
-
-
-def _label_runs(axes: Any, labels: list[str]) -> None:
-    """Write the runs under a logarithmic axis, eight of them at most."""
+    figure = Figure(figsize=(8.6, 0.8 + 1.8 * len(panels)), layout="constrained")
+    shown = slice(-MOST_RUNS_DRAWN, None)
+    labels = [f"{date[:10]}\n{commit[:7]}" for date, commit in runs][shown]
+    places = np.arange(len(labels))
     step = -(-len(labels) // 8)
-    axes.set_xticks(range(0, len(labels), step), labels[::step], fontsize=8)
-    axes.set_yscale("log")
-    set_frame(axes)
+    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    limit = np.broadcast_to(allowed, len(runs))[shown]
+    dashed = {"color": ALLOWED, "lw": 1.1, "ls": (0, (5, 2)), "label": "allowed"}
+    rows[0].plot(places, limit, **dashed)
+    for axes, (label, numbers) in zip(rows, panels.items(), strict=True):
+        for engine, values in numbers.items():
+            style = choose_style(engine).line
+            axes.plot(places, np.asarray(values)[shown], label=engine, **style)
+        axes.set_ylabel(label)
+        axes.set_xticks(places[::step], labels[::step], fontsize=8)
+        axes.set_yscale("log")
+        set_frame(axes)
+    handles = rows[0].get_legend_handles_labels()
+    figure.legend(
+        *handles, loc="outside upper left", ncols=4, frameon=False, fontsize=8
+    )
+    return write_svg(figure, name)
 
 
 def collect_history(folder: Path) -> list[Section]:
@@ -251,28 +261,17 @@ def summarise(file: Path) -> "DataFrame":
 
 def _draw_history(table: "DataFrame") -> str:
     """Draw error and time of each engine over the runs, labelled by their commits."""
-    from matplotlib.figure import Figure
-
-    runs = table[["run", "date", "commit"]].drop_duplicates().tail(MOST_RUNS_DRAWN)
-    places = {run: place for place, run in enumerate(runs.run)}
-    table = table[table.run.isin(places)]
-    figure = Figure(figsize=(8.6, 4.2), layout="constrained")
-    panels = figure.subplots(2, 1, sharex=True)
-    for engine, lines in table.groupby("engine", observed=True):
-        for axes, column in zip(panels, ("used", "time"), strict=True):
-            drawn = lines[np.isfinite(lines[column]) & (lines[column] > 0.0)]
-            if len(drawn):
-                axes.plot(
-                    drawn.run.astype(str).map(places),
-                    drawn[column],
-                    label=engine if column == "used" else None,
-                    **choose_style(str(engine)).line,
-                )
-    panels[0].axhline(1.0, color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
-    panels[0].set_ylabel("error / allowed")
-    panels[1].set_ylabel("time / formulas")
-    labels = [f"{run.date[:10]}\n{run.commit[:7]}" for run in runs.itertuples()]
-    for axes in panels:
-        _label_runs(axes, labels)
-    figure.legend(loc="outside upper left", ncols=4, frameon=False, fontsize=8)
-    return write_svg(figure, "history")
+    of_runs = table.pivot_table(
+        index=["date", "run", "commit"],
+        columns="engine",
+        values=["used", "time"],
+        dropna=False,
+        observed=True,
+    )
+    finite = of_runs.where(np.isfinite(of_runs) & (of_runs > 0.0))
+    panels = {
+        label: {str(engine): finite[column][engine] for engine in finite[column]}
+        for column, label in (("used", "error / allowed"), ("time", "time / formulas"))
+    }
+    runs = [(str(date), str(commit)) for date, _, commit in of_runs.index]
+    return _draw_panels("history", runs, panels, 1.0)

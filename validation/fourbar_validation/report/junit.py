@@ -1,7 +1,7 @@
 """JUnit XML, for the test page of a continuous-integration system."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from fourbar_validation.compare.rows import Row
@@ -29,35 +29,37 @@ def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
 
     What fails is a failure, and what was not compared is skipped.
     """
+    return make_cases(rows, _tell_row)
+
+
+def _tell_row(row: Row) -> tuple[str, ...]:
+    if row.compared and not row.failed:
+        return ()
+    if row.failed:
+        why = f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}"
+        return "failure", row.verdict, why
+    return "skipped", row.verdict, row.reason
+
+
+def make_cases(
+    rows: Iterable[Any],
+    tell: Callable[[Any], tuple[str, ...]],
+) -> Iterator[JunitCase]:
+    """Make a case of each row; of many the first that fail and the first others.
+
+    `tell`: tells outcome, kind and message of a row; nothing where it passed.
+    """
     counts = Counter[bool]()
     for row in rows:
-        counts[row.failed] += 1
-        if counts[row.failed] > MOST_PASSING_CASES:
-            continue
-        if row.compared and not row.failed:
-            yield make_case(row)
-        elif row.failed:
-            why = f"error {row.error!r}, allowed {row.allowed!r}: {row.reason}"
-            yield make_case(row, "failure", row.verdict, why)
-        else:
-            yield make_case(row, "skipped", row.verdict, row.reason)
-    others = [count - MOST_PASSING_CASES for count in counts.values()]
-    yield from count_beyond(sum(max(0, count) for count in others))
-
-
-def make_case(row: Any, *told: str) -> JunitCase:
-    """Make the case of a row.
-
-    `told`: its outcome, kind and message; left out: it passed.
-    """
-    name = f"{row.scene}.{row.engine} {row.setting}"
-    return JunitCase(row.scene, name, row.quantity, *(told or ("passed",)))
-
-
-def count_beyond(rows: int) -> Iterator[JunitCase]:
-    """Count what is not listed, as one case."""
-    if rows > 0:
-        name = f"{rows} rows more: see results.parquet"
+        told = tell(row) or ("passed",)
+        failed = told[0] == "failure"
+        counts[failed] += 1
+        if counts[failed] <= MOST_PASSING_CASES:
+            name = f"{row.scene}.{row.engine} {row.setting}"
+            yield JunitCase(row.scene, name, row.quantity, *told)
+    more = sum(max(0, count - MOST_PASSING_CASES) for count in counts.values())
+    if more:
+        name = f"{more} rows more: see results.parquet"
         yield JunitCase("all scenes", "all scenes", name, "skipped", "not listed")
 
 

@@ -23,7 +23,6 @@ from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.accept import find_differences
 from fourbar_validation.regression.changes import Differences, Kind
-from fourbar_validation.regression.engines import list_gone
 from fourbar_validation.regression.history import (
     collect_history,
     find_since,
@@ -146,12 +145,11 @@ def write_outcome(
             overview.since = f"It {since[key]}."
         weakened = list_weakened(before.about.rules, about.rules)
         overview.weaker = [*map(str, weakened)]
-        overview.gone = list_gone(before.about, about)
         overview.baseline = before.describe()
         with suppress(InputError):  # raised again where the differences are printed
             after = Recorded(about, out / PARQUET_FILE)
             differences = find_differences(before, after, {})
-            overview.gone += differences.name_whole(Kind.SCENE_GONE, Kind.REFUSED)
+            overview.gone = differences.gone
             if not summary.counts[FAILS]:  # its cause stands first
                 overview.gone += _list_rows(differences, Kind.GONE)
                 overview.worse = _list_rows(differences, Kind.VERDICT_WORSE, Kind.WORSE)
