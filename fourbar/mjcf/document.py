@@ -24,7 +24,6 @@ from fourbar.mjcf.model import (
     RECIPE,
     Model,
     Settings,
-    add_appearance,
     add_comments,
     add_element,
     make_motor,
@@ -134,7 +133,6 @@ def write_mjcf(
     add_comments(root, _write_comments(scene, drive, reader, passive=exerts))
     add_element(root, "compiler", angle="radian", autolimits="true")
     model.add_option()
-    add_appearance(root, scene.linkage)
     if start is not None:
         start = start._replace(qpos=unwind(scene, start.qpos))
         model.rest = start.qpos

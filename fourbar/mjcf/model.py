@@ -61,70 +61,10 @@ class Settings:
 
 RECIPE = Settings()
 
-_FOVY = 45.0
-"""Vertical field of view, deg."""
-_ASPECT = 4.0 / 3.0
-"""Narrowest window that shows the whole linkage."""
-PICTURE_MARGIN = 1.15
-"""Width and height of the picture over those of the linkage."""
-
 
 def write_six_digits(*numbers: float) -> str:
     """Write numbers that nothing is computed from, in six digits."""
     return " ".join(f"{number:.6g}" for number in numbers)
-
-
-def _find_view(linkage: FourBar) -> tuple[float, float, float]:
-    """Return where a camera that looks down on the plane sees every position, m.
-
-    No position leaves the box around the circle of A about O2 and of B about O4.
-    """
-    _, a, _, c = linkage.lengths
-    O4 = cmath.rect(linkage.ground, linkage.ground_angle)
-    left = min(-a, O4.real - c)
-    right = max(a, O4.real + c)
-    low = min(-a, O4.imag - c)
-    high = max(a, O4.imag + c)
-    half_height = 0.5 * PICTURE_MARGIN * max(high - low, (right - left) / _ASPECT)
-    distance = half_height / math.tan(math.radians(0.5 * _FOVY))
-    return 0.5 * (left + right), 0.5 * (low + high), distance
-
-
-def add_appearance(root: ET.Element, linkage: FourBar) -> None:
-    """Add the extent and free camera of the viewer, light and background."""
-    x, y, distance = _find_view(linkage)
-    extent = write_six_digits(distance / 1.5)
-    add_element(root, "statistic", extent=extent, center=write_six_digits(x, y, 0))
-    visual = add_element(root, "visual")
-    # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks
-    # straight down on the plane
-    add_element(
-        visual,
-        "global",
-        azimuth=90,
-        elevation=-90,
-        fovy=_FOVY,
-        offwidth=1280,
-        offheight=960,
-    )
-    add_element(
-        visual,
-        "headlight",
-        ambient=".45 .45 .45",
-        diffuse=".35 .35 .35",
-        specular=".1 .1 .1",
-    )
-    add_element(visual, "rgba", haze="1 1 1 1")
-    add_element(
-        add_element(root, "asset"),
-        "texture",
-        type="skybox",
-        builtin="flat",
-        rgb1=".95 .96 .98",
-        rgb2=".95 .96 .98",
-        width=32,
-        height=192,
-    )
 
 
 CYLINDER = "cylinder"
@@ -307,14 +247,10 @@ class Model:
         """Return True if loads or springs need actuators."""
         return bool(self.loads) or not all(map(_is_slack_somewhere, self.springs))
 
-    def used(self, attribute: str) -> bool:
-        """Return True if any pin carries the attribute."""
-        return any(attribute in attributes for attributes in self.pin.values())
-
     def add_option(self) -> None:
         """Add the timestep, integrator, solver and what effects state, as gravity.
 
-        Flags switch off what a closed loop and this model do not need.
+        Flags switch off what a closed loop does not need.
         """
         settings = self.settings
         option = add_element(
@@ -327,31 +263,14 @@ class Model:
             iterations=settings.iterations,
             **self.option,
         )
-        unneeded = list(_NEVER_NEEDED)
-        if not self.springs and not self.used("stiffness"):
-            unneeded.append("spring")
-        if not self.used("frictionloss"):
-            unneeded.append("frictionloss")
-        if not self.used("damping"):
-            unneeded.append("damper")
-        add_element(option, "flag", **dict.fromkeys(unneeded, "disable"))
+        add_element(option, "flag", **dict.fromkeys(_NEVER_NEEDED, "disable"))
+        # the viewer looks straight down on the plane
+        visual = add_element(self.root, "visual")
+        add_element(visual, "global", azimuth=90, elevation=-90)
 
     def add_bodies(self, flywheel: float) -> None:
-        """Add ground > (input > coupler), output; light and camera face the plane."""
+        """Add ground > (input > coupler), output."""
         world = add_element(self.root, "worldbody")
-        place = write_six_digits(*_find_view(self.linkage))
-        add_element(
-            world,
-            "light",
-            diffuse=".2 .2 .2",  # with the headlight 1
-            specular=".1 .1 .1",
-            directional="true",
-            castshadow="false",
-            name="light",
-            pos=place,
-            dir="0 0 -1",
-        )
-        add_element(world, "camera", name="plane", pos=place, fovy=_FOVY)
         ground = add_element(world, "body", name="ground")
         self.bodies[1] = ground
         add_element(ground, "inertial", pos="0 0 0", mass=1, diaginertia="1 1 1")

@@ -131,24 +131,16 @@ class Plane:
     def move_mjcf(self, root: ET.Element) -> None:
         """Move an MJCF that was written for the plane x-y, O2 in the origin.
 
-        Gravity turns; ground, light, camera and the view move, and turn if the plane is
-        tilted.
+        The ground moves, and turns as gravity does if the plane is tilted.
         """
-        light = "worldbody/light"
-        camera = "worldbody/camera"
-        body = "worldbody/body"
-        changes = [("statistic", "center", self.place)]
-        changes += ((path, "pos", self.place) for path in (body, light, camera))
+        for ground in root.iterfind("worldbody/body"):
+            ground.set("pos", write_exactly(*self.origin))
+            if self.is_tilted:
+                ground.set("quat", write_exactly(*self.quaternion))
         if self.is_tilted:
-            changes += [("option", "gravity", self.turn), (light, "dir", self.turn)]
-        for path, name, change in changes:
-            for element in root.iterfind(path):
-                vector = map(float, element.get(name, "0 0 0").split())
-                element.set(name, write_exactly(*change(*vector)))
-        if self.is_tilted:
-            for path in (body, camera):
-                for element in root.iterfind(path):
-                    element.set("quat", write_exactly(*self.quaternion))
+            for option in root.iterfind("option"):
+                gravity = map(float, option.get("gravity", "").split())
+                option.set("gravity", write_exactly(*self.turn(*gravity)))
 
 
 def _require_three(name: str, value: object) -> tuple[float, ...]:

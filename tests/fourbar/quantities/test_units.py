@@ -266,6 +266,11 @@ def test_what_may_have_been_meant_is_one(text, unit, meant):
     assert to_si(meant, unit) > 0.0
 
 
+def test_a_force_is_not_taken_for_a_length():
+    with raises(UnitError, match='"lb" does not convert to m$'):
+        to_si("5 lb", "m")
+
+
 @pytest.mark.parametrize(
     "text, half",
     read_rows("""
