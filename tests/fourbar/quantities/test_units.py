@@ -267,7 +267,7 @@ def test_what_may_have_been_meant_is_one(text, unit, meant):
 
 
 def test_a_force_is_not_taken_for_a_length():
-    with raises(UnitError, match='"lb" does not convert to m$'):
+    with raises(UnitError, match=r'"lb" does not convert to m$'):
         to_si("5 lb", "m")
 
 
