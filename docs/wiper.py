@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import fourbar
 from fourbar.show.plot.curves import mark_peak
+from fourbar.show.plot.labels import settle_labels
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -60,6 +61,7 @@ def draw(path: Path) -> None:
             title="Torque of the wiper's motor",
         )
         place_legend(axes)
+        settle_labels(figure)
         Drawing(figure).save(path)
 
 

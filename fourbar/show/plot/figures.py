@@ -36,21 +36,10 @@ _PANELS: dict[str, Callable[["Axes", View], None]] = {
     "moving linkage": partial(linkage_figure.draw_linkage, moving=True),
     "coupler": linkage_figure.draw_coupler_curves,
     "centres": linkage_figure.draw_centres,
-    "angles": curves.draw_angles,
-    "omega": curves.draw_velocities,
-    "alpha": curves.draw_accelerations,
-    "speeds": curves.draw_speeds,
-    "accelerations": curves.draw_point_accelerations,
-    "drive": curves.draw_drive,
-    "energy": curves.draw_energy,
-    "power": curves.draw_power,
-    "stroke": curves.draw_stroke,
-    "forces": curves.draw_forces,
-    "mu": curves.draw_transmission,
-    "shaking force": curves.draw_shaking_force,
-    "shaking moment": curves.draw_shaking_moment,
-    "ratios": curves.draw_speed_ratios,
-    "advantage": curves.draw_advantage,
+    **{
+        name: partial(curves.draw_chart, list_curves=list_curves)
+        for name, list_curves in curves.CHARTS.items()
+    },
 }
 """Panels, in the order in which their notes are written."""
 
