@@ -86,6 +86,20 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     assert abs(stop - O4 - cmath.rect(0.08, theta_4)) < 1e-15
 
 
+@pytest.mark.parametrize("moment", [2.0, -2.0])
+def test_the_arrow_of_a_moment_turns_as_the_moment_does(moment):
+    scene = crank_rocker(loads=(Load(4, moment=moment),))
+    (symbol,) = (one for one in list_acting(scene) if one.kind == "moment")
+    shown = view.make_view(scene)
+    axes = Figure().subplots()
+    symbols.draw_symbol(axes, symbol, symbols.pose_of(shown, shown.here, 0))
+    x, y = axes.lines[0].get_data()
+    area = np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])  # about O2
+    middle_x, middle_y = np.mean([x, y], axis=1)
+    area -= middle_x * (y[-1] - y[0]) - middle_y * (x[-1] - x[0])
+    assert copysign(1.0, area) == copysign(1.0, moment)
+
+
 @pytest.fixture(scope="module")
 def crowded(everything):
     """All that acts drawn on a crank of a twelfth of the coupler: axes, view, scale."""
