@@ -232,9 +232,9 @@ def read_number(key: str, text: str, unit: str, bound: str = ANY_NUMBER) -> floa
 def read_positions(scene: Scene, text: str) -> Command:
     """Read the positions of a text like "60 deg", "theta_4=30 deg" or "P_y=30 mm".
 
-    Without a name the number is what the scene commands. Angles, strokes and times are
-    those that the linkage can have, any other column has its value in the scene's
-    motion.
+    Without a name the number is what the scene commands. Angles and strokes are those
+    that the linkage can have; any other column, and each of a motion over time, has its
+    value in the scene's motion.
     """
     from fourbar.effects.linear_drive import LinearDrive
     from fourbar.files.drawn_pins import list_drawn
@@ -243,31 +243,31 @@ def read_positions(scene: Scene, text: str) -> Command:
     from fourbar.studies.passing import STATED_POSITIONS, find_positions, meet_limit
 
     name, equals, value = (part.strip() for part in text.rpartition("="))
+    motion = scene.motion
     if not equals:
-        name = scene.motion.commanded
+        name = motion.commanded
     if name == "t":  # as it is printed
         name = "time"
+    unit = "m" if name == "stroke" else "rad"
     if value == "drawn":
+        drawn = {}
         if scene.drawing is not None:
             drawn = list_drawn(scene.drawing, scene.settled_drive())
-            if name in drawn:
-                return find_positions(scene, name, drawn[name])
-        raise InputError("--at", text, "needs a scene that states [pins]")
-    is_column = name not in STATED_POSITIONS or value in EXTREMES
+        if name not in drawn:
+            raise InputError("--at", text, "needs a scene that states [pins]")
+        value = f"{drawn[name]!r} {unit}"
+    is_over_time = motion.law is not None or motion.free is not None
+    is_column = name not in STATED_POSITIONS or value in EXTREMES or is_over_time
     if name == "stroke" and isinstance(scene.drive, LinearDrive):
         is_column |= not scene.drive.may_be_commanded
     if is_column:
         return locate(scene, name, value)
-    unit = {"stroke": "m", "time": "s"}.get(name, "rad")
-    likely = {"stroke": "mm", "time": "s"}.get(name, "deg")
     if is_bare(value):  # it may have been meant in any unit
-        raise InputError(
-            "--at",
-            text,
-            f'the unit is missing; did you mean "{value} {likely}"?',
-        )
+        likely = "mm" if unit == "m" else "deg"
+        hint = f'the unit is missing; did you mean "{value} {likely}"?'
+        raise InputError("--at", text, hint)
     stated = read_number("--at", value, unit)
-    if unit == "rad" and name != scene.motion.commanded:
+    if unit == "rad" and name != motion.commanded:
         rounding = half_unit_of_text(value, unit)
         stated = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
     return find_positions(scene, name, stated)

@@ -21,6 +21,8 @@ LADDER = 0.5 ** np.arange(1, 50)
 """Parts of the interval in which the linkage ceases to assemble: quantities may grow
 there as the root of what is commanded.
 """
+SAME_PLACE = 1e-12
+"""Part of a motion within which two of its times are one."""
 Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
 
@@ -126,7 +128,9 @@ class MotionCourse:
         rows = np.linspace(0.0, steps, parts * steps + 1)
         places = np.interp(rows, np.arange(steps + 1), stated)
         if motion.law is not None:
-            places = np.union1d(places, motion.law.time)
+            knots = np.array(motion.law.time)
+            apart = np.abs(places[:, None] - knots).min(axis=1)
+            places = np.union1d(places[apart > SAME_PLACE * np.ptp(places)], knots)
         return places
 
     def _refine_edges(

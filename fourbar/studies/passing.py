@@ -1,7 +1,4 @@
-"""Positions at which a named quantity of a scene's motion has a value.
-
-The quantity is an angle, the stroke or the time.
-"""
+"""Positions of a scene's assembly at which an angle or the stroke has a value."""
 
 import math
 from collections.abc import Sequence
@@ -10,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.errors import InputError, NotAssembledError, write_in_units
+from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import FourBar
-from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import (
     COMMAND_NAMES,
@@ -22,12 +18,10 @@ from fourbar.scene.motion import (
     Motion,
 )
 from fourbar.scene.scene import default_places, write_stroke_ranges
-from fourbar.solution import Solution, compute_times, where_assembled
 from fourbar.solving import solve
-from fourbar.studies.course import MotionCourse, bisect
 
 COMMANDED_ANGLES = tuple(names[0] for names in COMMAND_NAMES.values())
-STATED_POSITIONS = (*COMMANDED_ANGLES, STROKE_COMMAND[0], "time")
+STATED_POSITIONS = (*COMMANDED_ANGLES, STROKE_COMMAND[0])
 """Names by which a position may be stated."""
 SAME_POSITION = 1e-6
 """rad, or part of a length: two places that the formulas give in two ways are one."""
@@ -38,42 +32,31 @@ _GRID_DIGITS = 4
 
 
 def find_positions(scene: Scene, name: str, value: float) -> Command:
-    """Find the positions of a scene's motion where a named quantity has a value.
-
-    The positions are those of the scene's assembly, of a motion over time those that it
-    passes, of a released one the first.
+    """Find the positions of a scene's assembly where a named quantity has a value.
 
     Parameters
     ----------
+    scene : its motion has no time of its own.
     name : one of `STATED_POSITIONS`.
-    value : rad, m or s.
+    value : rad or m.
 
     Raises
     ------
     InputError : a name that the motion has not.
     NotAssembledError : no position has the value; the message says the range.
     """
-    if scene.motion.free is not None or scene.motion.law is not None:
-        return _find_times(scene, name, value)
-    return command_at(scene, np.array(_find_places(scene, name, value)))
-
-
-def _find_places(scene: Scene, name: str, value: float) -> list[float]:
-    """Find the commanded angles or strokes at which a named one has a value."""
-    motion = scene.motion
-    if name == motion.commanded:
+    commanded = scene.motion.commanded
+    where = f"at {name} = {_write_position(name, value)}"
+    if name == commanded:
         at = command_at(scene, np.array([value]))  # which refuses a stroke out of range
         if solve(scene, "position", at=at).assembled[0]:
-            return [value]
+            return at
         raise NotAssembledError(
-            f"{_say_position(name, value)}: the linkage does not assemble there;"
-            f" {say_range(scene)}"
+            f"{where}: the linkage does not assemble there; {say_range(scene)}"
         )
-    if name == "time":
-        return [_find_place_of_sweep(scene, value)]
     places: list[float] = []
     for place in _list_candidates(scene, name, value):
-        if any(is_same_position(motion.commanded, place, other) for other in places):
+        if any(is_same_position(commanded, place, other) for other in places):
             continue
         here = solve(scene, "position", at=command_at(scene, np.array([place])))
         reached = getattr(here, name)[0]
@@ -83,32 +66,14 @@ def _find_places(scene: Scene, name: str, value: float) -> list[float]:
         # of the range that the scene's own motion is in
         places_of_range = default_places(scene, float(command(scene).angle[0]))
         whole = solve(scene, "position", at=command_at(scene, places_of_range))
-        low, high = _write_extent(getattr(whole, name), name, _GRID_DIGITS)
+        values = getattr(whole, name)
+        low = _write_position(name, float(np.nanmin(values)), _GRID_DIGITS)
+        high = _write_position(name, float(np.nanmax(values)), _GRID_DIGITS)
         raise NotAssembledError(
-            f"{_say_position(name, value)}: no position of this assembly has it;"
-            f" {name} goes from {low} to {high}"
+            f"{where}: no position of this assembly has it; {name} goes from {low} to"
+            f" {high}"
         )
-    return sorted(places)
-
-
-def _find_place_of_sweep(scene: Scene, time: float) -> float:
-    """Find what a steady sweep commands at a time."""
-    sweep = command(scene)
-    times = compute_times(scene, sweep)
-    if times is None:
-        raise InputError(
-            "at",
-            "time",
-            "needs a motion over time: a sweep at one speed, motion.law or motion.free",
-        )
-    last = float(times.max())
-    if not 0.0 <= time <= last:
-        raise NotAssembledError(
-            f"{_say_position('time', time)}: the sweep goes from 0 to"
-            f" {_write_position('time', last)}"
-        )
-    order = np.argsort(times)
-    return float(np.interp(time, times[order], sweep.places[order]))
+    return command_at(scene, np.array(sorted(places)))
 
 
 def say_nowhere(scene: Scene) -> str:
@@ -212,76 +177,10 @@ def is_same_position(name: str, first: float, second: float) -> bool:
     return abs(first - second) <= SAME_POSITION * abs(second)
 
 
-def _find_times(scene: Scene, name: str, value: float) -> Command:
-    """Find the instants at which a motion over time passes a value."""
-    course = MotionCourse(scene, "position")
-    start, stop = course.places[[0, -1]].tolist()
-    if name == "time":
-        if not start <= value <= stop:
-            raise NotAssembledError(
-                f"{_say_position(name, value)}: the motion goes from {start:.6g} to"
-                f" {stop:.6g} s"
-            )
-        return course.command(np.array([value]))
-
-    def read(solution: Solution) -> Array:
-        values = _require_values(getattr(solution, name), name)
-        return where_assembled(solution, values)
-
-    def measure_gaps(solution: Solution) -> Array:
-        gaps = read(solution) - value
-        if name in COMMANDED_ANGLES:
-            gaps = np.angle(np.exp(1j * gaps))
-        return np.asarray(gaps)
-
-    gaps = measure_gaps(course.solution)
-    before = gaps[:-1]
-    after = gaps[1:]
-    # half a turn away an angle changes its side, too
-    near = name not in COMMANDED_ANGLES or np.abs(after - before) < 0.5 * math.pi
-    rows = np.flatnonzero((before != 0.0) & (before * after <= 0.0) & near)
-    times = course.places[:1][gaps[:1] == 0.0]
-    if scene.motion.free is not None:
-        rows = rows[: 1 - times.size]
-    if rows.size:
-        sides = before[rows]
-        _, passed = bisect(
-            lambda there: measure_gaps(course.solve(there)) * sides > 0.0,
-            course.places[rows],
-            course.places[rows + 1],
-        )
-        times = np.concatenate([times, passed])
-    if not times.size:
-        low, high = _write_extent(read(course.solution), name)
-        raise NotAssembledError(
-            f"{_say_position(name, value)}: the motion does not pass it; it stays"
-            f" within {low} and {high}"
-        )
-    return course.command(times)
-
-
-def _write_extent(values: Array | None, name: str, digits: int = 6) -> list[str]:
-    """Write the least and the greatest of the values of a quantity."""
-    known = _require_values(values, name)
-    ends = float(np.nanmin(known)), float(np.nanmax(known))
-    return [_write_position(name, end, digits) for end in ends]
-
-
-def _require_values(values: Array | None, name: str) -> Array:
-    if values is None:
-        raise InputError("at", name, "needs a drive along a line")
-    return values
-
-
-def _say_position(name: str, value: float) -> str:
-    """Return a position as a message names it, "at theta_4 = 30 deg"."""
-    return f"at {name} = {_write_position(name, value)}"
-
-
 def _write_position(name: str, value: float, digits: int = 6) -> str:
     if name in COMMANDED_ANGLES:
         return f"{math.degrees(value):.{digits}g} deg"
-    return write_in_units("s" if name == "time" else "m", value, digits=digits)
+    return write_in_units("m", value, digits=digits)
 
 
 def join_commands(values: Sequence[Any]) -> Any:

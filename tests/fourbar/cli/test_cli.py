@@ -660,6 +660,19 @@ def test_an_angle_of_more_than_half_a_turn_is_that_of_the_sweep(run):
     assert shown["theta_4"] == approx([233.8003], abs=1e-4)
 
 
+@pytest.mark.parametrize("name", ["law_sine", "released_alone"])
+def test_an_angle_of_a_motion_over_time_is_that_of_each_instant(run, name):
+    file = MODELS / "capabilities" / f"{name}.toml"
+    motion = solve(load(file), "position")
+    middle = float(0.5 * (motion.theta_2.min() + motion.theta_2.max()))
+    _, out, _ = run("analyze", file, "--at", f"{middle!r} rad")
+    first, *lines = out.splitlines()
+    assert first.endswith(f" at {len(lines)} positions:")
+    passes = np.diff(np.sign(motion.theta_2 - middle)) != 0
+    assert len(lines) == np.count_nonzero(passes) > 1
+    assert all('--at "time=' in line for line in lines)
+
+
 def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
     """The limit is that of the sides 5, 4.5 and 6; 0.1 s at 10 rad/s are 1 rad."""
     lengths = '{ ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }'

@@ -8,20 +8,28 @@ import pytest
 from pytest import approx, raises
 
 from fourbar import (
+    Free,
+    Gravity,
     InputError,
+    Law,
     Motion,
     NotAssembledError,
     Place,
     Point,
+    Scene,
     Spring,
     Springs,
+    Sweep,
+    release,
     solve,
 )
+from fourbar.errors import FourBarError
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
+from fourbar.studies.passing import join_commands
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import bare, crank_rocker
 
 LOCATED = 1e-11
 """rad or s: a place is located to round-off, times the slope of what is asked for."""
@@ -154,6 +162,62 @@ def test_a_law_has_a_value_at_times_and_none_while_it_dwells():
         locate(scene, "B_x", "0.8 m")
 
 
+@pytest.mark.parametrize("omega", [0.5, -0.5])
+def test_a_steady_sweep_has_a_place_at_each_time(omega):
+    """A backward sweep begins at its other end, as its column of times has it."""
+    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.2, 10), omega))
+    found = locate(scene, "time", "1.3 s")
+    begin = 0.2 if omega > 0.0 else 1.2
+    assert found.angle == approx([begin + 1.3 * omega], abs=1e-12)
+    with raises(NotAssembledError, match=r"no position has it; time goes from 0 to 2"):
+        locate(scene, "time", "2.1 s")
+
+
+LAW = crank_rocker(
+    motion=Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest"))
+)
+DROPPED = crank_rocker(
+    motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
+    effects=(Gravity(),),
+)
+
+
+def test_a_law_passes_an_angle_up_and_down():
+    wanted = ("theta_2", "1.5 rad"), ("time", "0.5 s")
+    found = join_commands([locate(LAW, *at) for at in wanted])
+    assert len(found.angle) == 3
+    assert found.angle[:2] == approx(1.5, abs=LOCATED)
+    assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
+    begins = locate(LAW, "theta_2", "0.3 rad")
+    assert begins.time[0] == 0.0
+
+
+def test_a_knot_of_a_law_is_one_place():
+    """Its steps have the knot too, apart by a rounding of their times."""
+    knots = Law((-0.1, 0.1, 0.2, 0.5), (1.9, 2.0, 2.2, 2.5), steps=12, ends="rest")
+    found = locate(crank_rocker(motion=Motion(law=knots)), "time", "0.1 s")
+    assert found.time == approx([0.1], abs=LOCATED)
+
+
+@pytest.mark.slow
+def test_a_release_is_met_when_it_first_passes():
+    """By a much finer release: the angle lies between two of its instants."""
+    free = DROPPED.motion.replace(free=Free(1.0, 20000))
+    fine = release(replace(DROPPED, motion=free)).command
+    value = float(fine.theta_2[3001])
+    wanted = ("time", "0 s"), ("time", "0.25 s"), ("theta_2", f"{value!r} rad")
+    found = [locate(DROPPED, *at) for at in wanted]
+    begin, there, passing = found[0], found[1], found[2].part(slice(0, 1))
+    passes = np.diff(np.sign(fine.theta_2 - value)) != 0
+    first = int(np.flatnonzero(passes)[0])
+    assert begin.angle == approx([1.0]) and passing.angle == approx([value], abs=1e-9)
+    assert [*begin.time, *there.time] == approx([0.0, 0.25])
+    assert passing.time == approx([fine.time[first]], abs=fine.time[1] * (1.0 + 1e-6))
+    state = solve(DROPPED, at=join_commands([begin, passing]))
+    assert state.omega_2[0] == approx(0.0, abs=1e-6)
+    assert state.omega_2[1] == approx(fine.omega_2[first], rel=1e-3)
+
+
 @pytest.mark.slow
 def test_a_release_has_a_value_at_times():
     """A parallelogram of massless cranks swings its coupler as a point mass on one.
@@ -169,6 +233,20 @@ def test_a_release_has_a_value_at_times():
     speed = sqrt(2.0 * 9.81 * (sin(radians(50.0)) - 0.5) / 0.5)
     at = locate(scene, "omega_2", f"{-speed!r} rad/s")
     assert np.degrees(at.angle) == approx([-50.0, -130.0], abs=1e-6)
+
+
+def test_times_and_angles_that_a_law_does_not_pass_are_refused():
+    beyond = Law((0.0, 1.0), (0.4, 2.0), ends="rest")
+    stops = Scene(bare(0.6, 0.3, 0.35, 0.25), Motion(law=beyond))
+    still = crank_rocker(motion=Motion(Sweep(0.2, 1.2, 10)))
+    for scene, name, value, words in (
+        (LAW, "theta_2", "3 rad", "no position has it; theta_2 goes from"),
+        (stops, "theta_2", "1.5 rad", "goes from .* to 1.31812"),  # acos(1/4)
+        (LAW, "time", "3 s", "no position has it; time goes from 0 to 2 s"),
+        (still, "time", "1 s", "at no one speed"),
+    ):
+        with raises(FourBarError, match=words):
+            locate(scene, name, value)
 
 
 REFUSED = read_rows("""

@@ -29,7 +29,7 @@ from fourbar.scene import command_at
 from fourbar.show.located import locate
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import COMMON, units
-from fourbar.studies import course, passing
+from fourbar.studies import course
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
 from tests.support.texts import PLIERS
@@ -113,7 +113,7 @@ LIMITS = "on the change point: the limits from both sides"
 def write_forces(motion, gravity=ALONG, at=None, **parts):
     """Return the rows of pin forces, by position or where a quantity has a value."""
     scene = Scene(PARALLELOGRAM, motion, effects=(gravity,), **parts)
-    places = None if at is None else passing.find_positions(scene, *at)
+    places = None if at is None else locate(scene, *at).part(slice(0, 1))
     solution = solve(scene, at=places)
     assert solution.status == ["change_point"]
     return PositionSheet(solution, units("N m")).write_pin_forces(), solution
@@ -155,7 +155,7 @@ def test_a_release_has_the_limits_of_its_own_motion(gravity):
     same angle, so that half of it all is at each pin.
     """
     motion = Motion(0.5, 6.0, free=Free(2.0, 100))
-    rows, solution = write_forces(motion, gravity, ("theta_2", 0.0))
+    rows, solution = write_forces(motion, gravity, ("theta_2", "0 rad"))
     assert rows[-1] == LIMITS
     lost = 0.1 * solution.a_G2 + 0.3 * solution.a_G3 + 0.1 * solution.a_G4
     direction = np.array([np.cos(gravity.angle), np.sin(gravity.angle)])
@@ -178,7 +178,7 @@ REASONS = [
 
 @pytest.mark.parametrize("motion, why", slow_but(REASONS[:1], REASONS))
 def test_the_reason_is_said_where_a_motion_begins(motion, why):
-    rows, _ = write_forces(motion, at=("time", 0.0))
+    rows, _ = write_forces(motion, at=("time", "0 s"))
     assert rows[-1] == f"on the change point pin forces have no value: {why}"
     assert numbers(rows[1]) == []
 
