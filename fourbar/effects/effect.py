@@ -1,6 +1,7 @@
 """Base classes of effects, and the sums of what loads and effects apply to the bars."""
 
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from dataclasses import fields
 from functools import cache
 from typing import Any, ClassVar, NamedTuple, Self
@@ -184,21 +185,13 @@ class Actions:
         for point, sense in ((start, 1.0), (end, -1.0)):
             self.force(point.bar, sense * force, point.in_bar)
 
-    def plus(self, unit: "Actions", size: Number) -> "Actions":
-        """Return the sum of these actions and those of a drive.
-
-        `unit`: actions of 1 N of the drive.
-        """
-        total = Actions(self.state, self.bodies, self.impending)
-        for name in ("forces", "moments", "couples", "through"):
-            sums = dict(getattr(self, name))
-            for key, per_newton in getattr(unit, name).items():
-                sums[key] = sums.get(key, 0.0) + size * per_newton
-            setattr(total, name, sums)
-        total.on_coupler = list(self.on_coupler)
-        for force, point, beyond, moment in unit.on_coupler:
-            scaled = None if force is None else size * force
-            total.on_coupler.append((scaled, point, beyond, size * moment))
+    def plus(self, drive: Any, force: Number) -> "Actions":
+        """Return the sum of these actions and those of a drive's force, N."""
+        total = copy(self)
+        for name, sums in vars(self).items():
+            if isinstance(sums, (dict, list)):
+                setattr(total, name, copy(sums))
+        drive.act(total, force)
         return total
 
     def generalized_forces(self) -> tuple[Number, Number]:

@@ -15,12 +15,17 @@ for the coefficients h_k, and so is finite where these are not.
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fourbar.effects.effect import Actions
-from fourbar.effects.place import Place, Placed
-from fourbar.formulas.arithmetic import Number
+from fourbar.effects.place import COINCIDENT_POINTS, Place, Placed
+from fourbar.errors import InputError, write_in_units
+from fourbar.formulas.arithmetic import Number, is_any
 from fourbar.formulas.motion import State
+from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.pin_forces import Body
-from fourbar.linkage import FourBar
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
+from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
 
 MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
 
@@ -42,16 +47,29 @@ class ForceDrive(Placed, ABC):
         """
 
     @property
-    @abstractmethod
     def may_be_left_out(self) -> tuple[int, ...]:
         """Return the bars of which one may be left out.
 
-        The moments of the other two then give the force between them.
+        The moments of the other two then give the force between them. What the ground
+        exerts on bar 2 or 4 is in the moment of that bar alone, as a couple is; all
+        else is in any pair's.
         """
+        moving = {place.bar for _, place in self.ends} - {1}
+        return (*moving,) if moving in ({2}, {4}) else MOVING_BARS
 
-    @abstractmethod
     def require_motion(self, linkage: FourBar) -> None:
-        """Raise InputError where the drive does no work at any position."""
+        """Raise InputError if one bar holds both ends, or the ground the only one.
+
+        The drive then does no work at any position.
+        """
+        held = [_list_bars(linkage, place) for _, place in self.ends]
+        if common := held[0].intersection(held[1] if self.has_stroke else {1}):
+            _, last = self.ends[-1]
+            raise InputError(
+                "drive.to" if self.has_stroke else "drive",
+                f"bar {last.bar} at {write_in_units('m', last.distance)}",
+                f"does no work at any position: bar {min(common)} holds what it moves",
+            )
 
     @abstractmethod
     def line(self, state: State) -> tuple[Any, Number]:
@@ -61,20 +79,33 @@ class ForceDrive(Placed, ABC):
     def act(self, actions: Actions, force: Number) -> None:
         """Exert a force, N."""
 
-    @abstractmethod
+    def reach(self, state: State) -> Number:
+        """Return the path from one end to the other, m; 1 for a drive at one place."""
+        return 1.0
+
     def status(self, state: State, sines: dict[int, Number]) -> Number:
-        """Return the status of positions at which there is no force; None: nowhere."""
+        """Return NO_DIRECTION where the ends coincide, NO_LEVER where P vanishes.
+
+        P vanishes within its rounding. None: there is no such position. Places are
+        rounded by the lengths over which they are reached, the line's direction by that
+        over the stroke.
+        """
+        stroke, _ = self.line(state)
+        distance = 1.0 if stroke is None else stroke
+        lever, most = self.leverage(state, sines)
+        away = self.reach(state)
+        without_lever = abs(lever) * distance <= NO_DIGIT_LEFT * most * away
+        coincide = distance <= COINCIDENT_POINTS * away
+        if not is_any(without_lever | coincide):
+            return None
+        status = np.where(without_lever, NO_LEVER, OK)
+        return np.where(coincide, NO_DIRECTION, status)
 
     def gain(self, state: State) -> Number:
         """Compute ds/dq, m: the work of 1 N per change of the independent angle."""
-        gain, _ = self.per_newton(Actions(state, MASSLESS)).generalized_forces()
-        return gain
-
-    def per_newton(self, actions: Actions) -> Actions:
-        """Return what 1 N of the drive does to the bars."""
-        single = Actions(actions.state, actions.bodies)
+        single = Actions(state, MASSLESS)
         self.act(single, 1.0)
-        return single
+        return single.generalized_forces()[0]
 
     def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
         """Compute P and L, the largest value that P could have.
@@ -98,3 +129,14 @@ class ForceDrive(Placed, ABC):
             for _, place in self.ends
         )
         return self.gain(state._replace(k=k)), most
+
+
+def _list_bars(linkage: FourBar, point: Place) -> set[int]:
+    """List the bars that hold a point: its own, and at a pin the other bar there."""
+    length = linkage.lengths[point.bar - 1]
+    nothing = COINCIDENT_POINTS * length
+    bars = {point.bar}
+    for pin, along in zip(ENDS[point.bar], (0.0, length), strict=True):
+        if abs(point.in_bar - along) <= nothing:
+            bars.update(PINS[pin])
+    return bars

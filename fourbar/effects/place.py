@@ -35,6 +35,10 @@ STATED_PAIR = Declared("m", left_out=None, pair="rad")
 StatedPair = Annotated[tuple[float, float] | None, STATED_PAIR]
 STATED_PLACES = {"from_pin": STATED_PAIR, "from_centre": STATED_PAIR}
 """Forms in which numbers state a place that turns with its bar; `point` is a name."""
+COINCIDENT_POINTS = 16.0 * 2.0**-52
+"""Part of the paths from O2, bar by bar, below which two points count as one. There is
+no direction between them.
+"""
 AT_FIRST_PIN = (0.0, 0.0)
 """Place of the bar's first pin, m and rad."""
 

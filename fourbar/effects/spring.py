@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.effects.place import At, Line, Place
+from fourbar.effects.place import COINCIDENT_POINTS, At, Line, Place
 from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any, select
 from fourbar.formulas.motion import State
@@ -21,10 +21,6 @@ from fourbar.linkage import (
 )
 from fourbar.quantities import NO_DIRECTION, OK
 
-COINCIDENT_POINTS = 16.0 * 2.0**-52
-"""Part of the paths from O2, bar by bar, below which two points count as one. There is
-no direction between them.
-"""
 GAS = {
     "extended": Declared("m", POSITIVE),
     "stroke": Declared("m", POSITIVE),
@@ -160,14 +156,6 @@ class Spring(Line):
         """Return the distance of the ends less that at which the force is 0, m."""
         return np.abs(self.across(state)) + self.slack / self.stiffness
 
-    def greatest_tension(self, linkage: FourBar) -> float:
-        """Return a bound of the tension, N.
-
-        The points stay within the linkage and the arms to them.
-        """
-        reach = sum(linkage.lengths) + abs(self.start.distance) + abs(self.end.distance)
-        return float(abs(self.preload) + self.stiffness * (reach + self.length))
-
 
 @dataclass(frozen=True, slots=True)
 class Springs(Effect):
@@ -240,6 +228,13 @@ class Springs(Effect):
         model.springs.extend(self.springs)
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
-        """Sum the greatest tensions, at the longest arm."""
-        tensions = (spring.greatest_tension(linkage) for spring in self.springs)
-        return sum(tensions) * max(linkage.lengths)
+        """Sum bounds of the tensions, at the longest arm.
+
+        The points stay within the linkage and the arms to them.
+        """
+        total = 0.0
+        for spring in self.springs:
+            arms = abs(spring.start.distance) + abs(spring.end.distance)
+            reach = sum(linkage.lengths) + arms + spring.length
+            total += abs(spring.preload) + spring.stiffness * reach
+        return float(total * max(linkage.lengths))

@@ -382,17 +382,15 @@ class Case(NamedTuple):
         actions = Actions(state, self.bodies, impending).add(self.terms)
         if self.drive is None:
             may_be_left_out: tuple[int, ...] = (self.drive_bar,)
-            per_newton = None
             gain = state.k[self.drive_bar - 2]
         else:
             may_be_left_out = self.drive.may_be_left_out
-            per_newton = self.drive.per_newton(actions)
-            gain = per_newton.generalized_forces()[0]
+            gain = self.drive.gain(state)
         sines = {
             bar: self.path.drive_sine(state.position, bar) for bar in may_be_left_out
         }
         inertial = self._compute_inertial_forces(state, acceleration, sines.get(4))
-        free_bodies = _FreeBodies(state, inertial, sines, per_newton, gain)
+        free_bodies = _FreeBodies(state, inertial, sines, self.drive, gain)
         friction = SolvedFriction(free_bodies.solve_pin_forces(actions))
         # a scene holds one effect of a kind, and one kind depends on the forces
         for term in self.terms:
@@ -468,10 +466,8 @@ class _FreeBodies(NamedTuple):
     inertial: _InertialForces
     sines: dict[int, Any]
     """Sines between the two other bars, by the bar whose moment is left out."""
-    per_newton: Actions | None
-    """Actions of a drive that exerts a force, of 1 N. None: the drive is a couple on a
-    bar.
-    """
+    drive: "ForceDrive | None"
+    """Drive that exerts a force; None: it is a couple on a bar."""
     gain: Any
     """h of the driven bar, or ds/dq of the drive that exerts a force, m."""
 
@@ -489,10 +485,10 @@ class _FreeBodies(NamedTuple):
         bar 3, the pair of bars whose directions differ most keeps the digits.
         """
         inertial = self.inertial if with_inertia else _InertialForces()
-        if self.per_newton is not None:
+        if self.drive is not None:
             Q = actions.generalized_forces()[0]
             force = driving_torque(self.gain, inertial.total, Q)
-            actions = actions.plus(self.per_newton, force)
+            actions = actions.plus(self.drive, force)
         if len(self.sines) == 1:
             (bar,) = self.sines
             return self._solve_from_two_moments(bar, actions, inertial)

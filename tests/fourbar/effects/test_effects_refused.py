@@ -20,7 +20,7 @@ places | arm = | frame = "bar"\narm = | loads[2].arm
 line | [drive] | [drive]\nbar = 4 | drive.bar = 4: a drive along a line has from and to
 line | to = { bar = 4, from_pin = ["9 cm", "0 deg"] } | | drive.to
 line | to = { bar = 4 | to = { bar = 1 | drive.to.bar = 1: must be another bar
-line | "21 cm", "-60 deg" | "30 cm", "0 deg" | keeps its distance from `from`
+line | "21 cm", "-60 deg" | "30 cm", "0 deg" | does no work at any position
 line | 9 cm | 9 kg | drive.to.from_pin
 line | [drive] | [drive]\nforce = 1 | drive.force
 point | direction = "90 deg"\n | | drive.direction

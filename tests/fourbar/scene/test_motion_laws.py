@@ -169,7 +169,7 @@ omega_2 = ["0 rad/s"] | omega_2 | needs 2
         *(
             (SINE[2:-2].replace(old, new), words)
             for old, new, *words in read_rows("""
-0.5 rad/s | 0.5 Hz | frequency | 0.5 rev/s
+0.5 rad/s | 0.5 Hz | frequency | is not known
 0.5 rad/s | 0 rad/s | frequency | > 0
 mean = "1 rad", |  | law.mean | missing
 sine | cosine | law.kind | "sine"
