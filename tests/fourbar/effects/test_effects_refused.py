@@ -30,7 +30,7 @@ point | point = "handle"\n | from = { bar = 1 }\npoint = "handle"\n | from and t
 point | point = "handle"\n | bar = 1\nfrom_pin = ["1 m", "0 deg"]\n | drive.bar
 point | frame = "bar"\n[[ | frame = "body"\n[[ | drive.frame
 point | point = "handle"\n | at = ["1 m", "0 deg"]\nbar = 2\n | drive.at
-point | point = "handle"\n | bar = 2\nfrom_pin = ["0 m", "0 deg"]\n | bar 1 holds what it moves
+point | point = "handle"\n | bar = 2\nfrom_pin = ["0 m", "0 deg"]\n | bar 1 holds
 """)
 """A file, what is replaced in it and by what, and words of the refusal."""
 
