@@ -20,7 +20,7 @@ from fourbar.quantities import UNKNOWNS, VECTORS, Array
 from fourbar.scene import Command
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.solving import solve
-from fourbar_validation.cost.work_precision import time_call, time_in_turns
+from fourbar_validation.advise.clocks import time_call, time_in_turns
 from fourbar_validation.engines.programs import run_to_end
 from fourbar_validation.report.machine import name_machine
 

@@ -25,7 +25,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
 from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.tables import show_table
-from fourbar_validation.cost.work_precision import time_call, time_in_turns
+from fourbar_validation.advise.clocks import time_call, time_in_turns
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import declares
 from fourbar_validation.engines.registry import ENGINES

@@ -10,11 +10,14 @@ import pytest
 from click.testing import CliRunner
 
 from fourbar.errors import FAILED, HOLDS
-from fourbar.quantities import UNKNOWNS
+from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.solving import solve
 from fourbar_lab import bench, contenders
 from fourbar_lab.contenders import command_positions, make_example
 from fourbar_lab.starts import measure_starts
+from fourbar_lab.thirteen_bodies import make_bodies
+from fourbar_validation.published.thirteen import solve_thirteen
+from tests.support.scenes import crank_rocker, thesis
 
 ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
@@ -51,6 +54,20 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path):
     )
     picture = (tmp_path / "bench.svg").read_text()
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
+
+
+@pytest.mark.parametrize(
+    "scene", [crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0, 300.0]))]
+)
+def test_thirteen_equations_have_the_solution_of_the_formulas(scene):
+    solution = solve(scene, "force")
+    unknowns = solve_thirteen(make_bodies(scene, solution.at), scene.drive_bar)
+    pins = (unknowns[:, 2 * column : 2 * column + 2] for column in (0, 1, 3, 4))
+    for name, values in zip(PIN_FORCES, pins, strict=True):
+        expected = solution[name]
+        error = np.abs(values - expected).max() / np.abs(expected).max()
+        assert error < 1e-12
+    np.testing.assert_allclose(unknowns[:, -1], solution.torque, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.slow

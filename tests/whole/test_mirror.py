@@ -81,11 +81,12 @@ validation/regression/test_regression.py | scenes
 validation/report/test_report.py | machine overview run_summary
 validation/report/test_report.py | scene_pictures scene_record svg templating words
 # studies: each through its command
-lab/test_bench.py | contenders starts
+lab/test_bench.py | contenders starts thirteen_bodies
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
 lab/test_faults.py | fault_scenes injection
 validation/cost/test_cost.py | charts formulas series work_precision
+validation/cost/test_cost.py | validation/advise: clocks
 validation/advise/test_advise.py | judged_setup matters
 lab/test_benchmark.py | lab/simulators: slider_engines slider_mujoco slider_pinocchio
 lab/simulators/test_problems.py | slider_crank

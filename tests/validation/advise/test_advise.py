@@ -265,7 +265,7 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
     clocks = (lambda count: 2e-6 * count), (lambda count: 3e-5 * count)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(setup, "make_clocks", lambda settings: clocks)
+        patch.setattr(setup, "make_clocks", lambda *_: clocks)
         words = advise._describe_time(setup, attempt)
     revolution = 1e3 * (2e-6 * attempt.steps + 3e-5 * attempt.readings)
     second = revolution * 10.0 / math.tau  # at 10 rad/s

@@ -86,7 +86,7 @@ class Pretended:
             COMMAND, answer(F43=error), self.steps(settings), n, (), self.broken
         )
 
-    def make_clocks(self, settings):
+    def make_clocks(self, settings, edit=None):
         return (lambda steps: 1e-6 * steps), (lambda readings: 1e-6 * readings)
 
 

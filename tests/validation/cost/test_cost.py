@@ -21,6 +21,7 @@ from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
 from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.fault_scenes import FAULT_SCENES
+from fourbar_validation.advise.clocks import summarise_timings
 from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
@@ -147,41 +148,26 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit(scene):
 
 
 @pytest.mark.parametrize("scene", FEW)
-def test_formulas_in_four_precisions(scene):
-    commanded = formulas.choose_few(command(scene))
-    exact = formulas.evaluate_balls(scene, commanded, 2 * formulas.FIFTY_DIGITS)
-    wrong = {}
-    for name, method in formulas.METHODS_TIMED.items():
-        ours = method(scene, commanded)
-        errors = formulas.compare_with_reference(scene, commanded, ours, exact)
-        wrong[name] = errors.worst
-    assert wrong["formulas, double"] < 1e-13 and wrong["13x13"] < 1e-12
-    assert 1e-9 < wrong["formulas, single"] < 1e-4
-    assert wrong["50 digits"] < 1e-50
-
-
-def test_single_precision_slides_too():
-    """Thirteen equations that are not linear are not solved."""
-    friction = fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03))
-    scene = crank_rocker(effects=(friction,))
-    commanded = command(scene)
-    single = formulas.evaluate_single(scene, commanded)
-    assert compute_errors(scene, commanded, single).worst < 1e-4
-    with raises(NotImplementedError, match="pin forces"):
-        formulas.solve_thirteen_equations(scene, commanded)
+def test_formulas_are_right_to_round_off(scene, tmp_path):
+    (point_of_formulas,) = work_precision.CostStudy(
+        "s", scene, tmp_path
+    )._time_formulas()
+    assert point_of_formulas.errors.worst < 1e-13
 
 
 def test_what_is_no_number_or_not_compared_has_no_small_error():
     scene = turning(positions=8)
     commanded = formulas.choose_few(command(scene))
-    exact = formulas.evaluate_balls(scene, commanded)
-    ours = formulas.evaluate_double(scene, commanded)
+    solution = fourbar.solve(scene, at=commanded)
+    ours = {name: np.array(solution[name]) for name in ERROR_NAMES}
+    balls = formulas.evaluate_balls(scene, commanded)
     ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
-    worst_errors = formulas.compare_with_reference(
-        scene, commanded, ours, {**exact, "F14": [(None, None)] * 9}
-    )
+    ours["F32"][5] *= 1.0 + 1e-9
+    for ball in balls:
+        del ball["F14_x"]
+    worst_errors = formulas.compare_with_balls(scene, commanded, ours, balls)
     assert worst_errors.torque == worst_errors.F12 == worst_errors.F14 == math.inf
-    assert worst_errors.F43 < 1e-13
+    assert worst_errors.F43 < 1e-13 and 1e-12 < worst_errors.F32 < 2e-9
     still = replace(scene, motion=scene.motion.replace(speed=0.0), drive_bar=4)
     solution = fourbar.solve(still, "force")
     numbers = {name: solution[name] for name in ERROR_NAMES}
@@ -210,12 +196,6 @@ def test_fit_floor_and_warning():
     assert laws.list_warnings({"c": floored}) == [
         "c: torque, F12, F32, F43, F14: 9.0e-07 from 320 steps a revolution on"
     ]
-    dipping = [*falling[:-1], point(320.0, 1e-8), *floored[-2:], point(2560.0, 9e-7)]
-    (line,) = laws.list_warnings({"c": dipping})
-    assert line.endswith(
-        "9.0e-07 from 640 steps a revolution on, but for 1.0e-08 at 320, "
-        "where two errors cancel"
-    )
 
 
 JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
@@ -243,14 +223,6 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping):
     assert laws_found["F43"].decided
     jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640 steps a revolution"
     assert laws.list_warnings(curves) == [f"Euler, tc held: F43: {jump}"]
-    assert "F43 jumps" in charts.state_jumps(curves)
-    drawn = {
-        line.get_gid(): [*line.get_xdata()]
-        for axes in charts.draw_orders(curves, "").axes
-        for line in axes.lines
-        if line.get_gid() and len(line.get_xdata())
-    }
-    assert drawn == {"jump-F43": [1.0 / 640.0]}
     (line,) = laws.write_laws(list(laws_found.values()))
     assert f"; F43: FAILS, {jump}" in line
     assert "torque, F12, F32, F14: holds, 1.00" in line
@@ -308,8 +280,6 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported():
     assert not laws_found["F12"].decided and not laws_found["F12"].holds
     warning = "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
     assert laws.list_warnings(curves) == [warning]
-    jumps = "No timestep brings F12 below 0.1\nwith Euler"
-    assert charts.state_jumps(curves) == jumps
 
 
 def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
@@ -367,7 +337,7 @@ def test_the_command_writes_table_report_and_pictures(tmp_path, monkeypatch):
     assert "order of RK4 in the timestep" in text and "steps a revolution on" in text
     (order,) = [line for line in text.splitlines() if "order of RK4" in line]
     assert all(quantity in order for quantity in ERROR_NAMES) and "FAILS" not in order
-    stems = ("work-precision-torque", "work-precision-force", "orders", "solver")
+    stems = ("work-precision-torque", "work-precision-force", "integrator", "solver")
     for stem in stems:
         picture = (folder / f"{stem}.svg").read_text()
         assert picture.startswith("<svg") and "prefers-color-scheme:dark" in picture
@@ -385,7 +355,7 @@ def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measur
 
 
 def test_the_least_of_timings_counts_and_the_middle_one_tells_their_scatter():
-    assert work_precision.summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8]) == (1.0, 1.0)
+    assert summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8]) == (1.0, 1.0)
 
 
 def test_the_front_is_listed_by_what_lies_between_the_steps_too():

@@ -6,7 +6,7 @@ closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be lon
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import Settings, write_mjcf
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
+from fourbar_validation.advise.clocks import time_kinds
 from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import (
     DEGREE_BETWEEN,
@@ -206,26 +207,22 @@ def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
 
 def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
     """Time the steps and readings of an attempt, CPU seconds."""
-    times, reading = _time_kinds(setup, {"": attempt.settings})
-    return attempt.steps * times[""] + attempt.readings * reading
+    ((step, reading),) = _time_kinds(setup, [attempt.settings])
+    return attempt.steps * step + attempt.readings * reading
 
 
 def _time_kinds(
-    setup: TrialSetup, kinds: Mapping[str, Settings]
-) -> tuple[dict[str, float], float]:
-    """Time a step of each kind, and a reading of the first, CPU seconds.
-
-    Each time is the least of interleaved rounds.
-    """
-    clocks = {name: setup.make_clocks(settings) for name, settings in kinds.items()}
-    (_, time_readings), *_ = clocks.values()
-    steps = dict.fromkeys(kinds, math.inf)
-    reading = math.inf
-    for _ in range(TIMINGS_OF_A_KIND):
-        for name, (time_steps, _) in clocks.items():
-            steps[name] = min(steps[name], time_steps(STEPS_TIMED) / STEPS_TIMED)
-        reading = min(reading, time_readings(READINGS_TIMED) / READINGS_TIMED)
-    return steps, reading
+    setup: TrialSetup, kinds: Sequence[Settings]
+) -> list[tuple[float, float]]:
+    """Time a step and a reading of each kind, CPU seconds."""
+    timings = time_kinds(
+        setup,
+        [(settings, None) for settings in kinds],
+        [STEPS_TIMED] * len(kinds),
+        READINGS_TIMED,
+        TIMINGS_OF_A_KIND,
+    )
+    return [(min(steps), min(readings)) for steps, readings in timings]
 
 
 class _CheapestSearch:
@@ -282,10 +279,12 @@ class _CheapestSearch:
             name: replace(settings, **changes)
             for name, changes in KINDS_OF_STEP.items()
         }
-        times, reading = _time_kinds(self.setup, kinds)
-        base = times.pop("")
+        timings = _time_kinds(self.setup, [*kinds.values()])
+        base, reading = timings[0]
         self.reading_cost = reading / base
-        for name, seconds in sorted(times.items(), key=lambda pair: pair[1]):
+        steps_of = dict(zip(kinds, (step for step, _ in timings), strict=True))
+        del steps_of[""]
+        for name, seconds in sorted(steps_of.items(), key=lambda pair: pair[1]):
             cost = self.costs[name] = seconds / base
             allowed = _CHEAPER * min(map(self._work, self._list_served()))
             # with fewer steps than positions each step has a reading

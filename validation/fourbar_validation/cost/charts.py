@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from fourbar.show.plot.labels import add_label, settle_labels
 from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.writing import write_text
-from fourbar_validation.advise.worst_errors import ERROR_NAMES
 from fourbar_validation.cost.conclusion import (
     ERROR_IN_WORDS,
     ERROR_OF_FOUR_DIGITS,
@@ -24,7 +23,7 @@ from fourbar_validation.cost.conclusion import (
     list_stepped,
     write_one_digit,
 )
-from fourbar_validation.cost.laws import LARGEST_LAWFUL_ERROR, find_jumps, find_pareto
+from fourbar_validation.cost.laws import find_pareto
 from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.work_precision import (
     EXACT_MOTION,
@@ -62,75 +61,63 @@ class Look(NamedTuple):
     style: Style
 
 
-def _dress(curves: Mapping[str, str], *styles: tuple[str, str, Any]) -> dict[str, Look]:
+_STYLES = (
+    (_BLUE, "o", "solid"),
+    (_ORANGE, "s", _DASHED),
+    (_GREEN, "v", _DOTTED),
+    (_PINK, "D", LONG),
+    (_VIOLET, "P", (0, (5, 1))),
+)
+
+
+def _dress(curves: Mapping[str, str]) -> dict[str, Look]:
     """Give curves, by their labels, colour, marker and dashes."""
     every = {"mec": PAPER, "mew": 0.5, "ms": 5.0, "lw": 1.7}
     looks = {}
     for (label, curve), (colour, marker, dashes) in zip(
-        curves.items(), styles, strict=True
+        curves.items(), _STYLES, strict=False
     ):
         own = {"color": colour, "ls": dashes, "marker": marker}
         looks[label] = Look(curve, own | every)
     return looks
 
 
-_FIVE = (
-    (_ORANGE, "s", _DASHED),
-    (_PINK, "D", _DOTTED),
-    (_GREEN, "v", LONG),
-    (_VIOLET, "P", (0, (5, 1))),
-    (_BLUE, "o", "solid"),
-)
-_THREE = ((_BLUE, "o", "solid"), (_ORANGE, "s", _DASHED), (_GREEN, "^", _DOTTED))
 INTEGRATOR_LOOKS = _dress(
-    {name: f"{name}, tc held" for name in ("Euler", "implicitfast", "discrete", "RK4")},
-    (_ORANGE, "s", _DASHED),
-    (_PINK, "v", _DOTTED),
-    (_GREEN, "D", LONG),
-    (_BLUE, "o", "solid"),
+    {name: f"{name}, tc held" for name in ("RK4", "Euler", "implicitfast", "discrete")}
 )
 METHOD_LOOKS = _dress(
     {
+        "advised": "recommended",
         "Euler, defaults": "Euler, MuJoCo's defaults",
         "RK4, defaults": "RK4, MuJoCo's defaults",
         "Euler, stiff closure": "Euler, tc held",
         "RK4, no pads": "RK4, no pads, tc = 10 steps",
-        "advised": "recommended",
-    },
-    *_FIVE,
+    }
 )
 TIMESTEPS = _dress(
     {
-        **{f"tc = {n} steps": f"RK4, pads, tc = {n} steps" for n in (3, 10, 30, 100)},
         "tc a quarter turn": "RK4, tc held",
-    },
-    *_FIVE,
+        **{f"tc = {n} steps": f"RK4, pads, tc = {n} steps" for n in (3, 10, 30, 100)},
+    }
 )
 SOFTNESS_LOOKS = _dress(
     {
         "at the scene's speed": "softness d",
         "at 0.1 rad/s": "sag d, slow",
         "at 0.1 rad/s, nothing acts": "sag d, slow, nothing acts",
-    },
-    *_THREE,
+    }
 )
-SOLVERS = _dress(
-    {name: f"tolerance, {name}" for name in ("Newton", "PGS", "CG")}, *_THREE
-)
+SOLVERS = _dress({name: f"tolerance, {name}" for name in ("Newton", "PGS", "CG")})
 _RING = {"ls": "none", "marker": "o", "ms": 12, "mfc": "none", "mec": INK, "mew": 1.4}
 LARGEST_DRAWN_ERROR = 10.0
-"""Largest error over the timestep that is drawn in its place. A larger one, and one
-without end, is drawn at the upper edge.
-"""
+"""Error from which a point is not drawn."""
 _LOWEST = 1e-17
-"""Bottom of the picture; fifty digits lie far below and are not drawn."""
+"""Bottom of the picture."""
 ZERO_TOLERANCE_PLACE = 1e-18
 """Place on the logarithmic axis at which a tolerance of 0 is drawn."""
 PICTURE_WIDTH = 5.0
 """Width of a picture, in: on a screen of 360 px its texts are still 9 px high."""
 TEXT = 9.5
-_NEAR_FRONT = 1.1
-"""Time over that of the cheapest within which an advised setting is one of them."""
 
 
 def draw_pictures(
@@ -159,8 +146,6 @@ def make_pictures(curves: Curves, title: str) -> dict[str, Any]:
     for name, picture in SETTING_PICTURES.items():
         if curves.get(picture.needs):
             made[name] = _draw_setting(curves, title, picture)
-    if curves.get("RK4, tc held"):
-        made["orders"] = draw_orders(curves, title)
     return made
 
 
@@ -252,13 +237,9 @@ def draw_work_precision(
     )
     for name, look in METHOD_LOOKS.items():
         row = curves.get(look.curve, ())
-        label = name
-        if look.curve == "recommended":
-            most = _measure_distance(row, front, quantity)
-            label += f", up to {most:.1f} times as long" * (most > _NEAR_FRONT)
         row = [point for point in row if point.error(quantity) < LARGEST_DRAWN_ERROR]
         if row:
-            picture.draw(row, label=label, **look.style)
+            picture.draw(row, label=name, **look.style)
     default = find_default(curves)
     if default is not None and default.error(quantity) < LARGEST_DRAWN_ERROR:
         star = {"marker": "*", "ms": 16, "mec": INK, "mew": 0.8}
@@ -298,8 +279,6 @@ _MARKS = {EXACT_MOTION: ("h", _GREEN), FORMULAS_CURVE: ("*", INK)}
 """Marker and colour of a method that answers each position by itself."""
 SHORT = {
     "formulas, double": "formulas",
-    "formulas, single": "formulas, float32",
-    "13x13": "13 equations",
     PINOCCHIO: "Pinocchio",
     MUJOCO_INVERSE: "MuJoCo, mj_inverse",
 }
@@ -336,22 +315,6 @@ def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
         if point is not None:
             return ERROR_IN_WORDS[error], point
     return "", None
-
-
-def _measure_distance(
-    points: Sequence[CostPoint], front: Sequence[CostPoint], quantity: str
-) -> float:
-    """Return the greatest time of a point over that of the front.
-
-    The error is the same.
-    """
-    most = 1.0
-    for point in points:
-        error = point.error(quantity)
-        cheaper = (one for one in front if one.error(quantity) <= error)
-        if first := next(cheaper, None):
-            most = max(most, point.seconds_per_second / first.seconds_per_second)
-    return most
 
 
 def _take_timestep(point: CostPoint) -> float:
@@ -436,83 +399,3 @@ def _draw_setting(curves: Curves, title: str, picture: SettingPicture) -> Any:
         places = [ZERO_TOLERANCE_PLACE, *map(float, named)]
         axes.set_xticks(places, ["0", *named])
     return figure
-
-
-def _list_coarse_first(curves: Curves, look: Look) -> list[CostPoint]:
-    return sorted(curves.get(look.curve, ()), key=lambda point: point.setting_value)
-
-
-def _draw_over_timestep(
-    axes: Any,
-    curves: Curves,
-    quantity: str,
-) -> None:
-    """Draw one quantity's error over the timestep, by integrator; ring the jumps."""
-
-    def draw(points: Sequence[CostPoint], **style: Any) -> None:
-        x = [*map(_take_timestep, points)]
-        errors = (getattr(point.at_steps, quantity) for point in points)
-        y = [min(error, LARGEST_DRAWN_ERROR) for error in errors]
-        axes.plot(x, y, **style)
-
-    for label, look in INTEGRATOR_LOOKS.items():
-        row = _list_coarse_first(curves, look)
-        draw(row, label=label, **look.style)
-        draw(find_jumps(row, quantity), gid=f"jump-{quantity}", **_RING)
-
-
-def draw_orders(curves: Curves, title: str) -> Any:
-    """Draw panels of all quantities on the same axes."""
-    height = 8.4
-    figure = make_figure(height, state_jumps(curves), title)
-    panels = figure.subplots(3, 2, sharex=True, sharey=True)
-    figure.subplots_adjust(
-        left=0.135,
-        right=0.98,
-        bottom=0.065,
-        top=0.81,
-        wspace=0.08,
-        hspace=0.2,
-    )
-    flat = panels.ravel()
-    for axes, quantity in zip(flat, ERROR_NAMES, strict=False):
-        _draw_over_timestep(axes, curves, quantity)
-        set_axes(axes)
-        axes.get_legend().remove()
-        axes.set_ylim(1e-12, 2.0 * LARGEST_DRAWN_ERROR)
-        name = QUANTITY_WORDS.get(quantity, f"pin force {quantity}")
-        axes.set_title(name, loc="left", fontsize=TEXT, weight="bold", color=INK)
-    flat[-1].set_axis_off()
-    flat[-1].legend(
-        *flat[0].get_legend_handles_labels(),
-        loc="center",
-        fontsize=TEXT,
-        labelcolor=INK,
-    )
-    for axes in (flat[3], flat[4]):
-        axes.tick_params(labelbottom=True)
-        axes.set_xlabel("timestep, part of a revolution", fontsize=TEXT, color=INK)
-    return figure
-
-
-def state_jumps(curves: Curves) -> str:
-    """Say what the picture means."""
-    leaping: dict[str, None] = {}
-    lost: dict[str, None] = {}
-    losing: dict[str, None] = {}
-    for label, look in INTEGRATOR_LOOKS.items():
-        row = _list_coarse_first(curves, look)
-        for quantity in ERROR_NAMES:
-            if find_jumps(row, quantity):
-                leaping[quantity] = None
-            errors = [getattr(point.at_steps, quantity) for point in row]
-            if row and min(errors) >= LARGEST_LAWFUL_ERROR:
-                lost[quantity] = losing[label] = None
-    if leaping:
-        return f"{', '.join(leaping)} jumps where it is ringed"
-    if lost:
-        return (
-            f"No timestep brings {', '.join(lost)} below {LARGEST_LAWFUL_ERROR:g}\n"
-            f"with {', '.join(losing)}"
-        )
-    return "No error of torque or pin force jumps\ntowards finer steps"

@@ -154,14 +154,6 @@ def _list_errors(points: Sequence[CostPoint], quantity: str) -> list[float]:
     return [getattr(point.at_steps, quantity) for point in points]
 
 
-def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
-    """Return the points where an error jumps up as steps get finer.
-
-    A point counts once the motion is the scene's.
-    """
-    return [points[i] for i in _list_jumps(_list_errors(points, quantity))]
-
-
 def _list_jumps(errors: Sequence[float]) -> list[int]:
     """List the places in a ladder where its errors jump up."""
     jumps = []
@@ -290,10 +282,7 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
 
 
 def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]:
-    """Say from how many steps on more steps do not lessen an error.
-
-    An error that was less on the way is told too: two errors cancel there.
-    """
+    """Say from how many steps on more steps do not lessen an error."""
     floor = find_floor(ladder, quantity)
     if floor is None:
         return
@@ -302,12 +291,7 @@ def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]
     first = len(errors) - 1
     while first and FLOORED * floor <= errors[first - 1] <= floor / FLOORED:
         first -= 1
-    text = f"{floor:.1e} from {steps[first]} steps a revolution on"
-    least = min(errors)
-    if least < FLOORED * floor:
-        at = steps[errors.index(least)]
-        text += f", but for {least:.1e} at {at}, where two errors cancel"
-    yield text
+    yield f"{floor:.1e} from {steps[first]} steps a revolution on"
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:

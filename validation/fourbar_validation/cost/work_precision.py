@@ -1,14 +1,12 @@
 """The work-precision study of one scene: curve after curve, each stored once done."""
 
 import math
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
-from statistics import median
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +15,9 @@ from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Scene
 from fourbar.scene import command as command_of
+from fourbar.solving import solve
 from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.clocks import summarise_timings, time_call, time_kinds
 from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.advise.worst_errors import (
@@ -45,14 +45,13 @@ TIMED_READINGS = 50
 ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 IMPEDANCES_AT_ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-STUDY_VERSION = 10
+STUDY_VERSION = 11
 """Version of what is tried; parts made with another version are made again."""
 EXACT_MOTION = "exact"
 STEPPED_MOTION = "stepped"
 FORMULAS_CURVE = "formulas"
 PINOCCHIO = "Pinocchio, rnea and multipliers"
 MUJOCO_INVERSE = "MuJoCo, mj_inverse and multipliers"
-Clocked = TypeVar("Clocked")
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,20 +216,13 @@ class CostStudy:
 
         The timings are interleaved with those of the others.
         """
-        trials = [setup.try_out(spot.settings, spot.edit) for spot in spots]
-        clocks: dict[tuple[str, int], Callable[[], float]] = {}
-        for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
-            time_steps, time_readings = setup.make_clocks(spot.settings, spot.edit)
-            steps = min(trial.steps, MOST_STEPS_TIMED) or 1
-            clocks["step", number] = partial(_time_each, time_steps, steps)
-            clocks["reading", number] = partial(
-                _time_each, time_readings, TIMED_READINGS
-            )
-        times = time_in_turns(clocks, TIMINGS_OF_A_SETTING)
-        for number, (spot, trial) in enumerate(zip(spots, trials, strict=True)):
-            step, scatter = summarise_timings(times["step", number])
-            reading, _ = summarise_timings(times["reading", number])
-            total = step * trial.steps + reading * trial.readings
+        kinds = [(spot.settings, spot.edit) for spot in spots]
+        trials = [setup.try_out(*kind) for kind in kinds]
+        steps = [min(trial.steps, MOST_STEPS_TIMED) or 1 for trial in trials]
+        timings = time_kinds(setup, kinds, steps, TIMED_READINGS, TIMINGS_OF_A_SETTING)
+        for spot, trial, timed in zip(spots, trials, timings, strict=True):
+            (step, scatter), (reading, _) = map(summarise_timings, timed)
+            seconds = step * trial.steps + reading * trial.readings
             if settled:
                 _leave_out_first(trial)
             at_steps = errors = INFINITE_ERRORS
@@ -246,8 +238,8 @@ class CostStudy:
                 trial.steps_per_revolution or spot.settings.steps_per_revolution,
                 errors,
                 at_steps,
-                total / setup.simulated_seconds,
-                total / setup.revolutions,
+                seconds / setup.simulated_seconds,
+                seconds / setup.revolutions,
                 scatter,
                 trial.broken,
             )
@@ -301,20 +293,16 @@ class CostStudy:
         )
 
     def _time_formulas(self) -> Iterator[CostPoint]:
-        scene = self.scene
-        few = formulas.choose_few(self.command)
-        exact = formulas.evaluate_balls(scene, few, 2 * formulas.FIFTY_DIGITS)
-        for label, method in formulas.METHODS_TIMED.items():
-            try:
-                answer = method(scene, few)
-                errors = formulas.compare_with_reference(scene, few, answer, exact)
-            except (NotImplementedError, AssertionError) as error:
-                self.left_out.append(f"{label}: {error}")
-                continue
-            command = few if label == "50 digits" else self.command
-            action = partial(method, scene, command)
-            n = len(command.theta_2)
-            yield self._make_point("formulas", FORMULAS_CURVE, label, errors, n, action)
+        scene, command = self.scene, self.command
+        few = formulas.choose_few(command)
+        answer = solve(scene, "force", at=few)
+        numbers = {name: answer[name] for name in ERROR_NAMES}
+        balls = formulas.evaluate_balls(scene, few)
+        errors = formulas.compare_with_balls(scene, few, numbers, balls)
+        action = partial(solve, scene, "force", at=command)
+        n = len(command.theta_2)
+        label = "formulas, double"
+        yield self._make_point("formulas", FORMULAS_CURVE, label, errors, n, action)
 
     def _time_inverse(self) -> Iterator[CostPoint]:
         """Time the exact engines in a plain loop over their own calls.
@@ -374,39 +362,3 @@ def _leave_out_first(trial: Trial) -> None:
     ((rows, steps),) = trial.segments
     part = np.ptp(trial.at.theta_2) / np.ptp(command.theta_2)
     trial.segments = ((slice(rows.start, rows.stop - 1), round(steps * part)),)
-
-
-def summarise_timings(times: Sequence[float]) -> tuple[float, float]:
-    """Return the least of timings, and the middle one above it.
-
-    The latter is a part of the least.
-    """
-    least = min(times)
-    return least, median(times) / least - 1.0
-
-
-def _time_each(clock: Callable[[int], float], count: int) -> float:
-    return clock(count) / count
-
-
-def time_call(action: Callable[[], object], calls: int = 1) -> float:
-    """Time one call in this process, in CPU seconds."""
-    start = time.process_time()
-    for _ in range(calls):
-        action()
-    return (time.process_time() - start) / calls
-
-
-def time_in_turns(
-    clocks: Mapping[Any, Callable[[], Clocked]],
-    rounds: int,
-) -> dict[Any, list[Clocked]]:
-    """Read the clocks in turns, there and back.
-
-    A slow spell hits all, and none always finds a warmer machine.
-    """
-    times: dict[Any, list[Clocked]] = {name: [] for name in clocks}
-    for number in range(rounds):
-        for name in list(clocks)[:: -1 if number % 2 else 1]:
-            times[name].append(clocks[name]())
-    return times
