@@ -35,10 +35,9 @@ from fourbar_lab.contenders import (
     time_positions,
 )
 from fourbar_lab.starts import measure_starts
-from fourbar_lab.thirteen_bodies import make_bodies
+from fourbar_lab.thirteen_bodies import make_bodies, solve_thirteen
 from fourbar_validation.advise.clocks import time_call
 from fourbar_validation.engines.registry import ENGINES, Engine
-from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.run.judge import judge_for_report

@@ -18,7 +18,6 @@ from fourbar_validation.places import HARNESS_PROGRAM
 from fourbar_validation.published.printed_figures import (
     ERRATA,
     FIGURE_VERDICTS,
-    Erratum,
     PublishedFigure,
     read_printed,
 )
@@ -26,9 +25,8 @@ from fourbar_validation.published.textbook import compare_textbooks
 from fourbar_validation.published.thesis import (
     AS_PRINTED,
     LADDER,
-    ThesisProgram,
+    compute_model,
     compute_numbers,
-    find_noise,
 )
 from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
@@ -41,24 +39,15 @@ def list_figures() -> Iterator[PublishedFigure]:
 
     The sources are the thesis, the Maple worksheet, and public test cases.
     """
-    noise = find_noise()
     ours = compute_numbers()
     for table, figures in read_printed().items():
-        for name, (text, errata) in figures.items():
+        for name, (text, errata, noise) in figures.items():
             made = errata
             if errata and table == "manual, unknowns":
                 made = (*errata, AS_PRINTED)
             wrong = compute_numbers(made)[name]
-            apart = noise.get(table, {}).get(name, 0.0)
-            yield PublishedFigure(table, name, text, ours[name], errata, wrong, apart)
+            yield PublishedFigure(table, name, text, ours[name], errata, wrong, noise)
     yield from compare_textbooks()
-
-
-def _find_errata(figure: PublishedFigure) -> list[Erratum]:
-    """Find what a figure names; nothing if one of them is not known."""
-    if set(figure.errata) <= set(ERRATA):
-        return [ERRATA[name] for name in figure.errata]
-    return []
 
 
 def is_explained(figure: PublishedFigure) -> bool:
@@ -66,18 +55,16 @@ def is_explained(figure: PublishedFigure) -> bool:
 
     A misprint that no erratum can give is explained too.
     """
-    errata = _find_errata(figure)
-    known = all(erratum.reproduced for erratum in errata)
-    return bool(errata) and (figure.reproduced() or not known)
+    known = all(ERRATA[name].reproduced for name in figure.errata)
+    return bool(figure.errata) and (figure.reproduced() or not known)
 
 
 def explain_difference(figure: PublishedFigure) -> str:
     """Explain in a phrase why a figure differs."""
-    errata = _find_errata(figure)
-    if not errata:
+    if not figure.errata:
         return "no erratum explains this"
-    text = "; ".join(f"#{erratum.id} {erratum.title}" for erratum in errata)
-    if len(errata) > 3 and set(figure.errata) <= set(LADDER):
+    text = "; ".join(f"#{name} {ERRATA[name].title}" for name in figure.errata)
+    if len(figure.errata) > 3 and set(figure.errata) <= set(LADDER):
         text = "#" + " #".join(figure.errata) + ", the steps of the table above"
     if figure.reproduced():
         decimals = len(figure.printed.partition(".")[2])
@@ -171,13 +158,13 @@ def list_ladder_rows() -> list[tuple[str, ...]]:
         return (*did, f"{torque:.9f}", *(f"{force:.3f}" for force in forces))
 
     first = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
-    rows = [write(first, "the answer of this project", of=ThesisProgram().unknowns())]
+    rows = [write(first, "the answer of this project", of=compute_model())]
     printed = {AS_PRINTED: "manual, unknowns", "5b": "5.7 unknowns"}
     for step, name in enumerate(LADDER, 1):
         did = ("I_G3, I_G4 as printed in the manual, ten digits", "see #3")
         if name in ERRATA:
             did = (f"#{name} {ERRATA[name].title}", ERRATA[name].right)
-        rows.append(write(*did, of=ThesisProgram(LADDER[:step]).unknowns()))
+        rows.append(write(*did, of=compute_model(LADDER[:step])))
         if name in printed:
             figures = read_printed()[printed[name]].items()
             as_printed = {unknown: float(figure.printed) for unknown, figure in figures}

@@ -40,7 +40,9 @@ class PrintedFigure(NamedTuple):
     """
 
     printed: str
-    errata: tuple[str, ...]
+    errata: tuple[str, ...] = ()
+    noise: float = 0.0
+    """Round-off of whoever printed 15 digits or more, in the unit printed."""
 
 
 def read_printed() -> dict[str, dict[str, PrintedFigure]]:
@@ -50,10 +52,11 @@ def read_printed() -> dict[str, dict[str, PrintedFigure]]:
         for row in _read_rows("positions.csv"):
             for name in pair:
                 place = f"{row['theta2_deg']} {name}"
-                errata = ("6",) if place == "136 theta3_1" else ()
-                tables[POSITIONS][place] = PrintedFigure(row[f"{name}_deg"], errata)
+                made = ("6",) if place == "136 theta3_1" else ()
+                tables[POSITIONS][place] = PrintedFigure(row[f"{name}_deg"], made)
     for row in _read_rows("figures.csv"):
-        figure = PrintedFigure(row["printed"], tuple(row["errata"].split()))
+        errata = tuple(row["errata"].split())
+        figure = PrintedFigure(row["printed"], errata, float(row["noise"] or 0.0))
         tables.setdefault(row["table"], {})[row["name"]] = figure
     return tables
 

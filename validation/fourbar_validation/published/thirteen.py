@@ -1,8 +1,8 @@
 """The thesis's method for the forces: thirteen equations per position.
 
-The equations are assembled and solved as a batch, against which the speed of the
-eliminated form is measured. Moments are taken about the mass centres, unknowns in the
-order F12, F32, F23, F43, F14, F34 (x, y each), T, as in the thesis (section 5.7).
+The equations of all positions are assembled at once. Moments are taken about the mass
+centres, unknowns in the order F12, F32, F23, F43, F14, F34 (x, y each), T, as in the
+thesis (section 5.7).
 """
 
 from typing import NamedTuple
@@ -48,9 +48,3 @@ def assemble_equations(terms: EquationTerms, drive_bar: int) -> tuple[Array, Arr
     for row, columns in enumerate(_OPPOSITE, 9):
         matrix[..., row, columns] = 1.0
     return matrix, right
-
-
-def solve_thirteen(terms: EquationTerms, drive_bar: int) -> Array:
-    """Solve for the thirteen unknowns of each position, (..., 13)."""
-    matrix, right = assemble_equations(terms, drive_bar)
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
