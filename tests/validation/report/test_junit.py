@@ -8,8 +8,8 @@ import pytest
 
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED
 from fourbar_validation.report.junit import list_cases, write_document
-from fourbar_validation.report.overview import Overview
-from fourbar_validation.report.run_summary import Summary, compute_shares
+from fourbar_validation.report.overview import OVERVIEW_GROUPS
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_record import Record
 from tests.support.runs import ROW
 
@@ -60,17 +60,17 @@ def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance():
         replace(ROW, quantity=name, error=share * 1e-14)
         for name, share in shares.items()
     ]
-    overview = Overview()
-    overview.add(record(*rows))
-    (line,) = overview.name_lines({})
-    cells = [str(cell) for cell in line.columns.values()]
+    summary = Summary()
+    summary.add(record(*rows))
+    (line,) = summary.independent
+    cells = [" ".join(line.cell(group)) for group in OVERVIEW_GROUPS]
     assert any(cell.startswith("9.0e-15") for cell in cells)
-    assert (line.compared, line.failed) == (4, 0)
+    assert (line.counts.compared, line.counts[FAILS]) == (4, 0)
 
 
 def test_a_missing_answer_uses_all_that_is_allowed():
     missing = replace(ROW, verdict=FAILS, error=math.nan)
-    assert compute_shares([ROW, missing]) == pytest.approx([0.1, math.inf])
+    assert [ROW.used, missing.used] == pytest.approx([0.1, math.inf])
 
 
 @pytest.mark.parametrize(

@@ -41,8 +41,7 @@ from fourbar_validation.report.html import (
     write_html,
     write_summary_page,
 )
-from fourbar_validation.report.overview import Overview
-from fourbar_validation.report.run_summary import OWN_CONSISTENCY
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_pictures import (
     STRETCHES,
     draw_scene_figure,
@@ -179,19 +178,19 @@ def test_the_times_of_engines_are_those_of_the_run():
     for k in (1.0, 2.0, 8.0):
         timings = [replace(one, seconds=k * one.seconds) for one in bare.timings]
         scenes.append(replace(bare, timings=timings))
-    lines = {line.name: line for line in summary_of(scenes).engines}
+    lines = {line.engine: line for line in summary_of(scenes).engines}
     exact = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
     assert set(seconds) == {"formulas", *exact}
     page = unescape(report(scenes)[1])
     for engine, taken in seconds.items():
-        line = lines[OWN_CONSISTENCY if engine == "formulas" else engine]
+        line = lines[engine]
         assert line.microseconds == pytest.approx(2.0 * 1e6 * taken / 37, rel=1e-12)
         times = taken / seconds["formulas"]
         assert line.times_formulas == pytest.approx(times, rel=1e-12)
-        assert line.work == WORK[engine] and WORK[engine] in page
+        assert WORK[engine] in page
     refused = replace(bare.rows[0], engine="free-body", verdict=REFUSES)
     silent = summary_of([replace(bare, rows=[*bare.rows, refused])])
-    (line,) = [line for line in silent.engines if line.name == "free-body"]
+    (line,) = [line for line in silent.engines if line.engine == "free-body"]
     assert math.isnan(line.microseconds)
 
 
@@ -239,11 +238,12 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
         simulated = replace(record.timings[0], engine="sim", setting=setting)
         record.timings = [*record.timings, simulated]
     summary, text = report(pages)
-    worst = [worst.row.scene for worst in summary.worst[:2]]
+    worst = [worst.scene for worst in summary.worst[:2]]
     assert worst == ["scene-099", "scene-098"]
     shown = {f"scene-0{number}" for number in range(80, 100)}
     assert {scene.name for scene in summary.shown} == shown
     refusal = "falls to 0.0e+00; below 0.05 it is not simulated"
+    refusal += " (and 99 more like it, with other numbers)"
     assert summary.refusals == [("mujoco-simulated", refusal, 100)]
     assert summary.orders[0][0] == "scene-000" and summary.judged == 400
     page = write_summary_page(summary)
@@ -302,8 +302,8 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     rows, left_out = [row, share, identity], ["equilibria: too near"]
     summary = summary_of([record_of("first", rows, left_out=left_out)])
     first, second = summary.engines
-    assert (first.name, second.name) == ("mujoco-simulated", "our own consistency")
-    assert first.worst == row and first.undecided == 0.4
+    assert (first.engine, second.engine) == ("mujoco-simulated", "formulas")
+    assert first.worst[""] == row and first.undecided == 0.4
     text = printed(summary)
     words = " ".join(text.split())
     version = summary.versions["mujoco"]
@@ -369,11 +369,11 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
         died = f"{said}{numbers}"
         scene.rows.append(Row.unmeasured(scene.name, "theirs", "", "all", FAILS, died))
     summary = summary_of(scenes)
-    assert [str(cause) for cause in summary.overview.causes] == [
+    assert [str(cause) for cause in summary.causes] == [
         f"mine: {swapped}: 23 scenes; worst scene 00 120 deg",
         f"theirs: no answer: {said}[0.25, 0.5: 2 scenes; worst scene 00",
     ]
-    assert [line.engine for line in summary.lines] == ["mine", "theirs"]
+    assert [line.engine for line in summary.independent] == ["mine", "theirs"]
     assert summary.headline.startswith(f"FAILS: mine is wrong: {swapped}")
     assert "F32 of scene 00 120 deg" in summary.headline
     text = printed(summary)
@@ -466,7 +466,7 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
     """Missing digits are no missing term, and a number beside no answer no reason."""
     right = RIGHT if "agree" in words else []
     record = record_of("a", [*wrong, *right], causes={"mine": []})
-    (cause,) = summary_of([record]).overview.causes
+    (cause,) = summary_of([record]).causes
     assert cause.text == words
 
 
@@ -480,7 +480,7 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
     ]
     against = {name: ["one", "two"] for name in names}
     summary = summary_of([record_of("a", rows, against=against)])
-    (cause,) = summary.overview.causes
+    (cause,) = summary.causes
     words = "one, two agree with each other, and differ from it in"
     assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
@@ -514,7 +514,7 @@ def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
     named = {"named": ["gravity is left out"]}
     record = record_of("a", [*rows, ALONE], against=against, causes=named)
     summary = summary_of([record])
-    assert {cause.engine for cause in summary.overview.causes} == wrong
+    assert {cause.engine for cause in summary.causes} == wrong
 
 
 def test_pin_forces_of_which_one_fails_do_not_agree():
@@ -522,7 +522,7 @@ def test_pin_forces_of_which_one_fails_do_not_agree():
     rows = [fail(mine(quantity=name)) for name in ("F12", "torque")]
     rows.append(mine(quantity="F14"))
     summary = summary_of([record_of("a", rows, against={"F12": ["one", "two"]})])
-    causes = {cause.engine: cause.text for cause in summary.overview.causes}
+    causes = {cause.engine: cause.text for cause in summary.causes}
     assert causes["mine"] == "torque differs; mistakes are not looked for there"
 
 
@@ -556,9 +556,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
         (alike, "(2 scenes): 4 bars, not 5"),
     ):
         summary = summary_of(record_of(row.scene, [row]) for row in refusals)
-        assert [*summary.overview.silent.values()] == [
-            f"theirs: nothing compared {words}"
-        ]
+        assert [*summary.silent.values()] == [f"theirs: nothing compared {words}"]
 
 
 @pytest.mark.parametrize(
@@ -572,17 +570,17 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
 )
 def test_what_was_not_compared_is_counted_by_its_reason(verdict, reason, kind):
     row = mine(quantity="torque_inertia", verdict=verdict, reason=reason)
-    assert summary_of([record_of("a", [row])]).overview.not_compared == {kind: 1}
+    assert summary_of([record_of("a", [row])]).not_compared == {kind: 1}
 
 
 def test_a_weaker_rule_stands_before_a_verdict_that_holds():
     summary = summary_of([record_of("a", [OF_MINE])])
     assert summary.good
-    summary.overview.weaker = ["mine: factor 1e-14 -> 0.01", "mine: class a -> b"]
-    summary.overview.baseline = "last night"
-    summary.overview.gone = ["engine b"]
+    summary.weaker = ["mine: factor 1e-14 -> 0.01", "mine: class a -> b"]
+    summary.baseline = "last night"
+    summary.gone = ["engine b"]
     assert summary.headline.startswith("GONE: engine b, against last night. WEAKER")
-    summary.overview.gone = []
+    summary.gone = []
     assert not summary.good
     assert summary.headline.startswith(
         "WEAKER RULE: mine: factor 1e-14 -> 0.01, and 1 more, against last night. All 1"
@@ -594,7 +592,7 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     declared, confirmed
 ):
     """Only engines that declare few errors are independent."""
-    overview = Overview()
+    overview = Summary()
     overview.declared = {"one": 1e-14, "two": declared}
     overview.listed = {"two": dict.fromkeys(["friction", "gravity", "torque", "F12"])}
     for name, counts in (("a", (5, 5)), ("b", (5, 4)), ("c", (5, 0))):

@@ -39,7 +39,7 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.report.overview import Overview
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.run import causes as search
 from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
@@ -682,8 +682,8 @@ def name_wrong(changes, tolerance=EQUIVALENCE):
         Engine(name, partial(Named, name, change), tolerance, ("F43", "torque"))
         for name, change in changes.items()
     ]
-    overview = Overview()
-    overview.add(
+    summary = Summary()
+    summary.add(
         judge(
             "scene",
             SCENE,
@@ -691,7 +691,7 @@ def name_wrong(changes, tolerance=EQUIVALENCE):
             order=False,
         )
     )
-    return {cause.engine: cause.text for cause in overview.causes}
+    return {cause.engine: cause.text for cause in summary.causes}
 
 
 def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():

@@ -165,6 +165,18 @@ class Row:
         """
         return self.verdict == FAILS
 
+    @property
+    def used(self) -> float:
+        """Return error/allowed.
+
+        The ratio is infinite without an answer, 0 if the error is 0 or nothing was
+        compared.
+        """
+        if not self.compared or self.error == 0.0:
+            return 0.0
+        share = self.error / self.allowed if self.allowed else math.inf
+        return share if math.isfinite(share) else math.inf
+
 
 def _take_at(index: int, number: Array | float) -> float:
     """Take the number of a position, or the one number of all positions."""

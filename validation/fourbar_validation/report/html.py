@@ -18,12 +18,11 @@ from fourbar_validation.compare.rows import (
     sort_rows,
     write_rows,
 )
+from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
 from fourbar_validation.report.run_summary import (
-    OWN_CONSISTENCY,
     STATEMENT,
     Summary,
-    compute_shares,
 )
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.templating import (
@@ -50,8 +49,6 @@ class _Cell(NamedTuple):
 
     line: int
     row: Row
-    used: float
-    """error/allowed."""
 
     @property
     def kind(self) -> str:
@@ -64,7 +61,7 @@ class _Cell(NamedTuple):
         """Return the text of its cell."""
         if self.kind in (REFUSES, UNDECIDED):
             return self.kind
-        return write_share(self.used)
+        return write_share(self.row.used)
 
 
 class SectionFigure(NamedTuple):
@@ -151,7 +148,7 @@ def write_html(
     engines = _list_engines(rows)
     failing = sorted(
         (cell for cell in cells if cell.row.failed),
-        key=lambda cell: (-cell.used, cell.line),
+        key=lambda cell: (-cell.row.used, cell.line),
     )
     return render(
         "fourbar_validation.report",
@@ -160,11 +157,10 @@ def write_html(
         views=views,
         engines=[name for name in engines if name != FORMULAS],
         own_engines=[name for name in engines if name == FORMULAS],
-        own=OWN_CONSISTENCY,
         failing=failing,
         failing_scenes={cell.row.scene for cell in failing},
         groups=OVERVIEW_GROUPS,
-        causes=summary.overview.causes,
+        causes=summary.causes,
         places={
             view.scene.name: (number, view) for number, view in enumerate(views, 1)
         },
@@ -190,6 +186,7 @@ def write_html(
             for scene, e in summary.orders
         ],
         statement=STATEMENT,
+        work=WORK,
         csv=write_rows(rows),
     )
 
@@ -209,8 +206,7 @@ def write_summary_page(summary: Summary) -> str:
         "report.md.j2",
         s=summary,
         groups=OVERVIEW_GROUPS,
-        causes=summary.overview.causes,
-        own=OWN_CONSISTENCY,
+        causes=summary.causes,
         statement=STATEMENT,
     )
 
@@ -221,10 +217,10 @@ def _make_scene_view(
 ) -> _SceneView:
     rows = sort_rows(scene.rows)
     lines = range(first_line, first_line + len(rows))
-    cells = [*map(_Cell, lines, rows, compute_shares(rows))]
+    cells = [*map(_Cell, lines, rows)]
     ranked = sorted(
         reversed(cells),
-        key=lambda cell: (cell.row.compared, cell.used),
+        key=lambda cell: (cell.row.compared, cell.row.used),
     )  # the last cell of a place stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     # a share of undecided numbers is no error, unless it fails

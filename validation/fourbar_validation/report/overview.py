@@ -5,25 +5,23 @@ A few lines say what agrees, how closely, and which engine is at fault if not.
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from operator import itemgetter
+from operator import attrgetter
+from statistics import median
 
 from fourbar.errors import abbreviate, write_count
 from fourbar.quantities import LINE, PIN_FORCES, UNITS
-from fourbar_validation.compare.compare import NO_POSITION, NO_VALUE, NOWHERE
+from fourbar_validation.compare.compare import NOWHERE
 from fourbar_validation.compare.rows import (
     FORMULAS,
-    HOLDING_VERDICTS,
     QUOTED,
-    REFUSES,
-    UNDECIDED,
+    Counts,
     Row,
     write_one_line,
 )
-from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.report.words import NUMBERS_IN_A_REASON, AlikeTexts
+from fourbar_validation.report.words import NUMBERS_IN_A_REASON
 
 TORQUE_GROUP = "torque"
 PIN_FORCE_GROUP = "pin forces"
@@ -49,6 +47,7 @@ INDEPENDENT_ERROR = 1e-4
 """Largest error that an engine may declare which counts as an independent one: at 1e-2
 a pin force without an inertia may agree.
 """
+USED = attrgetter("used")
 _MOST_KINDS = 500
 """Causes that are told apart; further ones are one."""
 _MOST_LISTED = len(PIN_FORCES) + 1
@@ -62,76 +61,61 @@ ERROR_OF_MISSING_DIGITS = 1e-5
 """Largest error, relative to a quantity's scale, of an engine that lacks digits and not
 an equation.
 """
-_NOT_COMPARED = {
-    REFUSES: "at declared limits of an engine",
-    UNDECIDED: "with no digit left to decide by",
-}
-"""Kinds of what was not compared, by verdict."""
-_BY_REASON = {
-    NO_VALUE: "where the formulas state no value",
-    NO_POSITION: "at no position that can be judged",
-}
-"""Those that the reason tells."""
 _FREE_MOTION = ("theta_2", "omega_2", "energy")
 """Quantities that are compared of a released linkage's motion."""
-_DOES_NOT_APPLY = "where a check does not apply"
 
 
 @dataclass(slots=True)
-class _OverviewCell:
-    """Worst row of an engine in one group of quantities."""
+class EngineLine:
+    """Answers of an engine, or the identities of the formulas: their worst, and times.
 
-    row: Row | None = None
-    used: float = -1.0
-    """error/allowed of that row."""
-    scenes: int = 0
-    """Number of scenes, where its rows have a cause in common."""
-
-    def add(self, row: Row, used: float) -> None:
-        """Take in a row."""
-        if used > self.used:
-            self.row = row
-            self.used = used
-
-    @property
-    def failed(self) -> bool:
-        """Return whether that row fails."""
-        return self.row is not None and self.row.failed
-
-    @property
-    def parts(self) -> tuple[str, ...]:
-        """Return the error, and of what it is allowed, as the parts of a cell."""
-        if self.row is None:
-            return ("-",)
-        if math.isnan(self.row.error):
-            return ("no number",)
-        error = f"{self.row.error:.1e}"
-        allowed = f"{self.row.allowed:.0e}"
-        if float(error) > float(allowed):  # with as many digits they are in order
-            allowed = f"{self.row.allowed:.1e}"
-        return error, f"of {allowed}"
-
-    def __str__(self) -> str:
-        return " ".join(self.parts)
-
-
-@dataclass(slots=True)
-class OverviewLine:
-    """Answers of an engine, in the columns of the table."""
+    The name is the engine's as people write it.
+    """
 
     engine: str
-    name: str
-    columns: dict[str, _OverviewCell] = field(
-        default_factory=lambda: {group: _OverviewCell() for group in OVERVIEW_GROUPS}
-    )
-    compared: int = 0
-    failed: int = 0
-    answered: bool = False
-    """True if any number of it was compared. The reason why none was stands beneath the
-    table.
+    name: str = ""
+    version: str = ""
+    counts: Counts = field(default_factory=Counts)
+    worst: dict[str, Row] = field(default_factory=dict)
+    """The row that used most of its allowance, by group, and of all groups under ""."""
+    undecided: float = 0.0
+    """Largest share of the numbers of a scene that are undecided."""
+    times: list[tuple[float, float]] = field(default_factory=list)
+    """Microseconds per position, and the ratio to the formulas on the same scene in the
+    same process, of each scene.
     """
-    reasons: AlikeTexts = field(default_factory=AlikeTexts)
-    """Why it was not compared, by scene."""
+
+    def add(self, row: Row) -> None:
+        """Count a row; a share of undecided numbers is no error, unless it fails."""
+        self.counts.add([row])
+        if row.quantity == "undecided":
+            self.undecided = max(self.undecided, row.error)
+        if row.compared and (row.quantity != "undecided" or row.failed):
+            for group in {"", find_group(row) or ""}:
+                self.worst[group] = max(self.worst.get(group, row), row, key=USED)
+
+    @property
+    def microseconds(self) -> float:
+        """Return the time per position, median over the scenes."""
+        return median(time for time, _ in self.times) if self.times else math.nan
+
+    @property
+    def times_formulas(self) -> float:
+        """Return the time over that of the formulas, median over the scenes."""
+        return median(ratio for _, ratio in self.times) if self.times else math.nan
+
+    def cell(self, group: str) -> tuple[str, ...]:
+        """Return the worst error of a group, and of what it is allowed, for a table."""
+        row = self.worst.get(group)
+        if row is None:
+            return ("-",)
+        if math.isnan(row.error):
+            return ("no number",)
+        error = f"{row.error:.1e}"
+        allowed = f"{row.allowed:.0e}"
+        if float(error) > float(allowed):  # with as many digits they are in order
+            allowed = f"{row.allowed:.1e}"
+        return error, f"of {allowed}"
 
 
 @dataclass(slots=True)
@@ -155,15 +139,15 @@ class Cause:
         return f"{self.engine}: {self.text}: {count}; worst {self.place}"
 
 
-def _name_whole(row: Row) -> str:
+def name_whole(row: Row) -> str:
     """Name the quantity of a row, or that of which it is the inertial part."""
     return row.quantity.removesuffix("_inertia")
 
 
-def _find_group(row: Row) -> str | None:
+def find_group(row: Row) -> str | None:
     """Find the column of an engine's row; None for what is no error of a quantity."""
     name = row.quantity
-    if _name_whole(row) in DRIVES:
+    if name_whole(row) in DRIVES:
         return TORQUE_GROUP
     if name in PIN_FORCES:
         return PIN_FORCE_GROUP
@@ -172,119 +156,34 @@ def _find_group(row: Row) -> str | None:
     return None
 
 
-class Overview:
-    """The first screen, condensed scene by scene."""
+class Causes:
+    """What is wrong, and whose fault it is, condensed scene by scene."""
 
     def __init__(self) -> None:
-        self.statements = self.statements_failed = 0
-        """Comparisons that no engine takes part in."""
-        self.scenes = self.with_forces = self.checked_twice = 0
-        self.released = False
-        self.not_compared: Counter[str] = Counter()
-        self.since = ""
-        """State of the named failure in the run that this one is held against."""
-        self.weaker: list[str] = []
-        """Rules that are weaker than in that run."""
-        self.gone: list[str] = []
-        """Engines, scenes and rows that it had and this run lacks."""
-        self.worse: list[str] = []
-        """Rows that got worse, of a run without a failure."""
-        self.baseline = ""
-        """That run in words."""
-        self.declared: dict[str, float] = {}
-        """Error that each engine declares, relative to the scale."""
-        self.asked: list[str] = []
-        """Engines that were asked for by name: a run checks each of them."""
-        self.listed: dict[str, dict[str, None]] = {}
-        """Effects and quantities that the hello of each guest lists, without those that
-        were compared.
-        """
-        self._lines: dict[str, OverviewLine] = {}
-        self._kinds: dict[tuple[str, tuple[str, ...]], _OverviewCell] = {}
+        self._kinds: dict[tuple[str, tuple[str, ...]], Cause] = {}
 
     def add(self, scene: Record) -> None:
         """Add one more scene."""
-        self.scenes += 1
-        refused = {row.reason for row in scene.rows if row.verdict == REFUSES}
-        for line in scene.left_out:
-            if line.partition(": ")[2] not in refused:
-                self.not_compared[_DOES_NOT_APPLY] += 1
-        for row in scene.rows:
-            self._add_row(row)
-            listed = self.listed.get(row.engine, {})
-            if row.compared and row.quantity == _name_whole(row):
-                for name in (row.quantity, *scene.needs):
-                    listed.pop(name, None)
-        self._add_agreement(scene.rows)
-        self._add_causes(scene)
-        named = {*ENGINE_NAMES, *self.declared}
-        for engine, reason in _list_reasons(scene, named):
-            self._line(engine).reasons.add(reason)
-
-    def _line(self, engine: str) -> OverviewLine:
-        return self._lines.setdefault(engine, OverviewLine(engine, engine))
-
-    def _add_row(self, row: Row) -> None:
-        if usual := _NOT_COMPARED.get(row.verdict):
-            kinds = (kind for why, kind in _BY_REASON.items() if why in row.reason)
-            self.not_compared[next(kinds, usual)] += 1
-        if row.engine == FORMULAS:
-            self.statements += row.compared
-            self.statements_failed += row.failed
-            return
-        line = self._line(row.engine)
-        line.compared += row.compared
-        line.failed += row.failed
-        line.answered |= row.compared and row.quantity != "all"
-        group = _find_group(row)
-        if row.compared and group is not None:
-            line.columns[group].add(row, float(find_used(row.error, row.allowed)))
-
-    def _add_agreement(self, rows: Sequence[Row]) -> None:
-        """Count a scene of which two engines confirm the torque and all pin forces.
-
-        An engine that declares more than INDEPENDENT_ERROR confirms nothing.
-        """
-        asked: dict[str, dict[str, bool]] = {}
-        for row in rows:
-            name = "torque" if row.quantity in DRIVES else row.quantity
-            if row.engine != FORMULAS and name in ("torque", *PIN_FORCES):
-                asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
-        agreeing = [
-            len(of) > len(PIN_FORCES) and all(of.values())
-            for engine, of in asked.items()
-            if self.declared.get(engine, 0.0) <= INDEPENDENT_ERROR
-        ]
-        self.with_forces += bool(asked)
-        self.checked_twice += sum(agreeing) >= 2
-        self.released |= any(row.quantity == "energy" for row in rows)
-
-    def _add_causes(self, scene: Record) -> None:
         failing: dict[str, list[Row]] = {}
         ours = _list_ours(scene)
         for row in scene.rows:
             if row.failed:
-                engine = FORMULAS if _name_whole(row) in ours else row.engine
+                engine = FORMULAS if name_whole(row) in ours else row.engine
                 failing.setdefault(engine, []).append(row)
         for engine, rows in failing.items():
             # without an answer the rest is a consequence
             telling = _find_telling(scene, engine, rows)
-            named = [row for row in rows if _name_whole(row) in scene.against]
+            named = [row for row in rows if name_whole(row) in scene.against]
             shown = telling or (engine == FORMULAS and named) or rows
             key = (engine, tuple(_name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
                 key = (engine, (OTHER_CAUSES,))
-            kind = self._kinds.setdefault(key, _OverviewCell())
+            kind = self._kinds.setdefault(key, Cause(engine, "", 0, shown[0]))
             kind.scenes += 1
-            for row in shown:
-                kind.add(row, float(find_used(row.error, row.allowed)))
+            kind.worst = max(kind.worst, *shown, key=USED)
 
-    @property
-    def causes(self) -> list[Cause]:
-        """Return what is wrong, engine by engine.
-
-        The mistake that explains most comes first.
-        """
+    def list_all(self) -> list[Cause]:
+        """List the causes engine by engine; that which explains most comes first."""
         causes: list[Cause] = []
         for engine in dict.fromkeys(engine for engine, _ in self._kinds):
             left = {
@@ -297,100 +196,13 @@ class Overview:
                     counts.update(dict.fromkeys(texts, kind.scenes))
                 text, scenes = counts.most_common(1)[0]
                 explained = [left.pop(texts) for texts in [*left] if text in texts]
-                worst = max(explained, key=lambda kind: kind.used).row
-                assert worst is not None
+                worst = max((kind.worst for kind in explained), key=USED)
                 begin = _TOLD_BY.get(worst.quantity)
                 if begin is not None and text.startswith(begin):
                     text = begin + "".join(_take_reason(worst))
                 of_engine.append(Cause(engine, text, scenes, worst))
             causes += sorted(of_engine, key=lambda cause: -cause.scenes)
         return causes
-
-    @property
-    def named_failure(self) -> Row | None:
-        """Return the failing row that the verdict names; None if nothing fails."""
-        return next((cause.worst for cause in self.causes), None)
-
-    def name_lines(self, versions: Mapping[str, str]) -> list[OverviewLine]:
-        """Return the engines that were compared, with their names and versions."""
-        order = list(ENGINE_NAMES)
-        lines = []
-        for line in self._lines.values():
-            version = versions.get(line.engine, "")
-            name = f"{line.engine} {version}"
-            if line.engine in order:
-                name = ENGINE_NAMES[line.engine].format(version).replace(" ,", ",")
-            line.name = name.strip()
-            if line.answered or line.failed or line.reasons:
-                place = [*order, line.engine].index(line.engine)
-                lines.append((place, line.name, line))
-        return [line for *_, line in sorted(lines, key=itemgetter(0, 1))]
-
-    @property
-    def silent(self) -> dict[str, str]:
-        """Return a line for each engine with nothing to compare, with the reason.
-
-        Of several reasons the commonest is stated.
-        """
-        lines = {}
-        for line in sorted(self._lines.values(), key=lambda one: one.engine):
-            if not line.compared and not line.failed and line.reasons:
-                reason, count = line.reasons.find_commonest()
-                scenes = write_count(count, "scene")
-                told = f"{line.engine}: nothing compared ({scenes}): {reason}"
-                lines[line.engine] = told
-        return lines
-
-    @property
-    def unchecked(self) -> list[str]:
-        """Return the lines of the engines that were asked for in vain."""
-        return [line for name, line in self.silent.items() if name in self.asked]
-
-    @property
-    def notes(self) -> list[str]:
-        """Return what is said beneath the table."""
-        notes = []
-        if self.statements or self.statements_failed:
-            failed = self.statements_failed
-            held = f"{failed} FAIL" if failed else "all hold"
-            many = write_count(self.statements, "identity")
-            notes.append(
-                f"also checked, without an engine: {many} of the formulas; {held}"
-            )
-        if self.with_forces:
-            notes.append(
-                f"Torque and pin forces of {self.checked_twice} of {self.with_forces}"
-                " scenes: at least two independent engines compared all of them and"
-                " agree."
-            )
-        if self.released:
-            notes.append("released: angles, energy and speeds alone (no torque acts)")
-        notes += [
-            f"{engine} lists {', '.join(listed)}: compared in no scene"
-            for engine, listed in self.listed.items()
-            if listed and self._line(engine).answered
-        ]
-        notes += self.silent.values()
-        if self.not_compared:
-            total = sum(self.not_compared.values())
-            kinds = ", ".join(
-                f"{count} {kind}" for kind, count in self.not_compared.most_common()
-            )
-            notes.append(f"{total} not compared: {kinds}")
-        return notes
-
-
-def _list_reasons(scene: Record, named: Set[str]) -> Iterable[tuple[str, str]]:
-    """List the engines that a scene was not compared with, each with the reason."""
-    for row in scene.rows:
-        whole = row.verdict == REFUSES and row.quantity == "all"
-        if whole and row.engine != FORMULAS:
-            yield row.engine, row.reason
-    refused = {row.engine for row in scene.rows}
-    for line in scene.left_out:
-        engine, _, reason = line.partition(": ")
-        if engine in named and engine not in refused:
-            yield engine, reason
 
 
 def _list_ours(scene: Record) -> set[str]:
@@ -405,15 +217,15 @@ def _list_ours(scene: Record) -> set[str]:
     rows = [row for row in scene.rows if row.engine != FORMULAS]
     ours = {row.quantity for row in scene.rows if row.engine == FORMULAS and row.failed}
     if ours - {"status"}:  # which is that of the free bodies
-        forces = [row for row in rows if _find_group(row) in OVERVIEW_GROUPS[:2]]
+        forces = [row for row in rows if find_group(row) in OVERVIEW_GROUPS[:2]]
         failing = {row.engine for row in forces if not row.passed}
         explained = {engine for engine, causes in scene.causes.items() if causes}
         witnesses |= {row.engine for row in rows} - (failing & explained)
     answered = Counter(row.quantity for row in rows if row.compared)
     return {*scene.against, *(_FREE_MOTION if scene.against else ())} | {
-        _name_whole(row)
+        name_whole(row)
         for row in rows
-        if row.failed and _name_whole(row) in UNITS and answered[row.quantity] == 1
+        if row.failed and name_whole(row) in UNITS and answered[row.quantity] == 1
         if row.engine in witnesses
     }
 
@@ -493,13 +305,13 @@ def _list_first(names: Sequence[str]) -> str:
 
 def _name_group(row: Row) -> str:
     """Name what an engine's row is about, where it is said what differs."""
-    if _name_whole(row) != row.quantity:
-        return f"inertial part of the {_find_group(row)}"
+    if name_whole(row) != row.quantity:
+        return f"inertial part of the {find_group(row)}"
     if row.quantity == "closure":  # an identity of the engine's own angles
         return row.quantity
     if row.quantity == "assembled":
         return "positions at which the loop closes"
-    return _find_group(row) or row.quantity
+    return find_group(row) or row.quantity
 
 
 def _join_groups(groups: Sequence[str], verb: str) -> str:

@@ -2,92 +2,48 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from heapq import nlargest
-from operator import attrgetter, itemgetter
-from statistics import median
-from typing import TypeVar
-
-import numpy as np
+from collections.abc import Sequence
+from heapq import nlargest, nsmallest
+from operator import attrgetter
 
 from fourbar.errors import HOLDS, write_count
+from fourbar.quantities import PIN_FORCES
+from fourbar_validation.compare.compare import NO_POSITION, NO_VALUE
 from fourbar_validation.compare.rows import (
+    COMPARED_VERDICTS,
     DEGRADED,
+    FAILS,
     FORMULAS,
+    HOLDING_VERDICTS,
     REFUSES,
+    UNDECIDED,
     Counts,
     Row,
+    sort_rows,
 )
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
     IDENTITY,
     MOST_ALLOWED,
-    SIMULATED,
-    ErrorBound,
     K,
-    find_used,
 )
-from fourbar_validation.engines.registry import WORK
+from fourbar_validation.engines.guests import Guest
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import list_versions, name_machine
-from fourbar_validation.report.overview import Overview, OverviewLine
+from fourbar_validation.report.overview import (
+    DRIVES,
+    ENGINE_NAMES,
+    INDEPENDENT_ERROR,
+    USED,
+    Cause,
+    Causes,
+    EngineLine,
+    name_whole,
+)
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.report.words import NUMBERS_IN_A_REASON
+from fourbar_validation.report.words import AlikeTexts
 
-T = TypeVar("T")
-_ALLOWANCE = attrgetter("allowed")
-_USED = attrgetter("used")
-
-
-@dataclass(frozen=True, slots=True)
-class Worst:
-    """The row of one scene and engine with the largest error/allowed.
-
-    A failing row has a ratio beyond 1.
-    """
-
-    row: Row
-    used: float
-    """error/allowed of that row."""
-    rows: int
-    failed: int
-
-
-@dataclass(slots=True)
-class _EngineLine:
-    """Counts of one independent engine, or of our own consistency; its worst row."""
-
-    name: str
-    version: str = ""
-    counts: Counts = field(default_factory=Counts)
-    worst: Row | None = None
-    """The row that used most of its allowance."""
-    used: float = -1.0
-    """error/allowed of that row."""
-    undecided: float = 0.0
-    """Largest share of the numbers of a scene that are undecided."""
-    microseconds: float = math.nan
-    """Time per position, median over the scenes; our own is that of the formulas."""
-    times_formulas: float = math.nan
-    """Time over that of the formulas on the same scene, median over the scenes. Both
-    are of the same process.
-    """
-    work: str = ""
-    """Work that it did in that time."""
-
-    def add(self, row: Row, used: float) -> None:
-        """Count a row; a share of undecided numbers is no error, unless it fails."""
-        self.counts.add([row])
-        if row.quantity == "undecided":
-            self.undecided = max(self.undecided, row.error)
-        is_error = row.quantity != "undecided" or row.failed
-        if row.compared and is_error and used > self.used:
-            self.worst = row
-            self.used = used
-
-
-OWN_CONSISTENCY = "our own consistency"
 SCENES_SHOWN = 200
 SKETCHED = 60
 """Scenes with small pictures."""
@@ -96,7 +52,6 @@ PICTURED = 24
 it by an exact engine.
 """
 _WORST_SHOWN = 80
-_LOOSEST_SHOWN = 5
 _ORDERS_SHOWN = 20
 _FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
@@ -112,30 +67,77 @@ STATEMENT = (
 )
 
 
+_NOT_COMPARED = {
+    REFUSES: "at declared limits of an engine",
+    UNDECIDED: "with no digit left to decide by",
+}
+"""Kinds of what was not compared, by verdict."""
+_BY_REASON = {
+    NO_VALUE: "where the formulas state no value",
+    NO_POSITION: "at no position that can be judged",
+}
+"""Those that the reason tells."""
+_DOES_NOT_APPLY = "where a check does not apply"
+
+
 class Summary:
     """The report in data: a run condensed scene by scene.
 
     What is kept does not grow with their number.
+
+    `engines`: those that are asked. `missing`: (engine, why it could not run here).
+    `chosen`: whether all of them were asked for by name.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        engines: Sequence[Engine] = (),
+        missing: Sequence[tuple[str, str]] = (),
+        chosen: bool = False,
+    ) -> None:
+        guests = [engine for engine in engines if isinstance(engine, Guest)]
+        self.missing = missing
+        self.tolerances = dict.fromkeys(
+            (IDENTITY, *(engine.tolerance for engine in engines))
+        )
+        self.declared = {engine.name: engine.tolerance.factor for engine in engines}
+        """Error that each engine declares, relative to the scale."""
+        self.asked = [engine.name for engine in (engines if chosen else guests)]
+        """Engines that were asked for by name: a run checks each of them."""
+        self.listed = {
+            guest.name: dict.fromkeys((*guest.effects, *guest.answers))
+            for guest in guests
+        }
+        """Effects and quantities that the hello of each guest lists, without those that
+        were compared.
+        """
         self.counts = Counts()
-        self.overview = Overview()
         self.date = ""
         """Date on which it was made."""
         self.commit = ""
         """Commit of the harness at which it was made."""
-        self.asked = ""
+        self.scene = ""
         """Name of the scene that was asked for; empty if there are several."""
         self.versions = list_versions()
+        self._versions = {name.lower(): text for name, text in self.versions.items()}
+        self._versions |= {guest.name: guest.version for guest in guests}
         self.machine = name_machine()
+        self.since = ""
+        """State of the named failure in the run that this one is held against."""
+        self.weaker: list[str] = []
+        """Rules that are weaker than in that run."""
+        self.gone: list[str] = []
+        """Engines, scenes and rows that it had and this run lacks."""
+        self.worse: list[str] = []
+        """Rows that got worse, of a run without a failure."""
+        self.baseline = ""
+        """That run in words."""
         self.failures: list[Row] = []
         """Failures, at most _FAILURES_KEPT of them."""
-        self.pairs = 0
-        """Number of quantities of a scene that were compared."""
-        self.loose = 0
-        """Number of those that no row judges tighter than degraded."""
-        self._loosest: list[Row] = []
+        self.pairs = self.loose = 0
+        """Quantities of a scene that were compared; those that no row judges tighter
+        than degraded.
+        """
         self.judged = 0
         """Pairs of scene and engine of which `worst` shows the worst."""
         self.measured_k: dict[str, float] = {}
@@ -144,62 +146,88 @@ class Summary:
         """
         self.independence: dict[str, tuple[str, str]] = {}
         """engine: (shared with the formulas, found alone)."""
-        self.tolerances: Sequence[ErrorBound] = (IDENTITY, EQUIVALENCE, SIMULATED)
-        """Tolerances of the engines."""
-        self.stated: Mapping[str, str] = {}
-        """Version that each guest states of itself, nothing where it states none."""
-        self.missing: Sequence[tuple[str, str]] = ()
-        """(engine, why it could not run here)."""
-        self._engines: dict[str, _EngineLine] = {}
-        self._refusals: Counter[tuple[str, str]] = Counter()
-        self._first_reason: dict[tuple[str, str], str] = {}
-        self._worst: list[Worst] = []
-        self._times: dict[str, list[tuple[float, float]]] = {}
-        """Microseconds per position, and the ratio to the formulas, of at most _TIMED
-        scenes of each engine.
-        """
+        self.with_forces = self.checked_twice = 0
+        self.released = False
+        self.not_compared: Counter[str] = Counter()
+        self._causes = Causes()
+        self._lines: dict[str, EngineLine] = {}
+        self._left_out: dict[str, AlikeTexts] = {}
+        self._worst: list[Row] = []
         self._orders: list[tuple[str, dict[str, float]]] = []
-        self._failing: list[Record] = []
-        self._holding: list[tuple[float, Record]] = []
+        self._shown: list[Record] = []
 
     def add(self, scene: Record) -> None:
         """Add one more scene."""
-        self.counts.add_scene(scene.rows)
-        self.overview.add(scene)
-        bad = [row for row in scene.rows if row.failed]
+        rows = scene.rows
+        self.counts.add_scene(rows)
+        self._causes.add(scene)
+        bad = [row for row in rows if row.failed]
         self.failures += bad[: _FAILURES_KEPT - len(self.failures)]
-        for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
-            name = OWN_CONSISTENCY if row.engine == FORMULAS else row.engine
-            line = self._engines.setdefault(name, _EngineLine(name))
-            line.add(row, used)
-        compared, loose = _count_compared(scene.rows)
-        self.pairs += compared
-        self.loose += len(loose)
-        _keep_largest(_LOOSEST_SHOWN, self._loosest, loose, _ALLOWANCE)
-        for engine, reason in sorted(_list_left_out(scene)):
-            kind = (engine, NUMBERS_IN_A_REASON.sub("#", reason))
-            self._refusals[kind] += 1
-            self._first_reason.setdefault(kind, reason)
-        worst = _find_worst_row(scene.rows)
+        refused = {(row.engine, row.reason) for row in rows if row.verdict == REFUSES}
+        reasons = {reason for _, reason in refused}
+        for line in scene.left_out:
+            engine, _, reason = line.partition(": ")
+            self.not_compared[_DOES_NOT_APPLY] += reason not in reasons
+            refused.add((engine, reason))
+        for engine, reason in sorted(refused):
+            self._left_out.setdefault(engine, AlikeTexts()).add(reason)
+        worst: dict[tuple[str, str], Row] = {}
+        loose: dict[str, bool] = {}
+        for row in rows:
+            self._add_row(row, scene.needs)
+            if row.compared:
+                key = row.engine, row.setting
+                worst[key] = max(worst.get(key, row), row, key=USED)
+                degraded = row.verdict == DEGRADED
+                loose[row.quantity] = loose.get(row.quantity, True) and degraded
+        self.pairs += len(loose)
+        self.loose += sum(loose.values())
         self.judged += len(worst)
-        _keep_largest(_WORST_SHOWN, self._worst, worst, _USED)
-        for row in scene.rows:
-            if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
-                k = row.error * row.condition / EPS
-                largest = self.measured_k.get(row.engine, 0.0)
-                self.measured_k[row.engine] = max(largest, k)
+        self._worst = nlargest(_WORST_SHOWN, [*self._worst, *worst.values()], key=USED)
         self.independence.update(scene.independence)
+        self._add_agreement(rows)
         self._add_times(scene)
         self._add_orders(scene)
-        if bad:
-            self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
-        else:
-            most = max((w.used for w in worst), default=0.0)
-            _keep_largest(SCENES_SHOWN, self._holding, [(most, scene)], itemgetter(0))
+        # a row that fails has used more than all that it is allowed
+        self._shown = nlargest(SCENES_SHOWN, [*self._shown, scene], key=USED)
+
+    def _line(self, engine: str) -> EngineLine:
+        return self._lines.setdefault(engine, EngineLine(engine))
+
+    def _add_row(self, row: Row, needs: Sequence[str]) -> None:
+        self._line(row.engine).add(row)
+        if usual := _NOT_COMPARED.get(row.verdict):
+            kinds = (kind for why, kind in _BY_REASON.items() if why in row.reason)
+            self.not_compared[next(kinds, usual)] += 1
+        if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
+            k = row.error * row.condition / EPS
+            self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
+        if row.compared and row.quantity == name_whole(row):
+            for name in (row.quantity, *needs):
+                self.listed.get(row.engine, {}).pop(name, None)
+
+    def _add_agreement(self, rows: Sequence[Row]) -> None:
+        """Count a scene of which two engines confirm the torque and all pin forces.
+
+        An engine that declares more than INDEPENDENT_ERROR confirms nothing.
+        """
+        asked: dict[str, dict[str, bool]] = {}
+        for row in rows:
+            name = "torque" if row.quantity in DRIVES else row.quantity
+            if row.engine != FORMULAS and name in ("torque", *PIN_FORCES):
+                asked.setdefault(row.engine, {})[name] = row.verdict in HOLDING_VERDICTS
+        agreeing = [
+            len(of) > len(PIN_FORCES) and all(of.values())
+            for engine, of in asked.items()
+            if self.declared.get(engine, 0.0) <= INDEPENDENT_ERROR
+        ]
+        self.with_forces += bool(asked)
+        self.checked_twice += sum(agreeing) >= 2
+        self.released |= any(row.quantity == "energy" for row in rows)
 
     def picture(self, drawn: Record) -> None:
         """Add what was drawn and measured of a scene that is shown."""
-        for scene in self.shown:
+        for scene in self._shown:
             if scene.name == drawn.name:
                 scene.figure = drawn.figure
                 scene.thumbnail = drawn.thumbnail
@@ -208,19 +236,16 @@ class Summary:
     def _add_times(self, scene: Record) -> None:
         refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
         for timing in scene.timings:
-            times = self._times.setdefault(timing.engine, [])
+            times = self._line(timing.engine).times
             if timing.engine not in refused and len(times) < _TIMED:
                 microseconds = 1e6 * timing.seconds / timing.positions
-                ratio = timing.seconds / scene.timings[0].seconds
-                times.append((microseconds, ratio))
+                times.append((microseconds, timing.seconds / scene.timings[0].seconds))
 
     def _add_orders(self, scene: Record) -> None:
-        orders = [
-            (scene.name, evidence)
-            for evidence in scene.evidence.values()
-            if "observed_order" in evidence
-        ]
-        _keep_largest(_ORDERS_SHOWN, self._orders, orders, _find_lowest)
+        for evidence in scene.evidence.values():
+            if "observed_order" in evidence:
+                self._orders.append((scene.name, evidence))
+        self._orders = nsmallest(_ORDERS_SHOWN, self._orders, key=_find_order)
 
     @property
     def not_run(self) -> str:
@@ -237,22 +262,20 @@ class Summary:
     def headline(self) -> str:
         """Say the verdict in plain words: where it is not green, whose fault it is."""
         words = self._say_first_cause()
-        overview = self.overview
-        against = f", against {overview.baseline}"
+        against = f", against {self.baseline}"
         for heading, lost, end in (
-            ("NOT CHECKED", overview.unchecked, ""),
-            ("WORSE", overview.worse, against),
-            ("WEAKER RULE", overview.weaker, against),
-            ("GONE", overview.gone, against),
+            ("NOT CHECKED", self.unchecked, ""),
+            ("WORSE", self.worse, against),
+            ("WEAKER RULE", self.weaker, against),
+            ("GONE", self.gone, against),
         ):
             if lost:
                 more = f", and {len(lost) - 1} more" * (len(lost) > 1)
-                head = f"{heading}: {lost[0]}{more}{end}."
-                words = f"{head} {words}"
+                words = f"{heading}: {lost[0]}{more}{end}. {words}"
         return words
 
     def _say_first_cause(self) -> str:
-        causes = self.overview.causes
+        causes = self.causes
         if not causes:
             return self.counts.headline + self.not_run
         first = causes[0]
@@ -262,40 +285,101 @@ class Summary:
         scenes = write_count(first.scenes, "scene")
         worst = f"worst {first.worst.quantity} of "
         worst *= not math.isnan(first.worst.error)
-        since = f" {self.overview.since}".rstrip()
+        since = f" {self.since}".rstrip()
         what = f"{named} is wrong: {first.text}, in {scenes}; {worst}"
         return f"FAILS: {what}{first.place}{others}.{since}"
 
     @property
-    def lines(self) -> list[OverviewLine]:
-        """Return the engines of the first screen, with their names and versions."""
-        versions = {name: self._find_version(name) for name in self._engines}
-        return self.overview.name_lines(versions)
+    def causes(self) -> list[Cause]:
+        """Return what is wrong, engine by engine; what explains most comes first."""
+        return self._causes.list_all()
 
-    def _find_version(self, engine: str) -> str:
-        """Return the version to be shown with an engine; empty if its name has it."""
-        versions = {name.lower(): version for name, version in self.versions.items()}
-        ours = versions.get(engine.partition("-")[0], "")
-        version = self.stated.get(engine, ours)
-        return "" if engine.endswith(f" {version}") else version
+    @property
+    def engines(self) -> list[EngineLine]:
+        """Return every engine by its name, then the formulas.
+
+        An engine that had nothing to compare is among them if that has a reason.
+        """
+        for engine in {*ENGINE_NAMES, *self.declared} & self._left_out.keys():
+            self._line(engine)
+        for line in self._lines.values():
+            ours = self._versions.get(line.engine.partition("-")[0], "")
+            version = self._versions.get(line.engine, ours)
+            line.version = "" if line.engine.endswith(f" {version}") else version
+            name = ENGINE_NAMES.get(line.engine, f"{line.engine} {{}}")
+            line.name = name.format(line.version).replace(" ,", ",").strip()
+        return sorted(
+            self._lines.values(),
+            key=lambda line: (line.engine == FORMULAS, line.engine),
+        )
+
+    @property
+    def independent(self) -> list[EngineLine]:
+        """Return the engines in the order in which people look for them."""
+        order = [*ENGINE_NAMES]
+        lines = [line for line in self.engines if line.engine != FORMULAS]
+        return sorted(lines, key=lambda line: [*order, line.engine].index(line.engine))
+
+    @property
+    def silent(self) -> dict[str, str]:
+        """Return a line for each engine with nothing to compare, with the reason.
+
+        Of several reasons the commonest is stated.
+        """
+        lines = {}
+        for line in self.engines:
+            left_out = self._left_out.get(line.engine)
+            if left_out and not line.counts.compared:
+                reason, count = left_out.list_all()[0]
+                scenes = write_count(count, "scene")
+                told = f"{line.engine}: nothing compared ({scenes}): {reason}"
+                lines[line.engine] = told
+        return lines
+
+    @property
+    def unchecked(self) -> list[str]:
+        """Return the lines of the engines that were asked for in vain."""
+        return [line for name, line in self.silent.items() if name in self.asked]
+
+    @property
+    def notes(self) -> list[str]:
+        """Return what is said beneath the table."""
+        notes = []
+        identities = self._line(FORMULAS).counts
+        many = sum(identities[verdict] for verdict in COMPARED_VERDICTS)
+        if many:
+            failed = identities[FAILS]
+            held = f"{failed} FAIL" if failed else "all hold"
+            told = f"{write_count(many, 'identity')} of the formulas; {held}"
+            notes.append(f"also checked, without an engine: {told}")
+        if self.with_forces:
+            notes.append(
+                f"Torque and pin forces of {self.checked_twice} of {self.with_forces}"
+                " scenes: at least two independent engines compared all of them and"
+                " agree."
+            )
+        if self.released:
+            notes.append("released: angles, energy and speeds alone (no torque acts)")
+        notes += [
+            f"{engine} lists {', '.join(listed)}: compared in no scene"
+            for engine, listed in self.listed.items()
+            if listed and any(self._line(engine).worst)
+        ]
+        notes += self.silent.values()
+        if self.not_compared.total():
+            kinds = ", ".join(
+                f"{count} {kind}"
+                for kind, count in self.not_compared.most_common()
+                if count
+            )
+            notes.append(f"{self.not_compared.total()} not compared: {kinds}")
+        return notes
 
     @property
     def loosest(self) -> str:
-        """Say how many quantities no engine judges tighter than degraded.
-
-        Examples are the rows that allow most.
-        """
-        if not self.loose:
-            return ""
-        worst = nlargest(_LOOSEST_SHOWN, self._loosest, key=_ALLOWANCE)
-        examples = ", ".join(
-            f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})"
-            for row in worst
-        )
-        return (
-            f"{self.loose} of {self.pairs} quantities of a scene are at best"
-            f' "{DEGRADED}"; the widest: {examples}'
-        )
+        """Say how many quantities no engine judges tighter than degraded."""
+        of = f"{self.loose} of {self.pairs} quantities of a scene are at best"
+        return f'{of} "{DEGRADED}"' * bool(self.loose)
 
     @property
     def good(self) -> bool:
@@ -303,48 +387,28 @@ class Summary:
 
         All was compared, by no weaker rule, and nothing is gone or got worse.
         """
-        of = self.overview
-        if of.unchecked or of.weaker or of.gone or of.worse:
+        if self.unchecked or self.weaker or self.gone or self.worse:
             return False
         return self.counts.status == HOLDS and not self.missing
 
     @property
-    def engines(self) -> list[_EngineLine]:
-        """Return every independent engine by name, then our own consistency."""
-        for line in self._engines.values():
-            line.version = self._find_version(line.name)
-            engine = FORMULAS if line.name == OWN_CONSISTENCY else line.name
-            if times := self._times.get(engine):
-                line.microseconds, line.times_formulas = map(
-                    median, zip(*times, strict=True)
-                )
-                line.work = WORK.get(engine, "")
-        return sorted(
-            self._engines.values(),
-            key=lambda line: (line.name == OWN_CONSISTENCY, line.name),
-        )
-
-    @property
-    def worst(self) -> list[Worst]:
+    def worst(self) -> list[Row]:
         """Return the worst rows by scene and engine.
 
         More than _WORST_SHOWN are reduced to those that used most, in that order.
         """
-        if self.judged > _WORST_SHOWN:
-            return nlargest(_WORST_SHOWN, self._worst, key=_USED)
-        by_name = attrgetter("row.scene", "row.engine", "row.setting")
-        return sorted(self._worst, key=by_name)
+        return self._worst if self.judged > _WORST_SHOWN else sort_rows(self._worst)
 
     @property
     def refusals(self) -> list[tuple[str, str, int]]:
         """Return (engine, reason, number of scenes) of declared limits that were met.
 
-        Reasons that differ by their numbers alone are one, with the numbers of the
-        first scene.
+        Reasons that differ by their numbers alone are one.
         """
         return [
-            (kind[0], self._first_reason[kind], count)
-            for kind, count in sorted(self._refusals.items())
+            (engine, *told)
+            for engine, texts in sorted(self._left_out.items())
+            for told in texts.list_all()
         ]
 
     @property
@@ -353,17 +417,15 @@ class Summary:
 
         At most _ORDERS_SHOWN are returned, the lowest orders first.
         """
-        if len(self._orders) <= _ORDERS_SHOWN:
-            return self._orders
-        return nlargest(_ORDERS_SHOWN, self._orders, key=_find_lowest)
+        return self._orders
 
     @property
     def shown(self) -> list[Record]:
         """Return the scenes shown, by name, at most SCENES_SHOWN.
 
-        Scenes that fail come before those that used most of what is allowed.
+        They are those that fail, and those that used most of what is allowed.
         """
-        return sorted(self._find_most_used(SCENES_SHOWN), key=lambda scene: scene.name)
+        return sorted(self._shown, key=attrgetter("name"))
 
     @property
     def pictured(self) -> list[Record]:
@@ -371,7 +433,8 @@ class Summary:
 
         All that fail have one, then those that used most of their allowed error.
         """
-        return self._find_most_used(PICTURED)
+        failing = sum(scene.used > 1.0 for scene in self._shown)
+        return self._shown[: max(PICTURED, failing)]
 
     @property
     def sketched(self) -> list[Record]:
@@ -379,89 +442,13 @@ class Summary:
 
         Scenes that fail come first, then those nearest to it.
         """
-        scenes = self._find_most_used(SCENES_SHOWN)
-        return [scene for scene in scenes if scene.thumbnail][:SKETCHED]
+        return [scene for scene in self._shown if scene.thumbnail][:SKETCHED]
 
     @property
     def first(self) -> Record | None:
-        """Return the scene of the large figure, None if no scene has one.
-
-        A scene that fails goes before the first of those shown.
-        """
-        drawn = [scene for scene in self.shown if scene.figure]
-        failing = [scene for scene in self._failing if scene.figure]
-        return next(iter([*failing, *drawn]), None)
-
-    def _find_most_used(self, most: int) -> list[Record]:
-        left = most - len(self._failing)
-        holding = nlargest(left, self._holding, key=itemgetter(0))
-        return [*self._failing, *(scene for _, scene in holding)]
+        """Return the scene of the large figure, that which is nearest to failing."""
+        return next((scene for scene in self._shown if scene.figure), None)
 
 
-def _list_left_out(scene: Record) -> set[tuple[str, str]]:
-    """List what was not run, or refused to answer: (engine, reason)."""
-    left_out = (line.partition(": ") for line in scene.left_out)
-    refused = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
-    return refused | {(engine, reason) for engine, _, reason in left_out}
-
-
-def compute_shares(rows: Sequence[Row]) -> list[float]:
-    """Return error/allowed of each row.
-
-    The ratio is infinite without an answer, 0 if the error is 0 or nothing was
-    compared.
-    """
-    of_all = find_used(
-        np.array([row.error for row in rows]), np.array([row.allowed for row in rows])
-    )
-    return [
-        share if row.compared else 0.0
-        for row, share in zip(rows, of_all.tolist(), strict=True)
-    ]
-
-
-def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
-    """Return the number of quantities compared, and the tightest degraded rows.
-
-    Each quantity that every row calls degraded has one such row: the one that allows
-    least.
-    """
-    by_quantity: dict[str, list[Row]] = {}
-    for row in rows:
-        if row.compared:
-            by_quantity.setdefault(row.quantity, []).append(row)
-    loose = [
-        min(of_one, key=_ALLOWANCE)
-        for of_one in by_quantity.values()
-        if all(row.verdict == DEGRADED for row in of_one)
-    ]
-    return len(by_quantity), loose
-
-
-def _find_worst_row(rows: Sequence[Row]) -> list[Worst]:
-    groups: dict[tuple[str, str], list[tuple[float, Row]]] = {}
-    for share, row in zip(compute_shares(rows), rows, strict=True):
-        if row.compared:
-            groups.setdefault((row.engine, row.setting), []).append((share, row))
-    worst = []
-    for group in groups.values():
-        share, row = max(group, key=itemgetter(0))
-        failed = sum(one.failed for _, one in group)
-        worst.append(Worst(row, share, len(group), failed))
-    return worst
-
-
-def _keep_largest(
-    most: int,
-    entries: list[T],
-    further: Iterable[T],
-    key: Callable[[T], float],
-) -> None:
-    """Add further entries to a list; it is cut to the largest once it is too long."""
-    entries += further
-    if len(entries) > 2 * most:
-        entries[:] = nlargest(most, entries, key=key)
-
-
-def _find_lowest(order: tuple[str, dict[str, float]]) -> float:
-    return -order[1]["observed_order"]
+def _find_order(order: tuple[str, dict[str, float]]) -> float:
+    return order[1]["observed_order"]

@@ -28,7 +28,6 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
 )
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.report.run_summary import compute_shares
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import (
     ALLOWED,
@@ -118,7 +117,7 @@ def _choose_force(record: Record, solution: Solution) -> str:
     """
     failing = [row for row in record.rows if row.failed and row.quantity in PIN_FORCES]
     if failing:
-        return failing[int(np.argmax(compute_shares(failing)))].quantity
+        return max(failing, key=lambda row: row.used).quantity
     good = solution.status_code == OK
     return max(
         PIN_FORCES,

@@ -39,14 +39,14 @@ def print_table(
     colour = "green" if summary.good else "red"
     console.print(f"[bold {colour}]{escape(clean_line(summary.headline))}[/]")
     console.print(_make_overview(summary))
-    causes = summary.overview.causes
+    causes = summary.causes
     for cause in causes[:MOST_CAUSES_PRINTED]:
         console.print(f"[bold red]wrong:[/] {escape(clean_line(str(cause)))}")
     if len(causes) > MOST_CAUSES_PRINTED:
         console.print(
             f"and {len(causes) - MOST_CAUSES_PRINTED} more causes; the report has them"
         )
-    for note in summary.overview.notes[:_MOST_NOTES]:
+    for note in summary.notes[:_MOST_NOTES]:
         console.print(escape(clean_line(note)))
     for engine, reason in summary.missing:
         console.print(f"[bold red]Not run:[/] {escape(engine)}: {escape(reason)}")
@@ -94,15 +94,16 @@ def _make_overview(summary: Summary) -> "Table":
     shown.add_column("error of allowed", overflow="fold", ratio=1)
     for heading in (*OVERVIEW_GROUPS, "compared"):
         shown.add_column(heading, justify="right", no_wrap=True)
-    for line in summary.lines:
+    for line in summary.independent:
         name = escape(clean_line(line.name))
         cells = []
         for group in OVERVIEW_GROUPS:
-            cell = line.columns[group]
-            cells.append(f"[bold red]{cell}[/]" if cell.failed else str(cell))
-        if line.failed:
+            worst = line.worst.get(group)
+            cell = " ".join(line.cell(group))
+            cells.append(f"[bold red]{cell}[/]" if worst and worst.failed else cell)
+        if line.counts[FAILS]:
             name = f"[bold red]{name}[/]"
-        shown.add_row(name, *cells, str(line.compared))
+        shown.add_row(name, *cells, str(line.counts.compared))
     return shown
 
 
@@ -124,23 +125,23 @@ def _make_worst_table(summary: Summary) -> "Table":
         shown.add_column(heading, overflow="fold")
     for heading in ("error", "allowed", "used", "at deg"):
         shown.add_column(heading, justify="right", overflow="fold", no_wrap=True)
-    for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
+    for scene, group in groupby(summary.worst, key=lambda row: row.scene):
         shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
-        for w in group:
+        for row in group:
             numbers = (
-                write_two_digits(w.row.error),
-                write_two_digits(w.row.allowed),
-                f"{w.used:.2g}",
+                write_two_digits(row.error),
+                write_two_digits(row.allowed),
+                f"{row.used:.2g}",
                 (
                     "-"
-                    if math.isnan(w.row.theta_2)
-                    else f"{math.degrees(w.row.theta_2):.1f}"
+                    if math.isnan(row.theta_2)
+                    else f"{math.degrees(row.theta_2):.1f}"
                 ),
             )
-            words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
+            words = (f"  {escape(row.engine)}", escape(row.quantity))
             shown.add_row(
                 *words,
                 *numbers,
-                style="" if w.failed == 0 else "bold red",
+                style="bold red" if row.failed else "",
             )
     return shown

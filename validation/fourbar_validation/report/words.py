@@ -28,13 +28,15 @@ class AlikeTexts:
         if self._first.setdefault(words, text) != text:
             self._differing.add(words)
 
-    def find_commonest(self) -> tuple[str, int]:
-        """Return the first of the commonest texts with its numbers, and their count.
+    def list_all(self) -> list[tuple[str, int]]:
+        """List the first of each kind of texts with its numbers, and their count.
 
-        The text says if the others have other numbers.
+        The text says if the others have other numbers; the commonest comes first.
         """
-        words, count = self._counts.most_common(1)[0]
-        text = self._first[words]
-        if words in self._differing:
-            text += f" (and {count - 1} more like it, with other numbers)"
-        return text, count
+        listed = []
+        for words, count in self._counts.most_common():
+            text = self._first[words]
+            if words in self._differing:
+                text += f" (and {count - 1} more like it, with other numbers)"
+            listed.append((text, count))
+        return listed

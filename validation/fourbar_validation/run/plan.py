@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 
 from fourbar.errors import FAILED, DependencyError, InputError
 from fourbar_validation.compare.rows import FAILS, escape_controls
-from fourbar_validation.compare.tolerance import IDENTITY
-from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
@@ -192,25 +190,7 @@ class Plan:
 
     def summarise(self) -> Summary:
         """Return a summary that knows the engines, and no scene yet."""
-        tolerances = (IDENTITY, *(engine.tolerance for engine in self.engines))
-        summary = Summary()
-        summary.tolerances = list(dict.fromkeys(tolerances))
-        summary.missing = self.missing
-        summary.overview.declared = {
-            engine.name: engine.tolerance.factor for engine in self.engines
-        }
-        summary.overview.asked = [
-            engine.name
-            for engine in self.engines
-            if self.chosen or isinstance(engine, Guest)
-        ]
-        guests = [engine for engine in self.engines if isinstance(engine, Guest)]
-        summary.stated = {guest.name: guest.version for guest in guests}
-        summary.overview.listed = {
-            guest.name: dict.fromkeys((*guest.effects, *guest.answers))
-            for guest in guests
-        }
-        return summary
+        return Summary(self.engines, self.missing, bool(self.chosen))
 
     def conclude(self, summary: Summary, *, worse: bool = False) -> int:
         """Return the exit status of a run.
@@ -221,7 +201,7 @@ class Plan:
         `worse`: whether the run is worse than the one that it is compared with.
         """
         counts = summary.counts
-        if counts[FAILS] or worse or summary.overview.unchecked:
+        if counts[FAILS] or worse or summary.unchecked:
             return FAILED
         self.require_engines()
         return counts.status

@@ -135,24 +135,23 @@ def write_outcome(
     summary.date = about.date
     summary.commit = about.commit
     if len(suite) == 1:
-        summary.asked = names[0]
+        summary.scene = names[0]
     if options.against is not None:
         before = open_run(options.against, "--against")
-        overview = summary.overview
-        if failure := overview.named_failure:
+        if failure := next((one.worst for one in summary.causes), None):
             key = (failure.scene, failure.engine, failure.quantity)
             since = find_since(read_history(before), before, [key])
-            overview.since = f"It {since[key]}."
+            summary.since = f"It {since[key]}."
         weakened = list_weakened(before.about.rules, about.rules)
-        overview.weaker = [*map(str, weakened)]
-        overview.baseline = before.describe()
+        summary.weaker = [*map(str, weakened)]
+        summary.baseline = before.describe()
         with suppress(InputError):  # raised again where the differences are printed
             after = Recorded(about, out / PARQUET_FILE)
             differences = find_differences(before, after, {})
-            overview.gone = differences.gone
+            summary.gone = differences.gone
             if not summary.counts[FAILS]:  # its cause stands first
-                overview.gone += _list_rows(differences, Kind.GONE)
-                overview.worse = _list_rows(differences, Kind.VERDICT_WORSE, Kind.WORSE)
+                summary.gone += _list_rows(differences, Kind.GONE)
+                summary.worse = _list_rows(differences, Kind.VERDICT_WORSE, Kind.WORSE)
     write_text(out / "report.md", write_summary_page(summary))
     rows = read_columns(out / PARQUET_FILE)
     sections = collect_sections(rows if isinstance(suite, Hard) else None, out)
