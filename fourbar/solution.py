@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import (
+    COUPLE,
+    LINE,
     LINE_QUANTITIES,
     NOT_ASSEMBLED,
     PIN_FORCES,
@@ -32,7 +34,6 @@ from fourbar.writing import (
     describe_extent,
     list_names,
     make_data_frame,
-    write_between,
     write_object,
     write_text,
 )
@@ -49,6 +50,11 @@ out stays.
 """
 SI: Conversion = {}
 DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
+SHOWN_PARTS = (
+    *(*COUPLE, *LINE, "theta_3", "theta_4"),
+    *(f"|{name}|" for name in PIN_FORCES),
+)
+"""Main quantities, and sizes of the pin forces, that a notebook shows of a study."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,24 +172,19 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         )
 
     def __repr__(self) -> str:
-        """Say in ten lines what it holds."""
-        shown = list_parts(
-            {name: find_values(self, name) for name in _list_quantities(self)},
-            scalars=("theta_2", "torque", "drive_force"),
-        )
+        """Say in three lines what it holds."""
         on = f"on bar {self.drive_bar}"
         if self.drive is not None:
             on = "along a line" if self.drive.has_stroke else "at a point"
         of = f" {self.title!r}" if self.title else ""
-        lines = [f"Solution{of}: {describe_extent(self.theta_2)}, drive {on}"]
-        counts = np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES))
-        by_status = zip(STATUS_NAMES, counts, strict=True)
-        stated = [f"{count} {name}" for name, count in by_status if count]
-        lines.append("status: " + ", ".join(stated))
-        for name, values in shown.items():
-            unit = find_unit_of_quantity(name.strip("|"))
-            lines.append(f"{name}: {write_between(values)} {unit}")
-        return "\n".join([*lines, list_names("evaluated", self.evaluated())])
+        codes, counts = np.unique(self.status_code, return_counts=True)
+        stated = map("{} {}".format, counts, np.array(STATUS_NAMES)[codes])
+        lines = (
+            f"Solution{of}: {describe_extent(self.theta_2)}, drive {on}",
+            f"status: {', '.join(stated)}",
+            list_names("evaluated", self.evaluated()),
+        )
+        return "\n".join(lines)
 
     def _repr_html_(self) -> Any:
         return load_show("notebook").show_solution(self)
@@ -300,20 +301,6 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
         parts[f"|{name}|"] = np.hypot(x, y)
     parts[f"{name}_x"] = x
     parts[f"{name}_y"] = y
-    return parts
-
-
-def list_parts(
-    values: Mapping[str, Array | None],
-    scalars: tuple[str, ...],
-) -> dict[str, Array]:
-    """List the given scalars and the magnitudes of the pin forces that have values."""
-    parts: dict[str, Array] = {}
-    for name in (*scalars, *PIN_FORCES):
-        if (quantity := values.get(name)) is not None:
-            for part, array in split_parts(name, quantity).items():
-                if part[-2:] not in ("_x", "_y"):
-                    parts[part] = array
     return parts
 
 

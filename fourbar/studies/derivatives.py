@@ -26,10 +26,8 @@ from fourbar.formulas.arithmetic import (
 from fourbar.formulas.path import LoopPath
 from fourbar.formulas.position import HalfAngle, compute_factors, find_root_sign
 from fourbar.quantities import (
-    COUPLE,
     DRY_FRICTION_QUANTITIES,
     FORCE_NAMES,
-    LINE,
     NOT_ASSEMBLED,
     OK,
     PIN_FORCES,
@@ -44,6 +42,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import (
+    SHOWN_PARTS,
     Solution,
     find_unit_of_quantity,
     find_values,
@@ -205,7 +204,8 @@ class Sensitivity:
 
         A pin force counts by its magnitude.
         """
-        value = self.value(quantity)
+        part = f"|{quantity}|" if quantity in PIN_FORCES else quantity
+        value = self.value(part)
         size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
         rounding = _NO_INFLUENCE * np.nanmax(size, initial=0.0)
         rows = []
@@ -214,11 +214,8 @@ class Sensitivity:
             self.numbers.tolist(),
             strict=True,
         ):
-            change = self._find_step(entry, number) * self.of(quantity, key)
-            if quantity in PIN_FORCES:
-                with np.errstate(all="ignore"):
-                    change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
-            elif change.ndim == 2:
+            change = self._find_step(entry, number) * self.of(part, key)
+            if change.ndim == 2:
                 change = np.hypot(*change.T)
             if np.isfinite(change).any():
                 worst = int(np.nanargmax(np.abs(change)))
@@ -248,47 +245,24 @@ class Sensitivity:
             return steps
         return f"{steps}, of a drawn coordinate by 1 % of the longest bar"
 
-    def _list_rows(self) -> list[tuple[str, str, str]]:
-        """List for each quantity its values and the numbers that change it most."""
-        rows = []
-        for name in (
-            name
-            for name in (*COUPLE, *LINE, "theta_3", "theta_4", *PIN_FORCES)
-            if name in self.by
-        ):
-            part = f"|{name}|" if name in PIN_FORCES else name
-            most = ", ".join(
-                f"{row.key} {abs(row.change):.3g}" for row in self.influences(name)[:3]
-            )
-            rows.append((part, write_between(self.value(part)), most))
-        return rows
-
-    def _title(self) -> str:
+    def __repr__(self) -> str:
         counts = ", ".join(
             f"{self.status.count(word)} {word}" for word in dict.fromkeys(self.status)
         )
         return (
             f"Sensitivity {self.scene.title!r}: by {len(self.keys)} numbers at {counts}"
+            "\n" + list_names("quantities", self.by)
         )
-
-    def __repr__(self) -> str:
-        """Say in a dozen lines what it holds."""
-        rows = [
-            f"{part}, {value}: changes most with {most or 'nothing'}"
-            for part, value, most in self._list_rows()
-        ]
-        return "\n".join([self._title(), *rows, list_names("quantities", self.by)])
 
     def _repr_html_(self) -> str:
-        return make_html(
-            self._title(),
-            (
-                "",
-                "value",
-                f"changes most {self.describe_steps()}, with",
-            ),
-            self._list_rows(),
-        )
+        head = ("", "value", f"changes most {self.describe_steps()}, with")
+        rows = []
+        for part in SHOWN_PARTS:
+            if part.strip("|") in self.by:
+                first = self.influences(part)[:3]
+                most = ", ".join(f"{row.key} {abs(row.change):.3g}" for row in first)
+                rows.append((part, write_between(self.value(part)), most))
+        return make_html(repr(self), head, rows)
 
 
 def sensitivity(scene: Scene) -> Sensitivity:

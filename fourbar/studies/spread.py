@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect, needing
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import require_whole
-from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES, Array
+from fourbar.quantities import NOT_ASSEMBLED, Array
 from fourbar.scene import Scene, command
-from fourbar.solution import find_values, is_scalar, split_parts
+from fourbar.solution import SHOWN_PARTS, find_values, is_scalar, split_parts
 from fourbar.solving import split
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
@@ -142,45 +142,25 @@ class Tolerances:
             return "a generator's"
         return f"seed {self.seed}"
 
-    def _title(self) -> str:
+    def __repr__(self) -> str:
         drawn = f"{self.samples} samples ({self.describe_seed()})"
         tried = f"{drawn}, {self.apart} of them do not assemble somewhere"
         return (
             f"Tolerances {self.scene.title!r}: {describe_extent(self.theta_2)}, {tried}"
+            "\n" + list_names("quantities", self.spreads)
         )
-
-    def _list_rows(self) -> list[tuple[str, str, str, str]]:
-        """List each quantity's nominal values, largest deviation and worst case.
-
-        The deviation is the standard one.
-        """
-        rows = []
-        sizes = [f"|{name}|" for name in PIN_FORCES]
-        for name in (*COUPLE, *LINE, "theta_3", "theta_4", *sizes):
-            if name not in self.spreads:
-                continue
-            spread = self.spreads[name]
-            sigma, worst = (
-                f"{np.max(x[np.isfinite(x)], initial=0.0):.3g}"
-                for x in (spread.deviation, spread.worst)
-            )
-            rows.append((name, write_between(spread.nominal), sigma, worst))
-        return rows
-
-    def __repr__(self) -> str:
-        """Say in a dozen lines what it holds."""
-        rows = [
-            f"{name}, {value}: sigma up to {sigma}, worst case {worst}"
-            for name, value, sigma, worst in self._list_rows()
-        ]
-        return "\n".join([self._title(), *rows, list_names("quantities", self.spreads)])
 
     def _repr_html_(self) -> str:
-        return make_html(
-            self._title(),
-            ("", "nominal", "largest sigma", "largest worst case"),
-            self._list_rows(),
-        )
+        head = ("", "nominal", "largest sigma", "largest worst case")
+        rows = []
+        for part in SHOWN_PARTS:
+            if part in self.spreads:
+                spread = self.spreads[part]
+                cells = [part, write_between(spread.nominal)]
+                for x in (spread.deviation, spread.worst):
+                    cells.append(f"{np.max(x[np.isfinite(x)], initial=0.0):.3g}")
+                rows.append(cells)
+        return make_html(repr(self), head, rows)
 
 
 def tolerances(

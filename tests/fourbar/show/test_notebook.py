@@ -1,6 +1,7 @@
 """Scenes and solutions in a notebook, as tables, and new scene files."""
 
 import math
+import re
 import sys
 from base64 import b64decode
 from dataclasses import replace
@@ -94,10 +95,8 @@ def test_results_say_in_ten_lines_what_they_hold(result):
     assert LOOSE.title in text and "61" in text
 
 
-def test_a_solution_says_its_range_and_how_many_positions_it_has():
-    solution = solve(LOOSE)
-    low, high = (f"{x:.6g}" for x in (solution.torque.min(), solution.torque.max()))
-    assert f"torque: {low} to {high} N m" in repr(solution)
+def test_a_solution_says_how_many_positions_it_has():
+    assert "evaluated: theta_2, " in repr(solve(LOOSE))
     assert "status: 122 ok, 61 not_assembled" in repr(solve(STUDY))
     single = replace(LOOSE, motion=Motion(1.0))
     one = solve(vary(single, {"lengths.input": 0.1}))
@@ -118,9 +117,10 @@ def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
         (np.abs(slopes.of("torque", key)).max() * step, key)
         for key, step in steps.items()
     )
-    (line,) = (row for row in repr(slopes).splitlines() if row.startswith("torque"))
-    assert f"{most} {change:.3g}" in line
-    assert f"sigma up to {spread.spreads['torque'].deviation.max():.3g}" in repr(spread)
+    line = re.search("<td>torque</td>.*?</tr>", slopes._repr_html_())
+    assert f"{most} {change:.3g}" in line[0]
+    sigma = f"{spread.spreads['torque'].deviation.max():.3g}"
+    assert re.search(f"<td>torque</td>.*?<td>{sigma}</td>", spread._repr_html_())
     for outcome in (slopes, spread):
         hostile = replace(outcome, scene=replace(LOOSE, title=HOSTILE))
         assert outcome._repr_html_().count("<tr>") == 8
