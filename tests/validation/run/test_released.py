@@ -78,7 +78,8 @@ def row(rows, engine, quantity):
 
 
 def test_engines_that_agree_on_a_released_linkage_against_fourbar_name_it():
-    question = make_question("falling", falling(), ENGINES)
+    motion = Motion(1.0, 0.0, free=Free(0.1, 5))
+    question = make_question("falling", replace(falling(), motion=motion), ENGINES)
     question.solution = replace(question.solution, F14=-question.solution.F14)
     failed = {row.quantity for row in free._compare_forces(question) if row.failed}
     assert failed == question.against.keys() == {"F14"}
