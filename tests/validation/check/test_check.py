@@ -50,7 +50,7 @@ PINS = FORCES[1:]
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
 EVERY = 31
 """One position of so many is written."""
-OF_CAUSES = ("loads", "gravity is", "the weight")
+OF_CAUSES = ("loads", "gravity is", "the weight", "every weight")
 """Beginnings of mistakes that have their cases in `test_causes.py`."""
 NO_CAUSE = "no single known mistake explains it"
 

@@ -112,3 +112,6 @@ def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_ow
     for changes, verdict in ((none, DEGRADED), ({}, UNDECIDED)):
         worst = judge_quantity(1.0, predicted=np.array([2.0]), **changes)
         assert worst.verdict == verdict
+    for predicted, verdict in ((2.0, FAILS), (np.inf, UNDECIDED)):
+        worst = judge_quantity(np.nan, predicted=np.array([predicted]))
+        assert worst.verdict == verdict

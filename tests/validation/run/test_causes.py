@@ -188,6 +188,19 @@ REPLACED = {
     f"{CENTRIPETAL} is missing in a_G of bar 4, r from its first pin to G": [
         (IN_ARM, "(1j * turning - w * w * (name != 'output')) * arm")
     ],
+    "a_A is missing in a_G of bar 3": [("a_pin + ", "a_pin * (name != 'coupler') + ")],
+    f"{CENTRIPETAL} is missing in every a_G, and in a_A": [
+        (IN_ARM, "1j * turning * arm"),
+        ("a_A = (1j * alpha - omega**2) * r2", "a_A = 1j * alpha * r2"),
+    ],
+    "alpha_2 is reversed": [("    r2 = ", "    alpha = -alpha\n    r2 = ")],
+    "(dJ/dt) v is halved in the accelerations of the loop": [
+        (
+            NO_VELOCITY_TERMS[0],
+            "k = (alpha + 0.5j * omega**2) * r2 + 0.5j * omega_3**2 * r3"
+            " - 0.5j * omega_4**2 * r4",
+        )
+    ],
     "(dJ/dt) v has the wrong sign in the accelerations of the loop": [
         (
             NO_VELOCITY_TERMS[0],
@@ -557,6 +570,12 @@ RUBBING = Viscous((("A", 0.2),))
 WOUND = with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, -0.3))
 ARM, FROM_PIN = with_load(arm=PLACE), with_load(from_pin=PLACE)
 AT_PIN = {"from_pin": (0.0, 0.0)}
+PUSH = Load(4, (3.0, 0.7), from_pin=PLACE)
+FROM_B = (
+    math.hypot(0.22 + 0.05 * math.cos(1.0), 0.05 * math.sin(1.0)),
+    math.atan2(0.05 * math.sin(1.0), 0.22 + 0.05 * math.cos(1.0)),
+)
+WEIGHTS_AT_PINS = tuple(replace(one, from_pin=(0.0, 0.0)) for one in WEIGHTS)
 DAMPED = replace(SCENE, effects=(Gravity(), Viscous((("O4", 0.2),))))
 OTHER_SCENES = {
     "loads.0 (bar 3): its force acts at the second pin of the bar": (
@@ -587,6 +606,41 @@ OTHER_SCENES = {
     "effects.torsion.O2.stiffness 1.3 times ours (fitted)": (
         with_effects(Torsion((("O2", 2.0, 1.0, 0.3),))),
         with_effects(Torsion((("O2", 2.6, 1.0, 0.3),))),
+    ),
+    "every weight acts at its first pin": (
+        SCENE,
+        replace(with_effects(), loads=WEIGHTS_AT_PINS),
+    ),
+    "the places of loads.0 and loads.1 are exchanged": (
+        replace(SCENE, loads=(PUSH, Load(2, (5.0, 1.4), from_pin=(0.02, 0.3)))),
+        replace(
+            SCENE,
+            loads=(
+                replace(PUSH, from_pin=(0.02, 0.3)),
+                Load(2, (5.0, 1.4), from_pin=PLACE),
+            ),
+        ),
+    ),
+    "loads.0 (bar 4): its place is measured from the bar's second pin, not from its"
+    " first": (
+        replace(SCENE, loads=(PUSH,)),
+        replace(SCENE, loads=(replace(PUSH, from_pin=FROM_B),)),
+    ),
+    "dry friction is taken for viscous damping": (
+        with_effects(Friction((("O4", 0.3),))),
+        with_effects(Viscous((("O4", 0.3),))),
+    ),
+    "effects.torsion.O4.rest a turn larger": (
+        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, 0.2)),
+        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, 0.2 - 2.0 * math.pi)),
+    ),
+    "effects.torsion.*.rest a turn smaller": (
+        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, 0.0)),
+        with_torsion((2.0, 0.4, 0.5 + 4.0 * math.pi), (1.0, 1.0, 2.0 * math.pi)),
+    ),
+    "effects.springs.0.length 1.3 times ours (fitted)": (
+        with_effects(Springs((replace(SPRING, preload=-4.0),))),
+        with_effects(Springs((replace(SPRING, preload=-4.0, length=0.13),))),
     ),
     "the springs act both ways": (
         with_effects(Springs((PULLING,))),

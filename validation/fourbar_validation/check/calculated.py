@@ -64,7 +64,11 @@ _PART_OF_ACCELERATION = {
     1.0: "is doubled",
 }
 """What is added of a part of an acceleration, and what was done to it."""
-_VELOCITY_TERM = {-1.0: "is missing", -2.0: "has the wrong sign"}
+_VELOCITY_TERM = {
+    -1.0: "is missing",
+    -2.0: "has the wrong sign",
+    -0.5: "is halved",
+}
 """The same of the part of the others' accelerations that the speeds make."""
 
 
@@ -249,6 +253,12 @@ def _list_parts_of_centres(motion: BodyMotion) -> Iterator[_Accelerated]:
     for bar in MOVING_BARS:
         text = f"the acceleration of bar {bar}'s first pin is used as its a_G"
         yield _Accelerated(text, {bar: -centripetal[bar] - tangential[bar]})
+    r_A = motion.linkage.input.length * motion.unit[2]
+    of_A = -(motion.omega[2] ** 2) * r_A
+    a_A = of_A + 1j * motion.alpha[2] * r_A
+    yield _Accelerated("a_A is missing in a_G of bar 3", {3: -a_A})
+    whole = {bar: -part - of_A * (bar == 3) for bar, part in centripetal.items()}
+    yield _Accelerated("-omega^2 r is missing in every a_G, and in a_A", whole)
 
 
 def find_single_precision(judge: Judge) -> Iterator[Mistake]:

@@ -268,7 +268,11 @@ def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
 def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
     """List numbers of a scene that may be others, as functions of a factor or value."""
     groups = group_numbers(scene)
-    fitted = {name: own for name, own in groups.items() if not is_place(scene, own)}
+    fitted = {
+        name: own
+        for name, own in groups.items()
+        if name.endswith(".length") or not is_place(scene, own)
+    }
     lengths = {name: bar.length for name, bar in list_moving(scene)}
     lengths["ground"] = scene.linkage.ground
     for name, length in lengths.items():

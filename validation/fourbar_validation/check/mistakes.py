@@ -40,17 +40,19 @@ from fourbar_validation.check.wrong_scenes import list_wrong_scenes
 _RPM = np.pi / 30.0
 """rad/s of one rev/min."""
 _DEGREES_TAKEN = {
-    "deg/{0} taken for rad/{0}": float(np.degrees(1.0)),
-    "rad/{0} taken for deg/{0}": float(np.radians(1.0)),
+    "in deg/{0} taken for rad/{0}": float(np.degrees(1.0)),
+    "in rad/{0} taken for deg/{0}": float(np.radians(1.0)),
 }
 """Factors on the speed or acceleration that is commanded, by the unit mistaken."""
 _OF_SPEEDS = {
-    "rev/min taken for rad/s": 1.0 / _RPM,
-    "rad/s taken for rev/min": _RPM,
-    "rev/s taken for rad/s": 1.0 / TURN,
+    "in rev/min taken for rad/s": 1.0 / _RPM,
+    "in rad/s taken for rev/min": _RPM,
+    "in rev/s taken for rad/s": 1.0 / TURN,
     **_DEGREES_TAKEN,
 }
 """The same of a speed."""
+_OF_ACCELERATIONS = {"is left out": 0.0, "is reversed": -1.0, **_DEGREES_TAKEN}
+"""The same of an acceleration, with what else may be done to it."""
 _OTHER_BRANCH = "the other branch"
 _NEARLY_AT_REST = 1e-18
 """Factor on a speed of which only the sign is left."""
@@ -225,12 +227,11 @@ def _list_other_angles(
         return
     _, omega, alpha = command.names
     for words, factor in _OF_SPEEDS.items():
-        yield change(f"{omega} in {words.format('s')}", speed=command.speed * factor)
+        yield change(f"{omega} {words.format('s')}", speed=command.speed * factor)
     if np.any(command.acceleration):
-        yield change(f"{alpha} is left out", acceleration=0.0)
-        for words, factor in _DEGREES_TAKEN.items():
+        for words, factor in _OF_ACCELERATIONS.items():
             other = command.acceleration * factor
-            yield change(f"{alpha} in {words.format('s^2')}", acceleration=other)
+            yield change(f"{alpha} {words.format('s^2')}", acceleration=other)
 
 
 def _list_other_strokes(

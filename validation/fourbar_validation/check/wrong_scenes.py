@@ -4,6 +4,7 @@ A number of a scene, or all numbers under one name, may have another factor; a l
 act elsewhere; a bar may have what belongs to another.
 """
 
+import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,8 +12,18 @@ from fnmatch import filter as choose_names
 from itertools import combinations, permutations
 from typing import Any
 
-from fourbar.effects import Flywheel, Gravity, Load, Springs
+from fourbar.effects import (
+    Flywheel,
+    Friction,
+    Gravity,
+    Load,
+    Springs,
+    Torsion,
+    Viscous,
+)
+from fourbar.effects.load import PLACES_OF_LOADS
 from fourbar.errors import InputError
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import BAR_NUMBERS, MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.studies.keys import list_entries, read_number, replace_numbers
@@ -35,6 +46,11 @@ _INERTIAL = {
     f"inertial forces with the wrong sign {_D_ALEMBERT}": (-1.0, -1.0),
 }
 """Factors on m a and I alpha of every bar, by the mistake behind them."""
+_LAWS = {
+    "dry friction is taken for viscous damping": (Friction, Viscous),
+    "viscous damping is taken for dry friction": (Viscous, Friction),
+}
+"""Another law of the friction at pins: which is stated, and which is taken."""
 Numbers = dict[str, float]
 """Numbers of a scene by their keys."""
 
@@ -173,13 +189,37 @@ def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
     if len(scene.loads) > 1:
         for text, loads in every.items():
             yield f"loads.*: {text}", replace(scene, loads=tuple(loads))
+    pushing = [
+        (i, load) for i, load in enumerate(scene.loads) if load.force is not None
+    ]
+    for (i, one), (j, other) in combinations(pushing, 2):
+        exchanged = list(scene.loads)
+        exchanged[i], exchanged[j] = _put_at(one, other), _put_at(other, one)
+        text = f"the places of loads.{i} and loads.{j} are exchanged"
+        yield text, replace(scene, loads=tuple(exchanged))
+    (gravity,) = (one for one in scene.effects if isinstance(one, Gravity))
+    moved: dict[str, list[Load]] = {}
     for name, bar in list_moving(scene):
-        for effect in scene.effects:
-            if isinstance(effect, Gravity):
-                lifted = -effect.magnitude * bar.mass, effect.angle
-                lift = Load(BAR_NUMBERS[name], lifted)
-                text = f"the weight of bar {lift.bar} is missing"
-                yield text, replace(scene, loads=(*scene.loads, lift))
+        pull = gravity.magnitude * bar.mass
+        weight, lift = (
+            Load(BAR_NUMBERS[name], (force, gravity.angle)) for force in (pull, -pull)
+        )
+        places = {"its first pin": (0.0, 0.0), "mid-bar": (0.5 * bar.length, 0.0)}
+        text = f"the weight of bar {lift.bar}"
+        yield f"{text} is missing", replace(scene, loads=(*scene.loads, lift))
+        for where, place in places.items():
+            elsewhere = [lift, replace(weight, from_centre=None, from_pin=place)]
+            added = replace(scene, loads=(*scene.loads, *elsewhere))
+            yield f"{text} acts at {where}", added
+            moved.setdefault(where, []).extend(elsewhere)
+    for where, elsewhere in moved.items():
+        added = replace(scene, loads=(*scene.loads, *elsewhere))
+        yield f"every weight acts at {where}", added
+
+
+def _put_at(load: Load, other: Load) -> Load:
+    """Return a load at the place of another one, each on its own bar."""
+    return replace(load, **{key: getattr(other, key) for key in PLACES_OF_LOADS})
 
 
 def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
@@ -189,7 +229,7 @@ def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
         changes["its table is left out"] = {"table": None}
     if load.force is None:
         return changes
-    nowhere = dict.fromkeys(("from_pin", "from_centre", "point", "arm"))
+    nowhere = dict.fromkeys(PLACES_OF_LOADS)
     length = scene.linkage.bar(load.bar).length
     places: dict[str, dict[str, Any]] = {
         "its force acts at G of the bar": {"from_centre": (0.0, 0.0)},
@@ -202,6 +242,10 @@ def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
             "from_pin": load.from_centre
         },
     }
+    if load.from_pin is not None:
+        from_second = complex(*resolve(*load.from_pin)) + length
+        text = "its place is measured from the bar's second pin, not from its first"
+        places[text] = {"from_pin": cmath.polar(from_second)}
     for text, place in places.items():
         if None not in place.values():
             changes[text] = {**nowhere, **place}
@@ -220,7 +264,11 @@ def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
 
 
 def _list_other_effects(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """List scenes with a flywheel on another bar, or springs that act both ways."""
+    """List scenes with a flywheel on another bar, or other laws of friction or springs.
+
+    Torsion springs are within half a turn of their rest, so that a turn more is a
+    preload.
+    """
     for number, effect in enumerate(scene.effects):
         others: dict[str, Any] = {}
         if isinstance(effect, Flywheel):
@@ -229,6 +277,23 @@ def _list_other_effects(scene: Scene) -> Iterator[tuple[str, Scene]]:
         if isinstance(effect, Springs):
             both = tuple(replace(spring, acts=None) for spring in effect.springs)
             others["the springs act both ways"] = Springs(both)
+        for law, (kind, taken) in _LAWS.items():
+            if isinstance(effect, kind) and not any(
+                isinstance(one, taken) for one in scene.effects
+            ):
+                others[law] = taken(effect.rows)
+        if isinstance(effect, Torsion):
+            every = {"*": effect.springs} if len(effect.springs) > 1 else {}
+            each = {spring[0]: (spring,) for spring in effect.springs}
+            for where, springs in {**every, **each}.items():
+                for words, turned in (("larger", TURN), ("smaller", -TURN)):
+                    moved = {
+                        pin: (pin, k, rest, preload - turned * k)
+                        for pin, k, rest, preload in springs
+                    }
+                    rows = tuple(moved.get(row[0], row) for row in effect.springs)
+                    text = f"effects.torsion.{where}.rest a turn {words}"
+                    others[text] = Torsion(rows)
         for text, other in others.items():
             effects = list(scene.effects)
             effects[number] = other

@@ -549,9 +549,11 @@ def judge_errors(
     no_digit: Mask = np.zeros_like(beyond)
     if predicted is not None:
         bound = np.where(beyond, np.maximum(bound, TIMES_PREDICTED * predicted), bound)
-        # where a first-order prediction reaches the value itself, no digit is left
-        reaches = np.where(errors.relative, predicted >= 1.0, predicted == np.inf)
-        no_digit = np.asarray(beyond & np.isfinite(errors.error) & reaches)
+        # where a first-order prediction reaches the value itself, no digit is left, and
+        # where it is infinite no number is as good as any
+        is_part = errors.relative & np.isfinite(errors.error)
+        reaches = np.where(is_part, predicted >= 1.0, predicted == np.inf)
+        no_digit = np.asarray(beyond & reaches)
     used = find_used(errors.error, bound)
     used = np.where(no_digit, np.minimum(used, 1.0), used)
     candidates = next(
@@ -562,7 +564,7 @@ def judge_errors(
     if not errors.judged[at]:
         verdict = UNDECIDED
         why = errors.explain_undecided(at)
-    elif math.isnan(error):
+    elif math.isnan(error) and not no_digit[at]:
         verdict = FAILS
         why = "NaN"
     elif predicted is None or not beyond[at]:
