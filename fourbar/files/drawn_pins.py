@@ -12,12 +12,11 @@ import numpy as np
 
 from fourbar.effects import ForceDrive, LinearDrive
 from fourbar.errors import InputError
-from fourbar.files.fields import Entry
+from fourbar.files.fields import DRAWN_PLACE, Entry
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.mobility import count_equalities, meet_change_points
 from fourbar.linkage import (
     BAR_NAMES,
-    BAR_NUMBERS,
     ENDS,
     FIRST_PIN,
     MOVING_BARS,
@@ -36,7 +35,6 @@ from fourbar.scene.motion import (
 from fourbar.scene.scene import require_cylinder
 from fourbar.solving import solve
 
-_STANDS_ALONE = "must be left out: `drawn` states the place"
 PINS_APART = 0.05
 """Distance of the pins from the drawing above which no motion has that assembly. It is
 a part of the longest bar.
@@ -84,15 +82,7 @@ def read_drawing(top: Entry) -> DrawnPins | None:
     if isinstance(motion.value, dict) and "branch" in motion.value:
         raise motion["branch"].refuse("must be left out: the pins state the assembly")
     pins.table(PINS)
-    return DrawnPins(*(read_point(pins[pin]) for pin in PINS))
-
-
-def read_point(entry: Entry) -> tuple[float, float]:
-    """Read a place of the drawing, ["x", "y"], m."""
-    if not isinstance(entry.value, list) or len(entry.value) != 2:
-        raise entry.refuse('must be two coordinates like ["10 mm", "25 mm"]')
-    x, y = entry.quantities("m")
-    return x, y
+    return DrawnPins(*(pins[pin].pair(DRAWN_PLACE) for pin in PINS))
 
 
 class DrawnGround(NamedTuple):
@@ -151,55 +141,6 @@ def meet_lengths(drawing: DrawnPins, pins: dict[str, Any]) -> tuple[float, ...]:
     met = meet_change_points(tuple(lengths), tuple(roundings), tuple(decimals))  # type: ignore[arg-type]
     # one equality alone is met by chance: nobody draws it
     return met if count_equalities(met) > 1 else tuple(lengths)
-
-
-def state_places(
-    entry: Entry, drawing: DrawnPins | DrawnGround, bar: int | None = None
-) -> Any:
-    """State each `{ drawn = [x, y] }` of an entry in the frame of its bar."""
-    if isinstance(entry.value, list):
-        return [state_places(one, drawing, bar) for one in entry.entries()]
-    if not isinstance(entry.value, dict):
-        return entry.value
-    stated = dict(entry.value)
-    number = stated.get("bar")
-    if isinstance(number, int) and number in BAR_NAMES:
-        bar = number
-    if DRAWN_WORD in stated:
-        place = _state_place(entry, drawing, bar)
-        if len(stated) == 1:
-            return place
-        if "from_pin" in stated:
-            raise entry["from_pin"].refuse(_STANDS_ALONE)
-        del stated[DRAWN_WORD]
-        stated["from_pin"] = place
-    named = BAR_NUMBERS if entry.key == "bars" else {}
-    entry = entry.holding(stated)
-    return {
-        name: state_places(entry[name], drawing, named.get(name, bar))
-        for name in stated
-    }
-
-
-def _state_place(
-    entry: Entry, drawing: DrawnPins | DrawnGround, bar: int | None
-) -> dict[str, str]:
-    """State a place of the drawing by its coordinates in the frame of its bar."""
-    drawn = entry[DRAWN_WORD]
-    key = entry.key
-    if bar is None:
-        raise drawn.refuse(
-            f'must name the bar it is of: {key} = {{ bar = 3, drawn = ["x", "y"] }}'
-        )
-    if bar != 1 and isinstance(drawing, DrawnGround):
-        raise drawn.refuse(
-            "is a place of a moving bar: it is drawn where [pins] states the linkage;"
-            " here from_pin states it"
-        )
-    if key.endswith((".from_centre", ".arm")):
-        raise entry.refuse("a place of the drawing is written from_pin")
-    z = drawing.into_bar(bar, read_point(drawn))
-    return {"x": f"{z.real!r} m", "y": f"{z.imag!r} m"}
 
 
 def list_drawn(drawing: DrawnPins, drive: ForceDrive | None) -> dict[str, float]:

@@ -48,6 +48,7 @@ from fourbar.quantities.units import (
     UnitError,
     to_si,
 )
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import is_length
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -97,9 +98,11 @@ _WAYS = {
     ),
 }
 """Ways to state what has no key, by words for it."""
-PLACES_OF_ENDS = (*STATED_PLACES, "point")
+PLACES_OF_ENDS = (*STATED_PLACES, "point", DRAWN_WORD)
 """Keys of which one states an end of a spring or cylinder, or the point of a force."""
 _KEYS_OF_PLACE = ("bar", *PLACES_OF_ENDS)
+DRAWN_PLACE = Declared("m", pair="m")
+"""x and y of a place in the drawing."""
 _PAIR = ["0", "1"]
 """Keys of two numbers that are written as a pair [magnitude, angle]."""
 
@@ -115,6 +118,8 @@ class SceneFile:
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.drawing: Any = None
+        """Drawing that states the pins, or the ground of a scene of lengths."""
         self.drawn: dict[str, float] = {}
         """Numbers that the word "drawn" stands for in a motion, by their names."""
         self.bars: dict[str, int] = {}
@@ -214,7 +219,7 @@ class Entry:
         value = self.value
         if type(value) in (int, float):
             raise self.refuse(f"{UNIT_MISSING}; {wanted}")
-        if value == "drawn":
+        if value == DRAWN_WORD:
             _, _, name = self.key.partition("motion.")
             name = name.partition(".")[0]
             if name in self.file.drawn:
@@ -360,7 +365,8 @@ class Entry:
 
         A table without such a key is at the bar's first pin.
         """
-        stated = [name for name in PLACES_OF_LOADS if name in self.value]
+        names = (*PLACES_OF_LOADS, DRAWN_WORD)
+        stated = [name for name in names if name in self.value]
         if len(stated) > 1:
             allowed = f"{stated[0]} states the place already; state one of them"
             raise self[stated[1]].refuse(allowed)
@@ -380,7 +386,25 @@ class Entry:
         bar = of_bar.check(OfBar(allowed_bars))
         if name is not None and bar != bars[name]:
             raise of_bar.refuse(f"the point {name} is on bar {bars[name]}")
+        for holder in (self, self["from_pin"]):
+            if holder.is_drawn():
+                return Place(bar, holder.locate(bar))
         return Place(bar, **self.numbers(STATED_PLACES), point=name)
+
+    def is_drawn(self) -> bool:
+        """Return True for a table that states a place of the drawing."""
+        return isinstance(self.value, dict) and DRAWN_WORD in self.value
+
+    def locate(self, bar: int) -> tuple[float, float]:
+        """Read `drawn = [x, y]` of this table in the frame of a bar, m and rad."""
+        drawn = self[DRAWN_WORD]
+        if bar != 1 and not isinstance(self.file.drawing, DrawnPins):
+            raise drawn.refuse(
+                "is a place of a moving bar: it is drawn where [pins] states the"
+                " linkage; here from_pin states it"
+            )
+        z = self.file.drawing.into_bar(bar, drawn.pair(DRAWN_PLACE))
+        return convert_to_polar(z.real, z.imag)
 
 
 def list_keys(kind: Any) -> tuple[str, ...]:
@@ -388,6 +412,8 @@ def list_keys(kind: Any) -> tuple[str, ...]:
     keys = list[str]()
     for field in list_declared(kind):
         keys += [field.key] if field.key else _KEYS_OF_PLACE
+    if states_place(kind):
+        keys.append(DRAWN_WORD)
     return (*keys, *getattr(kind, "forms", ()))
 
 

@@ -30,7 +30,6 @@ from fourbar.files.drawn_pins import (
     meet_lengths,
     read_drawing,
     read_ground,
-    state_places,
 )
 from fourbar.files.fields import (
     BARE_KEY,
@@ -192,29 +191,13 @@ def _write_name(name: str) -> str:
     return name if name.isprintable() else repr(name)
 
 
-_UNQUOTED = re.compile(r"[=,\[{]\s*([+-]?\.?[0-9][0-9.]*\s*[A-Za-z°µ][^\",#\]}]*)")
-"""9 in, where "9 in" is meant."""
-PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
-
-
 def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     """Make the error for what the TOML reader stumbles over, with its line."""
-    place = PLACE.search(reason)
-    lines = text.split("\n")
-    if place is None:
-        allowed = f"cannot be read: {' '.join(reason.split())[:120]}"
-        return InputError("TOML", text[:LONGEST_SHOWN_LINE], allowed, shown)
-    line = int(place[1] or len(lines))
-    column = int(place[2] or len(lines[-1]) + 1)
-    start = max(0, column - 1 - LONGEST_SHOWN_LINE // 2)
-    value = lines[line - 1][start : start + LONGEST_SHOWN_LINE].strip()
-    why = " ".join(reason[: place.start()].split())[:120]
-    for bare in _UNQUOTED.finditer(lines[line - 1]):
-        if bare.start(1) < column <= bare.end(1) + 1:
-            number = bare[1].strip()[:LONGEST_SHOWN_LINE]
-            why = f'a number with a unit stands in quotes, like "{number}"'
-    key = f"line {line}, column {column}"
-    return InputError(key, value, f"cannot be read as TOML: {why}", shown)
+    place = re.search(r"line (\d+)", reason)
+    line = text.split("\n")[int(place[1]) - 1] if place else text
+    why = " ".join(reason.split())[:120]
+    allowed = f'{why}; a number with a unit stands in quotes, like "9 in"'
+    return InputError("TOML", line.strip()[:LONGEST_SHOWN_LINE], allowed, shown)
 
 
 def read_scene(document: Entry, folder: str) -> Scene:
@@ -222,11 +205,8 @@ def read_scene(document: Entry, folder: str) -> Scene:
     document.table(SCENE_TABLES)
     drawing = read_drawing(document)
     drawn = drawing or read_ground(document["lengths"])
-    stated = _LEFT_OUT | document.value
-    for key in document.value:
-        if key not in ("pins", "lengths"):
-            stated[key] = state_places(document[key], drawn)
-    top = document.holding(stated)
+    top = document.holding(_LEFT_OUT | document.value)
+    top.file.drawing = drawn
     points = _read_points(top["points"])
     top.file.bars = {point.name: point.bar for point in points}
     drive_bar, drive = _read_drive(top["drive"])
@@ -240,8 +220,10 @@ def read_scene(document: Entry, folder: str) -> Scene:
     bars.table(MOVING_BAR_NUMBERS)
     ground, *moving = met
     two, three, four = (
-        _read_bar(bars[name], length)
-        for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
+        _read_bar(bars[name], length, number)
+        for (name, number), length in zip(
+            MOVING_BAR_NUMBERS.items(), moving, strict=True
+        )
     )
     linkage = FourBar(ground, two, three, four, drawn.angle(1))
     pictures = []
@@ -345,13 +327,17 @@ def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]
     return lengths, meet_change_points(lengths, roundings)
 
 
-def _read_bar(bar: Entry, length: float) -> Bar:
+def _read_bar(bar: Entry, length: float, number: int) -> Bar:
     if bar.value is None:
         return Bar(length)
     declared = dict(Bar.numbers)
     del declared["length"]
     bar.table((*declared, "picture"))
-    numbers = bar.numbers(declared)
+    stated = {}
+    if bar["centre"].is_drawn():
+        stated["centre"] = bar["centre"].locate(number)
+        del declared["centre"]
+    numbers = bar.numbers(declared) | stated
     inertia = numbers["mass"] * length * length
     if numbers["inertia"] is None and not math.isfinite(inertia):
         raise bar["mass"].refuse("must leave the inertia m L^2/12 a finite number")

@@ -14,8 +14,9 @@ import numpy as np
 
 from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
-from fourbar.files.drawn_pins import choose_assembly, meet_lengths, read_point
+from fourbar.files.drawn_pins import choose_assembly, meet_lengths
 from fourbar.files.fields import (
+    DRAWN_PLACE,
     Entry,
     SceneFile,
     write_described,
@@ -290,7 +291,7 @@ def write_drawn_scene(
     rows = ["[pins]  # x and y in the position that is drawn"]
     places = []
     for pin, (x, y) in pins.items():
-        places.append(read_point(Entry(file, pin, [x, y])))
+        places.append(Entry(file, pin, [x, y]).pair(DRAWN_PLACE))
         rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
     drawing = DrawnPins(*places)
     moving = [drawing.length(bar) for bar in MOVING_BARS]

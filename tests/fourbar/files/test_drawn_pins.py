@@ -143,8 +143,8 @@ PLACE ["120 mm", "80 mm"] CLOSED
     assert loads(DRAWN + nested) == loads(dump(scene)) == scene
     assert scene.loads[1].from_pin == scene.points[0].from_pin
     for text, said in (
-        (short.replace("bar = 3, ", ""), "must name the bar it is of"),
-        (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "left out"),
+        (short.replace("bar = 3, ", ""), "points.P.bar: is missing"),
+        (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "already"),
     ):
         with raises(InputError, match=said):
             loads(DRAWN + text)
@@ -227,7 +227,7 @@ def test_the_default_sweep_holds_the_drawn_position():
 A = ["0 mm", "100 mm"]\n |  | pins.A: is missing
 "100 mm" | 100 | the unit is missing
 "0 mm", "100 mm" | "0 mm", "0 mm" | lies where O2 does
-"100 mm"] | "100 mm", "0 mm"] | must be two coordinates
+"100 mm"] | "100 mm", "0 mm"] | must be a pair like
 [pins] | [motion]\nbranch = "open"\n[pins] | the pins state the assembly
 """),
 )

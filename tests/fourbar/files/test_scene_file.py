@@ -72,7 +72,7 @@ gravity | gravitiy | effects.gravitiy | did you mean "gravity"?
 "3 N" | "3 kg" | loads[0].force[0] | 3 kg | N
 "10 rad/s" | "10 Hz" | motion.omega_2 | 10 Hz | "Hz" is not known
 "0.01 N m s/rad" | "0.01 N m s" | effects.viscous.O2 | N m s/rad
-"0.1 m" | 9 in | line 4, column | in quotes, like "9 in"
+"0.1 m" | 9 in | at line 4, column | in quotes, like "9 in"
 "0.1 m" | 0.1 | lengths.input | 0.1 | with a unit
 "0.1 m" | "nan m" | lengths.input | nan m | finite
 "0.1 m" | nan | lengths.input | nan | finite
@@ -128,8 +128,8 @@ ACROSS_LINES = [
     ('title = "good"', '"a\\nb\\u001b[31m" = 1', "'a\\nb\\x1b[31m'", "unknown key"),
     ('"open"', '"\\n\\u001b[2J\\u202e"', "motion.branch", "\\x1b", "\\u202e"),
     ('title = "good"', "k" * 50000 + " = 1", "unknown key"),
-    (GOOD, "<mujoco/>", "TOML", "line 1, column 1 = '<mujoco/>'"),
-    (GOOD, 'title = "a"\n\n[lengths\nground = 1', "line 3, column 9 = '[lengths'"),
+    (GOOD, "<mujoco/>", "TOML", "'<mujoco/>': Invalid statement (at line 1, column 1)"),
+    (GOOD, 'title = "a"\n\n[lengths\nground = 1', "TOML = '[lengths'"),
 ]
 
 
