@@ -79,7 +79,7 @@ validation/published/test_published.py | thesis thirteen
 validation/regression/test_regression.py | accept engines history record render rules
 validation/regression/test_regression.py | scenes
 validation/report/test_report.py | machine overview run_summary
-validation/report/test_report.py | scene_pictures scene_record svg templating words
+validation/report/test_report.py | scene_record svg templating words
 # studies: each through its command
 lab/test_bench.py | contenders starts thirteen_bodies
 lab/test_effect_costs.py | tables

@@ -5,14 +5,14 @@ Drawn are the linkage, every engine's answer over the formulas, and the errors b
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.quantities import ANGLES, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
-from fourbar.show.plot.labels import settle_labels
+from fourbar.show.plot.labels import add_label, settle_labels
 from fourbar.show.plot.linkage_figure import draw_linkage
 from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.view import View
@@ -35,11 +35,11 @@ from fourbar_validation.report.svg import (
     INK,
     LEAST_DRAWN_ERROR,
     PAPER,
+    SOFT,
     choose_style,
     set_frame,
     write_svg,
 )
-from fourbar_validation.report.thumbnail import choose_base
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,12 +87,45 @@ def draw_scene_figure(record: Record) -> str | None:
     return linkage + "".join(curve.draw() for curve in curves)
 
 
+def draw_thumbnail(record: Record) -> str | None:
+    """Draw linkage and torque as one small SVG; None where nothing assembles."""
+    from matplotlib.figure import Figure
+
+    solution = record.solution
+    scene = record.scene
+    if scene is None or solution is None or not np.any(solution.status_code == OK):
+        return None
+    figure = Figure(figsize=(3.3, 1.0), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[2.0, 3.0])
+    best = find_best_position(solution)
+    bars = scene.linkage
+    O4 = [part(bars.ground_angle) * bars.ground for part in (math.cos, math.sin)]
+    pins = np.array([[0.0, 0.0], solution.A[best], solution.B[best], O4])
+    left.plot(*pins[[0, 3]].T, color=SOFT, lw=1.0, ls="--")
+    left.plot(*pins.T, color=INK, lw=1.6, marker="o", ms=4.0)
+    left.set_aspect("equal", adjustable="datalim")
+    quantity = name_driving(scene)
+    # no torque acts on a released motion
+    if scene.motion.free is None and getattr(solution, quantity) is not None:
+        curve = _Curve(quantity, record, scene, solution)
+        curve.draw_values(right, curve.list_answers(), 3.0)
+        right.set_title(right.get_ylabel(), size=7.0, color=SOFT, loc="left")
+    for axes in (left, right):
+        axes.set_axis_off()
+    settle_labels(figure)
+    return write_svg(figure, f"{record.name} small")
+
+
+def find_best_position(solution: Solution) -> int:
+    """Return the index of the best conditioned position that assembles."""
+    return int(np.argmax(np.where(solution.status_code == OK, solution.condition, -1)))
+
+
 def _draw_best_position(name: str, scene: Scene, solution: Solution) -> str:
     """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
     from matplotlib.figure import Figure
 
-    condition = np.where(solution.status_code == OK, solution.condition, -1.0)
-    best = int(np.argmax(condition))
+    best = find_best_position(solution)
     with apply_style():
         figure = Figure(figsize=(3.1, 2.9), layout="constrained")
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
@@ -137,31 +170,36 @@ class _Curve:
     scene: Scene
     solution: Solution
 
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """Positions at which the formulas have values."""
+        return np.equal(self.solution.status_code, OK)
+
+    def list_answers(self, *, simulated: bool | None = None) -> list[Answer]:
+        """List the answers that have the quantity, of all engines or of one kind."""
+        return [
+            answer
+            for answer in self.record.answers
+            if answer.refusal is None
+            and self.quantity in answer.quantities
+            and simulated in (None, choose_style(answer.engine).simulated)
+        ]
+
     def draw(self) -> str:
         """Draw it as an SVG."""
         from matplotlib.figure import Figure
 
-        self.good = self.solution.status_code == OK
-        self.base = self.choose_base(self.solution.at)
-        exact: list[Answer] = []
-        simulated: list[Answer] = []
-        for answer in self.record.answers:
-            if answer.refusal is None and self.quantity in answer.quantities:
-                is_simulated = choose_style(answer.engine).simulated
-                (simulated if is_simulated else exact).append(answer)
-        groups = [group for group in (simulated, exact) if group]
+        groups = [self.list_answers(simulated=simulated) for simulated in (True, False)]
+        groups = [group for group in groups if group]
         figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
+        heights = [1.9, *[1.0] * len(groups)]
         panels = figure.subplots(
-            1 + len(groups),
-            1,
-            sharex=True,
-            height_ratios=[1.9, *[1.0] * len(groups)],
-            squeeze=False,
+            len(heights), sharex=True, height_ratios=heights, squeeze=False
         )
-        axes = list(panels[:, 0])
-        self.draw_values(axes[0], [*exact, *simulated])
+        first, *others = axes = panels[:, 0]
+        self.draw_values(first, self.list_answers(), 5.5)
         unit = "error / scale" if self.quantity in FORCE_NAMES else "error (rad)"
-        for below, group in zip(axes[1:], groups, strict=True):
+        for below, group in zip(others, groups, strict=True):
             self.draw_errors(below, group)
             below.set_ylabel(unit, fontsize=8.5)
         angle = f"θ{self.solution.at.bar} (°)".translate(_SUBSCRIPT)
@@ -169,31 +207,49 @@ class _Curve:
         figure.align_ylabels(axes)
         for panel in axes:
             set_frame(panel)
+        settle_labels(figure)
         return write_svg(figure, f"{self.record.name} {self.quantity}")
 
     def choose_base(self, command: Command | None) -> Array:
-        """Return what is drawn over: the commanded angle in degrees, or the time."""
-        base = choose_base(self.solution, command or self.solution.at)
-        return base if base is self.solution.time else np.degrees(base)
+        """Return what is drawn over: the commanded angle in degrees, or the time.
 
-    def draw_values(self, axes: "Axes", answers: list[Answer]) -> None:
-        """Draw the formulas as a band, and each engine's marks.
+        The time takes its place where the motion is free or follows a law.
+        """
+        angle = (command or self.solution.at).angle
+        time = self.solution.time
+        if time is not None and len(time) == len(angle):
+            return time
+        return np.degrees(angle)
 
-        The marks stand at positions of their own.
+    def draw_values(self, axes: "Axes", answers: list[Answer], size: float) -> None:
+        """Draw the formulas as a band, and each engine's marks, of a size in points.
+
+        The marks stand at positions of their own. Where the formulas have no value, as
+        at a change point, nothing is judged, and a mark would look like an error. Near
+        a pole the curve leaves the picture, which ends beyond 96 % of the positions.
         """
         quantity = self.quantity
         axis = self.choose_component(answers)
         values = _take_plain(quantity, getattr(self.solution, quantity), axis)
         ours = np.where(self.good, values, np.nan)
-        axes.plot(self.base, ours, color=BAND, lw=5, solid_capstyle="butt")
+        base = self.choose_base(None)
+        axes.plot(base, ours, color=BAND, lw=0.9 * size, solid_capstyle="butt")
         for turn, answer in enumerate(answers):
             theirs = _take_plain(quantity, answer.quantities[quantity], axis)
+            if len(theirs) == len(ours):  # a simulation makes positions of its own
+                theirs = np.where(self.good, theirs, np.nan)
             phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)
             parts = np.arange(MARKS_OF_A_CURVE) / MARKS_OF_A_CURVE + phase
             places = np.unique((parts * len(theirs)).astype(int))
             x = self.choose_base(answer.at)[places]
-            axes.plot(x, theirs[places], **_mark(answer, 5.5))
-        _limit_to_bulk(axes, ours[self.good])
+            axes.plot(x, theirs[places], **_mark(answer, size))
+        low, high = np.nanpercentile(ours, [2.0, 98.0])
+        span = high - low
+        beyond = max(np.nanmax(ours) - high, low - np.nanmin(ours))
+        if span > 0.0 and beyond > 3.0 * span:
+            axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
+            top = float(base[np.nanargmax(np.abs(ours))]), high + 0.5 * span
+            add_label(axes, "leaves towards a pole", complex(*top), -1j, INK, 8.0)
         axes.set_ylabel(_label(quantity, self.solution, axis))
 
     def draw_errors(self, axes: "Axes", answers: list[Answer]) -> None:
@@ -207,37 +263,26 @@ class _Curve:
         solution = self.solution
         rows = [row for row in self.record.rows if row.quantity == quantity]
         first = answers[0].engine
+        condition = find_condition(quantity, self.scene.linkage, solution)
+        allowed = EQUIVALENCE.allowed(condition)
         if choose_style(first).simulated:
             held_to = [row.allowed for row in rows if row.engine == first]
-            limit = held_to[0] if held_to else SIMULATED.factor
-            allowed = np.full(len(solution), limit)
-        else:
-            condition = find_condition(quantity, self.scene.linkage, solution)
-            allowed = EQUIVALENCE.allowed(condition)
-        dashed: dict[str, Any] = {"lw": 1.1, "ls": (0, (5, 2))}
+            allowed = np.full(len(solution), [*held_to, SIMULATED.factor][0])
         shown = np.where(self.good, allowed, np.nan)
-        axes.plot(self.base, shown, color=ALLOWED, **dashed)
-        low = float(np.nanmin(allowed[self.good]))
-        common = high = float(np.nanmax(allowed[self.good]))
-        engines = {answer.engine for answer in answers}
+        limits = [("allowed", ALLOWED, shown)]
+        common = float(np.nanmax(shown))
         for row in rows:  # of an engine that is allowed more than the others
-            limit = row.allowed
-            own = row.engine in engines and row.compared
-            if not own or not limit > 2.0 * common:
-                continue
-            colour = choose_style(row.engine).colour
-            axes.axhline(limit, color=colour, **dashed)
-            axes.annotate(
-                f"allowed to {row.engine}",
-                (0.99, limit),
-                (0, -9),
-                xycoords=axes.get_yaxis_transform(),
-                textcoords="offset points",
-                fontsize=8.5,
-                ha="right",
-                color=colour,
-            )
-            high = max(high, limit)
+            is_drawn = row.engine in {answer.engine for answer in answers}
+            if is_drawn and row.compared and row.allowed > 2.0 * common:
+                colour = choose_style(row.engine).colour
+                own = np.full(len(solution), row.allowed)
+                limits.append((f"allowed to {row.engine}", colour, own))
+        base = self.choose_base(None)
+        middle = int(np.flatnonzero(self.good)[np.count_nonzero(self.good) // 2])
+        for text, colour, limit in limits:
+            axes.plot(base, limit, color=colour, lw=1.1, ls=(0, (5, 2)))
+            place = complex(base[middle], limit[middle])
+            add_label(axes, text, place, -1j, colour, 8.5)
         for turn, answer in enumerate(answers):
             formulas = (
                 solution if answer.at is None else solve(self.scene, at=answer.at)
@@ -245,36 +290,23 @@ class _Curve:
             mine = getattr(formulas, quantity)
             size = scale_of(quantity, self.scene, formulas, mine).size
             error = find_error(quantity, mine, answer.quantities[quantity], size)
+            error = np.where(formulas.status_code == OK, error, np.nan)
             places = find_worst_of_segments(error, turn / len(answers))
-            if not len(places):
+            if not places:
                 continue
             x = self.choose_base(answer.at)[places]
             heights = np.maximum(error[places], LEAST_DRAWN_ERROR)
             mark = _mark(answer, 3.2) | {"mew": 0.8}
             axes.plot(x, heights, **mark)
             worst = int(np.argmax(heights))
-            ring: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "none", "mew": 0.9}
-            ring |= {"ls": "none", "mec": mark["color"]}
+            ring = mark | {"marker": "o", "ms": 9.0, "mfc": "none"}
             axes.plot(x[worst], heights[worst], **ring)
-            low = min(low, float(heights.min()))
-            high = max(high, float(heights.max()))
-        axes.set(yscale="log", ylim=(low / 4.0, 5.0 * high))
+        axes.set_yscale("log")
+        axes.margins(y=0.15)
         axes.yaxis.set(
             major_locator=LogLocator(numticks=5),
             minor_locator=NullLocator(),
             major_formatter=FuncFormatter(lambda value, _: f"{value:.0e}"),
-        )
-        middle = int(np.flatnonzero(self.good)[np.count_nonzero(self.good) // 2])
-        place = (float(self.base[middle]), float(allowed[middle]))
-        is_low = place[1] < math.sqrt(low * high)  # marks stand beneath it
-        axes.annotate(
-            "allowed",
-            place,
-            (0, 3 if is_low else -9),
-            textcoords="offset points",
-            fontsize=8.5,
-            ha="center",
-            color=ALLOWED,
         )
 
     def choose_component(self, answers: list[Answer]) -> int | None:
@@ -296,23 +328,18 @@ class _Curve:
         return int(np.argmax(np.max(differences, axis=0)))
 
 
-def find_worst_of_segments(
-    error: Array,
-    phase: float,
-) -> np.ndarray[Any, np.dtype[np.intp]]:
+def find_worst_of_segments(error: Array, phase: float) -> list[int]:
     """Find the index of the largest error in each of STRETCHES stretches.
 
     `phase`: in [0, 1), shifts where they begin. What is not finite is left out: the
     table says that it fails.
     """
-    edges = (np.arange(STRETCHES + 2) - 1.0 + phase) * len(error) / STRETCHES
-    bounds = np.clip(edges.astype(int), 0, len(error))
-    worst = []
-    for start, stop in pairwise(bounds):
-        piece = np.where(np.isfinite(error[start:stop]), error[start:stop], -1.0)
-        if piece.max(initial=-1.0) >= 0.0:
-            worst.append(start + int(piece.argmax()))
-    return np.array(worst, dtype=np.intp)
+    shift = int(phase * len(error) / STRETCHES)
+    rows = np.roll(np.arange(len(error)), -shift)
+    finite = [
+        piece[np.isfinite(error[piece])] for piece in np.array_split(rows, STRETCHES)
+    ]
+    return [int(piece[np.argmax(error[piece])]) for piece in finite if len(piece)]
 
 
 def _mark(answer: Answer, size: float) -> dict[str, Any]:
@@ -352,24 +379,3 @@ def _label(quantity: str, solution: Solution, axis: int | None) -> str:
     if axis is not None:
         return f"{quantity} {'xy'[axis]} (N)"
     return f"|{quantity}| (N)"
-
-
-def _limit_to_bulk(axes: "Axes", values: Array) -> None:
-    """Limit the axis to 96 % of the positions.
-
-    Near a pole the curve leaves the picture.
-    """
-    low, high = np.nanpercentile(values, [2.0, 98.0])
-    span = high - low
-    beyond = max(np.nanmax(values) - high, low - np.nanmin(values))
-    if span > 0.0 and beyond > 3 * span:
-        axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
-        axes.annotate(
-            "axis ends where the curve leaves towards a pole",
-            (0.99, 0.97),
-            xycoords="axes fraction",
-            fontsize=8.5,
-            ha="right",
-            va="top",
-            color=INK,
-        )

@@ -16,9 +16,12 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import ENGINES, Engine
+from fourbar_validation.report.scene_pictures import (
+    draw_scene_figure,
+    draw_thumbnail,
+)
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import STYLE_NUMBERS
-from fourbar_validation.report.thumbnail import draw_thumbnail
 from fourbar_validation.run.identities import check_identities, check_status
 from fourbar_validation.run.judge_engines import (
     compare_answers,
@@ -122,8 +125,6 @@ def judge_for_report(
     figure = thumbnail = None
     STYLE_NUMBERS.update(number_guests(engines))
     if draw:
-        from fourbar_validation.report.scene_pictures import draw_scene_figure
-
         figure = draw_scene_figure(record)
     if draw or sketch:
         thumbnail = draw_thumbnail(record)
