@@ -773,7 +773,7 @@ def test_the_table_of_another_scene_is_explained(words, read):
     [
         (0.0, HOLDS, "24 of 24 numbers agree"),
         (-0.7, HOLDS, "friction, not judged: F12_x 12 of 12 numbers agree"),
-        (1.0, HOLDS, "12 of torque lie within and agree, 12 of them at torque_high"),
+        (1.0, HOLDS, "12 of torque lie within and agree"),
         (1.01, FAILED, "no single known mistake"),
     ],
 )
@@ -900,7 +900,7 @@ BAD_TABLES = read_rows(r"""
  | header and at least one row
 theta_2,torque\n | header and at least one row
 torque\n1\n | theta_2
-theta_2\n1\n | needs a result
+theta_2\n1\n | needs a result; known are the columns
 theta_2,torque_error\n1,0\n | needs a result
 theta_2,torque\n,2\n | line 2 = ['', '2']: needs a theta_2
 theta_2,torque\n1,\n | needs a result in place of blank cells
@@ -909,7 +909,7 @@ theta_2,torque\nrad,kg\n1,2\n | kg
 theta_2,torque_low\n1,2\n | no dry friction
 theta_2,wheel\n1,2\n | known are the columns of
 theta_2,torque [kg]\n1,2\n | kg
-theta_2,torque,torque\n1,2,3\n | are both torque
+theta_2,torque,torque\n1,2,3\n | columns 2 and 3 are both torque: rename
 theta_2,torque\n1,much\n | line 2
 theta_2,torque\n1,nan\n | finite
 theta_2,torque\n1,1e999\n | larger than a double
@@ -1148,7 +1148,6 @@ def with_comma(theta, torque):
         ("Theta_2 [DEG],Torque [N M]",),
         ("Crank angle (deg)\tMotor torque (N-m)", "{theta:.0f}\t{torque:.9e}"),
         ("theta2 [deg],T [N·m]",),
-        ("theta_2 [deg],torque,torque", "{theta:.0f},{torque:.9e},{torque:.9e}"),
         ("theta_2 [deg],torque,alpha_2", "{theta:.0f},{torque:.9e},0"),
     ],
 )
@@ -1168,36 +1167,13 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
     assert note.startswith(words)
 
 
-@pytest.mark.parametrize(
-    "heading, words",
-    read_rows("""
-omega | omega_2
-R12x [N] | F12_x or F12_y
-Lagerkraft y [N] | F12_x, F32_x, F43_x, F14_x,
-Lagerkraft A x [N] | F32_x, F32_y or F32
-Fx at A (N) | F32_x, F32_y or F32
-A [lbf] | F32_x, F32_y or F32
-B_y [kN] | F43_x, F43_y or F43
-pin O2 [N] | F12_x, F12_y or F12
-R_O4 | F14_x, F14_y or F14
-Tin | torque
-rocker angle | theta_2, theta_3 or theta_4
-angular speed | omega_2, omega_3 or omega_4
-a [deg] | theta_2, theta_3 or theta_4
-"""),
-)
-def test_a_column_of_an_unknown_name_says_what_it_may_be(heading, words, torques):
+@pytest.mark.parametrize("heading", ["omega", "R12x [N]", "pin O2 [N]", "A [lbf]"])
+def test_a_column_of_an_unknown_name_is_left_out_by_name(heading, torques):
     table = torques(f"theta_2 [deg],torque,{heading}", "{theta:.0f},{torque:.9e},1")
-    (why,) = table.left_out.values()
-    assert why.startswith("not a known column: ")
-    assert f"rename it if it is {words}" in why
-    with raises(InputError, match=r"needs a result.*rename it if it is"):
+    ((name, why),) = table.left_out.items()
+    assert name == heading and why.startswith("not a known column: known are")
+    with raises(InputError, match="needs a result; known are the columns of"):
         torques(f"theta_2 [deg],{heading}", "{theta:.0f},1")
-
-
-def test_columns_that_say_two_things_are_refused(torques):
-    with raises(InputError, match="columns 2 and 3 are both torque, with other"):
-        torques("theta_2 [deg],torque,T2", "{theta:.0f},{torque:.9e},0.5")
 
 
 COARSE = read_rows(r"""
@@ -1211,7 +1187,6 @@ COARSE = read_rows(r"""
 103.76,,2\n79.18,0.281,3.00 | 0 | 3 of 3 numbers agree, compared to 2
 107,,2\n79.18,0.281,3.00 | 1 | 2 of 3 numbers agree
 60,0.4,6.36\n100,-0.04,1.603 --rtol 0.2 | 0 | 4 of 4
-60,0.45,6.36\n100,-0.0422,1.6 --rtol 0.02 | 1 | --atol 2.4e-03 allows it
 60,0.45,6.36\n100,-0.06,1.6 --rtol 0.02 | 1 | no single known mistake
 60,0,6.36 --rtol 2 | 0 | 2 of 2 numbers agree within
 60,0,6.36 --rtol 0.5 | 1 | no number has a digit to compare
@@ -1382,36 +1357,3 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     torque[7] *= 1.01
     code, printed, _ = check(THESIS, print_digits())
     assert code == FAILED and "all agree within" not in printed
-
-
-@pytest.mark.parametrize("sign", slow_but({1.0}, [1.0, -1.0]))
-def test_a_table_with_mistakes_and_few_right_digits_is_told_both(sign, check):
-    """Angles half a turn off, perhaps forces of the other sign, and 8 right digits.
-
-    With the tolerance that is named the mistakes explain all that differs.
-    """
-    numbers = right(OURS)
-    theta_4, torque = (rounded(numbers[name], 8) for name in ("theta_4", "torque"))
-    columns = {"theta_4": theta_4 + math.pi, "torque": sign * torque}
-    table = tabulate({"theta_2": numbers["theta_2"], **columns}, "{:.14e}".format)
-    code, printed, _ = check(OURS, table)
-    assert code == FAILED
-    assert "measured from the other end of the bar" in printed
-    assert ("sign reversed" in printed) == (sign < 0.0)
-    (named,) = re.findall("that apart, all agree within (1e-[0-9]+): --rtol", printed)
-    assert 1e-8 <= float(named) <= 1e-7
-    code, printed, _ = check(
-        OURS,
-        table,
-        "--rtol",
-        named,
-    )
-    assert code == FAILED and "explains" in printed
-    less = str(0.01 * float(named))
-    code, printed, _ = check(
-        OURS,
-        table,
-        "--rtol",
-        less,
-    )
-    assert code == FAILED and NO_CAUSE in printed

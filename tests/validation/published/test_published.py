@@ -48,9 +48,9 @@ from tests.support.rows import read_rows
 
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""
-ROUND_OFF = 2e-12
-"""N, N cm: less than the terms of the 13 x 13 system and its condition allow each
-unknown, 1e-13 of the small ones to 9e-11 of the torque.
+ROUND_OFF = 9e-14
+"""N, and a hundred times as much in N cm of T4: the terms of the 13 x 13 system and its
+condition allow the small forces so much, and the others more.
 """
 SPELLED = 1e-13
 """Relative; two spellings of one input, 57*153^2/12 cm^2 or 11.119275 m^2, differ by a
@@ -80,14 +80,15 @@ def test_the_published_torque_error_by_error():
     for name, listed in LISTED_UNKNOWNS.items():
         for step, figure in enumerate(listed.split()):
             number = compute_model(LADDER[:step])[name]
-            assert abs(number - float(figure)) <= LISTED + ROUND_OFF
+            assert abs(number - float(figure)) <= LISTED + 20.0 * ROUND_OFF
 
 
 def test_the_thesis_without_its_errors_is_ours():
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
     right, program = compute_right_unknowns(), compute_model()
     for name, unknown in right.items():
-        assert program[name] == pytest.approx(unknown, rel=0.0, abs=ROUND_OFF)
+        allowed = 100.0 * ROUND_OFF if name == "T4" else ROUND_OFF
+        assert program[name] == pytest.approx(unknown, rel=0.0, abs=allowed)
 
 
 def test_rows_for_the_report():

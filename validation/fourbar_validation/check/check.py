@@ -2,7 +2,6 @@
 
 import json
 import math
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
@@ -43,22 +42,12 @@ class Judgement:
     """All findings, and the known mistakes that would explain them."""
 
     judge: Judge
-    explained_power: int | None = None
-    """Power of ten within which all numbers agree once the mistakes are mended."""
 
     @cached_property
     def explanations(self) -> list[Explanation]:
         """Return the known mistakes that explain what differs."""
-        if self.explained_power is not None:
-            return self.within(self.explained_power).explanations
         labels = {finding.quantity for finding in self.differing}
         return _explain(self.judge, labels)
-
-    def within(self, power: int) -> "Judgement":
-        """Judge the same table within a power of ten of each number."""
-        judge = self.judge
-        allowance = Allowance(10.0**power)
-        return Judgement(Judge(judge.scene, judge.table, allowance, judge.rows))
 
     @cached_property
     def table(self) -> TheirTable:
@@ -128,32 +117,8 @@ class Judgement:
         )
         return math.ceil(math.log10(worst)) if worst <= FEWEST_DIGITS else None
 
-    @property
-    def needed_atol(self) -> float | None:
-        """Absolute tolerance under which what differs agrees; None if it is not small.
-
-        It is small within the relative tolerance of the largest of its quantity.
-        """
-        if self.judge.tolerance is None:
-            return None
-        rtol, atol = self.judge.tolerance
-        largest: dict[str, float] = {}
-        for one in self.findings:
-            size = math.hypot(*one.ours)
-            largest[one.quantity] = max(size, largest.get(one.quantity, 0.0))
-        more = 0.0
-        for one in self.differing:
-            assert one.permitted is not None
-            if one.difference > rtol * largest[one.quantity]:
-                return None
-            more = max(more, one.difference - one.permitted)
-        return _MARGIN * more + atol
-
     def describe_unexplained(self) -> str:
-        """Say that no mistake explains what differs, or that it is small."""
-        if (atol := self.needed_atol) is not None:
-            small = "what differs is small beside the largest of its quantity"
-            return f"{small}: --atol {atol:.1e} allows it"
+        """Say that no mistake explains what differs, or that the angle's digits do."""
         table = self.judge.table
         rounded = replace(table, places_rounding=table.place.rounding)
         judge = Judge(self.judge.scene, rounded, self.judge.tolerance)
@@ -161,7 +126,10 @@ class Judgement:
             within = f"what differs is within half a digit of {table.found_by}"
             return f"{within}: print more of its digits"
         what = "the rest" if self.explanations else "it"
-        return f"no single known mistake explains {what}"
+        found = f"no single known mistake explains {what}"
+        if self.judge.tolerance is None:
+            found += "; of numbers right in fewer digits --rtol may find one"
+        return found
 
     @cached_property
     def not_compared(self) -> list[str]:
@@ -241,24 +209,8 @@ def judge_table(
     The allowed error is K eps/condition, plus half a unit of the last printed digit,
     and of the angle's. A tolerance decides if it is given, and what explains the rest
     is held to it too.
-
-    Mistakes are looked for in fewer digits than a table prints if none explains it all
-    otherwise: in as many as are right, within what a table in few may be off by.
     """
-    judgement = Judgement(Judge(scene, table, tolerance))
-    explained = judgement.is_explained() or judgement.agreed_power is not None
-    if tolerance is not None or explained:
-        return judgement
-
-    def explains(power: int) -> bool:
-        within = judgement.within(power)
-        return bool(within.explanations) and within.is_explained()
-
-    powers = range(_LEAST_POWER, round(math.log10(FEWEST_DIGITS)) + 1)
-    if not explains(powers[-1]):
-        return judgement
-    power = powers[bisect_left(powers, True, key=explains)]
-    return Judgement(judgement.judge, power)
+    return Judgement(Judge(scene, table, tolerance))
 
 
 def _explain(judge: Judge, labels: Collection[str]) -> list[Explanation]:
@@ -349,10 +301,6 @@ def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]
 
 
 MOST_SHOWN_OF_EACH = 3
-_LEAST_POWER = -12
-"""Least power of ten that is tried as a tolerance: to round-off a table needs none."""
-_MARGIN = 1.06
-"""Factor on a tolerance that two digits are printed of."""
 FEWEST_DIGITS = 1e-4
 """Part of each number by which a table may be off that is right, in fewer digits than
 it prints.
@@ -514,8 +462,7 @@ def show_judgement(judgement: Judgement, name: str) -> None:
         extent += ", ".join(explanation.quantities)
         print_sentence(f"looks like: {explanation.text} (explains {extent})")
     power = judgement.agreed_power
-    mended = judgement.explained_power
-    if differing and mended is None:
+    if differing:
         if not judgement.is_explained():
             print_sentence(judgement.describe_unexplained())
         elif not any(one.complete for one in judgement.explanations):
@@ -523,10 +470,6 @@ def show_judgement(judgement: Judgement, name: str) -> None:
     if power is not None:
         within = f"all agree within 1e{power} of each number"
         print_sentence(f"{within}: --rtol 1e{power} judges so")
-    elif mended is not None:
-        print_sentence(
-            f"that apart, all agree within 1e{mended}: --rtol 1e{mended} judges so"
-        )
     print_sentence(judgement.sentence())
 
 

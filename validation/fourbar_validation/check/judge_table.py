@@ -382,10 +382,6 @@ class Judge:
             return
         text = f"at rest dry friction holds any {name} from {ends[0]} to {ends[1]}: "
         text += f"{n} of {name} lie within and agree"
-        for end in ends:
-            error, allowed, _ = self.columns[name].compare(getattr(self.right, end))
-            if at_end := np.count_nonzero(self.held & (error <= allowed)):
-                text += f", {at_end} of them at {end}"
         yield text
         pins = [column.label for column in self.columns.values() if column.is_shared]
         if pins:

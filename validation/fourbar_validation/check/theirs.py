@@ -88,29 +88,8 @@ _BY_UNIT = {"t": {"time": "s", "torque": "N m"}, "m": {"torque": "N m"}}
 """Letters, spelled as in _OTHER_NAMES, and what they mean by the unit beside them."""
 _REACTIONS = {"F21": "F12", "F23": "F32", "F34": "F43", "F41": "F14"}
 """Pin forces on the other bar, and those that they are the opposite of."""
-_MAY_MEAN = (
-    ("theta", "theta_2"),
-    ("omega", "omega_2"),
-    ("alpha", "alpha_2"),
-    (r"(?:r|fr|force|kraft|reaction)([1-4])([1-4])[xy]?", r"F\1\2_x or F\1\2_y"),
-    (r"[tm](?:_?in)?|.*(?:torque|moment).*", "torque"),
-    *(
-        (
-            r"(?:.*(?:force|kraft|reaction|pin)|fr?|r)?[xy]?(?:at)?"
-            rf"{pin.lower()}[xy]?",
-            f"{force}_x, {force}_y or {force}",
-        )
-        for pin, force in FORCE_AT.items()
-    ),
-    (
-        "f[xy]?|.*(?:force|kraft|reaction).*",
-        "F12_x, F32_x, F43_x, F14_x, or their y",
-    ),
-    (r".*(?:speed|velocity|geschwindigkeit).*", "omega_2, omega_3 or omega_4"),
-    (r".*(?:acceleration|beschleunigung).*", "alpha_2, alpha_3 or alpha_4"),
-    (r".*(?:angle|winkel|theta|phi).*", "theta_2, theta_3 or theta_4"),
-)
-"""Patterns of names, spelled as in _OTHER_NAMES, and what they may mean."""
+_KNOWN = "known are the columns of fourbar analyze SCENE --csv, such as theta_2 [deg]"
+_KNOWN += ", torque, F12_x, F12_y, or F12 (its magnitude)"
 OTHER_UNITS = {
     "rad": ("rad", "deg"),
     "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
@@ -272,8 +251,6 @@ class _Heading(NamedTuple):
     """Unit of its numbers; None if they are not read."""
     why: str = ""
     """Reason for which it is not judged."""
-    renaming: str = ""
-    """What it may be renamed to."""
 
 
 def read_table(
@@ -306,12 +283,13 @@ def _read_columns(
     law: _OverTime | None,
 ) -> TheirTable:
     """Read the columns of the rows of a table, each a line number and its cells."""
-    columns, left_out, renamings = _read_headings(
-        headings, unit_line, commanded, points
-    )
+    columns, left_out = _read_headings(headings, unit_line, commanded, points)
     times = _read_times(columns, rows)
-    left_out |= _drop_repeated(columns, headings, rows)
-    indices = {column.name: index for index, column in columns.items()}
+    indices: dict[str, int] = {}
+    for index, read in columns.items():
+        if (first := indices.setdefault(read.name, index)) != index:
+            both = f"columns {first + 1} and {index + 1} are both {read.name}"
+            raise InputError("header", headings, f"{both}: rename or remove one")
     lines = [line for line, _ in rows]
     found_by = next((name for name in (commanded, *_PLACES) if name in indices), None)
     place = None
@@ -326,7 +304,7 @@ def _read_columns(
             "header",
             headings,
             f"needs a column {commanded} (say {commanded} [deg] for degrees), or the"
-            f" angle of another bar{renamings}",
+            f" angle of another bar; {_KNOWN}",
         )
     numbers = _read_numbers(columns, headings, rows)
     notes: tuple[str, ...] = ()
@@ -348,14 +326,8 @@ def _read_columns(
         else:
             _enter_column(read_columns, columns[index].name, column)
     if not read_columns:
-        example = "such as torque, F12_x and F12_y, or F12 (its magnitude)"
         stated = " in place of blank cells" * bool(blank)
-        raise InputError(
-            "header",
-            headings,
-            f"needs a result{stated}, {example}{renamings}; "
-            "known are the columns of fourbar analyze SCENE --csv",
-        )
+        raise InputError("header", headings, f"needs a result{stated}; {_KNOWN}")
     return TheirTable(
         place,
         read_columns,
@@ -373,27 +345,20 @@ def _read_headings(
     unit_line: list[str],
     commanded: str,
     points: Collection[str],
-) -> tuple[dict[int, _Heading], dict[str, str], str]:
-    """Return the columns that are read, and why others are left out.
-
-    The last is what those that are not known may be renamed to.
-    """
+) -> tuple[dict[int, _Heading], dict[str, str]]:
+    """Return the columns that are read, and why others are left out."""
     columns: dict[int, _Heading] = {}
     left_out: dict[str, str] = {}
-    renamings = ""
     for index, heading in enumerate(headings):
         unit = "".join(unit_line[index : index + 1]).strip(" []()")
         read = _read_heading(heading, unit, commanded, points)
         if not read.name and index == len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
-        column = heading.strip() or f"column {index + 1}"
         if read.why:
-            left_out[column] = read.why
-        if read.renaming:
-            renamings += f"; {column}: {read.renaming}"
+            left_out[heading.strip() or f"column {index + 1}"] = read.why
         if read.unit is not None:
             columns[index] = read
-    return columns, left_out, renamings
+    return columns, left_out
 
 
 def _read_times(
@@ -426,39 +391,6 @@ def _follow(law: _OverTime, times: Array, lines: list[int]) -> TheirColumn:
     angle, speed, _ = law.at(inside)
     moved = np.abs(speed) * _find_rounding(half, Unit("s", 1.0))
     return TheirColumn(angle, moved, moved, Unit("rad", 1.0))
-
-
-def _drop_repeated(
-    columns: dict[int, _Heading],
-    headings: list[str],
-    rows: list[tuple[int, list[str]]],
-) -> dict[str, str]:
-    """Take out each column that repeats another one, and return why it is left out.
-
-    Raises InputError if it says otherwise.
-    """
-    first: dict[str, int] = {}
-    left_out = {}
-    for index, column in list(columns.items()):
-        earlier = first.setdefault(column.name, index)
-        if earlier == index:
-            continue
-        same = all(
-            cells[index : index + 1] == cells[earlier : earlier + 1]
-            for _, cells in rows
-        )
-        if not same or column != columns[earlier]:
-            raise InputError(
-                "header",
-                headings,
-                f"columns {earlier + 1} and {index + 1} are both {column.name}, with"
-                " other numbers: rename or remove one",
-            )
-        left_out[f"{headings[index].strip()} (column {index + 1})"] = (
-            f"repeats column {earlier + 1}"
-        )
-        del columns[index]
-    return left_out
 
 
 def _read_numbers(
@@ -503,8 +435,7 @@ def _read_degrees(
     if not _TWO_TURNS < largest < _MOST_DEGREES:
         return column, ()
     if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
-        text = f"{name} has no unit and is read in rad: write {name} [deg] if it is not"
-        return column, (text,)
+        return column, ()
     factor = math.pi / 180.0
     text = (
         f"{name} has no unit and goes to {largest:g}: it is read as degrees; "
@@ -637,15 +568,6 @@ def _spell(name: str) -> str:
     return re.sub(r"[\s_-]", "", plain.lower())
 
 
-def _suggest_column(name: str) -> str:
-    """Say what a column may be renamed to; an empty string where nothing is like it."""
-    plain = _spell(name)
-    for pattern, meaning in _MAY_MEAN:
-        if match := re.fullmatch(pattern, plain):
-            return f"rename it if it is {match.expand(meaning)}"
-    return ""
-
-
 def _is_unit_line(cells: list[str]) -> bool:
     """Return whether a line under the header states units.
 
@@ -694,14 +616,9 @@ def _read_heading(
                 with suppress(InputError):
                     known = _read_unit(heading, quantity, unit)
             return _Heading(name, known, NOT_JUDGED[quantity])
-        renaming = _suggest_column(name)
-    elif name != plain and len(name) == 1 and unit in OTHER_UNITS["rad"]:
-        renaming = _suggest_column("angle")
-    else:
-        key = f"|{name}|" if name == vector else name
-        return _Heading(key, _read_unit(heading, quantity, unit))
-    why = "not a known column" + f": {renaming}" * bool(renaming)
-    return _Heading(name, None, why, renaming)
+        return _Heading(name, None, f"not a known column: {_KNOWN}")
+    key = f"|{name}|" if name == vector else name
+    return _Heading(key, _read_unit(heading, quantity, unit))
 
 
 def _read_unit(heading: str, quantity: str, text: str) -> Unit:
