@@ -343,8 +343,7 @@ class Judge:
             for heading, why in table.left_out.items()
             if not (rows.by_time and why == NOT_JUDGED["time"])
         }
-        notes = (*table.notes, *rows.notes)
-        table = replace(table, columns=columns, left_out=left_out, notes=notes)
+        table = replace(table, columns=columns, left_out=left_out)
         if self.at.moves_stroke:
             place = table.place._replace(values=self.at.angle)
             table = replace(table, place=place, found_by=f"theta_{self.at.bar}")

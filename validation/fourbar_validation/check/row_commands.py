@@ -1,19 +1,19 @@
 """Commands at the rows of a table of results."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, write_count
+from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.motion import BAR_OF_ANGLE
-from fourbar.solution import Solution, compute_times
+from fourbar.solution import compute_times
 from fourbar.solving import solve
 from fourbar_validation.check.theirs import Steady, TheirTable, fill_zeros
 from fourbar_validation.compare.tolerance import EPS, wrap_difference
@@ -26,8 +26,10 @@ is found they differ by the square root of round-off.
 """
 _BY_CHANCE = 0.05
 """Probability of rounded times at which the law has every angle as it is printed."""
-_TIMES_TO_A_SIDE = 32
-"""Times to either side of a rounded one at which a law is looked at."""
+_TIMES_TRIED = 65
+"""Times within the rounding of a printed one at which a law is looked at."""
+_ANGLES_TRIED = 721
+"""Angles of a turn at which another bar is looked at."""
 _HALVINGS = 60
 """Halvings after which an interval of doubles is none."""
 
@@ -42,8 +44,6 @@ class RowCommands(NamedTuple):
     """Names of the speed and acceleration that the table states, and not the scene."""
     by_time: bool = False
     """True if the rates are those of a law at the times of the rows."""
-    notes: tuple[str, ...] = ()
-    """Sentences on rows at another time than the printed one."""
 
 
 def find_steady(scene: Scene) -> Steady | None:
@@ -205,9 +205,9 @@ def _follow_law(
     half = np.where(fits_stated, fill_zeros(printed, half), half)
     half = np.where(fits_stated & np.isin(printed, (first, last)), 0.0, half)
     ends = [np.clip(printed + side, first, last) for side in (-half, half)]
-    nearest, several = _find_nearest_time(measure, stated, ends)
+    nearest, several = _find_root(measure, ends[0], ends[1], stated, _TIMES_TRIED)
     time = np.where(fits_stated, stated, nearest)
-    off = ~fits_stated & several | (np.abs(measure(time)) > rounding + _ONE_PLACE)
+    off = ~fits_stated & several | ~(np.abs(measure(time)) <= rounding + _ONE_PLACE)
     if off.any():
         names = scene.motion.names[1:]
         if all(name in table.columns for name in names):
@@ -225,42 +225,37 @@ def _follow_law(
     if fits_stated.all() and np.prod(rounding / passed) < _BY_CHANCE:
         return RowCommands(at, by_time=True)  # nobody rounded these times
     near = tuple(command_at(_find_last_that_holds(fits, time, end)) for end in ends)
-    moved = np.flatnonzero(~fits_stated)
-    notes = [
-        f"at {write_count(len(moved), 'row')} the time is taken that rounds to the"
-        " printed one and at which the law has the angle: line"
-        f" {table.lines[row]} at {time[row]:.6g} s"
-        for row in moved[:1].tolist()
-    ]
-    return RowCommands(at, near, by_time=True, notes=tuple(notes))
+    return RowCommands(at, near, by_time=True)
 
 
-def _find_nearest_time(
+def _find_root(
     measure: Callable[[Array], Array],
-    stated: Array,
-    ends: Sequence[Array],
+    low: Array,
+    high: Array,
+    wanted: Array,
+    tried: int,
+    last: float = math.inf,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the time nearest to the stated one at which a measure is 0, or smallest.
+    """Return where a measure is 0 between two ends, nearest to what is wanted, (n,).
 
-    Marked are the rows with several such times between the ends.
+    It is where the measure is smallest if it has no zero. Marked are the rows with
+    several zeros. Those up to a last place count before others.
     """
-    shares = np.linspace(-1.0, 1.0, 2 * _TIMES_TO_A_SIDE + 1)[:, None]
-    early, late = ends
-    times = stated + np.where(
-        shares < 0.0, -shares * (early - stated), shares * (late - stated)
-    )
-    apart = np.array([measure(time) for time in times])
+    places = low + np.linspace(0.0, 1.0, tried)[:, None] * (high - low)
+    apart = np.array([measure(place) for place in places])
     changes = (apart[1:] > 0.0) != (apart[:-1] > 0.0)
     changes &= np.abs(apart[1:] - apart[:-1]) < math.pi
-    away = np.abs(shares[1:] + shares[:-1])
-    rows = np.arange(len(stated))
+    before = changes & (places[:-1] <= last)
+    changes = np.where(before.any(axis=0), before, changes)
+    rows = np.arange(len(wanted))
+    away = np.abs(0.5 * (places[1:] + places[:-1]) - wanted)
     chosen = np.argmin(np.where(changes, away, np.inf), axis=0)
-    start, end = times[chosen, rows], times[chosen + 1, rows]
+    start, end = places[chosen, rows], places[chosen + 1, rows]
     above = measure(start) > 0.0
     root = _find_last_that_holds(
-        lambda time: (measure(time) > 0.0) == above, start, end
+        lambda place: (measure(place) > 0.0) == above, start, end
     )
-    smallest = times[np.argmin(np.abs(apart), axis=0), rows]
+    smallest = places[np.argmin(np.abs(apart), axis=0), rows]
     counts = changes.sum(axis=0)
     return np.where(counts > 0, root, smallest), counts > 1
 
@@ -316,73 +311,36 @@ def _find_by_another_bar(
 ) -> RowCommands:
     """Find the commanded angle at which another bar has the angle of each row.
 
-    Of two such positions one lies in another assembly, or beyond the scene's motion.
+    Raises InputError for a row whose angle the motion passes twice.
     """
-    n = len(table.places)
-    found = [_command_other_bar(scene, table, table.places, side) for side in (1, -1)]
-    angles = np.stack([_turn_into(base.angle, one[base.commanded]) for one in found])
-    fits = np.stack([_fits(scene, table, base, angle) for angle in angles])
-    inside = fits & (angles <= base.angle.max() + _ONE_PLACE)
-    both_fit = fits.all(axis=0)
-    fits = np.where(both_fit & inside.any(axis=0), inside, fits)
-    one_place = np.abs(angles[0] - angles[1]) <= _ONE_PLACE
-    several = fits.all(axis=0) & ~one_place
+    first = np.full(len(table.places), base.angle.min() - _ONE_PLACE)
+    last = base.angle.max() + _ONE_PLACE
+
+    def measure(angle: Array, shift: Array | float = 0.0) -> Array:
+        at = _command_each(base, angle, scene)._replace(speed=None, acceleration=0.0)
+        found = solve(scene, "position", at=at)[table.found_by]
+        return wrap_difference(found - table.places - shift)
+
+    def find(wanted: Array, shift: Array | float = 0.0) -> tuple[Array, Any]:
+        shifted = partial(measure, shift=shift)
+        turned = first + TURN - 2.0 * _ONE_PLACE
+        return _find_root(shifted, first, turned, wanted, _ANGLES_TRIED, last)
+
+    angle, several = find(first)
     if several.any():
-        _refuse_row(table, base.commanded, angles[:, several], np.argmax(several))
-    chosen = np.argmax(fits, axis=0)
-    angle = np.where(fits.any(axis=0), angles[chosen, np.arange(n)], np.nan)
+        row = int(np.argmax(several))
+        place = table.places[row] / table.place.unit.factor
+        passed = f"{base.commanded} = {math.degrees(angle[row]):.6g} deg"
+        raise InputError(
+            f"line {table.lines[row]}, {table.found_by}",
+            f"{place:.6g} {table.place.unit.text}",
+            f"the motion passes it at {passed} and again: add a column"
+            f" {base.commanded}",
+        )
+    angle = np.where(np.abs(measure(angle)) <= _ONE_PLACE, angle, np.nan)
     at = _command_each(base, angle, scene)
-    side = np.where(chosen == 0, 1, -1)
 
     def command_at(shift: Array) -> Command:
-        beside = _command_other_bar(scene, table, table.places + shift, side)
-        moved = angle + wrap_difference(beside[base.commanded] - angle)
-        return at._replace(angle=moved)
+        return at._replace(angle=find(angle, shift)[0])
 
     return RowCommands(at, _command_beside(table, command_at))
-
-
-def _command_other_bar(
-    scene: Scene,
-    table: TheirTable,
-    places: Array,
-    branch: NDArray[np.int_] | int,
-) -> Solution:
-    """Solve the positions at which the bar by which rows are found has these angles."""
-    assembly = np.broadcast_to(np.asarray(branch, dtype=np.int8), places.shape)
-    bar = BAR_OF_ANGLE[table.found_by]
-    at = Command(places, assembly, None, 0.0, bar=bar)
-    return solve(scene, "position", at=at)
-
-
-def _turn_into(motion: Array, angle: Array) -> Array:
-    """Turn angles by whole turns to the first position of a motion or beyond it."""
-    least = motion.min() - _ONE_PLACE
-    return np.asarray(angle + TURN * np.ceil((least - angle) / TURN))
-
-
-def _fits(
-    scene: Scene, table: TheirTable, base: Command, angle: Array
-) -> NDArray[np.bool_]:
-    """Mark the rows whose angle another bar has in the assembly of the scene."""
-    at = _command_each(base, angle, scene)
-    positions = solve(scene, "position", at=at._replace(speed=None))
-    apart = wrap_difference(positions[table.found_by] - table.places)
-    return np.asarray(np.abs(apart) <= _ONE_PLACE)
-
-
-def _refuse_row(
-    table: TheirTable,
-    commanded: str,
-    angles: Array,
-    row: np.intp,
-) -> None:
-    """Raise InputError for a row at whose angle the motion is twice."""
-    unit = table.place.unit
-    place = f"{table.places[row] / unit.factor:.6g} {unit.text}"
-    both = " and ".join(f"{math.degrees(angle):.6g}" for angle in sorted(angles[:, 0]))
-    raise InputError(
-        f"line {table.lines[row]}, {table.found_by}",
-        place,
-        f"the motion passes it at {commanded} = {both} deg: add a column {commanded}",
-    )
