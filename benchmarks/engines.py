@@ -24,7 +24,7 @@ class Verdict:
         here = [engine for engine in ENGINES if not engine.missing()]
         verdicts = {}
         for model, path in SCENES.items():
-            rows = judge(model, fourbar.load(path), here, order=False).rows
+            rows = judge(model, fourbar.load(path), here).rows
             for name in BY_NAME:
                 judged = [
                     row

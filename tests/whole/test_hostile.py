@@ -30,7 +30,7 @@ from fourbar_validation.engines.programs import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, write_about
 from fourbar_validation.report.terminal import print_table
-from fourbar_validation.run.plan import Plan, RunOptions
+from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import LARGEST_LIST, Suite, read_suite
 from tests.support.here import judge_here
@@ -89,7 +89,7 @@ class Named(Suite):
 def test_reports_hold_hostile_text_as_text(tmp_path, monkeypatch, capsys):
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
-    summary = run(Plan(Named(), EXACT, RunOptions(workers=1)), out)
+    summary = run(Plan(Named(), EXACT, workers=1), out)
     html = (out / "report.html").read_text()
     assert not ACTIVE.search(html) and "7*7 }}" in html
     markdown = (out / "report.md").read_text()
@@ -294,8 +294,8 @@ def test_running_out_of_memory_costs_its_own_row(tmp_path, monkeypatch):
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(f"fourbar_validation.run.plan.{size}", 2)
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
-    options = RunOptions(workers=1, drawn=False)
-    run(Plan(suite, (*EXACT, greedy), options), tmp_path / "run")
+    options = dict(workers=1, drawn=False)
+    run(Plan(suite, (*EXACT, greedy), **options), tmp_path / "run")
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     (failing,) = (row for row in rows if row.verdict == FAILS)
     assert (failing.scene, failing.engine) == ("b", "greedy")

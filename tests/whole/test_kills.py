@@ -30,7 +30,7 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import hash_modules
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import jobs
-from fourbar_validation.run.plan import COLLECTING, Plan, RunOptions
+from fourbar_validation.run.plan import COLLECTING, Plan
 from fourbar_validation.run.run import run
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType
@@ -72,8 +72,8 @@ EXACT = choose_engines("free-body")
 
 def judge_all(suite, out, engines=EXACT, workers=2):
     heard = Heard()
-    options = RunOptions(workers=workers, drawn=False)
-    summary = run(Plan(suite, engines, options), out, heard)
+    options = dict(workers=workers, drawn=False)
+    summary = run(Plan(suite, engines, **options), out, heard)
     assert heard.scenes[COLLECTING] == len(suite)
     return summary
 
@@ -400,9 +400,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
         monkeypatch.setattr(f"fourbar_validation.{module}.PICTURED", 3)
     monkeypatch.setattr("fourbar_validation.run.run.write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)
-    without = run(
-        Plan(Few(), (*EXACT, blunders), RunOptions(drawn=False)), tmp_path / "without"
-    )
+    without = run(Plan(Few(), (*EXACT, blunders), drawn=False), tmp_path / "without")
     assert not drawn and not any(record.figure for record in without.shown)
     once = Blunders.titles.count("b")
     last = run(Plan(Few(), (*EXACT, blunders)), tmp_path / "with")

@@ -22,7 +22,7 @@ from fourbar_validation.engines.registry import (
 from fourbar_validation.regression.changes import WHOLE_ENGINE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.plan import Plan, RunOptions
+from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.released import FORWARD, RELEASED_ERRORS
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.random import DrawnType
@@ -43,9 +43,9 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
-        options = RunOptions(workers=1, drawn=False)
+        options = dict(workers=1, drawn=False)
         suite = Random(8, 1, tuple(DrawnType))
-        run(Plan(suite, choose_engines("free-body"), options), folder / "results")
+        run(Plan(suite, choose_engines("free-body"), **options), folder / "results")
     return folder
 
 

@@ -67,8 +67,8 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted():
 one | a | F12 | degraded | 1e-3
 one | b | F12 | degraded | 2e-4
 one | a | F43 | agrees | 1e-14
-two | a | F12 | degraded | 1
 two | b | F12 | agrees | 1e-14
+two | a | F12 | degraded | 1
 two | b | F43 | fails | nan
 three | a | torque | degraded | 0.5
 three | b | torque | refuses | nan

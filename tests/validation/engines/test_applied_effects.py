@@ -3,7 +3,6 @@
 The run must catch the faults.
 """
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -96,7 +95,7 @@ ACTING = {
     ),
 }
 EXACT = [engine for engine in ENGINES if not engine.through_time]
-SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
+SIMULATED = [engine for engine in ENGINES if engine.through_time]
 ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 NO_COUNTERPART = {

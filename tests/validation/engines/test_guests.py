@@ -20,7 +20,7 @@ from fourbar_validation.engines import guests, programs
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.plan import Plan, RunOptions
+from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.run.request import Request, select_engines
 from fourbar_validation.run.run import run
@@ -497,8 +497,8 @@ def answer(scene, at):
 @pytest.mark.slow
 def test_what_a_guest_prints_is_kept_beside_the_results(tmp_path, suite):
     printing = guests.read_guests([HERE + "Prints"], ())
-    options = RunOptions(workers=1, drawn=False)
-    run(Plan(suite, printing, options), tmp_path / "out")
+    options = dict(workers=1, drawn=False)
+    run(Plan(suite, printing, **options), tmp_path / "out")
     text = (tmp_path / "out" / "output.txt").read_text()
     assert "\\x1b]0;owned\\x07begin\nfrom a shell" in text
 
@@ -522,7 +522,7 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suit
     def run_once():
         heard, engines = Interrupting(), guests.read_guests(["mine:Mine", program], ())
         with pytest.raises(KeyboardInterrupt):
-            plan = Plan(suite, engines, RunOptions(drawn=False))
+            plan = Plan(suite, engines, drawn=False)
             run(plan, tmp_path / "out", heard)
         return heard.lines
 

@@ -233,8 +233,6 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
         record.rows[0] = replace(record.rows[0], error=number * 8e-3, allowed=1.0)
         words = f"falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"
         record.left_out = [f"mujoco-simulated: {words}"]
-        errors = {"error_at_4h": 1e-3, "error_at_2h": 1e-4}
-        record.evidence = {"sim": {**errors, "observed_order": 3.0 + number}}
         setting = f"RK4 {628 + number}/rev"
         simulated = replace(record.timings[0], engine="sim", setting=setting)
         record.timings = [*record.timings, simulated]
@@ -246,7 +244,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
     refusal = "falls to 0.0e+00; below 0.05 it is not simulated"
     refusal += " (and 99 more like it, with other numbers)"
     assert summary.refusals == [("mujoco-simulated", refusal, 100)]
-    assert summary.orders[0][0] == "scene-000" and summary.judged == 400
+    assert summary.judged == 400
     page = write_summary_page(summary)
     assert "the 80 of 400 scenes and engines" in page and page.count("\n") < 160
     # 20 scenes, each with 30 kB of compressed rows; the table of all of them is

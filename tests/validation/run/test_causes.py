@@ -274,7 +274,6 @@ def find_causes(guest, scene=SCENE):
         "scene",
         scene,
         [engine],
-        order=False,
     )
     assert any(row.engine == "plain" for row in record.rows)
     failed = any(row.engine == "plain" and row.failed for row in record.rows)
@@ -366,7 +365,6 @@ def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
         "scene",
         HARD_TO_EXPLAIN[name],
         [engine],
-        order=False,
     ).rows
     failed = {row.quantity for row in rows if row.failed}
     assert "F12" in failed and "all" not in failed
@@ -742,7 +740,6 @@ def name_wrong(changes, tolerance=EQUIVALENCE):
             "scene",
             SCENE,
             engines,
-            order=False,
         )
     )
     return {cause.engine: cause.text for cause in summary.causes}
@@ -785,7 +782,7 @@ def test_what_follows_from_two_answers_alike_is_no_fault_of_theirs(quantity):
         Engine(one.name, partial(one, turn_faster), EQUIVALENCE, ("omega_3", "v_G3"))
         for one in (Alike, AlsoAlike)
     ]
-    record = judge("scene", SCENE, engines, order=False)
+    record = judge("scene", SCENE, engines)
     failed = {row.quantity for row in record.rows if row.failed}
     assert quantity in failed and failed == {*record.against}
 

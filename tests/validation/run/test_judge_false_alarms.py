@@ -152,7 +152,6 @@ def test_moments_about_far_centres_are_right_to_full_accuracy():
             names[index],
             scene,
             [right, wrong],
-            order=False,
         ).rows
         failed = {(row.engine, row.quantity) for row in rows if row.failed}
         torques = {(wrong.name, "torque"), (wrong.name, "torque_inertia")}

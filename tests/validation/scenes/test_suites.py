@@ -73,7 +73,6 @@ def test_every_scene_of_it_holds(index):
         SUITE.name(index),
         SUITE.scene(index),
         [FREE_BODY],
-        order=False,
     ).rows
     assert not [row for row in rows if row.failed]
     assert any(row.compared and row.engine == FREE_BODY.name for row in rows)

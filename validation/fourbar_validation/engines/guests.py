@@ -205,9 +205,7 @@ def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...
         elif engine.through_time:
             engine = replace(engine, start=partial(SIMULATED_TO_ERROR, error))
         adjusted.append(
-            replace(engine, tolerance=tolerance, order=None)
-            if engine.through_time
-            else engine
+            replace(engine, tolerance=tolerance) if engine.through_time else engine
         )
     return tuple(adjusted)
 

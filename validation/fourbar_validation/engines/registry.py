@@ -48,10 +48,6 @@ from fourbar_validation.engines.prediction import (
 
 Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
-Order = Callable[
-    [Scene, Command, Callable[[Answer], float]], tuple[float, float, float]
-]
-"""Runs an engine at two coarser timesteps; their errors and the observed order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +60,6 @@ class Engine:
     tolerance: ErrorBound
     answers: tuple[str, ...] = COMPARED_QUANTITIES
     """Quantities that it must answer."""
-    order: Order | None = None
-    """Function that measures its observed order, which is shown."""
     positions: tuple[str, ...] = ()
     """Quantities it must answer if the scene states positions only. If empty, it is not
     started for such a scene.
@@ -230,7 +224,6 @@ ENGINES = (
         Later(f"{ENGINES_PACKAGE}.mujoco.simulate:MujocoSimulated"),
         SIMULATED,
         UNKNOWNS,
-        order=Later(f"{ENGINES_PACKAGE}.mujoco.simulate:observe_order"),
         through_time=True,
         generated=True,
         residuals=True,

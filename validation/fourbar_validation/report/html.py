@@ -28,7 +28,6 @@ from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.templating import (
     count_or_size,
     render,
-    write_error,
     write_share,
 )
 
@@ -176,14 +175,6 @@ def write_html(
         tolerances=[
             (tolerance.name, count_or_size(tolerance.factor), tolerance.reason)
             for tolerance in summary.tolerances
-        ],
-        orders=[
-            (
-                scene,
-                *map(write_error, (e["error_at_4h"], e["error_at_2h"])),
-                f"{e['observed_order']:.1f}",
-            )
-            for scene, e in summary.orders
         ],
         statement=STATEMENT,
         work=WORK,

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
-from heapq import nlargest, nsmallest
+from heapq import nlargest
 from operator import attrgetter
 
 from fourbar.errors import HOLDS, write_count
@@ -52,7 +52,6 @@ PICTURED = 24
 it by an exact engine.
 """
 _WORST_SHOWN = 80
-_ORDERS_SHOWN = 20
 _FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
 _TIMED = 1000
@@ -153,7 +152,6 @@ class Summary:
         self._lines: dict[str, EngineLine] = {}
         self._left_out: dict[str, AlikeTexts] = {}
         self._worst: list[Row] = []
-        self._orders: list[tuple[str, dict[str, float]]] = []
         self._shown: list[Record] = []
 
     def add(self, scene: Record) -> None:
@@ -187,7 +185,6 @@ class Summary:
         self.independence.update(scene.independence)
         self._add_agreement(rows)
         self._add_times(scene)
-        self._add_orders(scene)
         # a row that fails has used more than all that it is allowed
         self._shown = nlargest(SCENES_SHOWN, [*self._shown, scene], key=USED)
 
@@ -226,12 +223,11 @@ class Summary:
         self.released |= any(row.quantity == "energy" for row in rows)
 
     def picture(self, drawn: Record) -> None:
-        """Add what was drawn and measured of a scene that is shown."""
+        """Add what was drawn of a scene that is shown."""
         for scene in self._shown:
             if scene.name == drawn.name:
                 scene.figure = drawn.figure
                 scene.thumbnail = drawn.thumbnail
-        self._add_orders(drawn)
 
     def _add_times(self, scene: Record) -> None:
         refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
@@ -240,12 +236,6 @@ class Summary:
             if timing.engine not in refused and len(times) < _TIMED:
                 microseconds = 1e6 * timing.seconds / timing.positions
                 times.append((microseconds, timing.seconds / scene.timings[0].seconds))
-
-    def _add_orders(self, scene: Record) -> None:
-        for evidence in scene.evidence.values():
-            if "observed_order" in evidence:
-                self._orders.append((scene.name, evidence))
-        self._orders = nsmallest(_ORDERS_SHOWN, self._orders, key=_find_order)
 
     @property
     def not_run(self) -> str:
@@ -412,14 +402,6 @@ class Summary:
         ]
 
     @property
-    def orders(self) -> list[tuple[str, dict[str, float]]]:
-        """Return (scene, errors at 4h and 2h and observed order) of simulations.
-
-        At most _ORDERS_SHOWN are returned, the lowest orders first.
-        """
-        return self._orders
-
-    @property
     def shown(self) -> list[Record]:
         """Return the scenes shown, by name, at most SCENES_SHOWN.
 
@@ -448,7 +430,3 @@ class Summary:
     def first(self) -> Record | None:
         """Return the scene of the large figure, that which is nearest to failing."""
         return next((scene for scene in self._shown if scene.figure), None)
-
-
-def _find_order(order: tuple[str, dict[str, float]]) -> float:
-    return order[1]["observed_order"]

@@ -12,7 +12,7 @@ from fourbar_validation.regression.accept import add_output_options, report_diff
 from fourbar_validation.regression.record import PARQUET_FILE
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
-from fourbar_validation.run.plan import WORKERS, RunPart
+from fourbar_validation.run.plan import WORKERS
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
 from fourbar_validation.run.run import run
@@ -109,7 +109,7 @@ from fourbar_validation.run.run import run
 @click.option(
     "--no-pictures",
     is_flag=True,
-    help="Draw nothing and measure no observed order; no verdict changes.",
+    help="Draw nothing; no verdict changes.",
 )
 @add_output_options("; without --against the comparisons of the run")
 def run_command(**stated: Any) -> int:
@@ -123,12 +123,11 @@ def run_command(**stated: Any) -> int:
 
     request = Request(**stated)
     request.require_consistent()
-    part = None if request.part is None else RunPart.read(request.part)
     plan = make_plan(request)
-    if part is not None:
-        scenes = plan.count_scenes(plan.list_tasks(part))
+    if request.part is not None:
+        scenes = plan.part_scenes
         with ShownProgress(scenes) as progress:
-            judge_part(plan, part, request, progress)
+            judge_part(plan, request, progress)
         count = write_count(scenes, "scene")
         click.echo(f"part {request.part}: {count}, in {request.out / 'parts'}")
         plan.require_engines()
@@ -137,10 +136,8 @@ def run_command(**stated: Any) -> int:
         summary = run(plan, request.out, progress)
     print_table(summary, request.out, verbose=request.verbose)
     worse = False
-    if plan.options.against is not None:
-        worse = bool(
-            report_differences(plan.options.against, request.out, request.forms)
-        )
+    if plan.against is not None:
+        worse = bool(report_differences(plan.against, request.out, request.forms))
     elif request.junit is not None:
         write_text(
             request.junit,

@@ -113,9 +113,9 @@ def judge_for_report(
 ) -> Record:
     """Judge a scene and keep what the report needs of it.
 
-    `draw`: with its pictures and observed orders. `sketch`: with its small picture.
+    `draw`: with its pictures. `sketch`: with its small picture.
     """
-    record = judge(name, scene, engines, order=draw)
+    record = judge(name, scene, engines)
     for i, row in enumerate(record.rows):
         if row.engine in record.output and row.failed:
             record.rows[i] = replace(
@@ -131,21 +131,10 @@ def judge_for_report(
     return record.kept(figure, thumbnail)
 
 
-def judge(
-    name: str,
-    scene: Scene,
-    engines: Sequence[Engine] = ENGINES,
-    *,
-    order: bool = True,
-) -> Record:
-    """Make every check of one scene.
-
-    `order`: measure the observed order of what is simulated, which takes two more
-    simulations and changes no row.
-    """
+def judge(name: str, scene: Scene, engines: Sequence[Engine] = ENGINES) -> Record:
+    """Make every check of one scene."""
     question = make_question(name, scene, engines)
     free = scene.motion.free is not None
-    question.order = order
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin

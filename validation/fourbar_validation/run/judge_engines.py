@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.linkage import copy_with
 from fourbar.mjcf.document import LIGHT_BAR_RATIO
-from fourbar.quantities import COUPLE, FORCE_NAMES, UNITS, Array
+from fourbar.quantities import COUPLE, UNITS, Array
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
@@ -120,8 +120,6 @@ def _answer_of_engine(question: Question, engine: Engine) -> Iterator[Row]:
     if any(row.failed for row in rows):
         _note_causes(question, question, engine, answer)
     yield from rows
-    if question.order and engine.order and answer.refusal is None:
-        answer.evidence |= _observe_order_of_engine(question, engine)
 
 
 def _note_causes(
@@ -166,24 +164,6 @@ def compare_answer(
     if whole and answer.theta is not None:
         rows.append(comparison.closure())
     return rows
-
-
-def _observe_order_of_engine(question: Question, engine: Engine) -> dict[str, float]:
-    """Measure the worst error of torque and pin forces at 4h and 2h.
-
-    The order in h that they show is returned too.
-    """
-
-    def error(answer: Answer) -> float:
-        rows = compare_answer(question, replace(engine, answers=FORCE_NAMES), answer)
-        errors = [row.error for row in rows if row.quantity in FORCE_NAMES]
-        return max(errors, default=math.nan)  # a refusal has none
-
-    assert engine.order is not None
-    coarse, fine, order = engine.order(question.scene, question.at, error)
-    seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
-    # a coarse run may leave what the scene covers
-    return seen if all(map(math.isfinite, seen.values())) else {}
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:

@@ -3,7 +3,6 @@
 A part has many tasks; `run/store.py` keeps the file of each.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import click
 
 from fourbar.errors import InputError
 from fourbar_validation.report.run_summary import Summary
-from fourbar_validation.run.plan import Plan, Progress, RunPart
+from fourbar_validation.run.plan import Plan, Progress
 from fourbar_validation.run.progress import ShownProgress
 from fourbar_validation.run.request import (
     Request,
@@ -26,26 +25,21 @@ _MOST_NAMED = 5
 """Parts that a message names; further ones are counted."""
 
 
-def judge_part(
-    plan: Plan,
-    part: RunPart,
-    request: Request,
-    progress: Progress,
-) -> None:
+def judge_part(plan: Plan, request: Request, progress: Progress) -> None:
     """Judge a part of a run into its folder.
 
     The folder keeps what an interrupted one left.
     """
     with open_store(plan, request.out) as store:
-        keep_request(request, part, plan.suite, request.out)
-        plan.judge(store, part, progress)
+        keep_request(request, plan)
+        plan.judge(store, progress)
 
 
 def _gather(plan: Plan, folders: Sequence[Path], parts: int) -> dict[int, Store]:
-    """Find the folder of each finished task of a run.
+    """Find a folder that has each finished task of a run.
 
     InputError if a folder is of another run, or names the parts with missing or damaged
-    tasks. A damaged task is no copy of the one that another folder holds.
+    tasks.
     """
     stores: dict[int, Store] = {}
     spoilt = []
@@ -56,43 +50,17 @@ def _gather(plan: Plan, folders: Sequence[Path], parts: int) -> dict[int, Store]
             if damage:
                 spoilt.append(f"{path} {damage}")
             else:
-                task = int(path.name)
-                first = stores.setdefault(task, store)
-                if first is not store:
-                    _require_alike(task, first, store)
+                stores.setdefault(int(path.name), store)
     tasks = range(len(plan.tasks))
     missing = [task for task in tasks if task not in stores]
-    damaged = "; ".join(spoilt[:_MOST_NAMED]) or None
     if missing:
         numbers = sorted({task % parts + 1 for task in missing})
         named = [f"--part {number}/{parts}" for number in numbers]
         further = len(named) - _MOST_NAMED
         words = ", ".join(named[:_MOST_NAMED]) + f" and {further} more" * (further > 0)
         why = f"{len(missing)} of {len(tasks)} tasks are missing: run {words} again"
-        raise InputError("DIR", damaged, why)
-    if damaged:
-        why = "differs from another folder's: leave it out, or judge its part again"
-        raise InputError("DIR", damaged, why)
+        raise InputError("DIR", "; ".join(spoilt[:_MOST_NAMED]) or None, why)
     return stores
-
-
-def _require_alike(task: int, first: Store, second: Store) -> None:
-    """Raise InputError unless two copies of a task have the same rows.
-
-    Times and what engines printed may differ from machine to machine.
-    """
-    rows = [
-        {json.dumps(row) for kept in store.read(task) for row in kept["rows"]}
-        for store in (first, second)
-    ]
-    if differing := sorted(rows[0] ^ rows[1]):
-        scene, engine, _, quantity, *_ = json.loads(differing[0])
-        raise InputError(
-            "DIR",
-            str(second.folder),
-            f"holds another result than {first.folder}: {quantity} of {engine} in"
-            f" {scene}; name one of the two folders, or judge that part again",
-        )
 
 
 def collect_parts(

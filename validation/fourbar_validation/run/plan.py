@@ -4,14 +4,14 @@ Every machine cuts a run alike.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from fourbar.errors import FAILED, DependencyError, InputError
-from fourbar_validation.compare.rows import FAILS, escape_controls
+from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
@@ -24,31 +24,10 @@ SCENES_OF_A_SLOW_TASK = 1
 """Scenes per task if something is simulated or drawn: a second each."""
 SCENES_OF_A_QUICK_TASK = 20
 """Scenes per task otherwise: a second together."""
-MOST_KEPT_NAMED = 5
-"""Scenes named whose answers a resumed run keeps; the others are counted."""
 _MOST_TASKS = 10_000
 """Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 """Stages of a run, as its progress is told."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunOptions:
-    """Options of a run; none changes a result."""
-
-    workers: int = WORKERS
-    """Number of processes."""
-    drawn: bool = True
-    """True for pictures. A long suite has them at the end, of the scenes that fail or
-    come nearest to failing.
-    """
-    against: Path | None = None
-    """Earlier run that `--against` names. The failure that the verdict names is looked
-    up there, and its rules must not be stricter.
-    """
-
-
-DEFAULTS = RunOptions()
 
 
 class Progress:
@@ -64,27 +43,13 @@ class Progress:
 UNHEARD = Progress()
 
 
-class RunPart(NamedTuple):
-    """The share of a run that one machine judges.
-
-    A share is every `of`-th task, from task `number` on.
-    """
-
-    number: int = 1
-    of: int = 1
-
-    @classmethod
-    def read(cls, text: str) -> "RunPart":
-        """Read `K/N`; InputError for anything else."""
-        number, _, of = text.partition("/")
-        if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of):
-            return cls(int(number), int(of))
-        allowed = "must be K/N, part K of N parts: --part 1/8 to --part 8/8"
-        raise InputError("--part", text, allowed)
-
-
-WHOLE_RUN = RunPart()
-"""The only part of a run that one machine judges."""
+def read_part(text: str) -> tuple[int, int]:
+    """Read `K/N`, part K of N parts; InputError for anything else."""
+    number, _, of = text.partition("/")
+    if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of):
+        return int(number), int(of)
+    allowed = "must be K/N, part K of N parts: --part 1/8 to --part 8/8"
+    raise InputError("--part", text, allowed)
 
 
 @dataclass(frozen=True)
@@ -96,7 +61,18 @@ class Plan:
 
     suite: Suite
     engines: tuple[Engine, ...]
-    options: RunOptions = DEFAULTS
+    workers: int = WORKERS
+    """Number of processes."""
+    drawn: bool = True
+    """True for pictures. A long suite has them at the end, of the scenes that fail or
+    come nearest to failing.
+    """
+    against: Path | None = None
+    """Earlier run that `--against` names. The failure that the verdict names is looked
+    up there, and its rules must not be stricter.
+    """
+    part: tuple[int, int] = (1, 1)
+    """Number of the part of the run that is judged here, and how many there are."""
     missing: Sequence[tuple[str, str]] = ()
     """Engines that cannot answer here, each with the reason."""
     chosen: str = ""
@@ -113,12 +89,12 @@ class Plan:
     def draw_at_once(self) -> bool:
         """Return whether scenes are drawn as they are judged, because there are few."""
         pictures = len(self.suite) - len(self.suite.not_drawn)
-        return self.options.drawn and pictures <= PICTURED
+        return self.drawn and pictures <= PICTURED
 
     @property
     def sketch(self) -> bool:
         """Return whether scenes have small pictures."""
-        return self.options.drawn and len(self.suite) <= SKETCHED
+        return self.drawn and len(self.suite) <= SKETCHED
 
     @cached_property
     def tasks(self) -> list[range]:
@@ -144,49 +120,35 @@ class Plan:
             "sketch": self.sketch,
         }
 
-    def list_tasks(self, part: RunPart) -> range:
-        """List the numbers of the tasks of a part."""
-        return range(len(self.tasks))[part.number - 1 :: part.of]
+    @property
+    def part_tasks(self) -> range:
+        """Return the numbers of the tasks of its part: every N-th, from the K-th on."""
+        number, of = self.part
+        return range(len(self.tasks))[number - 1 :: of]
 
-    def count_scenes(self, tasks: Iterable[int]) -> int:
-        """Count the scenes of some tasks."""
-        return sum(len(self.tasks[task]) for task in tasks)
+    @property
+    def part_scenes(self) -> int:
+        """Return how many scenes its part has."""
+        return sum(len(self.tasks[task]) for task in self.part_tasks)
 
-    def judge(
-        self,
-        store: Store,
-        part: RunPart,
-        progress: Progress,
-    ) -> None:
-        """Judge the tasks of a part that the store does not have yet."""
-        wanted = self.list_tasks(part)
+    def judge(self, store: Store, progress: Progress) -> None:
+        """Judge the tasks of its part that the store does not have yet."""
         done = store.done()
         for line in store.notes:
             progress.note(line)
-        kept = [scene for task in wanted if task in done for scene in self.tasks[task]]
+        left = [task for task in self.part_tasks if task not in done]
+        kept = self.part_scenes - sum(len(self.tasks[task]) for task in left)
         if kept:
-            progress.note(self._tell_kept(kept))
-        progress.advance(JUDGING, len(kept))
+            progress.note(
+                "kept from an interrupted run: the answers of all engines on"
+                f" {kept} of {len(self.suite)} scenes"
+            )
+        progress.advance(JUDGING, kept)
         how = self.engines, self.draw_at_once, self.sketch
-        jobs = (
-            (task, make_jobs(self.suite, self.tasks[task], *how))
-            for task in wanted
-            if task not in done
-        )
-        workers = self.options.workers
-        for task, records in judge_tasks(self.suite, self.engines, jobs, workers):
+        jobs = ((task, make_jobs(self.suite, self.tasks[task], *how)) for task in left)
+        for task, records in judge_tasks(self.suite, self.engines, jobs, self.workers):
             store.put(task, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
-
-    def _tell_kept(self, scenes: Sequence[int]) -> str:
-        """Say which answers of an interrupted run are kept."""
-        names = [escape_controls(self.suite.name(i)) for i in scenes[:MOST_KEPT_NAMED]]
-        more = len(scenes) - len(names)
-        listed = ", ".join(names) + f" and {more} more" * bool(more)
-        return (
-            f"kept from an interrupted run: the answers of all engines on"
-            f" {len(scenes)} of {len(self.suite)} scenes, {listed}"
-        )
 
     def summarise(self) -> Summary:
         """Return a summary that knows the engines, and no scene yet."""

@@ -66,10 +66,6 @@ class Question:
     at: Command
     engines: Sequence[Engine] = ()
     """Engines that are to answer."""
-    order: bool = False
-    """True if the observed order of what is simulated is wanted. It takes two more
-    simulations.
-    """
     output: dict[str, str] = field(default_factory=dict)
     """Text that each engine printed."""
     left_out: list[str] = field(default_factory=list)

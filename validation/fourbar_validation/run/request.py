@@ -18,8 +18,7 @@ from fourbar_validation.regression.record import find_baseline, open_run
 from fourbar_validation.run.plan import (
     WORKERS,
     Plan,
-    RunOptions,
-    RunPart,
+    read_part,
 )
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
@@ -43,19 +42,6 @@ HARD_SUITE = "hard"
 """Name of the suite of hard cases."""
 _REQUEST = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
-OPTIONS_OF_A_PART = (
-    "scenes",
-    "engines",
-    "error",
-    "suite",
-    "random",
-    "seed",
-    "type",
-    "guest",
-    "time_limit",
-    "no_pictures",
-)
-"""Options that a part keeps."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,12 +113,6 @@ class Request:
             return self.suite or "models"
         return Path(str(self.suite)).name
 
-    @property
-    def options(self) -> RunOptions:
-        """Return the options of the run itself."""
-        against = None if self.against is None else find_baseline(self.against)
-        return RunOptions(self.workers, not self.no_pictures, against)
-
 
 def make_plan(request: Request, files: Files | None = None) -> Plan:
     """Read the scenes and make the engines ready.
@@ -146,26 +126,30 @@ def make_plan(request: Request, files: Files | None = None) -> Plan:
     missing = [(one.name, why) for one, why in reasons.items() if why is not None]
     if missing and request.engines is not None:
         raise DependencyError("; ".join(f"{name}: {why}" for name, why in missing))
-    present = tuple(engine for engine, why in reasons.items() if why is None)
-    asked = (request.engines or "", request.suite_name)
-    return Plan(suite, present, request.options, missing, *asked)
+    return Plan(
+        suite,
+        tuple(engine for engine, why in reasons.items() if why is None),
+        request.workers,
+        not request.no_pictures,
+        None if request.against is None else find_baseline(request.against),
+        (1, 1) if request.part is None else read_part(request.part),
+        missing,
+        request.engines or "",
+        request.suite_name,
+    )
 
 
-def keep_request(
-    request: Request,
-    part: RunPart,
-    suite: Suite,
-    out: Path,
-) -> None:
+def keep_request(request: Request, plan: Plan) -> None:
     """Write what was asked for beside a part, with the text of scene files.
 
     Another machine need not have the files.
     """
-    asked = {name: getattr(request, name) for name in OPTIONS_OF_A_PART}
-    kept: dict[str, Any] = {"parts": part.of, "asked": asked}
-    if isinstance(suite, Files):
-        kept["files"] = asdict(suite) | {"not_drawn": sorted(suite.not_drawn)}
-    write_text(out / _REQUEST, json.dumps(kept, default=str) + "\n")
+    _, parts = plan.part
+    kept: dict[str, Any] = {"parts": parts, "asked": asdict(request)}
+    if isinstance(plan.suite, Files):
+        files = asdict(plan.suite)
+        kept["files"] = files | {"not_drawn": sorted(plan.suite.not_drawn)}
+    write_text(request.out / _REQUEST, json.dumps(kept, default=str) + "\n")
 
 
 def read_request(folder: Path) -> tuple[int, Request, Files | None]:

@@ -51,7 +51,6 @@ from fourbar_validation.run.plan import (
     COLLECTING,
     DRAWING,
     UNHEARD,
-    WHOLE_RUN,
     Plan,
     Progress,
 )
@@ -89,7 +88,7 @@ def run(plan: Plan, out: Path, progress: Progress = UNHEARD) -> Summary:
     left.
     """
     with open_store(plan, out) as store:
-        plan.judge(store, WHOLE_RUN, progress)
+        plan.judge(store, progress)
         summary = write_outcome(plan, store.read, out, progress)
         store.finish()
         forget_request(out)
@@ -117,15 +116,14 @@ def write_outcome(
     """
     suite = plan.suite
     engines = plan.engines
-    options = plan.options
     summary = plan.summarise()
     first_lines = _collect_tasks(plan, read, out, summary, progress)
-    pictured = {record.name for record in summary.pictured if options.drawn}
+    pictured = {record.name for record in summary.pictured if plan.drawn}
     names = [escape_controls(suite.name(index)) for index in range(len(suite))]
     shown = [index for index, name in enumerate(names) if name in pictured]
     if shown and not plan.draw_at_once:
         jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
-        for _, records in judge_tasks(suite, engines, jobs, options.workers):
+        for _, records in judge_tasks(suite, engines, jobs, plan.workers):
             summary.picture(*records)
             progress.advance(DRAWING, 1)
     about = describe_run(
@@ -136,8 +134,8 @@ def write_outcome(
     summary.commit = about.commit
     if len(suite) == 1:
         summary.scene = names[0]
-    if options.against is not None:
-        before = open_run(options.against, "--against")
+    if plan.against is not None:
+        before = open_run(plan.against, "--against")
         if failure := next((one.worst for one in summary.causes), None):
             key = (failure.scene, failure.engine, failure.quantity)
             since = find_since(read_history(before), before, [key])
@@ -155,7 +153,7 @@ def write_outcome(
     write_text(out / "report.md", write_summary_page(summary))
     rows = read_columns(out / PARQUET_FILE)
     sections = collect_sections(rows if isinstance(suite, Hard) else None, out)
-    if options.against is not None:
+    if plan.against is not None:
         sections += collect_history(before.table.parent)
     STYLE_NUMBERS.update(number_guests(engines))
     page = write_html(summary, first_lines, sections)

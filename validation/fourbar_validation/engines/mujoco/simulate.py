@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Container
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,7 +20,6 @@ from fourbar.scene.motion import COMMAND_NAMES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.scales import make_reference, size_answer
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import (
     list_speeds,
     list_unknowns,
@@ -358,26 +357,3 @@ class _Simulation:
         for name, value in evidence.items():
             worst = np.maximum(self.evidence.get(name, 0.0), value)
             self.evidence[name] = float(worst)
-
-
-def observe_order(
-    scene: Scene,
-    command: Command,
-    error: Callable[[Answer], float],
-) -> tuple[float, float, float]:
-    """Return errors at 4h and 2h, and log2 of their ratio.
-
-    The closure's time constant is held in seconds. At the recipe's own h the softness
-    is already of the size of the truncation; the order shows above it.
-    """
-
-    def measure(scale: float) -> float:
-        settings = replace(
-            RECIPE, timestep_scale=scale, time_constant_steps=80.0 / scale
-        )
-        return error(ask_at(MujocoSimulated(settings), scene, command))
-
-    coarse, fine = map(measure, (4.0, 2.0))
-    ratio = coarse / fine if fine else math.inf
-    order = math.log2(ratio) if 0.0 < ratio < math.inf else math.nan
-    return coarse, fine, order
