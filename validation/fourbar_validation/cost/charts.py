@@ -251,7 +251,6 @@ def draw_work_precision(
     for point in chain.from_iterable(curves.values()):
         if (
             point.kind != STEPPED_MOTION
-            and math.isfinite(point.seconds_per_second)
             and _LOWEST <= point.error(quantity) < LARGEST_DRAWN_ERROR
         ):
             marker, colour = _MARKS[point.kind]

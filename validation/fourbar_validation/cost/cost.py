@@ -1,6 +1,5 @@
 """`fourbar-validation cost`: the study of scenes, its table, laws and pictures."""
 
-import math
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
@@ -195,5 +194,4 @@ def list_front(curves: Curves) -> list[tuple[str, ...]]:
             f"{1e3 * point.seconds_per_revolution:.2f}",
         )
         for point in find_pareto(list_stepped(curves), "worst")
-        if math.isfinite(point.seconds_per_second)
     ]

@@ -191,7 +191,6 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     for name, curve, order, rest in (
         ("softness in (1-d)", "softness d", 1.0, ""),
         ("sag at 0.1 rad/s in (1-d)", "sag d, slow", 1.0, ""),
-        ("MuJoCo at one state in (1-d)/d", "one state", 1.0, ""),
         ("sag at 0.1 rad/s in tc", "sag tc, slow", 2.0, "softness alone, slow"),
     ):
         laws += _fit_law(name, curves.get(curve, ()), order, curves.get(rest, ()))

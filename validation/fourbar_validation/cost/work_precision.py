@@ -28,7 +28,6 @@ from fourbar_validation.advise.worst_errors import (
 )
 from fourbar_validation.cost import formulas
 from fourbar_validation.cost.series import SLOW, Curve, Spot, design_curves
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.mujoco.trial import Trial
 from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.report.machine import list_versions
@@ -44,8 +43,7 @@ TIMED_READINGS = 50
 """Readings per timing."""
 ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
-IMPEDANCES_AT_ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-STUDY_VERSION = 11
+STUDY_VERSION = 12
 """Version of what is tried; parts made with another version are made again."""
 EXACT_MOTION = "exact"
 STEPPED_MOTION = "stepped"
@@ -134,7 +132,6 @@ class CostStudy:
         self.units: dict[str, Callable[[], Iterable[CostPoint]]] = {
             "formulas": self._time_formulas,
             "inverse": self._time_inverse,
-            "one state": self._try_one_state,
             "recommended": self._try_recommended,
             **{
                 curve.name: partial(self._try_curve, curve)
@@ -264,8 +261,7 @@ class CostStudy:
         label: str,
         errors: WorstErrors,
         n: int,
-        action: Callable[[], object] | None,
-        setting_value: float = math.nan,
+        action: Callable[[], object],
     ) -> CostPoint:
         """Make a point of a method that answers each position by itself.
 
@@ -273,16 +269,14 @@ class CostStudy:
         """
         setup = self.setup()
         positions = sum(map(len, setup.segments))
-        seconds = scatter = math.nan
-        if action is not None:
-            times = [time_call(action) for _ in range(TIMINGS_OF_A_SETTING)]
-            seconds, scatter = summarise_timings(times)
+        times = [time_call(action) for _ in range(TIMINGS_OF_A_SETTING)]
+        seconds, scatter = summarise_timings(times)
         total = seconds / n * positions
         return CostPoint(
             name,
             kind,
             label,
-            setting_value,
+            math.nan,
             n,
             positions / setup.revolutions,
             errors,
@@ -326,31 +320,6 @@ class CostStudy:
             errors = compute_errors(self.scene, command, action())
             yield self._make_point(
                 "inverse", EXACT_MOTION, label, errors, len(rows), action
-            )
-
-    def _try_one_state(self) -> Iterator[CostPoint]:
-        """Yield points of MuJoCo at single states, by several impedances.
-
-        Errors are measured, and no time.
-        """
-        from fourbar_validation.engines.mujoco.forward import MujocoOneState
-
-        tried = {
-            f"d = {d:g}": (MujocoOneState((d,)), (1.0 - d) / d)
-            for d in IMPEDANCES_AT_ONE_STATE
-        }
-        tried["extrapolated"] = (MujocoOneState(), 0.0)
-        for how, (engine, softness) in tried.items():
-            answer = ask_at(engine, self.scene, self.command)
-            if answer.refusal is not None:
-                raise LimitError(f"{engine.name}: {answer.refusal}")
-            assert answer.assembled is not None
-            rows = np.flatnonzero(answer.assembled)
-            quantities = {name: x[rows] for name, x in answer.quantities.items()}
-            errors = compute_errors(self.scene, self.command.part(rows), quantities)
-            label = f"MuJoCo at one state, {how}"
-            yield self._make_point(
-                "one state", EXACT_MOTION, label, errors, len(rows), None, softness
             )
 
 
