@@ -175,28 +175,34 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
 
 
 @pytest.mark.parametrize(
-    ("condition", "names", "hidden", "failed"),
+    ("condition", "names", "hidden", "of_itself", "failed"),
     [
         # no engine, however many quantities it answers, has digits to be judged by
-        (1e-14, ("omega_3", "F12"), (), False),
-        (1e-14, ("torque",), (), False),
+        (1e-14, ("omega_3", "F12"), (), True, False),
+        (1e-14, ("torque",), (), True, False),
         # an engine's own predicted errors may hide half of what has digits
-        (1.0, ("omega_3", "F12"), ("F12",), False),
-        (1.0, ("omega_3", "F12"), ("F12", "omega_3"), True),
-        (1.0, ("torque",), ("torque",), True),
+        (1.0, ("omega_3", "F12"), ("F12",), True, False),
+        (1.0, ("omega_3", "F12"), ("F12", "omega_3"), True, True),
+        (1.0, ("torque",), ("torque",), True, True),
+        (1.0, ("torque",), ("torque",), False, False),
     ],
 )
 def test_an_engine_whose_predicted_errors_hide_most_numbers_does_not_hold(
-    condition, names, hidden, failed
+    condition, names, hidden, of_itself, failed
 ):
     blind = replace(FORMULAS, condition=np.full(POSITIONS, condition))
     answer = make_answer(**{name: 3.0 * FORMULAS[name] for name in hidden})
-    held = Demands(EQUIVALENCE, names, lambda name, mask: np.full(POSITIONS, 1e9))
+
+    def predict(name, mask):
+        return np.full(POSITIONS, 1e9)
+
+    held = Demands(EQUIVALENCE, names, predict, of_itself=of_itself)
     compared = Comparison("", SCENE, answer, blind, held, blind).rows()
     rows = {row.quantity: row for row in compared}
     assert rows[names[-1]].verdict == UNDECIDED
     row = rows["undecided"]
-    assert (row.failed, row.verdict == UNDECIDED) == (failed, condition < 1.0)
+    nothing = condition < 1.0 or not of_itself
+    assert (row.failed, row.verdict == UNDECIDED) == (failed, nothing)
 
 
 def test_an_error_within_the_rounding_of_theta_2_is_taken_again():

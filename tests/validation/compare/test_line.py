@@ -10,7 +10,10 @@ import pytest
 
 import fourbar
 from fourbar.effects import LinearDrive, Place
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import AGREES
+from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.guests import GuestClient, Hello, Program
 from fourbar_validation.engines.registry import ENGINES, load_further
@@ -72,6 +75,27 @@ def test_what_is_stated_of_a_line_is_judged(what):
     assert not [row for row in rows if row.failed]
     agreeing = {row.quantity for row in rows if row.verdict == AGREES}
     assert quantities <= agreeing and "torque" not in agreeing
+
+
+@pytest.mark.parametrize(
+    "answered, due",
+    [
+        ({"v_B"}, set()),
+        ({"v_B", "torque"}, {"drive_force"}),
+        ({"theta_3", "theta_4", "sin_mu"}, {"stroke", "drive_line"}),
+    ],
+)
+def test_of_a_line_is_due_what_takes_the_place_of_an_answer_or_follows(answered, due):
+    scene = driven(1, 4, 1, ())
+    solution = fourbar.solve(scene)
+    numbers = {name: np.array(solution[name]) for name in answered - {"torque"}}
+    answer = Answer("theirs", "exact", solution.at, solution.assembled, numbers)
+    held = Demands(EQUIVALENCE, tuple(answered))
+    rows = Comparison("", scene, answer, solution, held).rows()
+    quantities = {row.quantity for row in rows} - {"assembled", "undecided", "torque"}
+    assert quantities == answered - {"torque"} | due
+    failed = {row.quantity for row in rows if row.failed}
+    assert failed == due & {"drive_force"}  # which is not answered
 
 
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it():

@@ -573,7 +573,6 @@ FROM_B = (
     math.hypot(0.22 + 0.05 * math.cos(1.0), 0.05 * math.sin(1.0)),
     math.atan2(0.05 * math.sin(1.0), 0.22 + 0.05 * math.cos(1.0)),
 )
-WEIGHTS_AT_PINS = tuple(replace(one, from_pin=(0.0, 0.0)) for one in WEIGHTS)
 DAMPED = replace(SCENE, effects=(Gravity(), Viscous((("O4", 0.2),))))
 OTHER_SCENES = {
     "loads.0 (bar 3): its force acts at the second pin of the bar": (
@@ -605,10 +604,23 @@ OTHER_SCENES = {
         with_effects(Torsion((("O2", 2.0, 1.0, 0.3),))),
         with_effects(Torsion((("O2", 2.6, 1.0, 0.3),))),
     ),
-    "every weight acts at its first pin": (
-        SCENE,
-        replace(with_effects(), loads=WEIGHTS_AT_PINS),
-    ),
+    **{
+        f"{whose} acts at {where}": (
+            SCENE,
+            replace(
+                with_effects(),
+                loads=tuple(
+                    replace(weight, from_pin=(part * bar.length, 0.0))
+                    for weight, bar in zip(WEIGHTS, BARS.values(), strict=True)
+                ),
+            ),
+        )
+        # G of the other two is there
+        for whose, where, part in (
+            ("every weight", "its first pin", 0.0),
+            ("the weight of bar 3", "mid-bar", 0.5),
+        )
+    },
     "the places of loads.0 and loads.1 are exchanged": (
         replace(SCENE, loads=(PUSH, Load(2, (5.0, 1.4), from_pin=(0.02, 0.3)))),
         replace(

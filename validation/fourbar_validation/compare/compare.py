@@ -105,7 +105,7 @@ to is compared or the engine answers it.
 _OF_FORCES = (*FORCE_NAMES, *DRY_FRICTION_QUANTITIES)
 _MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene which have digits to decide by, and which the errors
-predicted for an engine may nevertheless leave undecided.
+that an engine predicts of itself may nevertheless leave undecided.
 """
 _SLOW_DRIVE = 0.1
 """Part of the drive's greatest speed above which a simulation's forces are judged. The
@@ -137,6 +137,10 @@ class Demands(NamedTuple):
     """
     method: str = ""
     """Method for which the errors are predicted, as the end of a reason."""
+    of_itself: bool = False
+    """True if the engine itself predicts its errors: no prediction of the harness hides
+    what is wrong.
+    """
 
 
 class _Judged(NamedTuple):
@@ -150,7 +154,7 @@ class _Judged(NamedTuple):
     a reversal, where either side is right.
     """
     decided: int = 0
-    """Those of them with a verdict: no error as large as the number is predicted."""
+    """Those of them with a verdict: the engine predicts no error as large."""
 
 
 @dataclass
@@ -193,7 +197,8 @@ class Comparison:
             names |= {
                 line
                 for line, quantity in _OF_THE_LINE.items()
-                if quantity in names or line in answer.quantities
+                if line in answer.quantities
+                or (quantity in names and self._follows(line))
             }
         rows = [self._compare_assembled()]
         counted = []
@@ -237,6 +242,14 @@ class Comparison:
             condition,
             answer.assembled,
         )
+
+    def _follows(self, line: str) -> bool:
+        """Tell whether a quantity of the drive is due from what is answered.
+
+        A force that drives takes the torque's place, and the others follow from angles
+        and speeds.
+        """
+        return line == LINE.value or getattr(self._solution, line, None) is not None
 
     @property
     def _who(self) -> tuple[str, str, str]:
@@ -370,7 +383,9 @@ class Comparison:
             float(formulas.theta_2[worst.position]),
             worst.condition,
         )
-        decidable = int(np.count_nonzero(errors.decidable))
+        decidable = worst.decided
+        if self.demands.of_itself:
+            decidable = int(np.count_nonzero(errors.decidable))
         return _Judged(row, closed, reversals + decidable, reversals + worst.decided)
 
     def _measure(

@@ -325,6 +325,7 @@ def make_demands(
         make_prediction(engine, scene, command, answer),
         answer_nearby,
         method,
+        engine.residuals,
     )
 
 
