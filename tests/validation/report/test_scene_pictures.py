@@ -61,21 +61,21 @@ def test_no_mark_stands_where_nothing_is_judged():
 
 
 def test_marks_stand_at_the_positions_of_their_engine():
-    """An engine that answers the first half of a turn has no mark beyond its middle."""
+    """An engine that answers the second half of a turn has no mark before its middle."""
     at = command(PLAIN)
-    half = at.part(slice(0, len(at.angle) // 2 + 1))
+    half = slice(len(at.angle) // 2, None)
     whole_turn, half_turn = (
-        sorted(list_marks(PLAIN, WHOLE, WHOLE.torque[: len(one.angle)], one))
-        for one in (at, half)
+        sorted(list_marks(PLAIN, WHOLE, WHOLE.torque[part], at.part(part)))
+        for part in (slice(None), half)
     )
     x = [x for x, _ in whole_turn]
-    middle = 0.5 * (x[0] + x[-1] + (x[1] - x[0]))
-    assert half_turn[-1][0] <= middle < x[-1]
+    middle = 0.5 * (x[0] + x[-1])
+    assert x[0] < middle <= half_turn[0][0]
 
 
 def test_where_a_curve_is_cut_a_label_says_so():
     pole = WHOLE.torque.copy()
     pole[100:102] *= 1e3
-    for torque, cuts in ((WHOLE.torque, 0), (pole, 1)):
+    for torque, cuts in ((1e3 * WHOLE.torque, 0), (pole, 1)):
         record = Record("pole", PLAIN, solution=replace(WHOLE, torque=torque))
         assert draw_thumbnail(record).count("towards a pole") == cuts
