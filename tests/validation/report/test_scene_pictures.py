@@ -61,7 +61,7 @@ def test_no_mark_stands_where_nothing_is_judged():
 
 
 def test_marks_stand_at_the_positions_of_their_engine():
-    """An engine that answers the second half of a turn has no mark before its middle."""
+    """An engine of the second half of a turn has no mark before its middle."""
     at = command(PLAIN)
     half = slice(len(at.angle) // 2, None)
     whole_turn, half_turn = (
