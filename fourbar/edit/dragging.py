@@ -21,7 +21,8 @@ from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, SECOND_PIN
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
-from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
+from fourbar.scene.drawing import DRAWN_WORD
+from fourbar.show.plot.style import split_complex
 from fourbar.studies.keys import list_described
 
 _SAME_ANGLE = 1e-9
@@ -52,11 +53,8 @@ class _Handle(NamedTuple):
 
     def drawn(self) -> dict[str, Any]:
         """Return the handle as the page has it, complex places as pairs."""
-        plain = {
-            name: [z.real, z.imag]
-            for name, z in (("at", self.at), ("beyond", self.beyond))
-        }
-        return self._asdict() | plain
+        pairs = {"at": split_complex(self.at), "beyond": split_complex(self.beyond)}
+        return self._asdict() | pairs
 
 
 def list_handles(scene: Scene) -> list[_Handle]:
@@ -151,10 +149,7 @@ def drag(
     branch = np.array([dragged.branch], dtype=np.int8)
     state = compute_shown_state(scene, Command(theta_2, branch, 0.0, 0.0))
     if isinstance(dragged.what, str):
-        if scene.drawing is None:
-            _drag_pin(document, dragged, state)
-        else:
-            _drag_drawn_pin(document, dragged, scene.drawing)
+        _drag_pin(document, dragged, scene, state)
         return
     if not np.isfinite(state.position.u3).all():
         raise InputError(
@@ -162,19 +157,23 @@ def drag(
             dragged.theta_2,
             "the linkage does not assemble there; choose another position",
         )
-    in_world = 1.0 + 0.0j
     for handle in list_handles(scene):
         bar_frame = _take_one(state.direction(handle.bar))
         foot = _take_one(state.foot(handle.bar)) + bar_frame * handle.at
-        frame = bar_frame if handle.turns else in_world
+        frame = bar_frame if handle.turns else 1.0
         if list(handle.path) == dragged.what:
             pair = (dragged.to - foot) / frame
             put_place(document, handle.path, pair, dragged.grain)
             return
         if handle.force is not None and list(handle.force) == dragged.what:
-            force_frame = bar_frame if handle.force_turns else in_world
+            force_frame = bar_frame if handle.force_turns else 1.0
             arrow = (dragged.to - foot - frame * handle.beyond) / force_frame
-            _put_force(document, handle.force, plain, arrow, dragged.stretch)
+            stated = plain["loads"][handle.force[1]]["force"][0]
+            # a negative force stays so
+            size = to_si(stated, "N") * dragged.stretch
+            angle = cmath.phase(math.copysign(1.0, size) * arrow)
+            put_number(document, (*handle.force, 0), size, abs(size) / 50.0, "N")
+            put_number(document, (*handle.force, 1), angle, 0.02, "rad")
             return
     raise InputError(
         "drag",
@@ -188,71 +187,41 @@ def _take_one(value: Any) -> complex:
     return complex(np.ravel(value)[0])
 
 
-def _put_force(
-    document: SceneDocument,
-    path: KeyPath,
-    plain: dict[str, Any],
-    arrow: complex,
-    stretch: float,
+def _drag_pin(
+    document: SceneDocument, dragged: Dragged, scene: Scene, state: State
 ) -> None:
-    """Turn a force into the direction of its arrow; a negative one stays so."""
-    stated = str(plain["loads"][path[1]]["force"][0])
-    unit = find_unit(stated, "N")
-    force = to_si(stated, unit) * stretch
-    angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
-    document.put((*path, 0), write_rounded(force, abs(force) / 50.0, unit))
-    _put_like(document, (*path, 1), angle, 0.02, "rad")
-
-
-def _drag_pin(document: SceneDocument, dragged: Dragged, state: State) -> None:
-    """Change the lengths of the bars that end in a pin."""
-    ground = ("lengths", "ground")
-    if dragged.what == "O4" and isinstance(document.at(ground), dict):
-        put_place(document, ground, dragged.to, dragged.grain)
-        return
-    for bar, pin in SECOND_PIN.items():
-        if pin == dragged.what:
-            length = abs(dragged.to - _take_one(state.foot(bar)))
-            _put_like(document, ("lengths", BAR_NAMES[bar]), length, dragged.grain)
-    if dragged.what == "O4":
-        angle = cmath.phase(dragged.to)
-        grain = dragged.grain / max(abs(dragged.to), dragged.grain)
-        _put_like(document, ("lengths", "ground_angle"), angle, grain, "rad")
-
-
-def _drag_drawn_pin(
-    document: SceneDocument,
-    dragged: Dragged,
-    drawing: DrawnPins,
-) -> None:
-    """Move a pin of the drawing.
+    """Change the lengths of the bars that end in a pin, or the pin of a drawing.
 
     Raises InputError at another position than the one that is drawn.
     """
-    drawn = drawing.angle(2)
-    if abs(math.remainder(dragged.theta_2 - drawn, 2.0 * math.pi)) > _SAME_ANGLE:
-        raise InputError(
-            "drag",
-            dragged.what,
-            "the pins are those of the drawing: go to theta_2 ="
-            f" {math.degrees(drawn):.6g} deg",
-        )
-    x0, y0 = drawing.O2
-    place = (dragged.to.real + x0, dragged.to.imag + y0)
-    for axis, coordinate in enumerate(place):
-        key = ("pins", str(dragged.what), axis)
-        _put_like(document, key, coordinate, dragged.grain)
-
-
-def parse_place(stated: Any) -> complex:
-    """Return the place of a bar that an entry of the file states, m.
-
-    The entry is polar, or by x and y.
-    """
-    if isinstance(stated, dict):
-        return complex(to_si(stated["x"], "m"), to_si(stated["y"], "m"))
-    distance, angle = stated
-    return cmath.rect(to_si(distance, "m"), to_si(angle, "rad"))
+    pin = str(dragged.what)
+    to = dragged.to
+    grain = dragged.grain
+    if scene.drawing is not None:
+        drawn = scene.drawing.angle(2)
+        if abs(math.remainder(dragged.theta_2 - drawn, math.tau)) > _SAME_ANGLE:
+            raise InputError(
+                "drag",
+                pin,
+                "the pins are those of the drawing: go to theta_2 ="
+                f" {math.degrees(drawn):.6g} deg",
+            )
+        x0, y0 = scene.drawing.O2
+        put_number(document, ("pins", pin, 0), to.real + x0, grain)
+        put_number(document, ("pins", pin, 1), to.imag + y0, grain)
+        return
+    ground = ("lengths", "ground")
+    if pin == "O4" and isinstance(document.at(ground), dict):
+        put_place(document, ground, to, grain)
+        return
+    for bar, second in SECOND_PIN.items():
+        if second == pin:
+            length = abs(to - _take_one(state.foot(bar)))
+            put_number(document, ("lengths", BAR_NAMES[bar]), length, grain)
+    if pin == "O4":
+        angle_grain = grain / max(abs(to), grain)
+        angle = cmath.phase(to)
+        put_number(document, ("lengths", "ground_angle"), angle, angle_grain, "rad")
 
 
 def put_place(
@@ -268,52 +237,40 @@ def put_place(
     file has no place yet, its unit is that of the ground's length.
     """
     old = document.at(path)
-    before = "polar"
-    if isinstance(old, dict):
+    by = by or ("xy" if isinstance(old, dict) else "polar")
+    keys: Any = ("x", "y") if by == "xy" else (0, 1)
+    if any(document.at((*path, key)) is None for key in keys):
         # what is drawn is a place of its bar from now on
-        before = DRAWN_WORD if DRAWN_WORD in old else "xy"
-        by = by or "xy"
-    lengths = (
-        (*path, DRAWN_WORD, 0),
-        (*path, "x"),
-        (*path, 0),
-        ("lengths", "ground", "x"),
-        ("lengths", "ground"),
-        ("pins", "A", 0),
-    )
-    length = next(filter(None, map(document.at, lengths)))
-    stated: Any
+        lengths = (
+            (*path, DRAWN_WORD, 0),
+            (*path, "x"),
+            (*path, 0),
+            ("lengths", "ground", "x"),
+            ("lengths", "ground"),
+            ("pins", "A", 0),
+        )
+        length = next(filter(None, map(document.at, lengths)))
+        new: Any = [str(length), "0 deg"]
+        if by == "xy":
+            new = {"x": str(length), "y": str(length)}
+        document.put(path, new)
+    first, second = ((*path, key) for key in keys)
     if by == "xy":
-        x = _write_like(document.at((*path, "x")) or length, place.real, grain)
-        y = _write_like(document.at((*path, "y")) or length, place.imag, grain)
-        stated = {"x": x, "y": y}
-        parts = [*stated.items()]
-    else:
-        distance = abs(place)
-        angle_grain = grain / max(distance, grain)
-        old_angle = document.at((*path, 1))
-        angle = _write_like(old_angle, cmath.phase(place), angle_grain, "rad")
-        stated = [_write_like(length, distance, grain), angle]
-        parts = [*enumerate(stated)]
-    if old is None or (by or before) != before:
-        document.put(path, stated)
+        put_number(document, first, place.real, grain)
+        put_number(document, second, place.imag, grain)
         return
-    for step, text in parts:
-        document.put((*path, step), text)
+    put_number(document, first, abs(place), grain)
+    angle_grain = grain / max(abs(place), grain)
+    put_number(document, second, cmath.phase(place), angle_grain, "rad")
 
 
-def _put_like(
+def put_number(
     document: SceneDocument, path: KeyPath, value: float, grain: float, si: str = "m"
 ) -> None:
-    """State a number as `_write_like` writes it in the place of an older one."""
-    document.put(path, _write_like(document.at(path), value, grain, si))
-
-
-def _write_like(old: object, value: float, grain: float, si: str = "m") -> str:
-    """Write a number of an SI unit, "m" or "rad", in the unit of its older text."""
-    unit = find_unit(old, "m" if si == "m" else "deg")
+    """State a number of an SI unit in the unit of what stood there; angles in deg."""
+    unit = find_unit(document.at(path), "deg" if si == "rad" else si)
     factor = to_si(f"1 {si}", unit)
-    return write_rounded(value * factor, grain * factor, unit)
+    document.put(path, write_rounded(value * factor, grain * factor, unit))
 
 
 def write_rounded(value: float, grain: float, unit: str) -> str:

@@ -34,6 +34,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import SceneBlock
+from fourbar.show.driving import read_drive_demand
 from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
 from fourbar.show.shown_units import COMMON, write_short
 from fourbar.show.studies import write_type
@@ -115,9 +116,6 @@ def _list_turns(scene: Scene) -> list[tuple[str, float, float, float]]:
     return turns
 
 
-_DRIVE = {"torque": "N m", "drive_force": "N"}
-
-
 def write_headline(
     solution: Solution,
     units: Conversion,
@@ -128,26 +126,25 @@ def write_headline(
     `facts`: those of the solution; without them numbers are said to be reached at
     least.
     """
+    peaks = list_peaks(solution, facts)
+    drive = read_drive_demand(solution)
     reached = "" if facts is not None or len(solution) == 1 else "at least "
     among = " (of these positions)" if facts and facts.kind == "list" else ""
-    peaks = list_peaks(solution, facts)
     parts = []
-    for name in _DRIVE.keys() & peaks.keys():
-        words = name.replace("_", " ")
-        peak = peaks[name]
-        if peak is None:
-            parts.append(f"{words} grows without bound")
-        else:
-            text = write_short(peak, _DRIVE[name], units)
-            parts.append(f"peak {words} {reached}{text}{among}")
-    loads = {pin: peaks[name] for pin, name in PIN_FORCE.items() if name in peaks}
-    unbounded = [pin for pin, load in loads.items() if load is None]
-    if unbounded:
-        parts.append(f"pin forces grow without bound at {', '.join(unbounded)}")
-    elif loads:
-        load, pin = max((load or 0.0, pin) for pin, load in loads.items())
-        text = write_short(load, "N", units)
-        parts.append(f"largest pin force {reached}{text} at {pin}{among}")
+    for what, unit, names in (
+        (f"peak {drive.name}", drive.unit, {"": drive.keys.value}),
+        ("largest pin force", "N", PIN_FORCE),
+    ):
+        sizes = {at: peaks[name] for at, name in names.items() if name in peaks}
+        places = [at for at, size in sizes.items() if size is None]
+        text = "grows without bound"
+        if sizes and not places:
+            size, place = max((size or 0.0, at) for at, size in sizes.items())
+            text = f"{reached}{write_short(size, unit, units)}"
+            places = [place]
+        at_pins = ", ".join(filter(None, places))
+        if sizes:
+            parts.append(f"{what} {text}{at_pins and f' at {at_pins}'}{among}")
     if facts is None:
         least = math.asin(min(float(np.nanmin(np.abs(solution.sin_mu))), 1.0))
         reached = reached.replace("least", "most")
@@ -162,24 +159,22 @@ def list_peaks(solution: Solution, facts: Facts | None) -> dict[str, float | Non
 
     `facts`: where they are located between the positions.
     """
+    sizes = {} if solution.F12 is None else compute_pin_loads(solution)
+    drive = read_drive_demand(solution)
+    is_driven = solution.scene is None or solution.scene.motion.free is None
+    if is_driven and drive.values is not None:
+        sizes[drive.keys.value] = drive.sizes
     peaks = dict[str, float | None]()
-    if solution.F12 is not None:
-        for force, sizes in compute_pin_loads(solution).items():
-            if np.isfinite(sizes).any():
-                peaks[force] = float(np.nanmax(sizes))
-    if facts is not None:
-        for pin, load in facts.pins.items():
-            peaks[PIN_FORCE[pin]] = None if load.peak is None else load.peak.value
-    for name in _DRIVE:
-        values = getattr(solution, name)
-        is_driven = solution.scene is None or solution.scene.motion.free is None
-        if is_driven and values is not None and np.isfinite(values).any():
-            peak = float(np.nanmax(np.abs(values)))
-            if facts is not None and facts.peak is not None:
-                peak = abs(facts.peak.value)
-            peaks[name] = 0.0 if peak <= find_drive_rounding(solution) else peak
-    if facts is not None:
-        peaks |= dict.fromkeys(facts.motion.panels.growing & peaks.keys())
+    for name, values in sizes.items():
+        if not np.isfinite(values).any():
+            continue
+        peaks[name] = float(np.nanmax(values))
+        if facts is not None:
+            peak = facts.motion.find_peak(name)
+            peaks[name] = peak and abs(peak.value)
+    size = peaks.get(drive.keys.value)
+    if size is not None and size <= find_drive_rounding(solution):
+        peaks[drive.keys.value] = 0.0
     return peaks
 
 

@@ -2,9 +2,7 @@
 
 import base64
 import json
-import math
 import os
-import re
 import secrets
 import tomllib
 from collections.abc import Callable
@@ -16,18 +14,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
+from fourbar.edit.dragging import (
+    Dragged,
+    drag,
+    list_handles,
+    put_number,
+    put_place,
+    write_rounded,
+)
 from fourbar.edit.exports import Exports, evaluate_scene, list_peaks
-from fourbar.edit.scene_entries import SceneDocument, list_offers, name_entry
+from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
-from fourbar.files.fields import Entry, SceneFile
+from fourbar.files.fields import Entry, SceneFile, split_key
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
 from fourbar.files.scene_text import write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE
-from fourbar.quantities.units import UnitError, find_unit, to_si
+from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
-from fourbar.scene.drawing import DRAWN_WORD
 from fourbar.scene.motion import (
     BRANCH_OF_NAME,
     COMMAND_NAMES,
@@ -71,6 +75,16 @@ OFFERED_UNITS = (
 """Units of results to choose from; any other list can be typed."""
 
 
+_STORED = {
+    "disk": "disk",
+    "texts": "texts",
+    "place": "history_index",
+    "kept": "kept",
+    "reference": "reference",
+    "units": "unit_names",
+    "pressure": "pressure_text",
+}
+"""Entries of the state file, and the attributes of a session that they hold."""
 _ENDING_OF_PICTURE = {
     "data:image/png": "png",
     "data:image/jpeg": "jpg",
@@ -132,17 +146,13 @@ class Session:
         """Go on where an earlier session stopped."""
         data = read_bytes(self.state_file, "state file", LARGEST_STATE)
         try:
-            state = json.loads(data)
+            state = {"pressure": ""} | json.loads(data)
             if state["schema"] != EDIT_SCHEMA:
                 raise ValueError(f"schema {str(state['schema'])[:60]!r}")
-            self.texts = [str(text) for text in state["texts"]]
-            self.history_index = int(state["place"])
-            self.kept = {str(name): str(text) for name, text in state["kept"].items()}
-            self.reference = str(state["reference"])
-            self.unit_names = str(state["units"])
-            self.disk = state["disk"]
+            for key, name in _STORED.items():
+                setattr(self, name, state[key])
             _require_readable_units(self.unit_names)
-            self.pressure_text = _read_typed_pressure(state.get("pressure", ""))
+            self.pressure_text = _read_typed_pressure(self.pressure_text)
             if self.history_index < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
             self.now = self.read(self.texts[self.history_index])
@@ -155,16 +165,8 @@ class Session:
 
     def write_state_file(self) -> None:
         """Write the state file, readable by its owner alone as the scene may be."""
-        state = {
-            "schema": EDIT_SCHEMA,
-            "disk": self.disk,
-            "texts": self.texts,
-            "place": self.history_index,
-            "kept": self.kept,
-            "reference": self.reference,
-            "units": self.unit_names,
-            "pressure": self.pressure_text,
-        }
+        state = {"schema": EDIT_SCHEMA}
+        state |= {key: getattr(self, name) for key, name in _STORED.items()}
         data = json.dumps(state, ensure_ascii=False).encode()
         write_bytes(self.state_file, data, private=True)
 
@@ -321,11 +323,8 @@ class Session:
     # ---- one method for each request that a page can make ----
 
     def _do_hello(self, asked: Asked) -> Asked:
-        """List what a page needs once: what it offers, in the units of the scene."""
-        offers = dict(list_offers())
-        for name in ("fields", "commands"):
-            offers[name] = _suit_entry(offers[name], self.now.units)
-        offers["units"] = OFFERED_UNITS
+        """List what a page needs once: what it offers."""
+        offers = list_offers() | {"units": OFFERED_UNITS}
         return {"offers": offers, "file": self.path.name, "refer": True}
 
     def _do_set(self, asked: Asked) -> None:
@@ -344,9 +343,10 @@ class Session:
         if path[0] == "tolerances" and name in entries:
             # a thousandth of the number, until the designer says more
             entry = entries[name]
+            unit = find_unit(self.document.at(split_key(name)), entry.unit)
             number = float(read_number(scene, entry) or 1.0)
-            value = f"{abs(number) / 1000.0:.1g} {entry.unit}"
-        value = _suit_entry(value, self.now.units)
+            number *= to_si(f"1 {entry.unit}", unit) / 1000.0
+            value = f"{abs(number):.1g} {unit}"
         self.change(lambda document: document.put(path, value))
 
     def _do_remove(self, asked: Asked) -> None:
@@ -442,29 +442,27 @@ class Session:
         motion = now.plain["motion"]
         for name in {*chain(*names_of.values()), "side", "free", "law"} & motion.keys():
             document.remove(["motion", name])
-        unit = "deg"
-        factor = math.degrees(1.0)
-        rate_unit, rate_factor = find_unit_in("rad/s", now.units)
         is_stroke = commanded == "stroke"
+        si, unit, rate_unit = "rad", "deg", find_unit_in("rad/s", now.units)[0]
         if is_stroke:
-            unit = find_unit(find_length(now.plain), "m")
-            factor = to_si("1 m", unit)
+            si, unit = "m", find_unit(find_length(now.plain), "m")
             rate_unit = f"{unit}/s"
-            rate_factor = factor
+        steps = max(60, min(last - first, 360))
+        zero = f"0 {unit}"
+        document.put(["motion", commanded], {"from": zero, "to": zero, "steps": steps})
         # so that rounding leads to no position beyond
         inset = 1e-3 * (values[last] - values[first])
-        grain = abs(factor * inset)
-        sweep = {
-            "from": write_rounded(factor * (values[first] + inset), grain, unit),
-            "to": write_rounded(factor * (values[last] - inset), grain, unit),
-            "steps": max(60, min(last - first, 360)),
-        }
-        document.put(["motion", commanded], sweep)
+        for end, value in (
+            ("from", values[first] + inset),
+            ("to", values[last] - inset),
+        ):
+            put_number(document, ["motion", commanded, end], value, abs(inset), si)
         middle = (first + last) // 2
         if has_speed:
-            rate = rate_factor * float(getattr(before, rate_name)[middle])
-            rounded = write_rounded(rate, abs(rate) / 100.0, rate_unit)
-            document.put(["motion", rate_name], rounded)
+            rate = float(getattr(before, rate_name)[middle])
+            of_rate = ["motion", rate_name]
+            document.put(of_rate, f"0 {rate_unit}")
+            put_number(document, of_rate, rate, abs(rate) / 100.0, f"{si}/s")
 
         pose = _read_bar_directions(before, middle)
         text = self._choose_nearest_assembly(document, is_stroke, pose)
@@ -495,10 +493,8 @@ class Session:
         """State a place by x and y, or by distance and angle."""
         path = asked["path"]
         by = str(asked["by"])
-        stated = self.document.at(path)
-        if isinstance(stated, dict) and DRAWN_WORD in stated:
-            raise InputError(name_entry(path), by, "is stated in the drawing")
-        place = parse_place(stated)
+        places = {handle.path: handle.beyond for handle in list_handles(self.now.scene)}
+        place = places[tuple(path)]
         grain = 1e-6 * abs(place)
         self.change(lambda document: put_place(document, path, place, grain, by))
 
@@ -601,44 +597,6 @@ def _read_placeholder() -> Asked:
 def _require_readable_units(name: str) -> None:
     if name != _AS_THE_FILE:
         _cached_units(name)
-
-
-_SUITED = {
-    "m": "m",
-    "N": "N",
-    "N m": "N m",
-    "kg": "kg",
-    "N/m": "N",
-    "kg m^2": "kg",
-    "kg/m^3": "kg",
-}
-"""SI units whose quantities a new entry states in the scene's own units.
-
-The value is the unit for which the scene must have one of its own: lengths in mm make
-no density in kg/mm^3.
-"""
-
-
-def _suit_entry(value: Any, own: Conversion) -> Any:
-    """Write the quantities of a new entry in the scene's own units, of two digits."""
-    if isinstance(value, dict):
-        return {key: _suit_entry(inner, own) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_suit_entry(inner, own) for inner in value]
-    if not isinstance(value, str):
-        return value
-    for si, base in _SUITED.items():
-        try:
-            number = to_si(value, si)
-        except UnitError:
-            continue
-        if base not in own:
-            return value
-        unit = re.sub(r"N m|kg|N|m", lambda part: find_unit_in(part[0], own)[0], si)
-        shown = number / to_si(f"1 {unit}", si)
-        of_two_digits = float(f"{shown:.2g}")
-        return f"{of_two_digits:g} {unit}"
-    return value
 
 
 def _read_typed_pressure(text: str) -> str:
