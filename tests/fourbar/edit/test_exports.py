@@ -71,3 +71,5 @@ def test_a_balanced_drive_has_no_peak_of_rounding():
     gravity_only = replace(scene, effects=(), loads=())
     peaks = evaluate_scene(gravity_only, COMMON, settled=True)["peaks"]
     assert peaks["torque"] == 0.0
+    headline = evaluate_scene(gravity_only, COMMON)["headline"]
+    assert headline.startswith("peak torque at least 0 N m; ")

@@ -164,6 +164,12 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes(part):
     loads(document.text())
 
 
+def test_a_new_tolerance_is_a_thousandth_in_the_unit_of_its_number(session):
+    (part,) = (n for n, part in enumerate(PARTS) if part["at"][0] == "tolerances")
+    ask(session, "add", part=part, name="lengths.input")
+    assert session.now.plain["tolerances"] == {"lengths.input": "0.1 mm"}
+
+
 MASS_PER_METRE = {
     "mass": None,
     "density": 7850.0 * math.pi * 0.025**2,
