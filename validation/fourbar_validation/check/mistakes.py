@@ -30,8 +30,6 @@ from fourbar_validation.check.variants import (
     Mistake,
     Predict,
     Variant,
-    Wanted,
-    always,
     drop_remainder,
     state_all,
 )
@@ -335,21 +333,16 @@ class Explanation(NamedTuple):
 def explain(
     judge: Judge,
     differing: list[JudgedColumn],
-    wanted: Wanted = always,
 ) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
 
     The most complete come first. A mistake of the calculation breaks no quantity that
-    agreed as it was; those of columns count together. Of a calculation only those are
-    tried that are wanted.
+    agreed as it was; those of columns count together.
     """
     least = ENOUGH_EXPLAINED * len(differing)
     found: list[Explanation] = []
     for find in _SOURCES:
         for mistake in find(judge, differing):
-            tried = mistake.fitted or not mistake.whole or wanted(mistake.text)
-            if not tried:
-                continue
             explained = _list_explained(judge, mistake, differing, least)
             if explained:
                 explanation = Explanation(

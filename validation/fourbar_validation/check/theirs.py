@@ -172,11 +172,6 @@ class TheirColumn(NamedTuple):
     """The same if the zeros at the ends of numbers were left off, (n,)."""
     unit: Unit
 
-    def part(self, rows: slice) -> "TheirColumn":
-        """Return some of the rows."""
-        values, rounding, filled, unit = self
-        return TheirColumn(values[rows], rounding[rows], filled[rows], unit)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TheirTable:
@@ -206,17 +201,6 @@ class TheirTable:
     def places(self) -> Array:
         """Return the angle of each row, rad, (n,)."""
         return self.place.values
-
-    def part(self, rows: slice) -> "TheirTable":
-        """Return some of the rows."""
-        return replace(
-            self,
-            place=self.place.part(rows),
-            columns={key: column.part(rows) for key, column in self.columns.items()},
-            lines=self.lines[rows],
-            places_rounding=self.places_rounding[rows],
-            times=None if self.times is None else self.times[rows],
-        )
 
     def from_pin(self, origin: tuple[float, float]) -> "TheirTable":
         """Return the table with its places from O2.

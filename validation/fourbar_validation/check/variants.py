@@ -27,13 +27,6 @@ _COMPUTED = UNITS.keys() - {*COUPLE[1:], *LINE[1:]}
 """Quantities that a wrong problem changes: an error and a range are the formulas'."""
 _TURNING = ("rad", "rad/s", "rad/s^2", "N m")
 """Units of what is reversed where angles are counted clockwise."""
-Wanted = Callable[[str], bool]
-"""Function of the text of a mistake that returns True if it is tried."""
-
-
-def always(text: str) -> bool:
-    """Want every mistake."""
-    return True
 
 
 class Mistake(NamedTuple):

@@ -4,7 +4,7 @@ import numpy as np
 
 from fourbar.errors import FourBarError
 from fourbar.quantities import OK, UNITS
-from fourbar_validation.check.judge_table import Judge
+from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.row_commands import RowCommands
 from fourbar_validation.check.theirs import (
@@ -13,7 +13,6 @@ from fourbar_validation.check.theirs import (
     TheirTable,
     Unit,
 )
-from fourbar_validation.check.variants import Wanted, always
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
 from fourbar_validation.compare.pins import state_from_pins
@@ -28,12 +27,10 @@ from fourbar_validation.run.question import Question
 
 MOST_POSITIONS_SEARCHED = 400
 """Positions, in a row, by which a mistake is looked for."""
-FIRST_ROWS = 30
-"""Rows, about the first that differs, by which mistakes are tried first. One that these
-do not contradict is held to all rows.
+MOST_POSITIONS_OF_FRICTION = 30
+"""The same, about the first that differs, where each trial looks for friction that
+balances the forces it follows.
 """
-FIRST_ROWS_OF_FRICTION = 8
-"""The same where each trial looks for friction that balances the forces it follows."""
 _NO_CAUSE = {*NOT_JUDGED, "drive_condition"}
 """Quantities by which no mistake is looked for: under friction the condition follows
 the forces.
@@ -58,40 +55,32 @@ def find_causes(
     if at is None or answer.assembled is None:
         return None
     scene = state_from_pins(question.scene)
+    slack = max(SAME_NUMBERS, tolerance.factor * (not tolerance.conditioned))
     try:
         regular = question.solution.status_code == OK
-        table = make_answer_table(answer, regular)
-        slack = max(SAME_NUMBERS, tolerance.factor * (not tolerance.conditioned))
-        rows = RowCommands(at.part(slice(len(table.places))))
-        judge = Judge(scene, table, rows=rows, slack=slack)
-        if predicted is not None:
-            hold_to_prediction(judge, predicted, len(at.angle))
-        columns = judge.columns.values()
-        wrong = {column: column.wrong & judge.ok for column in columns}
+
+        def judge_rows(rows: slice) -> tuple[Judge, dict[JudgedColumn, Mask]]:
+            table = make_answer_table(answer, regular, rows)
+            judge = Judge(scene, table, rows=RowCommands(at.part(rows)), slack=slack)
+            if predicted is not None:
+                hold_to_prediction(judge, predicted, rows, len(at.angle))
+            columns = judge.columns.values()
+            return judge, {column: column.wrong & judge.ok for column in columns}
+
+        judge, wrong = judge_rows(slice(MOST_POSITIONS_SEARCHED))
+        labels = [column.label for column, rows in wrong.items() if rows.any()]
+        if any(effect.loaded_pins for effect in scene.effects):
+            any_wrong = np.logical_or.reduce(list(wrong.values()))
+            judge, wrong = judge_rows(
+                choose_rows(any_wrong, MOST_POSITIONS_OF_FRICTION)
+            )
         differing = [column for column, rows in wrong.items() if rows.any()]
         if not differing:
             return None
-        wanted: Wanted = always
-        most = FIRST_ROWS
-        if any(effect.loaded_pins for effect in scene.effects):
-            most = FIRST_ROWS_OF_FRICTION
-        if len(table.places) > most:
-            part = choose_rows(np.logical_or.reduce(list(wrong.values())), most)
-            rows = RowCommands(judge.at.part(part))
-            few = Judge(scene, table.part(part), rows=rows, slack=slack)
-            for key, column in few.columns.items():
-                column.exact = judge.columns[key].exact[part]
-            there = [one.key for one in differing if wrong[one][part].any()]
-            tried = explain(few, [few.columns[key] for key in there])
-            if not tried:
-                return []
-            wanted = {explanation.text for explanation in tried}.__contains__
-        found = explain(judge, differing, wanted)
-        if not found and wanted is not always:  # what explained some rows misled
-            found = explain(judge, differing)
+        found = explain(judge, differing)
     except FourBarError:
         return None
-    return _say_causes(found, [column.label for column in differing])
+    return _say_causes(found, labels)
 
 
 def _say_causes(found: list[Explanation], differing: list[str]) -> list[str]:
@@ -118,13 +107,13 @@ def _say_causes(found: list[Explanation], differing: list[str]) -> list[str]:
 
 
 def choose_rows(wrong: Mask, most: int) -> slice:
-    """Choose the rows by which mistakes are tried first, about the first wrong one."""
+    """Choose the rows by which mistakes are looked for, about the first wrong one."""
     latest = max(0, len(wrong) - most)
     start = min(max(0, int(np.argmax(wrong)) - most // 2), latest)
     return slice(start, start + most)
 
 
-def hold_to_prediction(judge: Judge, predicted: Predicted, n: int) -> None:
+def hold_to_prediction(judge: Judge, predicted: Predicted, rows: slice, n: int) -> None:
     """Allow the predicted error at those of n positions where the law leaves no digit.
 
     A run fails an answer by the same prediction.
@@ -132,20 +121,21 @@ def hold_to_prediction(judge: Judge, predicted: Predicted, n: int) -> None:
     for key, column in judge.columns.items():
         exact = column.exact
         beyond = np.zeros(n, dtype=bool)
-        beyond[: len(exact)] = ~(exact <= MOST_ALLOWED)
+        beyond[rows] = ~(exact <= MOST_ALLOWED)
         if beyond.any():
-            errors = TIMES_PREDICTED * predicted(key, beyond)[: len(exact)]
+            errors = TIMES_PREDICTED * predicted(key, beyond)[rows]
             share = divide(errors, column.size)
-            column.exact = np.where(beyond[: len(exact)], share, exact)
+            column.exact = np.where(beyond[rows], share, exact)
 
 
-def make_answer_table(answer: Answer, regular: Mask) -> TheirTable:
+def make_answer_table(
+    answer: Answer, regular: Mask, rows: slice = slice(MOST_POSITIONS_SEARCHED)
+) -> TheirTable:
     """Return a table of an engine's numbers, as if they had been read from a file.
 
     `regular`: positions that are looked at; beside a change point numbers are anything.
     """
     assert answer.at is not None and answer.assembled is not None
-    rows = slice(MOST_POSITIONS_SEARCHED)
     angle = np.asarray(answer.at.angle[rows], dtype=float)
     blank = ~(answer.assembled & regular)[rows]
     exact = np.zeros(len(angle))
