@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.examine import (
-    examine_changed,
     examine_file,
     examine_mended,
 )
@@ -266,11 +265,6 @@ def examine_text(scene, text, names):
     """
     file = None if text is None else file_of(text)
     return examine_file(scene, file, replace(AS_DRAWN, names=names))
-
-
-def change(scene, changes):
-    """Return the answers of the generated file, and with each entry changed."""
-    return list(map(_answers_or_none, examine_changed(scene, changes)))
 
 
 def mend(scene, file, names, changes):

@@ -3,6 +3,7 @@
 The list says what each difference costs.
 """
 
+import cmath
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from fourbar.effects import Gravity
+from fourbar.linkage import Bar
 from fourbar.quantities import FORCE_NAMES
+from fourbar.scene import Scene
+from fourbar.studies.keys import list_entries, read_number, replace_number
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.description import ModelEntry, Value
@@ -108,6 +113,37 @@ def find_differences(
         written = "" if entries[1] is None else " ".join(entries[1][1:]).strip()
         differences.append(Difference(key, mine, yours, remark, written))
     return differences
+
+
+def change_scene(scene: Scene, one: Difference) -> Scene | None:
+    """Return a scene with a length, a number of a bar or gravity as in a file.
+
+    None for other entries.
+    """
+    if not (isinstance(one.theirs, float) and isinstance(one.generated, float)):
+        return None
+    change = one.theirs - one.generated
+    if one.key in ("gravity.x", "gravity.y"):
+        pull = complex(change) if one.key.endswith("x") else 1j * change
+        others = []
+        for effect in scene.effects:
+            if isinstance(effect, Gravity):
+                pull += complex(*effect.vector)
+            else:
+                others.append(effect)
+        return replace(scene, effects=(*others, Gravity(*cmath.polar(pull))))
+    linkage = scene.linkage
+    crank, coupler, output = (
+        Bar(bar.length, bar.mass, bar.moment_of_inertia, bar.mass_centre)
+        for bar in linkage.moving
+    )
+    linkage = replace(linkage, input=crank, coupler=coupler, output=output)
+    scene = replace(scene, linkage=linkage, drawing=None)
+    key = one.key.replace("centre.distance", "centre.0").replace(".angle", ".1")
+    entry = list_entries(scene).get(key)
+    if entry is None or not key.startswith(("lengths.", "bars.")):
+        return None
+    return replace_number(scene, entry, read_number(scene, entry) + change)
 
 
 def price(

@@ -1,7 +1,7 @@
 """Somebody's MJCF judged against a scene: errors, what differs, and what that costs.
 
-Differences of the mechanism are put one at a time into the generated file; settings,
-and what the generated file cannot hold, are corrected in theirs.
+Lengths, numbers of bars and gravity are put one at a time into the scene; all other
+differences are corrected in their file.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, FORCE_NAMES, OK, PIN_FORCES, UNKNOWNS, Array
-from fourbar.scene import Scene, command
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -43,6 +43,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
 from fourbar_validation.report.templating import write_error
 from fourbar_validation.robots.differences import (
     Difference,
+    change_scene,
     find_differences,
     is_of_another_linkage,
     is_setting,
@@ -61,7 +62,6 @@ JUDGED_QUANTITIES = tuple(
 for an instant; what that does to the torque and the pin forces is judged there.
 """
 _EXAMINE = "fourbar_validation.engines.mujoco.robots.examine:examine_file"
-_CHANGED = "fourbar_validation.engines.mujoco.robots.examine:examine_changed"
 _MENDED = "fourbar_validation.engines.mujoco.robots.examine:examine_mended"
 _SOFTNESS = "fourbar_validation.engines.mujoco.robots.examine:predict_softness"
 _NOTHING = 1e-9
@@ -201,11 +201,12 @@ def judge_file(
             rows = list_rows(name, theirs.measured, tolerance, softness)
         differences = find_differences(generated.described, theirs.described)
         if any(row.failed for row in rows):
+            at = theirs.measured.command(theirs.measured.states)
             differences = _price(
                 differences,
-                lambda measured: list_rows(name, measured, tolerance),
                 rows,
-                lambda changes: examined(_CHANGED, scene, changes, plain),
+                lambda one: answer_changed(scene, one, at),
+                lambda ones: judge_answers(name, theirs.measured, ones, tolerance),
                 lambda changes: examined(_MENDED, scene, file, held, changes),
             )
     notes = [*theirs.notes]
@@ -223,36 +224,50 @@ def judge_file(
     return LoopJudgement(theirs.measured, order(differences), errors, notes)
 
 
-Remeasure = Callable[[Sequence[Any]], list[LoopMeasurement | None]]
-"""Function that measures a file with each of some entries changed."""
-
-
 def _price(
     differences: list[Difference],
-    judge: Callable[[LoopMeasurement], list[Row]],
     rows: list[Row],
-    change: Remeasure,
-    mend: Remeasure,
+    answer: Callable[[Difference], Answer | None],
+    judge: Callable[[Sequence[Answer]], list[Row]],
+    mend: Callable[[Sequence[Any]], list[LoopMeasurement | None]],
 ) -> list[Difference]:
-    """Return the differences that change something, each with its cost in accuracy."""
-    of_mechanism = [one for one in differences if not is_setting(one.key)]
-    unchanged, *changed = (
-        [] if measured is None else judge(measured)
-        for measured in change([(one.key, one.theirs) for one in of_mechanism])
-    )
-    priced = {
-        one.key: price(one, its_rows, unchanged)
-        for one, its_rows in zip(of_mechanism, changed, strict=True)
-    }
+    """Return the differences that change something, each with its cost in accuracy.
+
+    Parameters
+    ----------
+    answer : answer of the formulas with one entry as in the file, if they have it.
+    judge : judges answers.
+    mend : measures the file with each of some entries mended.
+    """
+    priced = {one.key: one for one in differences}
+    left = []
     for one in differences:
-        priced.setdefault(one.key, one)
-    left = [one for one in priced.values() if one.cost is None]
+        changed = answer(one)
+        if changed is None:
+            left.append(one)
+        else:
+            priced[one.key] = price(one, judge([changed]), ())
     mended = mend([(one.key, one.generated) for one in left])
     for one, measured in zip(left, mended, strict=True):
         if measured is not None:
-            priced[one.key] = price(one, rows, judge(measured))
-    kept = [priced[one.key] for one in differences]
-    return [one for one in kept if one.cost is None or one.cost > _NOTHING]
+            priced[one.key] = price(one, rows, judge(list_answers(measured)))
+    return [one for one in priced.values() if one.cost is None or one.cost > _NOTHING]
+
+
+def answer_changed(scene: Scene, one: Difference, at: Command) -> Answer | None:
+    """Answer with the formulas of a scene that has one entry as in their file.
+
+    None where a scene cannot have it.
+    """
+    changed = change_scene(scene, one)
+    if changed is None:
+        return None
+    solution = solve(changed, "force", at=at)
+    quantities = {
+        name: np.asarray(getattr(solution, name)) for name in JUDGED_QUANTITIES
+    }
+    closed = solution.status_code == OK
+    return Answer(FILE_AT_ONE_STATE, "formulas", at, closed, quantities)
 
 
 def list_rows(
@@ -265,6 +280,25 @@ def list_rows(
 
     Where the softness of its loop is known, errors are held to what it leaves.
     """
+    answers = list_answers(measured)
+    rows = judge_answers(name, measured, answers, tolerance, softness)
+    reason = "" if measured.through_time is None else measured.through_time.lost
+    if measured.left_assembly and not change_points(measured.scene.linkage, 2):
+        reason = "the simulation goes over to the other assembly"
+    if reason:
+        who = (name, FILE_THROUGH_TIME, "-")
+        rows.append(Row.unmeasured(*who, "watch", FAILS, reason))
+    return rows
+
+
+def judge_answers(
+    name: str,
+    measured: LoopMeasurement,
+    answers: Sequence[Answer],
+    tolerance: ErrorBound,
+    softness: Mapping[str, float] | None = None,
+) -> list[Row]:
+    """Hold answers on a measured loop to a tolerance; see `list_rows`."""
     scene = measured.scene
 
     def predicted(quantity: str, mask: Mask) -> Array:
@@ -279,7 +313,7 @@ def list_rows(
     if softness:
         held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
     rows = []
-    for answer in list_answers(measured):
+    for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
         for row in Comparison(name, scene, answer, formulas, held).rows():
             force = _name_force(scene, row.quantity)
@@ -290,12 +324,6 @@ def list_rows(
             left = TIMES_PREDICTED * (softness or {}).get(force, 0.0) / scale
             allowed = max(tolerance.factor, left)
             rows.append(_judge_vanishing(row, answer, formulas, scale, allowed))
-    reason = "" if measured.through_time is None else measured.through_time.lost
-    if measured.left_assembly and not change_points(scene.linkage, 2):
-        reason = "the simulation goes over to the other assembly"
-    if reason:
-        who = (name, FILE_THROUGH_TIME, "-")
-        rows.append(Row.unmeasured(*who, "watch", FAILS, reason))
     return rows
 
 

@@ -53,11 +53,11 @@ ERROR_HEADINGS = ("method", "quantity", "error", "of largest", "at", "median")
 JUDGED_HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 _DIFFERENCES = ("cost", "what differs")
 _ABOUT_COSTS = (
-    "cost: what this one entry adds to the error of the file itself, if it is a"
-    " setting, contacts, a range, a motor or gravcomp; of the others what it adds, as"
-    " in the file, to the error of the generated one. It is that of the torque or pin"
-    " force whose error grows most; of a setting, how far the worst error of all grows."
-    " A dash: this entry cannot be set by itself, or the file holds what it is held to"
+    "cost: what this one entry adds to the error, in the formulas if it is a length,"
+    " a number of a bar, gravity or a load, else in the file itself. It is that of the"
+    " torque or pin force whose error grows most; of a setting, how far the worst error"
+    " of all grows. A dash: this entry cannot be set by itself, or the file holds what"
+    " it is held to"
 )
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
 SCENE_ROUND_OFF = 1e-8
@@ -270,10 +270,9 @@ def _write_held(loop: LoopMeasurement) -> str:
     text = "no other degree of freedom is held"
     if loop.held:
         are = "degree of freedom is" if loop.held == 1 else "degrees of freedom are"
-        text = (
-            f"{loop.held} other {are} held: at single states by generalized forces,"
-            " through time (once the loop has settled) by armature"
-        )
+        text = f"{loop.held} other {are} held: at single states by generalized forces"
+        if loop.through_time is not None:
+            text += ", through time (once the loop has settled) by armature"
     if loop.as_it_is:
         return f"{text}; contacts, joint limits and other motors act as in the file"
     return f"{text}; contacts, joint limits and motors are off"

@@ -7,10 +7,8 @@ generated file.
 """
 
 import math
-from collections.abc import Mapping
 from itertools import chain, count
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -46,6 +44,8 @@ FRICTION_COMPLIANCE = {"dof_solref": "solreffriction", "dof_solimp": "solimpfric
 """Fields of MjModel and attributes by which dry friction yields, compared if there is
 any friction.
 """
+_FIELDS_OF_A_PIN = {name: entry[0] for name, entry in PIN_PROPERTIES.items()}
+_FIELDS_OF_A_PIN |= {attribute: one for one, attribute in FRICTION_COMPLIANCE.items()}
 _TENDON = {
     "stiffness": "stiffness",
     "damping": "damping",
@@ -367,171 +367,6 @@ def _read_bias(model: mujoco.MjModel, actuator: int) -> Array:
     return np.zeros(3)
 
 
-def set_entry(
-    text: str,
-    generated: Mapping[str, ModelEntry],
-    key: str,
-    value: Value | None,
-) -> str | None:
-    """Set one entry of the generated file, all others as they are.
-
-    None if it cannot be set alone.
-
-    `generated`: its description. `value`: None for what is not there.
-    """
-    subject, _, rest = key.partition(".")
-    if subject == "lift":  # its flags let nothing be lifted
-        return None
-    file = _GeneratedFile(text, generated)
-    name, _, part = rest.rpartition(".")
-    try:
-        if subject == "lengths":
-            file.set_length(rest, float(value))  # type: ignore[arg-type]
-        elif subject == "bars":
-            bar, _, part = rest.partition(".")
-            file.set_inertial(bar, part, float(value))  # type: ignore[arg-type]
-        elif subject == "loads":
-            file.set_load(name, part, value)
-        elif value is None:
-            file.find(generated[key].element).clear()
-        else:
-            file.set_attribute(key, value)
-    except (
-        KeyError,
-        TypeError,
-        ValueError,
-    ):  # an entry of another kind, or of an element that is not there
-        return None
-    return ET.tostring(file.root, encoding="unicode")
-
-
-def _write_setting(value: Value) -> str:
-    if isinstance(value, str):
-        return value
-    numbers = value if isinstance(value, tuple) else (value,)
-    return " ".join(
-        repr(int(number)) if number == int(number) else repr(number)
-        for number in numbers
-    )
-
-
-class _GeneratedFile:
-    """The generated file as elements, with its description."""
-
-    def __init__(self, text: str, generated: Mapping[str, ModelEntry]) -> None:
-        self.root = ET.fromstring(text)
-        self.generated = generated
-
-    def find(self, element: str) -> ET.Element:
-        """Find an element by tag and name; KeyError if there is none."""
-        tag, _, name = element.partition(" ")
-        written = {"tendon": ("fixed", "spatial"), "actuator": ("general",)}
-        for each_tag in written.get(tag, (tag,)):
-            for candidate in self.root.iter(each_tag):
-                if not name or candidate.get("name") == name.strip('"'):
-                    return candidate
-        raise KeyError(element)
-
-    def set_attribute(self, key: str, value: Value) -> None:
-        """Set the attribute that states an entry.
-
-        A pin's flag is taken off, so that the entry acts.
-        """
-        entry = self.generated[key]
-        attribute = entry.attribute
-        element = self.find(entry.element)
-        if attribute in ("", "axis"):
-            raise KeyError(key)
-        if attribute == "gravity":
-            field = [float(number) for number in element.attrib["gravity"].split()]
-            field["xy".find(key[-1]) if key[-1] in "xy" else 2] = float(value)  # type: ignore[arg-type]
-            value = tuple(field)
-        elif attribute in (
-            "springref",
-            "springlength",
-        ):  # described from the bars' lines
-            stated = float(element.attrib[attribute])
-            described = np.atleast_1d(entry.value)[0]
-            value = stated + float(np.atleast_1d(value)[0]) - float(described)
-        element.set(attribute, _write_setting(value))
-        flags = {name: flag for _, name, flag in PIN_PROPERTIES.values()}
-        flag = flags.get(attribute, "limit" if attribute == "range" else "")
-        switches = self.root.find("option/flag")
-        if flag and switches is not None:
-            switches.attrib.pop(flag, None)
-
-    def set_length(self, bar: str, value: float) -> None:
-        """Move the pin at the end of a bar along its line.
-
-        The pin of the ground is that of the output.
-        """
-        place: tuple[float, ...] = (value, 0.0, 0.0)
-        ends = {
-            "ground": 'body "output"',
-            "input": 'body "coupler"',
-            "coupler": 'site "B3"',
-            "output": 'site "B4"',
-        }
-        end = self.find(ends[bar])
-        if bar == "ground":
-            stated = [float(number) for number in end.attrib["pos"].split()]
-            factor = value / math.hypot(*stated)
-            place = tuple(factor * number for number in stated)
-        end.set("pos", _write_setting(place))
-
-    def set_inertial(self, bar: str, name: str, value: float) -> None:
-        """Set mass, inertia or mass centre of a bar, the others kept."""
-        inertial = self.find(f'body "{bar}"').find("inertial")
-        if inertial is None:
-            raise KeyError(bar)
-        if name == "mass":
-            inertial.set("mass", repr(value))
-        elif name == "inertia":
-            inertial.set("diaginertia", _write_setting((value, value, value)))
-        else:
-            polar = {
-                part: float(self.generated[f"bars.{bar}.{part}"].value)  # type: ignore[arg-type]
-                for part in ("centre.distance", "centre.angle")
-            }
-            distance, angle = (polar | {name: value}).values()
-            place = (distance * math.cos(angle), distance * math.sin(angle), 0.0)
-            inertial.set("pos", _write_setting(place))
-
-    def set_load(self, key: str, name: str, value: Value | None) -> None:
-        """Add what a load lacks of another.
-
-        The sum of the two is the load with this one entry, the others kept.
-        """
-        bar, axes = key.split(", ")
-        if axes not in ("world axes", f"axes of the {bar}"):
-            raise KeyError(axes)
-        was = {}
-        for part in ("force", "point", "couple"):
-            entry = self.generated.get(f"loads.{key}.{part}")
-            was[part] = np.atleast_1d((0.0, 0.0, 0.0) if entry is None else entry.value)
-        wanted = was | {name: np.atleast_1d(0.0 if value is None else value)}
-        body = self.find(f'body "{bar}"')
-        actuators = ET.SubElement(self.root, "actuator")
-        for number, (parts, sign) in enumerate(((was, -1.0), (wanted, 1.0))):
-            force, point = (np.resize(parts[part], 2) for part in ("force", "point"))
-            site = f"changed_{number}"
-            place = (float(point[0]), float(point[1]), 0.0)
-            ET.SubElement(body, "site", name=site, pos=_write_setting(place))
-            gear = sign * np.array((*force, 0.0, 0.0, 0.0, parts["couple"][0]))
-            ET.SubElement(
-                actuators,
-                "general",
-                {"refsite": "O2"} if axes == "world axes" else {},
-                site=site,
-                name=site,
-                gaintype="fixed",
-                gainprm="0",
-                biastype="affine",
-                biasprm="1 0 0",
-                gear=_write_setting(tuple(gear.tolist())),
-            )
-
-
 def mend_entry(
     seen: SeenLoop,
     key: str,
@@ -541,7 +376,8 @@ def mend_entry(
 
     False if that is not possible. Contacts are switched off, a
     stop and the motors at a pin are removed, the loop is made as stiff as MuJoCo lets
-    it be unless it is, and a setting gets its value.
+    it be unless it is, and a setting, and what acts at a pin or along a tendon, gets
+    its value.
     """
     model = seen.model
     subject, _, rest = key.partition(".")
@@ -550,12 +386,6 @@ def mend_entry(
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     elif subject == "lift":
         model.body_gravcomp[seen.list_parts(BAR_NUMBERS[rest])] = 0.0
-    elif subject == "pins" and what == "range":
-        model.jnt_limited[seen.hinge[pin]] = 0
-    elif subject == "pins" and what == "motor":
-        joint = seen.hinge[pin]
-        for i in list_actuators(model, joint):
-            model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
     elif subject == "option" and rest in ENUMERATIONS:
         setattr(model.opt, rest, number_of_word(rest, str(value)))
     elif subject == "option":
@@ -567,14 +397,51 @@ def mend_entry(
         if np.all(model.eq_solimp[seen.closure, :2] == STIFFEST):
             return False
         model.eq_solimp[seen.closure, :2] = STIFFEST
-    elif subject == "pins" and what in FRICTION_COMPLIANCE.values():
-        (field,) = (
-            one for one, attribute in FRICTION_COMPLIANCE.items() if attribute == what
-        )
-        dof = model.jnt_dofadr[seen.hinge[pin]]
-        getattr(model, field)[dof] = value
+    elif subject == "pins" and pin in seen.hinge:
+        return _mend_pin(seen, pin, what, value)
+    elif subject == "tendons":
+        return _mend_tendon(seen, key, value)
     else:
         return False
+    return True
+
+
+def _mend_pin(seen: SeenLoop, pin: str, what: str, value: Value | None) -> bool:
+    """Make what acts at a pin, or how it yields, that of the generated file.
+
+    Stops and motors are removed.
+    """
+    model = seen.model
+    joint = seen.hinge[pin]
+    if what == "range":
+        model.jnt_limited[joint] = 0
+    elif what == "motor":
+        for i in list_actuators(model, joint):
+            model.actuator_gainprm[i] = model.actuator_biasprm[i] = 0.0
+    elif what == "spring angle":
+        turned = np.subtract(value, seen.rest_angle(pin, spring=True))  # type: ignore[arg-type]
+        model.qpos_spring[model.jnt_qposadr[joint]] += seen.sense[pin] * turned
+    elif what in _FIELDS_OF_A_PIN:
+        field = _FIELDS_OF_A_PIN[what]
+        row = joint if field.startswith("jnt") else model.jnt_dofadr[joint]
+        getattr(model, field)[row] = value
+    else:
+        return False
+    return True
+
+
+def _mend_tendon(seen: SeenLoop, key: str, value: Value | None) -> bool:
+    """Make one entry of a tendon that of the generated file, 0 where it has none."""
+    entry = describe_model(seen).get(key)
+    if entry is None or not entry.attribute:
+        return False
+    number = seen.model.tendon(entry.element.partition(" ")[2].strip('"')).id
+    if entry.attribute == "springlength":
+        longer = np.subtract(value, entry.value)  # type: ignore[arg-type]
+        seen.model.tendon_lengthspring[number] += longer
+        return True
+    (field,) = (one for one, written in _TENDON.items() if written == entry.attribute)
+    getattr(seen.model, f"tendon_{field}")[number] = 0.0 if value is None else value
     return True
 
 

@@ -8,13 +8,12 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fourbar.errors import FourBarError, LimitError
+from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.document import Drive
 from fourbar.quantities import OK
@@ -29,7 +28,6 @@ from fourbar_validation.engines.mujoco.describe import (
     Described,
     describe_model,
     mend_entry,
-    set_entry,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
     LoopMeasurement,
@@ -68,8 +66,9 @@ class Examined:
     notes: list[str]
 
 
-def _generate(scene: Scene, drive: Drive = "flywheel") -> RobotFile:
+def _generate(scene: Scene) -> RobotFile:
     """Generate the file of a scene, at rest if no MJCF has a motion like its own."""
+    drive: Drive = "flywheel"
     commanded = command(scene)
     rates = (commanded.speed, commanded.acceleration)
     varies = any(rate is not None and np.ptp(rate) for rate in rates)
@@ -111,34 +110,6 @@ def examine_file(
     notes = [*found.compiled.notes, *found.robot.notes, *found.parts]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return Examined(described, measured, notes)
-
-
-def examine_changed(
-    scene: Scene, changes: Changes, options: MeasureOptions = _PLAIN
-) -> list[LoopMeasurement | None]:
-    """Measure the generated file, then it with each entry alone changed.
-
-    The file is without a drive, and first as it is. None stands for an entry that
-    cannot be set alone. After PRICING the rest are not evaluated either.
-    """
-    file = _generate(scene, "none")
-    found = find_loop_of_scene(file, scene, options)
-    generated = describe_model(found.see())
-    texts = (set_entry(file.text, generated, key, value) for key, value in changes)
-
-    def measure(text: str | None) -> LoopMeasurement | None:
-        if text is None:
-            return None
-        try:
-            changed = find_loop_of_scene(replace(file, text=text), scene, options)
-            return measure_loop(changed, options, briefly=True)
-        except FourBarError:
-            # with this entry it is no four-bar, or does not compile
-            return None
-
-    return list(
-        _take_in_time(map(measure, chain([file.text], texts)), len(changes) + 1)
-    )
 
 
 def examine_mended(
