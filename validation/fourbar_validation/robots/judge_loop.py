@@ -263,9 +263,8 @@ def answer_changed(scene: Scene, one: Difference, at: Command) -> Answer | None:
     if changed is None:
         return None
     solution = solve(changed, "force", at=at)
-    quantities = {
-        name: np.asarray(getattr(solution, name)) for name in JUDGED_QUANTITIES
-    }
+    names = {*JUDGED_QUANTITIES} - {COUPLE.value} | {name_driving(scene)}
+    quantities = {name: np.asarray(getattr(solution, name)) for name in names}
     closed = solution.status_code == OK
     return Answer(FILE_AT_ONE_STATE, "formulas", at, closed, quantities)
 

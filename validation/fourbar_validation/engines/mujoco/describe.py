@@ -413,6 +413,8 @@ def _mend_pin(seen: SeenLoop, pin: str, what: str, value: Value | None) -> bool:
     """
     model = seen.model
     joint = seen.hinge[pin]
+    if value is None and what != "motor":
+        return False
     if what == "range":
         model.jnt_limited[joint] = 0
     elif what == "motor":
@@ -435,13 +437,14 @@ def _mend_tendon(seen: SeenLoop, key: str, value: Value | None) -> bool:
     entry = describe_model(seen).get(key)
     if entry is None or not entry.attribute:
         return False
+    value = 0.0 if value is None else value
     number = seen.model.tendon(entry.element.partition(" ")[2].strip('"')).id
     if entry.attribute == "springlength":
-        longer = np.subtract(value, entry.value)  # type: ignore[arg-type]
+        longer = np.subtract(value, entry.value)
         seen.model.tendon_lengthspring[number] += longer
         return True
     (field,) = (one for one, written in _TENDON.items() if written == entry.attribute)
-    getattr(seen.model, f"tendon_{field}")[number] = 0.0 if value is None else value
+    getattr(seen.model, f"tendon_{field}")[number] = value
     return True
 
 
