@@ -54,7 +54,7 @@ JUDGED_HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 _DIFFERENCES = ("cost", "what differs")
 _ABOUT_COSTS = (
     "cost: what this one entry adds to the error, in the formulas if it is a length,"
-    " a number of a bar, gravity or a load, else in the file itself. It is that of the"
+    " a number of a bar or gravity, else in the file itself. It is that of the"
     " torque or pin force whose error grows most; of a setting, how far the worst error"
     " of all grows. A dash: this entry cannot be set by itself, or the file holds what"
     " it is held to"

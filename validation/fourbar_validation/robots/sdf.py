@@ -31,11 +31,16 @@ _WIDEST = 1e9
 """rad or m; stands for a missing end of a range of which the other is stated."""
 LEAST_INERTIA = 1e-13
 """kg m^2; a thin rod states 0 about itself, which MuJoCo takes from no moving body."""
-_BUSHING = "drake:linear_bushing_rpy"
-_PIN = "drake:ball_constraint"
-_WELD = "drake:weld_constraint"
-_FRAMES = ("drake:parent_frame", "drake:child_frame")
+_BUSHING = "drake_linear_bushing_rpy"
+_PIN = "drake_ball_constraint"
+_WELD = "drake_weld_constraint"
+_FRAMES = ("drake_parent_frame", "drake_child_frame")
 """Elements of a joint that name its frame on each link; they coincide at its zero."""
+_ENDS = {
+    _WELD: {"parent": "", "child": ""},
+    _PIN: {f"{_PIN}_body_A": f"{_PIN}_p_AP", f"{_PIN}_body_B": f"{_PIN}_p_BQ"},
+}
+"""Elements of a constraint that name its bodies, each with that of a point on it."""
 _AXES = {
     "fixed": (),
     "ball": (),
@@ -97,13 +102,17 @@ def convert_sdf(root: ET.Element, find: FindModel) -> tuple[ET.Element, list[str
     InputError : what is missing or contradicts itself, in one line.
     """
     _name_prefixes(root)
-    return _Conversion(find).convert(root)
+    try:
+        return _Conversion(find).convert(root)
+    except RecursionError:
+        refused = "is placed relative to itself or attached to itself"
+        raise _refuse("one of its frames", refused) from None
 
 
 def _name_prefixes(root: ET.Element) -> None:
-    """Write the tags of Drake's elements as files write them, "drake:..."."""
+    """Write the tags of Drake's elements so that a path may hold them, "drake_..."."""
     for element in root.iter():
-        element.tag = re.sub("{[^}]*drake[^}]*}", "drake:", element.tag)
+        element.tag = re.sub("{[^}]*drake[^}]*}", "drake_", element.tag)
 
 
 def _refuse(what: object, allowed: str) -> InputError:
@@ -112,12 +121,7 @@ def _refuse(what: object, allowed: str) -> InputError:
 
 def _text(element: ET.Element, path: str, default: str = "") -> str:
     """Return the text of a descendant, or a default where it is missing or empty."""
-    if ":" in path:  # ElementTree takes it for the prefix of a namespace
-        found = next((one for one in element if one.tag == path), None)
-        text = "" if found is None else found.text
-    else:
-        text = element.findtext(path)
-    return (text or "").strip() or default
+    return (element.findtext(path) or "").strip() or default
 
 
 def _numbers(text: str, count: int, what: str) -> list[float]:
@@ -248,8 +252,6 @@ class _Conversion:
     def __init__(self, find: FindModel) -> None:
         self.find = find
         self.members: dict[str, _Member] = {}
-        self.pending: set[tuple[str, str]] = set()
-        """Names whose pose in a frame, or whose link, is being looked for."""
         self.edges: list[_Edge] = []
         self.constraints: list[tuple[str, ET.Element]] = []
         self.notes: list[str] = []
@@ -305,11 +307,11 @@ class _Conversion:
                 f"models that are missing are left out: {', '.join(self.missing)}"
             )
         if self.left_out:
-            names = ", ".join(sorted(self.left_out))
+            names = ", ".join(sorted(self.left_out)).replace("drake_", "drake:")
             self.notes.append(f"left out of the SDF: {names}")
         if _BUSHING in self.left_out:
             self.notes.append(
-                f"{_BUSHING} joins two links by springs; if it closes the loop, put "
+                "a bushing joins two links by springs; if it closes the loop, put "
                 "<drake:ball_constraint> in its place, a rigid pin"
             )
         return mujoco, self.notes
@@ -388,37 +390,31 @@ class _Conversion:
         )
         self.edges.append(_Edge(name, kind, parent, child, member.scope, element))
 
-    def _begin(self, name: str, asked: str) -> _Member:
-        """Return a member, of which the link or the pose in a frame is asked for."""
-        scope = name.rpartition("::")[0]
-        short = _shorten(name)
+    def _find_member(self, name: str) -> _Member:
+        """Return a member by its full name."""
         if name not in self.members:
+            scope, _, short = name.rpartition("::")
             unknown = _refuse(short, f"is no link, joint, frame or model of {scope}")
             raise next(iter(self.missing.values()), unknown)
-        if (name, asked) in self.pending:
-            raise _refuse(short, "is placed relative to itself or attached to itself")
-        self.pending.add((name, asked))
         return self.members[name]
 
     def _locate(self, name: str, base: str = "") -> Array:
         """Return the pose of a member in the frame of a model or the world, (4, 4)."""
         if name == base:
             return np.eye(4)
-        member = self._begin(name, base)
+        member = self._find_member(name)
         element = member.element
         pose = self._locate(member.reference, base) @ _make_pose_matrix(element)
         placed = element.get("placement_frame", "")
         if placed:
             pose = pose @ np.linalg.inv(self._locate(_join(name, placed), name))
-        self.pending.discard((name, base))
         return pose
 
     def _find_link(self, name: str) -> str:
         """Return the link that a name stands for or is attached to."""
         if not name:
             return ""
-        member = self._begin(name, "link")
-        link = name
+        member = self._find_member(name)
         if member.element.tag == "model":
             inside = [
                 other.element.get("name", "")
@@ -428,11 +424,8 @@ class _Conversion:
             stated = member.element.get("canonical_link")
             if not (stated or inside):
                 raise _refuse(name, "has no link")
-            link = self._find_link(_join(name, stated or inside[0]))
-        elif member.element.tag != "link":
-            link = self._find_link(member.carrier)
-        self.pending.discard((name, "link"))
-        return link
+            return self._find_link(_join(name, stated or inside[0]))
+        return name if member.element.tag == "link" else self._find_link(member.carrier)
 
     def _locate_in(self, link: str, name: str) -> Array:
         """Return the pose of a member in a link, (4, 4)."""
@@ -555,31 +548,22 @@ class _Conversion:
                 raise _refuse(name, 'states a <mass> beside auto="true": not read')
             self._add_collisions(body, link, element, _text(inertial, "density"))
             return
-        pose = _make_pose_matrix(inertial)
-        xx, yy, zz = (
-            _number(inertial, f"inertia/i{part}", "1", name)
-            for part in ("xx", "yy", "zz")
-        )
-        xy, xz, yz = (
-            _number(inertial, f"inertia/i{part}", "0", name)
-            for part in ("xy", "xz", "yz")
-        )
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        tensor = [
+            [
+                _number(inertial, f"inertia/i{min(a, b)}{max(a, b)}", own, name)
+                for a, own in zip("xyz", row, strict=True)
+            ]
+            for b, row in zip("xyz", np.eye(3).astype(str), strict=True)
+        ]
         moments, axes = np.linalg.eigh(tensor)
-        if moments[0] < LEAST_INERTIA:
-            tensor = axes @ np.diag(np.maximum(moments, LEAST_INERTIA)) @ axes.T
-        rotation = pose[:3, :3]
-        if xy or xz or yz or not np.array_equal(rotation, np.eye(3)):
-            tensor = rotation @ tensor @ rotation.T
-            numbers = [*np.diagonal(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-            stated = {"fullinertia": _write(numbers)}
-        else:
-            stated = {"diaginertia": _write(np.diagonal(tensor))}
-        place = _write(pose[:3, 3])
+        pose = _make_pose_matrix(inertial)
+        pose[:3, :3] = pose[:3, :3] @ axes * np.linalg.det(axes)
         mass = _number(inertial, "mass", "1", name)
         if mass <= 0.0:
             raise _refuse(mass, f"must be above 0: the mass of {name}, kg")
-        ET.SubElement(body, "inertial", {"pos": place, "mass": repr(mass), **stated})
+        stated = {"mass": repr(mass), **_write_place(pose)}
+        stated["diaginertia"] = _write(np.maximum(moments, LEAST_INERTIA))
+        ET.SubElement(body, "inertial", stated)
 
     def _add_collisions(
         self, body: ET.Element, link: str, element: ET.Element, density: str
@@ -646,22 +630,17 @@ class _Conversion:
     def _add_constraint(self, scope: str, constraint: ET.Element) -> None:
         """Add a constraint of Drake: a weld of two frames, or a pin of two points."""
         ends = {}
-        if constraint.tag == _WELD:
-            for end in ("parent", "child"):
-                frame = _join(scope, _text(constraint, end))
-                link = self._find_link(frame)
-                ends[link] = self._locate_in(link, frame)
-        else:
-            for body, point in (("body_A", "p_AP"), ("body_B", "p_BQ")):
-                text = _text(constraint, f"{_PIN}_{point}")
-                place = np.eye(4)
-                place[:3, 3] = _numbers(text, 3, f"ball_constraint_{point}")
-                link = self._find_link(
-                    _join(scope, _text(constraint, f"{_PIN}_{body}"))
-                )
-                ends[link] = place
+        for body, point in _ENDS[constraint.tag].items():
+            frame = _join(scope, _text(constraint, body))
+            link = self._find_link(frame)
+            place = self._locate_in(link, frame)
+            if point:
+                where = _numbers(_text(constraint, point), 3, point)
+                place[:3, 3] += place[:3, :3] @ where
+            ends[link] = place
         if len(ends) != 2:
-            raise _refuse(constraint.tag, "must join two bodies")
+            tag = constraint.tag.replace("drake_", "drake:")
+            raise _refuse(tag, "must join two bodies")
         kind = "weld" if constraint.tag == _WELD else "connect"
         self._close(kind, "-".join(self.names[link] for link in ends), ends)
 
