@@ -322,8 +322,9 @@ class _Finder:
         reason = next(self._list_reasons(chain), "")
         if not reason:
             try:
+                loop = self._make_loop(chain)
                 other = self._make_loop(chain, from_other_end=True)
-                loop = replace(self._make_loop(chain), from_other_end=other)
+                loop = replace(loop, from_other_end=other)
             except _NoFourBarError as error:
                 reason = str(error)
         first, second = find_ends(model, self.before, number)
