@@ -10,7 +10,7 @@ GENERATED = write_mjcf(fourbar.load(ROOT / "models" / "crank_rocker.toml"))
 UNREAD = read_rows("""
 joint name="O4" | joint name="O4" actuatorfrcrange="-1 1" | joint actuatorfrcrange
 island="disable" | island="disable" eulerdamp="disable" | flag eulerdamp
-<statistic | <statistic meaninertia="2" | statistic meaninertia
+<worldbody> | <statistic meaninertia="2"/><worldbody> | statistic meaninertia
 </worldbody> | </worldbody><deformable/> | deformable
 """)
 
