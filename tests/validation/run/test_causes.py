@@ -813,28 +813,3 @@ def test_where_pins_slide_the_rows_about_the_first_wrong_one_are_looked_at():
 
     (cause,) = find_causes(partial(Altered, spoil_one_more), scene)
     assert cause == "sign reversed, or F_ij given for F_ji: F43, but F12 differs"
-
-
-def round_to_single(numbers, at):
-    rng = np.random.default_rng(2)
-    for name, values in numbers.items():
-        noise = rng.uniform(-1.0, 1.0, values.shape) * np.abs(values).max()
-        numbers[name] = np.float32(values + np.finfo(np.float32).eps * noise)
-
-
-def test_single_precision_is_named_and_a_smooth_error_of_its_size_is_not():
-    words = "numbers have some 7 digits, as those of single precision"
-    assert find_causes(partial(Altered, round_to_single)) == [words]
-
-    def add_noise(numbers, at):  # each number has all digits of a double
-        rng = np.random.default_rng(3)
-        for name, values in numbers.items():
-            numbers[name] = values * (1.0 + 3e-7 * rng.normal(size=values.shape))
-
-    assert find_causes(partial(Altered, add_noise)) == []
-
-    def stretch(numbers, at):
-        for name in ("F12", "torque"):
-            numbers[name] = (numbers[name].T * (1.0 + 1e-7 * np.sin(at.angle))).T
-
-    assert find_causes(partial(Altered, stretch)) == []

@@ -17,10 +17,9 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
 from fourbar.solving import solve
 from fourbar_validation.check.csv_columns import compute_column
-from fourbar_validation.check.judge_table import Judge, JudgedColumn
+from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.variants import Mistake
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
-from fourbar_validation.compare.tolerance import EPS, Mask
 from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving
 from fourbar_validation.engines.free_body import (
     DRIVE_COLUMN,
@@ -47,12 +46,6 @@ SOFT_TORQUE = 1e-6
 """Part of the torque that a soft constraint still carries at rest in MuJoCo's inverse
 dynamics of a loop; 2e-8 was seen.
 """
-EPS_SINGLE = float(np.finfo(np.float32).eps)
-"""Round-off of numbers of single precision."""
-LEAST_OF_SINGLE = EPS_SINGLE / 100.0
-"""Median error, as a part of each size, from which numbers may be single ones."""
-MOST_IN_COMMON = 0.5
-"""Correlation of the errors of neighbours that round-off does not reach."""
 _LATE = {
     "one step late: numbers of the position before": 1,
     "one step early: numbers of the position after": -1,
@@ -259,43 +252,6 @@ def _list_parts_of_centres(motion: BodyMotion) -> Iterator[_Accelerated]:
     yield _Accelerated("a_A is missing in a_G of bar 3", {3: -a_A})
     whole = {bar: -part - of_A * (bar == 3) for bar, part in centripetal.items()}
     yield _Accelerated("-omega^2 r is missing in every a_G, and in a_A", whole)
-
-
-def find_single_precision(judge: Judge) -> Iterator[Mistake]:
-    """Yield the mistake of too short numbers if errors are such as these leave.
-
-    Each number is one of single precision, or ours but for the rounding to one. No
-    error is beyond what round-off of that size allows, most are larger than those of a
-    file that is rounded elsewhere, and those of neighbours have nothing in common.
-    """
-    errors = []
-    common = []
-    for column in judge.columns.values():
-        mask = column.where
-        error = column.judged_right[0][mask]
-        if not np.all(error <= EPS_SINGLE / EPS * column.exact[mask]):
-            return
-        errors.append(error[error > 0.0])
-        apart = (column.theirs - column.ours)[mask]
-        if not np.all(_is_single(column)[mask] | np.isnan(column.theirs[mask])):
-            return
-        common.append(np.nansum(apart[1:] * apart[:-1]) / np.nansum(apart**2))
-    typical = np.median(np.concatenate(errors))
-    if typical >= LEAST_OF_SINGLE and np.nanmedian(common) < MOST_IN_COMMON:
-        theirs = {key: column.theirs for key, column in judge.columns.items()}
-        text = "numbers have some 7 digits, as those of single precision"
-        yield Mistake(text, theirs.get)
-
-
-def _is_single(column: JudgedColumn) -> Mask:
-    """Mark the numbers that single precision holds, or that are off by its rounding."""
-    theirs = column.theirs
-    factor = column.unit.factor
-    rounding = (column.rounding * column.divisor).reshape(-1, *[1] * (theirs.ndim - 1))
-    printed = theirs / factor
-    held = np.abs(np.float32(printed) - printed) - EPS * np.abs(printed)
-    off = np.abs(theirs - column.ours) - 0.5 * EPS_SINGLE * np.abs(theirs)
-    return np.asarray((held * factor <= rounding) | (off <= rounding))
 
 
 def _find_late(judge: Judge) -> Iterator[Mistake]:

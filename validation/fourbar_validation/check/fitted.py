@@ -397,18 +397,13 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     if several_alike or np.array_equal(nearest, in_place):
         return
     found_by = judge.table.found_by
-    steps = np.diff(nearest)
-    if np.all(steps[1:-1] == -1):
+    shifts = np.remainder(nearest - in_place + n / 2, n) - n / 2
+    rows = round(float(np.median(shifts)))
+    text = f"the rows are in another order than their {found_by}"
+    if np.all(np.diff(nearest)[1:-1] == -1):
         text = f"the rows are in reverse order: {found_by} runs the other direction"
-    elif np.count_nonzero(steps == 1) >= n - 2:
-        shifts = np.remainder(nearest - in_place + n / 2, n) - n / 2
-        rows = round(float(np.median(shifts)))
-        text = (
-            f"the rows are shifted by {rows:+d}: each has the numbers of another"
-            f" {found_by}"
-        )
-    else:
-        text = f"the rows are in another order than their {found_by}"
+    elif np.count_nonzero(shifts == rows) >= n - 2:
+        text = f"each row has the numbers of the {found_by} {rows:+d} rows away"
 
     def take(quantity: str) -> Array | None:
         values = getattr(judge.right, quantity, None)

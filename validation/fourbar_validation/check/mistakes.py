@@ -3,7 +3,7 @@
 The numbers that each would make are held against the table.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -17,7 +17,6 @@ from fourbar.solution import Solution
 from fourbar_validation.check.calculated import (
     ENOUGH_POSITIONS,
     find_miscalculated,
-    find_single_precision,
 )
 from fourbar_validation.check.fitted import (
     ENOUGH_DIGITS,
@@ -28,7 +27,6 @@ from fourbar_validation.check.fitted import (
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import (
     Mistake,
-    Predict,
     Variant,
     drop_remainder,
     state_all,
@@ -83,7 +81,6 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     """List every other problem that may have been solved, the simplest first."""
     at = drop_remainder(command)
     stated = state_all(scene)
-    yield from _take_differences(stated, at)
     for variant in _list_other_commands(stated, at):
         yield variant.mistake()
     for text, other in list_wrong_scenes(stated):
@@ -114,58 +111,6 @@ def _subtract_angle_of(right: Solution, bar: int, quantity: str) -> Array | None
     return np.asarray(values - base) if _is_angular(quantity) else None
 
 
-_DIFFERENCES = {
-    "forward": ((0, 1), (0, 1, 2)),
-    "backward": ((-1, 0), (-2, -1, 0)),
-    "central": ((-1, 1), (-1, 0, 1)),
-}
-"""Steps of the table at which an angle is taken for its speed and acceleration."""
-_NEAR = range(-2, 3)
-"""Steps by which the angles are shifted from which the differences are taken."""
-_SAME_STEP = 1e-6
-"""Part of a step by which the steps of a table may differ: the rounding of a file."""
-
-
-def _take_differences(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """Take speeds and accelerations from the angles at neighbouring rows of a table.
-
-    The rows are those of a motion at one speed, at equal steps; else there are none.
-    """
-    steps = np.diff(command.angle)
-    if command.speed is None or steps.size < ENOUGH_NUMBERS or not steps[0]:
-        return
-    speed = np.asarray(command.speed, dtype=float)
-    changes = np.any(command.acceleration) or np.ptp(speed) != 0.0 or not speed.any()
-    if changes or np.ptp(steps) > _SAME_STEP * abs(steps[0]):
-        return
-    second = steps[0] / float(speed.flat[0])
-    moved = {}
-    for number in _NEAR:
-        at = command._replace(angle=command.angle + number * steps[0])
-        moved[number] = Variant("", scene, at).mistake().predict
-    for name, taken in _DIFFERENCES.items():
-        predict = partial(_divide_differences, moved, taken, second)
-        yield Mistake(f"speeds and accelerations are {name} differences", predict)
-
-
-def _divide_differences(
-    moved: Mapping[int, Predict],
-    steps: tuple[tuple[int, ...], ...],
-    second: float,
-    quantity: str,
-) -> Array | None:
-    """Divide differences of an angle by those of the time."""
-    rate, _, bar = quantity.rpartition("_")
-    order = ("omega", "alpha").index(rate) + 1 if rate in ("omega", "alpha") else 0
-    angles = [moved[number](f"theta_{bar}") for number in steps[order - 1]]
-    if not order or angles[0] is None:
-        return None
-    turns = np.diff(np.array(angles), axis=0)
-    turns -= TURN * np.rint(turns / TURN)
-    step = second * (steps[order - 1][1] - steps[order - 1][0])
-    return np.asarray(np.diff(turns, order - 1, axis=0)[0] / step**order)
-
-
 def _list_other_commands(scene: Scene, command: Command) -> Iterator[Variant]:
     change = partial(_change_command, scene, command)
     yield change(_OTHER_BRANCH, branch=-command.branch)
@@ -181,9 +126,7 @@ def _list_other_commands(scene: Scene, command: Command) -> Iterator[Variant]:
         level = replace(scene, linkage=linkage)
         at = command._replace(angle=command.angle - turned)
         yield Variant("ground_angle is left out", level, at)
-    if isinstance(command.origin, StrokeOrigin):
-        yield from _list_other_strokes(change, command, command.origin)
-    else:
+    if not command.moves_stroke:
         yield from _list_other_angles(change, command)
     if len(command.angle) <= ENOUGH_POSITIONS:
         return
@@ -230,26 +173,6 @@ def _list_other_angles(
         for words, factor in _OF_ACCELERATIONS.items():
             other = command.acceleration * factor
             yield change(f"{alpha} {words.format('s^2')}", acceleration=other)
-
-
-def _list_other_strokes(
-    change: Callable[..., Variant], command: Command, origin: StrokeOrigin
-) -> Iterator[Variant]:
-    """List accelerations of the bar of a cylinder without one of their two terms.
-
-    One term is the acceleration of the stroke times omega over its speed; the other
-    is what the speed makes.
-    """
-    if command.speed is None or not np.all(origin.speed):
-        return
-    per_stroke = np.divide(command.speed, np.asarray(origin.speed, dtype=float))
-    of_stroke = origin.acceleration * per_stroke
-    alone = {
-        "stroke_acceleration is left out": command.acceleration - of_stroke,
-        f"what stroke_speed adds to alpha_{command.bar} is missing": of_stroke,
-    }
-    for text, acceleration in alone.items():
-        yield change(text, acceleration=acceleration)
 
 
 def _shift_by_half(values: Any, step: int) -> Any:
@@ -417,7 +340,6 @@ _SOURCES: tuple[Callable[[Judge, list[JudgedColumn]], Iterator[Mistake]], ...] =
     lambda judge, differing: find_miscalculated(judge),
     lambda judge, differing: list_hypotheses(judge.scene, judge.at),
     find_fitted,
-    lambda judge, differing: find_single_precision(judge),
 )
 """Sources of mistakes, the cheapest first: one is asked if none before it explains all.
 """
