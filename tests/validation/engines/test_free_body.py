@@ -24,6 +24,7 @@ from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody, continue_couples
+from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import imported
@@ -64,6 +65,13 @@ def test_a_spring_is_wound_along_the_assembly_through_change_points(pin):
         np.testing.assert_array_equal(np.isnan(torque), wound)
         due = 2.0 * (begin + turned - rest)[~wound]
         np.testing.assert_allclose(torque[~wound], due, rtol=1e-9)
+
+
+def test_a_spring_is_followed_through_a_gap_with_bars_3_and_4_in_line():
+    """Over the gap between the last two positions their line turns by 3.3 rad, and bar
+    3 with it; 3.0 rad the other way would wind the spring beyond half a turn.
+    """
+    assert np.isfinite(answered(draw_random_scene(401, 1216, ()))["torque"]).all()
 
 
 def test_it_imports_the_description_and_nothing_of_the_formulas():

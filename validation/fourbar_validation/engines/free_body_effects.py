@@ -295,8 +295,9 @@ def _interpolate_table(table: Any, theta_2: Array) -> Array:
 def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     """Return where a torsion spring is wound more than half a turn from its rest.
 
-    The spring's turns are followed from the motion's start, in its assembly. None where
-    no spring counts turns.
+    The spring's turns are followed from the motion's start, in its assembly. Where the
+    loop is open bars 3 and 4 lie along the line from A to O4, as at its limits. None
+    where no spring counts turns.
     """
     springs = [
         spring
@@ -313,11 +314,17 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
     closed = close(link, path, find_signs(link, path, scene.motion.branch))
-    path = path[closed.assembled]
-    if not (on_path := np.isin(begins.theta_2, path)).any():
+    on_path = np.isin(begins.theta_2, path[closed.assembled])
+    if not on_path.any():
         return gone
+    d, a, b, c = link.lengths
+    to_O4 = d * np.exp(1j * link.ground_angle) - a * np.exp(1j * path)
+    folded = np.abs(to_O4) < abs(b - c)
     theta = {1: np.full(len(path), link.ground_angle), 2: path}
-    theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
+    for bar, turned in ((3, folded & (b < c)), (4, ~folded | (b < c))):
+        in_line = np.angle(to_O4) + np.pi * turned
+        followed = np.where(closed.assembled, closed.theta[bar - 3], in_line)
+        theta[bar] = np.unwrap(followed)
     start = begins.theta_2[on_path][0]
     first = int(np.searchsorted(path, start))
     places = np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
