@@ -144,7 +144,6 @@ def write_html(
     ]
     cells = [cell for view in views for cell in view.cells]
     rows = [cell.row for cell in cells]
-    engines = _list_engines(rows)
     failing = sorted(
         (cell for cell in cells if cell.row.failed),
         key=lambda cell: (-cell.row.used, cell.line),
@@ -154,8 +153,7 @@ def write_html(
         "report.html.j2",
         s=summary,
         views=views,
-        engines=[name for name in engines if name != FORMULAS],
-        own_engines=[name for name in engines if name == FORMULAS],
+        engines=_list_engines(rows),
         failing=failing,
         failing_scenes={cell.row.scene for cell in failing},
         groups=OVERVIEW_GROUPS,
@@ -165,9 +163,6 @@ def write_html(
         },
         answers=Markup(_take_answers(summary.first)),
         lazy=len(views) > ALL_OPEN,
-        figures={
-            scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure
-        },  # drawn by our own code
         sections=sections,
         independence=[
             (engine, *texts) for engine, texts in sorted(summary.independence.items())

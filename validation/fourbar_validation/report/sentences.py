@@ -1,6 +1,5 @@
 """Sentences and small tables that commands print."""
 
-import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -54,10 +53,3 @@ def make_words_table(
     for row in rows:
         shown.add_row(*(escape(clean_line(cell)) for cell in row))
     return shown
-
-
-def write_two_digits(value: float) -> str:
-    """Write two digits: the table fits 80 columns, and results.csv has them all."""
-    if math.isnan(value):
-        return "-"
-    return f"{value:.1e}"

@@ -1,7 +1,6 @@
 """The table at the end of a run."""
 
 import math
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +8,7 @@ from fourbar.errors import clean_line, write_count
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.report.overview import OVERVIEW_GROUPS
 from fourbar_validation.report.run_summary import Summary
-from fourbar_validation.report.sentences import write_two_digits
+from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import write_error
 
 if TYPE_CHECKING:
@@ -80,68 +79,25 @@ def _print_rows(summary: Summary, console: Any) -> None:
 
 def _make_overview(summary: Summary) -> "Table":
     """Make the table of engines: largest error and allowance in each group."""
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-
-    from fourbar.show.folded import FoldedTable
-
-    shown = FoldedTable(
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
-        padding=(0, 1),
-    )
-    shown.add_column("error of allowed", overflow="fold", ratio=1)
-    for heading in (*OVERVIEW_GROUPS, "compared"):
-        shown.add_column(heading, justify="right", no_wrap=True)
+    rows = []
     for line in summary.independent:
-        name = escape(clean_line(line.name))
-        cells = []
-        for group in OVERVIEW_GROUPS:
-            worst = line.worst.get(group)
-            cell = " ".join(line.cell(group))
-            cells.append(f"[bold red]{cell}[/]" if worst and worst.failed else cell)
-        if line.counts[FAILS]:
-            name = f"[bold red]{name}[/]"
-        shown.add_row(name, *cells, str(line.counts.compared))
-    return shown
+        cells = [" ".join(line.cell(group)) for group in OVERVIEW_GROUPS]
+        rows.append((line.name, *cells, str(line.counts.compared)))
+    headings = ("error of allowed", *OVERVIEW_GROUPS, "compared")
+    return make_words_table(headings, rows, collapse_padding=True)
 
 
 def _make_worst_table(summary: Summary) -> "Table":
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-
-    from fourbar.show.folded import FoldedTable
-
     title = "worst row of each scene and engine"
     if len(summary.worst) < summary.judged:
         title = (
             f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
         )
-    shown = FoldedTable(
-        title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True
-    )
-    for heading in ("scene and engine", "worst"):
-        shown.add_column(heading, overflow="fold")
-    for heading in ("error", "allowed", "used", "at deg"):
-        shown.add_column(heading, justify="right", overflow="fold", no_wrap=True)
-    for scene, group in groupby(summary.worst, key=lambda row: row.scene):
-        shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
-        for row in group:
-            numbers = (
-                write_two_digits(row.error),
-                write_two_digits(row.allowed),
-                f"{row.used:.2g}",
-                (
-                    "-"
-                    if math.isnan(row.theta_2)
-                    else f"{math.degrees(row.theta_2):.1f}"
-                ),
-            )
-            words = (f"  {escape(row.engine)}", escape(row.quantity))
-            shown.add_row(
-                *words,
-                *numbers,
-                style="bold red" if row.failed else "",
-            )
-    return shown
+    rows = []
+    for row in summary.worst:
+        place = f"{math.degrees(row.theta_2):.1f}".replace("nan", "-")
+        sizes = map(write_error, (row.error, row.allowed))
+        words = (f"{row.engine}, {row.scene}", row.quantity)
+        rows.append((*words, *sizes, f"{row.used:.2g}", place))
+    headings = ("engine and scene", "worst", "error", "allowed", "used", "at deg")
+    return make_words_table(headings, rows, 2, title=title, collapse_padding=True)

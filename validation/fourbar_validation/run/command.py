@@ -13,7 +13,7 @@ from fourbar_validation.regression.record import PARQUET_FILE
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
 from fourbar_validation.run.plan import WORKERS
-from fourbar_validation.run.progress import ShownProgress
+from fourbar_validation.run.progress import show_progress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
 from fourbar_validation.run.run import run
 
@@ -126,13 +126,13 @@ def run_command(**stated: Any) -> int:
     plan = make_plan(request)
     if request.part is not None:
         scenes = plan.part_scenes
-        with ShownProgress(scenes) as progress:
+        with show_progress(scenes) as progress:
             judge_part(plan, request, progress)
         count = write_count(scenes, "scene")
         click.echo(f"part {request.part}: {count}, in {request.out / 'parts'}")
         plan.require_engines()
         return HOLDS
-    with ShownProgress(len(plan.suite)) as progress:
+    with show_progress(len(plan.suite)) as progress:
         summary = run(plan, request.out, progress)
     print_table(summary, request.out, verbose=request.verbose)
     worse = False

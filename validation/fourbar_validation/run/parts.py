@@ -11,7 +11,7 @@ import click
 from fourbar.errors import InputError
 from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.run.plan import Plan, Progress
-from fourbar_validation.run.progress import ShownProgress
+from fourbar_validation.run.progress import show_progress
 from fourbar_validation.run.request import (
     Request,
     keep_request,
@@ -117,7 +117,7 @@ def collect_command(
 
     parts, request, files = read_request(folders[0])
     plan = make_plan(request, files)
-    with ShownProgress(len(plan.suite)) as progress:
+    with show_progress(len(plan.suite)) as progress:
         summary = collect_parts(plan, folders, parts, out, progress)
     print_table(summary, out, verbose=verbose)
     return plan.conclude(summary)

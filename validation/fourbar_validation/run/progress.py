@@ -1,48 +1,19 @@
 """Progress of a run on a terminal."""
 
-from types import TracebackType
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from fourbar_validation.run.plan import DRAWING, Progress
 
 
-class ShownProgress(Progress):
+class _Shown(Progress):
     """Progress of a run on standard error: notes, and on a terminal a bar per stage."""
 
-    def __init__(self, scenes: int) -> None:
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-        from rich.progress import Progress as Bars
-
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-        )
-        console = Console(stderr=True)
-        self.bars = Bars(*columns, console=console, disable=not console.is_terminal)
+    def __init__(self, bars: Any, scenes: int) -> None:
+        self.bars = bars
         self.scenes = scenes
         self.tasks: dict[str, Any] = {}
-
-    def __enter__(self) -> "ShownProgress":
-        """Begin to show."""
-        self.bars.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave the bars as they are."""
-        self.bars.stop()
 
     def note(self, line: str) -> None:
         """Print the line above the bars."""
@@ -51,8 +22,24 @@ class ShownProgress(Progress):
     def advance(self, stage: str, scenes: int) -> None:
         """Move the bar of the stage; how many scenes are drawn is not told before."""
         if stage not in self.tasks:
-            self.tasks[stage] = self.bars.add_task(
-                stage,
-                total=None if stage == DRAWING else self.scenes,
-            )
+            total = None if stage == DRAWING else self.scenes
+            self.tasks[stage] = self.bars.add_task(stage, total=total)
         self.bars.advance(self.tasks[stage], scenes)
+
+
+@contextmanager
+def show_progress(scenes: int) -> Iterator[Progress]:
+    """Show the progress of a run of so many scenes, and leave the bars as they are."""
+    from rich import progress
+    from rich.console import Console
+
+    columns = (
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+    )
+    console = Console(stderr=True)
+    hidden = not console.is_terminal
+    with progress.Progress(*columns, console=console, disable=hidden) as bars:
+        yield _Shown(bars, scenes)
