@@ -13,7 +13,7 @@ from itertools import combinations, islice, pairwise, permutations
 import mujoco
 import numpy as np
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, write_count
 from fourbar.linkage import ENDS, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -73,7 +73,6 @@ EQUALITY_KINDS = {
 _TIED = {"connect": "body", "weld": "body"}
 """What an equality ties, where its kind does not say it."""
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
-NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven")
 NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
 _SERVE_SPATIAL = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
 _SERVE_PLANAR = "MuJoCo or Drake serve it, PMKS+ for a sketch"
@@ -190,11 +189,6 @@ def describe_equality(model: mujoco.MjModel, number: int) -> str:
     tied = [one for one in find_tied_bodies(model, number) if one >= 0]
     names = [name_part(model, _TIED.get(kind, kind), one) for one in tied]
     return "-".join(names)
-
-
-def _spell_count(number: int, most: int = 7) -> str:
-    """Write a number as a word up to a largest one."""
-    return NUMBERS[number] if number <= most else str(number)
 
 
 class _NoFourBarError(Exception):
@@ -444,14 +438,8 @@ class _Finder:
             return f"is a ball joint: the loop is spatial ({_SERVE_SPATIAL})"
         text = f"is a slide: a slider-crank or of its kin ({_SERVE_PLANAR})"
         coupled = self._find_coupled(chain)
-        taken = {joint for other in coupled for joint in other.joints}
-        holds = {*chain.others.values()} == {SLIDE} and taken.isdisjoint(chain.hinges)
-        if holds and self._makes_four_bar(chain, chain.others):
-            names = ",".join(name_joint(self.model, one) for one in chain.others)
-            text += f"; --hold {names} makes it a four-bar"
-        elif chain.hinges:
-            text += self._describe_inner_four_bar(chain, coupled)
-        return text
+        inner = self._describe_inner_four_bar(chain, coupled)
+        return text + (self._suggest_holds(chain, coupled) or inner)
 
     def _suggest_hinge(self, chain: _Chain) -> str:
         """Say what to type for a body that floats between two pins.
@@ -496,7 +484,7 @@ class _Finder:
     def _explain_count(self, chain: _Chain) -> str:
         """Say what another number of hinges makes, and what makes it a four-bar."""
         freedoms = chain.pins - 3
-        count = f"{_spell_count(chain.pins)} hinge{'s' if chain.pins > 1 else ''}"
+        count = write_count(chain.pins, "hinge")
         if freedoms <= 0 and chain.is_pin:
             return f"{count} in a plane cannot move"
         if freedoms <= 0:
@@ -504,26 +492,12 @@ class _Finder:
                 f"a weld that leaves no freedom: {count} in a plane cannot move; a"
                 ' <connect> or torquescale="0" makes a pin of it'
             )
-        motors = self._list_motors(chain)
         coupled = self._find_coupled(chain)
-        holds = self._list_holds(chain, coupled, freedoms - 1)
-        text = f"{count} and {_spell_count(freedoms, 3)} freedoms"
+        holds = self._suggest_holds(chain, coupled)
         if not holds and coupled:
             return self._explain_coupling(chain, coupled)
-        if not holds:
-            return f"{text}: no hold makes it a four-bar"
-        if len(motors) > 1:
-            names = ", ".join(
-                self.model.actuator(actuator).name
-                or f"on {name_joint(self.model, joint)}"
-                for joint, actuator in motors
-            )
-            text += f", driven by {len(motors)} motors ({names})"
-        first, *others = holds
-        text += f"; --hold {first}"
-        if others:
-            text += f" (or {' or '.join(others)})"
-        return f"{text} makes it a four-bar"
+        text = f"{count} and {write_count(freedoms, 'freedom')}"
+        return text + (holds or ": no hold makes it a four-bar")
 
     def _makes_four_bar(self, chain: _Chain, held: Iterable[int]) -> bool:
         """Tell whether a closure makes a four-bar with these joints held as well."""
@@ -551,29 +525,35 @@ class _Finder:
             joints.update(*(other.joints for other in more))
         return sorted(coupled, key=lambda other: other.number)
 
-    def _list_holds(
-        self, chain: _Chain, coupled: list[_Chain], count: int
-    ) -> list[str]:
-        """List the joints to hold that leave a four-bar apart from other loops.
+    def _suggest_holds(self, chain: _Chain, coupled: list[_Chain]) -> str:
+        """Name the joints to hold that leave a four-bar apart from other loops, if any.
 
-        The likeliest come first. Joints without a motor may be held. Several motors
-        hold: one of them is held while another moves. A spring holds its joint best.
+        The likeliest come first. Joints without a motor may be held, and slides.
+        Several motors hold: one of them is held while another moves. A spring holds its
+        joint best.
         """
+        count = max(chain.pins - len(PINS), 0)
         driven = {joint for joint, _ in self._list_motors(chain)}
         several = len(driven) > 1
-        joints = [one for one in chain.joints if (one in driven) == several]
+        hinges = [one for one in chain.hinges if (one in driven) == several]
         stiffness = self.model.jnt_stiffness
-        holdable = sorted(joints or chain.joints, key=lambda one: not stiffness[one])
+        hinges = sorted(hinges or chain.hinges, key=lambda one: not stiffness[one])
+        holdable = [*chain.others, *hinges]
         if len(holdable) < count:
             holdable = chain.joints
         taken = {joint for other in coupled for joint in other.joints}
         found = (
             ",".join(name_joint(self.model, joint) for joint in held)
             for held in combinations(holdable, count)
-            if not ({*chain.joints} - {*held}) & taken
+            if chain.others.keys() <= {*held}
+            and not ({*chain.joints} - {*held}) & taken
             and self._makes_four_bar(chain, held)
         )
-        return [*islice(found, 1 + _MOST_HOLDS)]
+        holds = [*islice(found, 1 + _MOST_HOLDS)]
+        if not holds:
+            return ""
+        others = f" (or {' or '.join(holds[1:])})" if holds[1:] else ""
+        return f"; --hold {holds[0]}{others} makes it a four-bar"
 
     def _explain_coupling(self, chain: _Chain, coupled: list[_Chain]) -> str:
         """Say which linkage loops with common bars make."""
@@ -588,12 +568,10 @@ class _Finder:
         bars = len(joints) + 1 - max(freedoms - 1, 0)
         which = NAMES_OF_LINKAGES.get(bars, f"a linkage of {bars} bars")
         if freedoms > 1:
-            held = _spell_count(freedoms - 1, 3)
-            which += f" once {held} of its freedoms is held"
+            which += f" once {freedoms - 1} of its freedoms is held"
         text = (
             f"with {names}, which {moves} its bars too, {len(joints)} hinges,"
-            f" {len(coupled) + 1} loops and {_spell_count(freedoms, 3)}"
-            f" {'freedom' if freedoms == 1 else 'freedoms'}: {which}"
+            f" {len(coupled) + 1} loops and {write_count(freedoms, 'freedom')}: {which}"
             f" ({_SERVE_PLANAR})"
         )
         return text + self._describe_inner_four_bar(chain, coupled)
@@ -604,53 +582,40 @@ class _Finder:
         The pins may be those of other closures.
         """
         model = self.model
-        pins: dict[frozenset[int], tuple[Array, str]] = {}
-        """Place and name of what joins two bars; hinges have no name."""
-        for joint in {*chain.hinges}.union(*(other.hinges for other in coupled)):
-            across = np.cross(*self.data.xaxis[[joint, chain.hinges[0]]])
-            if float(np.linalg.norm(across)) > math.sin(PARALLEL):
-                continue
-            parent = self.root[find_parent(model, model.jnt_bodyid[joint])]
-            pair = frozenset((self._find_root(joint), parent))
-            pins[pair] = self.data.xanchor[joint], ""
-        for one in (*coupled, chain):
+        loops = (*coupled, chain)
+        hinges = {joint for one in loops for joint in one.hinges}
+        pins: dict[frozenset[int], Array] = {}
+        """Place of what joins two bars."""
+        for joint in hinges:
+            across = np.cross(*self.data.xaxis[[joint, min(hinges)]])
+            if float(np.linalg.norm(across)) <= math.sin(PARALLEL):
+                parent = self.root[find_parent(model, model.jnt_bodyid[joint])]
+                pair = frozenset((self._find_root(joint), parent))
+                pins[pair] = self.data.xanchor[joint]
+        for one in loops:
             first, last = (self.root[end] for end in one.ends)
-            place, _ = find_ends(model, self.data, one.number)
-            pins[frozenset((first, last))] = place, one.name
-        of_others = {
-            self._find_root(joint) for other in coupled for joint in other.joints
-        }
+            pins[frozenset((first, last))], _ = find_ends(model, self.data, one.number)
+        moved = {self._find_root(joint) for one in coupled for joint in one.joints}
         bars = {bar for pair in pins for bar in pair}
         for inner in permutations(bars - {first, last}, 2):
             cycle = [first, *inner, last]
-            pairs = [frozenset(pair) for pair in pairwise([*cycle, first])]
-            if not all(pair in pins for pair in pairs):
-                continue
-            places = [pins[pair][0] for pair in pairs]  # before and after each bar
-            sizes = {
-                bar: float(np.linalg.norm(places[i] - places[i - 1]))
-                for i, bar in enumerate(cycle)
-            }
             ground = cycle.index(min(cycle, key=lambda bar: len(climb(model, bar))))
             cycle = cycle[ground:] + cycle[:ground]
             if cycle[1] > cycle[3]:
                 cycle[1:] = reversed(cycle[1:])
-            names = [name_body(model, bar) for bar in cycle]
-            shared = [name_body(model, bar) for bar in cycle[1:] if bar in of_others]
-            if len(shared) == len(cycle) - 1:  # it is the four-bar of another closure
+            pairs = [frozenset(pair) for pair in pairwise([*cycle, cycle[0]])]
+            shared = [name_body(model, bar) for bar in cycle[1:] if bar in moved]
+            # all of them: it is the four-bar of another closure
+            if len(shared) == len(cycle) - 1 or not pins.keys() >= {*pairs}:
                 continue
-            lengths = ", ".join(write_length(sizes[bar]) for bar in cycle)
-            text = (
+            names = [name_body(model, bar) for bar in cycle]
+            places = np.array([pins[pair] for pair in pairs])  # behind each bar
+            sizes = np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1)
+            lengths = ", ".join(map(write_length, sizes))
+            return (
                 f"; {', '.join(names[1:])} on {names[0]} ({lengths} mm) are a"
                 f" four-bar, but {', '.join(shared)} belongs to another loop too"
             )
-            in_it = ", ".join(filter(None, (pins[pair][1] for pair in pairs[:-1])))
-            if in_it:
-                text += (
-                    f": to measure it make a hinge of {in_it} and a connect"
-                    " of another joint of that loop"
-                )
-            return text
         return ""
 
     def _find_bar(self, body: int, bars: Container[int]) -> int:
