@@ -166,8 +166,8 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes(part):
 
 def test_a_new_tolerance_is_a_thousandth_in_the_unit_of_its_number(session):
     (part,) = (n for n, part in enumerate(PARTS) if part["at"][0] == "tolerances")
-    ask(session, "add", part=part, name="lengths.input")
-    assert session.now.plain["tolerances"] == {"lengths.input": "0.1 mm"}
+    ask(session, "add", part=part, name="bars.output.mass")
+    assert session.now.plain["tolerances"] == {"bars.output.mass": "0.0004 kg"}
 
 
 MASS_PER_METRE = {
