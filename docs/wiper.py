@@ -53,7 +53,8 @@ def draw(path: Path) -> None:
             torque = fourbar.solve(scene).torque
             look = {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar]}
             axes.plot(degrees, torque, label=name, **look)
-            mark_peak(axes, degrees, torque, "N m")
+            peak = torque[np.abs(torque).argmax()]
+            mark_peak(axes, degrees, torque, f"{peak:.3g} N m")
         set_degree_ticks(axes.xaxis, 360.0)
         axes.set(
             xlabel=r"$\theta_2$ (°)",

@@ -19,9 +19,7 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +51,6 @@ _ENDINGS = {
 HARNESS_PACKAGE = "fourbar_validation"
 LAST_LINES = 30
 """Lines of what the harness prints."""
-TICK = 0.5
-"""s, between two reports of progress."""
 
 
 def evaluate_scene(
@@ -249,7 +245,7 @@ def find_harness() -> list[str]:
 
 
 class HarnessRun:
-    """Run of the harness, with its progress; only one goes on at a time."""
+    """Run of the harness; only one goes on at a time."""
 
     def __init__(self, folder: Path, tell: Callable[[dict[str, Any]], None]) -> None:
         self.folder = folder
@@ -276,43 +272,28 @@ class HarnessRun:
                 self.process.terminate()
 
     async def _run(self, text: str) -> None:
-        began = time.monotonic()
-        lines = list[str]()
-
-        def report(**more: Any) -> None:
-            seconds = time.monotonic() - began
-            about = {"seconds": seconds, "lines": lines[:LAST_LINES], **more}
-            self.tell({"check": about})
-
+        about: dict[str, Any] = {"running": True, "lines": [], "report": False}
+        self.tell({"check": about})
         try:
             command = find_harness()
             self.folder.mkdir(parents=True, exist_ok=True)
             self.report.unlink(missing_ok=True)
             scene = self.folder / "scene.toml"
             write_text(scene, text)
+            files = str(scene.absolute()), "--out", str(self.folder.absolute())
             self.process = await asyncio.create_subprocess_exec(
                 *command,
                 "run",
-                str(scene.absolute()),
-                "--out",
-                str(self.folder.absolute()),
+                *files,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # so that it ends with all that it starts
             )
-            printed = self.process.stdout
-            assert printed is not None
-            while not printed.at_eof():
-                with suppress(TimeoutError):
-                    line = await asyncio.wait_for(printed.readline(), TICK)
-                    text = line.decode(errors="replace").rstrip()
-                    is_progress_bar = "\u2501" in text
-                    if line and not is_progress_bar:
-                        lines.append(text)
-                report(running=True)
-            status = await self.process.wait()
-            written = self.report.exists()
-            report(running=False, stopped=status < 0, status=status, report=written)
+            printed, _ = await self.process.communicate()
+            status = self.process.returncode
+            assert status is not None
+            lines = printed.decode(errors="replace").splitlines()[:LAST_LINES]
+            about |= {"lines": lines, "stopped": status < 0, "status": status}
         except (DependencyError, OSError) as error:
-            lines[:] = [str(error)]
-            report(running=False, report=False)
+            about["lines"] = [str(error)]
+        self.tell({"check": about | {"running": False, "report": self.report.exists()}})

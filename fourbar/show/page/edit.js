@@ -182,7 +182,7 @@ function showCheck(check) {
   byId("stop").hidden = !check.running;
   byId("check").disabled = check.running;
   byId("verdict").hidden = false;
-  const state = check.running ? `checking, ${check.seconds.toFixed(0)} s` : check.stopped ? "stopped" : check.status === 0 ? "all hold" : "not all hold, or the check did not run";
+  const state = check.running ? "checking" : check.stopped ? "stopped" : check.status === 0 ? "all hold" : "not all hold, or the check did not run";
   byId("verdict").replaceChildren(...[state, ...check.lines].map(lineOf));
   byId("report").hidden = !check.report;
   byId("report").href = location.href.replace(/[^/]*$/, "report");

@@ -30,16 +30,15 @@ from fourbar.show.plot.style import (
     RING_MARK,
     choose_bar_line,
     choose_force_line,
+    choose_scale,
     find_peak_index,
     largest_magnitude,
     place_legend,
     plot_points,
     set_degree_ticks,
     write_labelled_quantity,
-    write_number,
 )
 from fourbar.show.plot.view import View, collect_point_vectors
-from fourbar.show.shown_units import choose_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +91,7 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     sizes = [curve.values for curve in chart.curves]
     limit = choose_limit(sizes) if chart.zero else None
     units = {**view.units, **_DEGREES}
-    factor, unit = choose_unit(limit or largest_magnitude(*sizes), chart.unit, units)
+    factor, unit = choose_scale(limit or largest_magnitude(*sizes), chart.unit, units)
     poles = view.axis.factor * np.array(chart.poles)
     for name, values, look, over in chart.curves:
         # no line crosses a pole
@@ -108,7 +107,7 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     if chart.zero == "end":
         axes.set_ylim(bottom=0.0)
     elif chart.zero:
-        draw_zero_line(axes)
+        axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     if unit == "°":
         set_degree_ticks(axes.yaxis, float(np.ptp(axes.get_ylim())))
     named = chart.symbol if unit == "1" else f"{chart.symbol} ({unit})"
@@ -118,26 +117,27 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     if limit is not None:
         lowest = min(float(np.nanmin(values)) for values in sizes)
         axes.set_ylim(0.0 if lowest >= 0.0 else -factor * limit, factor * limit)
-        _note_largest(view, chart, f"{write_number(factor * limit)} {unit}")
+        _note_largest(view, chart, limit)
     elif chart.has_peak:
-        mark_peak(axes, positions, factor * sizes[0], unit)
+        values = sizes[0]
+        peak = values[find_peak_index(values)]
+        text = write_labelled_quantity(peak, chart.unit, view.units)
+        mark_peak(axes, positions, factor * values, text)
 
 
-def _note_largest(view: View, chart: Chart, end: str) -> None:
+def _note_largest(view: View, chart: Chart, limit: float) -> None:
     """Say where the axis ends, and what lies beyond."""
     name, values, *_ = max(chart.curves, key=lambda one: largest_magnitude(one.values))
     index = find_peak_index(values)
     words = view.axis.words(view.sweep.at.places[index], 5)
-    largest = write_labelled_quantity(values[index], chart.unit, view.units)
-    view.note(
-        f"{chart.title} clipped at {end.removesuffix(' 1')}; the largest evaluated,"
-        f" {name} = {largest.removesuffix(' 1')}, is at {words}."
+    end, largest = (
+        write_labelled_quantity(value, chart.unit, view.units).removesuffix(" 1")
+        for value in (limit, values[index])
     )
-
-
-def draw_zero_line(axes: "Axes") -> None:
-    """Draw the line of zero under the curves."""
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
+    view.note(
+        f"{chart.title} clipped at {end}; the largest evaluated, {name} = {largest},"
+        f" is at {words}."
+    )
 
 
 def draw_axes(axes: "Axes", view: View) -> Array:
@@ -181,7 +181,7 @@ def choose_limit(values: Iterable[Array]) -> float | None:
     return None
 
 
-def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
+def mark_peak(axes: "Axes", over: Array, values: Array, text: str) -> None:
     """Mark the largest magnitude of a curve by a ring, with its value as a label."""
     if not np.isfinite(values).any():
         return
@@ -190,7 +190,7 @@ def mark_peak(axes: "Axes", over: Array, values: Array, unit: str) -> None:
     plot_points(axes, place, "o", ms=5.0, mew=1.1, ls="none", zorder=5, **RING_MARK)
     axes.margins(y=0.18)  # room for the words
     away = math.copysign(1.0, place.imag) * 1j
-    add_label(axes, f"{write_number(place.imag)} {unit}", place, away, size=7.5)
+    add_label(axes, text, place, away, size=7.5)
 
 
 def list_angles(view: View) -> Chart:

@@ -19,7 +19,6 @@ from fourbar.show.plot.style import (
     Drawing,
     apply_style,
     format_of,
-    name_powers,
     shorten_text,
 )
 from fourbar.show.plot.view import View, is_over_time, make_view
@@ -177,7 +176,12 @@ def draw_figure(
         shown.units = units
         shown.dimensions = dimensions
         _look_between(shown)
-        return Drawing(_compose(kind, shown))
+
+        def paint(part: "SubFigure") -> str:
+            kind.paint(part, shown)
+            return textwrap.fill(" ".join(shown.notes), int(kind.size[0] * 18.5))
+
+        return Drawing(compose(kind.size, write_heading(scene), paint))
 
 
 def _look_between(shown: View) -> None:
@@ -209,18 +213,25 @@ def draw(
     draw_figure(scene, figure, **options).save(path)
 
 
-def _compose(kind: FigureKind, shown: View) -> "Figure":
-    """Compose the figure itself, laid out and labelled."""
+def compose(
+    size: tuple[float, float], heading: str, paint: Callable[["SubFigure"], str]
+) -> "Figure":
+    """Compose a figure of a size (inches), laid out and labelled.
+
+    `paint`: draws its panels, and returns the caption beneath them.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=kind.size, layout="constrained")
+    figure = Figure(figsize=size, layout="constrained")
     (part,) = figure.subfigures(squeeze=False).ravel()
-    kind.paint(part, shown)
-    heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
+    caption = paint(part)
     part.suptitle(heading, **TITLE)
-    caption = textwrap.fill(" ".join(shown.notes), int(kind.size[0] * 18.5))
     if caption:
         part.supxlabel(caption, linespacing=1.35, **CAPTION_STYLE)
-    name_powers(figure)
     settle_labels(figure)
     return figure
+
+
+def write_heading(scene: Scene) -> str:
+    """Write the title of a scene over a figure."""
+    return shorten_text(scene.title, 90) or "Four-bar linkage"

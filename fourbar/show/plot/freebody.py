@@ -21,6 +21,7 @@ from fourbar.show.plot.style import (
     FORCE_COLOURS,
     INK,
     MUTED,
+    choose_scale,
     draw_arrow,
     largest_magnitude,
     write_force_name,
@@ -227,7 +228,7 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
         panels_of_bar = zip(column, ("N", "V", "M"), ("N", "N", "N m"), strict=True)
         for axes, name, si in panels_of_bar:
             curve = getattr(forces, name)[worst.row]
-            scale, shown = choose_unit(largest_magnitude(curve), si, view.units)
+            scale, shown = choose_scale(largest_magnitude(curve), si, view.units)
             line = factor * x, scale * curve
             axes.plot(*line, color=BAR_COLOURS[bar])
             axes.fill_between(*line, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)

@@ -277,6 +277,19 @@ def write_number(value: float) -> str:
     )
 
 
+def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, str]:
+    """Choose the factor from SI and the unit of an axis.
+
+    A number whose unit has no prefix may need a power of ten before the unit.
+    """
+    factor, name = choose_unit(largest, unit, units)
+    power = math.floor(math.log10(factor * largest)) if largest > 0.0 else 0
+    if -4 < power < 5:
+        return factor, name
+    named = f"10{str(power).translate(RAISED_CHARACTERS)} {name}"
+    return factor / 10.0**power, named.removesuffix(" 1")
+
+
 def write_labelled_quantity(value: float, unit: str, units: Conversion) -> str:
     """Write a quantity of an SI unit in a unit, or with the prefix that suits it."""
     factor, name = choose_unit(abs(value), unit, units)
@@ -332,30 +345,3 @@ def fit_legends(figure: "Figure") -> None:
     figure.set_dpi(dpi)
     if is_changed:
         figure.draw_without_rendering()
-
-
-def name_powers(figure: "Figure") -> None:
-    """Write powers of ten of upright axes into their names, as legends stand above."""
-    from matplotlib import rcParams
-    from matplotlib.axes import Axes
-    from matplotlib.ticker import ScalarFormatter
-
-    least, most = rcParams["axes.formatter.limits"]
-    for axes in figure.findobj(Axes):
-        formatter = axes.yaxis.get_major_formatter()
-        if not isinstance(formatter, ScalarFormatter) or not axes.get_ylabel():
-            continue
-        power = math.floor(math.log10(max(map(abs, axes.get_ylim()))))
-        if least < power < most:
-            formatter.set_scientific(False)
-            continue
-        formatter.set_powerlimits((power, power))
-        axes.yaxis.get_offset_text().set_visible(False)
-        name, _, unit = axes.get_ylabel().partition(" (")
-        scale = f"10{str(power).translate(RAISED_CHARACTERS)}"
-        axes.set_ylabel(f"{name} ({scale} {unit}" if unit else f"{name} ({scale})")
-
-
-def draw_zero_line(axes: "Axes") -> None:
-    """Draw the line of zero under the curves."""
-    axes.axhline(0.0, color=INK, lw=0.6, zorder=1)

@@ -11,26 +11,26 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import command
+from fourbar.show.plot.figures import compose, write_heading
 from fourbar.show.plot.style import (
-    CAPTION_STYLE,
     FAINT,
     FORCE_COLOURS,
     INK,
-    TITLE,
     Drawing,
     apply_style,
+    choose_scale,
     format_of,
+    place_legend,
     set_degree_ticks,
-    shorten_text,
 )
 from fourbar.show.plot.view import axis_of
-from fourbar.show.shown_units import choose_unit
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_drawn_parts
 from fourbar.solution import Conversion
 from fourbar.studies.spread import BAND_PERCENTILES, Tolerances
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
 
 _MOST_BANDS = 7
 """Torque, four pin forces, and the components of one point; the eighth is for shares.
@@ -42,8 +42,6 @@ _OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched. Towards a limit
 they grow without end.
 """
-_BELOW = 30.0
-"""Space that numbers and name of an axis take, typographic points."""
 
 
 def draw_tolerances(
@@ -65,33 +63,29 @@ def draw_tolerances(
             "one position",
             "a picture of bands needs a sweep",
         )
-    with apply_style():
-        from matplotlib.figure import Figure
+    parts = list_drawn_parts(spreads)[:_MOST_BANDS]
+    columns = (len(parts) + 2) // 2
 
-        parts = list_drawn_parts(spreads)[:_MOST_BANDS]
-        columns = (len(parts) + 2) // 2
-        figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
+    def paint(figure: "SubFigure") -> str:
         panels = figure.subplots(2, columns, squeeze=False).ravel()
         for axes, part in zip(panels, parts, strict=False):
             _draw_band(axes, spreads, part, units)
         for axes in panels[len(parts) + 1 :]:
             axes.set_axis_off()
         _draw_shares(panels[len(parts)], spreads, parts[0], units)
-        title = shorten_text(spreads.scene.title, 80) or "Four-bar linkage"
-        figure.suptitle(
-            f"{title}: what the tolerances do ({spreads.samples} samples)",
-            **TITLE,
-        )
-        caption = (
-            f"Deviation from the nominal. Filled: {BAND_PERCENTILES[0]:g} to"
-            f" {BAND_PERCENTILES[1]:g} % of the"
-            " samples; thin: least and greatest sampled; dashed: first-order worst"
-            " case."
-        )
-        parted = (line for part in parts for line in describe_parted(spreads, part))
-        lines = [caption, *parted]
-        text = "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
-        figure.supxlabel(text, **CAPTION_STYLE)
+        low, high = BAND_PERCENTILES
+        lines = [
+            f"Deviation from the nominal. Filled: {low:g} to {high:g} % of the samples;"
+            " thin: least and greatest sampled; dashed: first-order worst case."
+        ]
+        for part in parts:
+            lines += describe_parted(spreads, part)
+        return "\n".join(textwrap.fill(line, 52 * columns) for line in lines)
+
+    with apply_style():
+        heading = f"{write_heading(spreads.scene)}: what the tolerances do"
+        size = 2.95 * columns, 5.6
+        figure = compose(size, f"{heading} ({spreads.samples} samples)", paint)
         Drawing(figure).save(path)
 
 
@@ -112,7 +106,7 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
     sizes = np.abs(lines[:5])
     sizes = sizes[np.isfinite(sizes)]
     most = 1.1 * float(np.percentile(sizes, _OFF_SCALE)) if sizes.size else 0.0
-    factor, unit = choose_unit(most, find_part_unit(part), units)
+    factor, unit = choose_scale(most, find_part_unit(part), units)
     low, high, least, greatest, *worst = factor * lines
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(over, low, high, color=colour, alpha=0.35, lw=0.0)
@@ -132,8 +126,6 @@ def _draw_shares(
     part: str,
     units: Conversion,
 ) -> None:
-    from matplotlib.transforms import offset_copy
-
     spread = spreads.spreads[part]
     over = _lay_out_positions(axes, spreads, units)
     with np.errstate(all="ignore"):
@@ -150,13 +142,4 @@ def _draw_shares(
         ylabel="share of the variance (%)",
         title=f"{part}: from which dimension",
     )
-    # below the axis and its name
-    figure = axes.get_figure(root=True)
-    below = offset_copy(axes.transAxes, figure, y=-_BELOW, units="points")
-    axes.legend(
-        loc="upper left",
-        bbox_to_anchor=(0.0, 0.0),
-        bbox_transform=below,
-        borderaxespad=0.0,
-        fontsize=6.5,
-    )
+    place_legend(axes, 6)

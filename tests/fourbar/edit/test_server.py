@@ -298,15 +298,14 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench, monkeypatch
 ):
-    # the report first: a line is what the test waits for before it stops the check
+    # the line first: the report is what the test waits for before it stops the check
     program = (
         "import sys, time, pathlib; out = pathlib.Path(sys.argv[-1]); "
-        "(out / 'report.html').write_text('<p>report'); print('agrees', flush=True); "
+        "print('agrees', flush=True); (out / 'report.html').write_text('<p>report'); "
         "time.sleep(float(out.parent.joinpath('wait').read_text()))"
     )
     harness = [sys.executable, "-c", program]
     monkeypatch.setattr(exports, "find_harness", lambda: harness)
-    monkeypatch.setattr(exports, "TICK", 0.05)
 
     def has_ended(about):
         return not about.get("check", {"running": True})["running"]
@@ -314,12 +313,15 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     async def ask(made, address):
         folder = made.session.exports.folder
         folder.mkdir()
+        report = folder / "check" / "report.html"
         line = await page(address)
         for wait, stopped in (("0", False), ("60", True)):
             (folder / "wait").write_text(wait)
+            report.unlink(missing_ok=True)
             await line.write_message(json.dumps({"do": "check"}))
             if stopped:
-                await heard(line, lambda about: about.get("check", {}).get("lines"))
+                while not report.exists():
+                    await asyncio.sleep(0.05)
                 await line.write_message(json.dumps({"do": "stop"}))
             check = (await heard(line, has_ended))["check"]
             assert check["lines"] == ["agrees"] and check["report"]
