@@ -109,7 +109,6 @@ def _cut_loop(judge: Judge) -> Iterator[Mistake]:
         "B": join(right.B),
         "O4": linkage.ground * np.exp(1j * linkage.ground_angle),
     }
-    of_torque = []
     for pin, (force, joints) in _CUTS.items():
         passed = right[force]
         joint, sense = joints[judge.scene.drive_bar]
@@ -118,10 +117,6 @@ def _cut_loop(judge: Judge) -> Iterator[Mistake]:
         numbers["torque"] = right.torque + moment
         text = f"open tree, cut at {pin}: {how}"
         yield Mistake(f"forces and torque of the {text}", numbers.get, left=SOFT_TORQUE)
-        alone = {"torque": numbers["torque"]}
-        of_torque.append(Mistake(f"torque of the {text}", alone.get, False))
-    for mistake in of_torque:
-        yield mistake._replace(left=SOFT_TORQUE)
 
 
 def _turn_forces(judge: Judge) -> Iterator[Mistake]:

@@ -215,33 +215,24 @@ def judge_table(
 
 def _explain(judge: Judge, labels: Collection[str]) -> list[Explanation]:
     """Explain what differs of the quantities of a solution, or else of its motion."""
-    stages = {
-        key: STAGE_OF.get(column.quantity)
-        for key, column in judge.columns.items()
-        if column.quantity in UNITS
+    columns = {
+        key: column for key, column in judge.columns.items() if column.quantity in UNITS
     }
-    differing = [key for key in sorted(stages) if judge.columns[key].label in labels]
-    explanations = _explain_part(judge, differing, stages)
-    motion = [key for key, stage in stages.items() if stage != "force"]
-    if explanations or set(differing) <= set(motion):
-        return explanations
-    of_motion = _explain_part(judge, differing, motion)
-    return [one._replace(complete=False) for one in of_motion]
-
-
-def _explain_part(
-    judge: Judge, differing: list[str], keys: Collection[str]
-) -> list[Explanation]:
-    """Explain what differs as if the table had these columns alone."""
-    wrong = [key for key in differing if key in keys]
-    if not wrong:
-        return []
-    columns = {key: judge.table.columns[key] for key in judge.columns if key in keys}
-    table = replace(judge.table, columns=columns)
-    part = judge
-    if len(columns) < len(judge.columns):
-        part = Judge(judge.scene, table, judge.tolerance, judge.rows)
-    return explain(part, [part.columns[key] for key in wrong])
+    motion = [key for key in columns if STAGE_OF.get(columns[key].quantity) != "force"]
+    for keys in dict.fromkeys((tuple(columns), tuple(motion))):
+        table = {key: judge.table.columns[key] for key in keys}
+        part = Judge(
+            judge.scene,
+            replace(judge.table, columns=table),
+            judge.tolerance,
+            judge.rows,
+        )
+        wrong = [key for key in sorted(keys) if columns[key].label in labels]
+        found = explain(part, [part.columns[key] for key in wrong]) if wrong else []
+        if found:
+            is_all = len(keys) == len(columns)
+            return [one._replace(complete=one.complete and is_all) for one in found]
+    return []
 
 
 def write_judgement_json(judgement: Judgement) -> str:
@@ -488,23 +479,10 @@ def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
 def _write_in_their_unit(
     finding: Discrepancy, units: dict[str, Unit]
 ) -> tuple[str, ...]:
-    """Write the quantity with the unit of their column, and both numbers in it.
-
-    As many digits are written as set the numbers apart.
-    """
+    """Write the quantity with the unit of their column, and both numbers in it."""
     unit = units[finding.quantity]
-    theirs, ours = (
-        [x / unit.factor for x in numbers] for numbers in (finding.theirs, finding.ours)
-    )
-    digits = next(
-        (
-            d
-            for d in (4, 6, 9, 12)
-            if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))  # noqa: B905
-        ),
-        15,
-    )
     written = (
-        ", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours)
+        ", ".join(f"{x / unit.factor:.9g}" for x in numbers)
+        for numbers in (finding.theirs, finding.ours)
     )
     return f"{finding.quantity} [{escape_controls(unit.text)}]", *written

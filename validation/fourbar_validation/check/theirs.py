@@ -33,7 +33,6 @@ from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
 from fourbar_validation.check.csv_columns import GROWING
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.engines.description import FORCE_AT
 
 _DECIMALS = 4
 """Decimals of a position that somebody chose, like 12.5 deg or 0.25 rad. 0.1745 rad is
@@ -588,12 +587,7 @@ def _read_heading(
             break
     vector = _name_vector(name, points)
     quantity = vector or name
-    is_at_pin = quantity in FORCE_AT and converts(unit, "N")
-    unread = match is None or quantity in NOT_JUDGED or is_at_pin
-    if unread or not _is_known(name, points):
-        parts = re.split("[-/]", re.sub(r"\s*\[.*", "", heading.strip()))
-        if len(parts) > 1 and all(part in UNITS or part in points for part in parts):
-            return _Heading(name, why="follows from columns that are judged")
+    if match is None or quantity in NOT_JUDGED or not _is_known(name, points):
         if quantity in NOT_JUDGED:
             known = None
             if quantity == "time":
