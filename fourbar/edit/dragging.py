@@ -71,23 +71,38 @@ def list_handles(scene: Scene) -> list[_Handle]:
             path: KeyPath = ("bars", name, "centre")
             mass_centre = f"mass centre of {name}"
             handles.append(_Handle(mass_centre, path, number, 0j, bar.to_centre))
+    points = {point.name: point for point in scene.points}
     for key, _, one in list_described(scene):
-        path = split_key(key)
         if not isinstance(one, Place | Load) and not states_place(type(one)):
             continue
-        if one.place is not None:
-            handle = _hold_place(path, one.place, scene)
-        elif one.arm is not None:
-            G = scene.linkage.bar(one.bar).to_centre
-            arm = cmath.rect(*one.arm)
-            of_arm = (*path, "arm")
-            handle = _Handle(_name_handle(path), of_arm, one.bar, G, arm, turns=False)
-        else:  # a couple without a place
-            continue
+        path = split_key(key)
+        name = _name_handle(path)
+        stated: Any = one
+        force = None
         if isinstance(one, Load) and one.force is not None:
-            turns = one.frame == "bar"
-            handle = handle._replace(force=(*path, "force"), force_turns=turns)
-        handles.append(handle)
+            force = (*path, "force")
+        named = getattr(one, "point", None)
+        if named is not None:  # the handle is that of the point
+            path = ("points", named)
+            stated = points[named]
+        for form in ("from_pin", "from_centre", "arm"):
+            pair = getattr(stated, form, None)
+            if pair is None:
+                continue
+            at = 0j
+            if form != "from_pin":
+                at = scene.linkage.bar(stated.bar).to_centre
+            handle = _Handle(
+                name,
+                (*path, form),
+                stated.bar,
+                at,
+                cmath.rect(*pair),
+                turns=form != "arm",
+                force=force,
+                force_turns=force is not None and one.frame == "bar",
+            )
+            handles.append(handle)
     return handles
 
 
@@ -98,22 +113,6 @@ def _name_handle(path: KeyPath) -> str:
         return f"{str(table)[:-1]} {inner[0]}"
     *of, last = inner if table == "effects" else (table, *inner)
     return f"{last} of {' '.join(map(str, of))}" if of else f"point of {last}"
-
-
-def _hold_place(path: KeyPath, place: Place, scene: Scene) -> _Handle:
-    """Make the handle of a place by the form in which it is stated.
-
-    The handle of a named point is that of the point.
-    """
-    name = _name_handle(path)
-    if place.point is not None:
-        path = ("points", place.point)
-        place = next(p.place for p in scene.points if p.name == place.point)
-    if place.from_centre is None:
-        return _Handle(name, (*path, "from_pin"), place.bar, 0j, place.vector())
-    G = scene.linkage.bar(place.bar).to_centre
-    pair = cmath.rect(*place.from_centre)
-    return _Handle(name, (*path, "from_centre"), place.bar, G, pair)
 
 
 class Dragged(NamedTuple):

@@ -134,7 +134,6 @@ class Session:
         self.kept = {"start": text}
         self.reference = "start"
         self.gesture = ""
-        self.located: dict[str, dict[str, float | None]] = {}
         if self.state_file.exists():
             self._resume()
         else:
@@ -266,12 +265,8 @@ class Session:
 
         None if it states one position: its curves go on over the whole range.
         """
-        text = self.kept[self.reference]
-        if text not in self.located:
-            kept = solve(self.read(text).scene)
-            peaks = list_peaks(kept, Facts(kept)) if len(kept) > 1 else {}
-            self.located = {text: peaks}
-        return self.located[text]
+        kept = solve(self.read(self.kept[self.reference]).scene)
+        return list_peaks(kept, Facts(kept)) if len(kept) > 1 else {}
 
     def do(self, asked: Asked) -> Asked:
         """Do what a page asks for and describe the state after it.

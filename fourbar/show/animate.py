@@ -115,10 +115,7 @@ def collect_live_data(
     """
     linkage = scene.linkage
     motion = scene.motion
-    if is_over_time(scene):
-        shown = _collect_motion(scene, stage)
-    else:
-        shown = _collect_sweep(scene, signs or (motion.branch,), stage, solved)
+    shown = _collect_shown(scene, signs or (motion.branch,), stage, solved)
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
     if not closes.any():
         raise NotAssembledError(
@@ -176,49 +173,73 @@ def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     return entry
 
 
-def _collect_sweep(
+def _collect_shown(
     scene: Scene,
     signs: tuple[int, ...],
     stage: str | None,
     solved: Solution | None,
 ) -> dict[str, Any]:
-    """Collect both branches over theta_2, or over another commanded quantity."""
+    """Collect the motion that the scene makes, or branches over its command."""
     motion = scene.motion
-    swept = list_sweep(scene)
-    places = thin_out(swept).places
-    name = swept.commanded
-    shown = command_at(scene, places)
-    start = _find_start(scene, shown)
-    branches = {}
+    over_time = is_over_time(scene)
+    made = solve(scene) if over_time else None
+    covered = list_sweep(scene) if made is None else made.at
+    at = thin_out(covered)
+    places = at.places
+    commanded = covered.commanded
+    name = "time" if over_time else commanded
+    start = None if over_time else _find_start(scene, at)
     if solved is not None and not np.array_equal(places, solved.at.places):
         solved = None
+    branches = {}
     for sign in signs if name == "theta_2" else (motion.branch,):
-        if solved is None or sign != motion.branch:
+        if over_time:
+            solution = solve(scene, stage, at=at)
+        elif solved is not None:
+            solution = solved
+        else:
             one = set_branch(scene, sign)
             solution = solve(one, stage, at=command_at(one, places))
             if start is not None and len(command(scene).angle) == 1:
                 _count_turns_from(start, solution)
-        else:
-            solution = solved
         branches[str(sign)] = _collect_columns(solution)
     theta_2 = solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
+    if motion.free is not None:
+        energies = compute_energies(scene, solution)
+        branches[str(motion.branch)]["energy"] = energies.kinetic
+    rate = pace = None
+    if made is not None:
+        rate = _choose_rate(float(places[-1] - places[0]))
+        pace = _describe_pace(made, rate, len(places))
+    has_one_speed = not over_time and not isinstance(motion.speed, np.ndarray)
     return {
         "theta_2": null_nan(theta_2),
-        "time": None,
+        "time": places.tolist() if over_time else None,
         "over": {
             "name": name,
-            "commanded": name,
+            "commanded": commanded,
             "values": None if name == "theta_2" else places.tolist(),
-            "speed": None if isinstance(motion.speed, np.ndarray) else motion.speed,
+            "speed": motion.speed if has_one_speed else None,
         },
-        "rate": None,
+        "rate": rate,
         "start": start,
         "branches": branches,
-        "pace": None,
-        "positions": len(swept.angle),
+        "pace": pace,
+        "positions": len(covered.angle),
     }
+
+
+def _choose_rate(duration: float) -> float:
+    """Choose a power of ten for a motion that is too short or too long to watch."""
+    shortest, longest = _WATCHED
+    power = 0
+    if 0.0 < duration < shortest:
+        power = math.floor(math.log10(duration / shortest))
+    elif duration > longest:
+        power = math.ceil(math.log10(duration / longest))
+    return float(10.0**power)
 
 
 def _count_turns_from(row: int, solution: Solution) -> None:
@@ -242,43 +263,6 @@ def _find_start(scene: Scene, shown: Command) -> int | None:
     else:
         away = np.angle(np.exp(1j * (shown.angle - stated.angle[0])))
     return int(np.argmin(np.abs(away)))
-
-
-def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
-    """Collect the one motion that the scene makes: released, or by a law."""
-    motion = solve(scene)
-    solution = solve(scene, stage, at=thin_out(motion.at))
-    time = solution.at.places
-    columns = _collect_columns(solution)
-    columns["theta_2"] = solution.theta_2.tolist()
-    if scene.motion.free is not None:
-        for name in DRIVE_SCALARS:
-            columns.pop(name, None)
-        columns["energy"] = compute_energies(scene, solution).kinetic
-    # a power of ten, of a motion that is too short or too long to watch
-    duration = float(time[-1] - time[0])
-    shortest, longest = _WATCHED
-    power = 0
-    if 0.0 < duration < shortest:
-        power = math.floor(math.log10(duration / shortest))
-    elif duration > longest:
-        power = math.ceil(math.log10(duration / longest))
-    rate = float(10.0**power)
-    return {
-        "theta_2": null_nan(solution.theta_2),
-        "time": time.tolist(),
-        "over": {
-            "name": "time",
-            "commanded": motion.commanded,
-            "values": time.tolist(),
-            "speed": None,
-        },
-        "rate": rate,
-        "start": None,
-        "branches": {str(scene.motion.branch): columns},
-        "pace": _describe_pace(motion, rate, len(time)),
-        "positions": len(motion),
-    }
 
 
 def thin_out(positions: Command) -> Command:
@@ -309,9 +293,10 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
         columns["status"] = solution.status
+    is_free = solution.scene.motion.free is not None
     for name in (*ANIMATED_SCALARS, *PIN_FORCES):
         values = getattr(solution, name)
-        if values is not None:
+        if values is not None and not (is_free and name in DRIVE_SCALARS):
             columns[name] = values
     if solution.omega_4 is not None:
         fastest = _drop_rounding(columns, RATES[:3])

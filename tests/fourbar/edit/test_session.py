@@ -304,6 +304,10 @@ from_pin = ["1 in", "20 deg"]
 bar = 3
 force = ["5 N", "10 deg"]
 from_pin = { x = "1 in", y = "20 mm" }
+[[loads]]
+bar = 3
+force = ["5 N", "10 deg"]
+arm = ["30 mm", "20 deg"]
 [[effects.springs]]
 from.bar = 1
 to.bar = 4
@@ -346,6 +350,10 @@ DRAGGED = {
             s.scene.linkage.coupler.to_centre
             + cmath.rect(*s.scene.loads[1].from_centre),
         ),
+    ),
+    "arm in world axes": (
+        ["loads", 4, "arm"],
+        lambda s: complex(*s.G3[0]) + cmath.rect(*s.scene.loads[4].arm),
     ),
     "by coordinates": (
         ["loads", 3, "from_pin"],

@@ -124,6 +124,12 @@ def test_what_is_rounding_of_its_kind_is_zero(model, row, name):
 RELEASED = crank_rocker(motion=Motion(0.5, 0.0, free=Free(1.8, 90)), drive_bar=2)
 
 
+def test_a_released_motion_has_an_energy_and_no_torque():
+    columns = animate.collect_live_data(RELEASED)["branches"]["1"]
+    assert not {"torque", "torque_error", "power"} & columns.keys()
+    assert columns["energy"][0] == 0.0 < columns["energy"][1]
+
+
 @pytest.mark.parametrize(
     "duration, rate",
     [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)],
