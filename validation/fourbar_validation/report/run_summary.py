@@ -328,8 +328,9 @@ class Summary:
 
     @property
     def unchecked(self) -> list[str]:
-        """Return the lines of the engines that were asked for in vain."""
-        return [line for name, line in self.silent.items() if name in self.asked]
+        """Return the lines of engines that were asked for in vain, beside others."""
+        asked = () if self.counts.nothing else self.asked
+        return [line for name, line in self.silent.items() if name in asked]
 
     @property
     def notes(self) -> list[str]:
