@@ -207,11 +207,11 @@ def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
 
 def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
     """Time the steps and readings of an attempt, CPU seconds."""
-    ((step, reading),) = _time_kinds(setup, [attempt.settings])
+    ((step, reading),) = _time_settings(setup, [attempt.settings])
     return attempt.steps * step + attempt.readings * reading
 
 
-def _time_kinds(
+def _time_settings(
     setup: TrialSetup, kinds: Sequence[Settings]
 ) -> list[tuple[float, float]]:
     """Time a step and a reading of each kind, CPU seconds."""
@@ -279,7 +279,7 @@ class _CheapestSearch:
             name: replace(settings, **changes)
             for name, changes in KINDS_OF_STEP.items()
         }
-        timings = _time_kinds(self.setup, [*kinds.values()])
+        timings = _time_settings(self.setup, [*kinds.values()])
         base, reading = timings[0]
         self.reading_cost = reading / base
         steps_of = dict(zip(kinds, (step for step, _ in timings), strict=True))

@@ -53,7 +53,7 @@ class Spot:
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class SettingCurve:
     """A row of settings that differ in one number."""
 
     name: str
@@ -116,37 +116,39 @@ def _vary_steps(held: float | None = None, **changes: Any) -> tuple[Spot, ...]:
     )
 
 
-def design_curves(scene: Scene) -> Iterator[Curve]:
+def design_curves(scene: Scene) -> Iterator[SettingCurve]:
     """Design the curves of one scene."""
     for name in INTEGRATORS:
         yield _vary_defaults(name, abs(scene.motion.omega_2 or 1.0))
     for name in INTEGRATORS:
         spots = _vary_steps(integrator=name, time_constant_steps=10.0)
-        yield Curve(f"{name}, pads, tc = 10 steps", spots)
+        yield SettingCurve(f"{name}, pads, tc = 10 steps", spots)
     for name in INTEGRATORS:
-        yield Curve(f"{name}, tc held", _vary_steps(_PART_OF_TURN, integrator=name))
+        yield SettingCurve(
+            f"{name}, tc held", _vary_steps(_PART_OF_TURN, integrator=name)
+        )
     for tc in (3.0, 30.0, 100.0):
         spots = _vary_steps(time_constant_steps=tc)
-        yield Curve(f"RK4, pads, tc = {tc:g} steps", spots)
+        yield SettingCurve(f"RK4, pads, tc = {tc:g} steps", spots)
     spots = _vary_steps(pad=None, time_constant_steps=10.0)
-    yield Curve("RK4, no pads, tc = 10 steps", spots)
+    yield SettingCurve("RK4, no pads, tc = 10 steps", spots)
     for factor in (1e2, 1e4, 1e6, 1e8):
-        yield Curve(f"RK4, flywheel {factor:g}", _vary_steps(flywheel=factor))
-    yield Curve("softness d", _vary_impedance())
+        yield SettingCurve(f"RK4, flywheel {factor:g}", _vary_steps(flywheel=factor))
+    yield SettingCurve("softness d", _vary_impedance())
     label = "tc = {:g} steps"
     tc_varied = _vary("time_constant_steps", label, TIME_CONSTANTS, WITHOUT_PADS)
-    yield Curve("softness tc", tc_varied)
+    yield SettingCurve("softness tc", tc_varied)
     pads = _vary("pad", "pads {:g}", _PADS, BEST)
-    yield Curve("pads", (Spot("no pads", replace(BEST, pad=None), x=1.0), *pads))
+    yield SettingCurve("pads", (Spot("no pads", replace(BEST, pad=None), x=1.0), *pads))
     yield from _vary_sag()
     for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
         settings = replace(BEST, solver=solver, iterations=iterations)
         label = solver + ", tolerance {:g}"
         spots = _vary("tolerance", label, SOLVER_TOLERANCES, settings)
-        yield Curve(f"tolerance, {solver}", spots)
+        yield SettingCurve(f"tolerance, {solver}", spots)
 
 
-def _vary_defaults(integrator: str, speed: float) -> Curve:
+def _vary_defaults(integrator: str, speed: float) -> SettingCurve:
     """Vary the timestep with MuJoCo's solref, solimp and solver.
 
     A new user gets these, with Euler at 2 ms.
@@ -158,10 +160,10 @@ def _vary_defaults(integrator: str, speed: float) -> Curve:
         steps.append(Spot("MuJoCo's defaults", settings, x=n))
         steps.sort(key=lambda spot: spot.x)
     spots = tuple(replace(spot, edit=restore_defaults) for spot in steps)
-    return Curve(f"{integrator}, MuJoCo's defaults", spots, settled=True)
+    return SettingCurve(f"{integrator}, MuJoCo's defaults", spots, settled=True)
 
 
-def _vary_sag() -> Iterator[Curve]:
+def _vary_sag() -> Iterator[SettingCurve]:
     """Vary what a loop at rest would sag by.
 
     The rest of the error at a short time constant is varied too.
@@ -171,7 +173,9 @@ def _vary_sag() -> Iterator[Curve]:
     by_tc = _vary("time_constant_steps", label, _SAGGING_CONSTANTS, sagging)
     label = "{} steps a revolution"
     short = _vary("steps_per_revolution", label, (_MANY_STEPS,), sagging)
-    yield Curve("sag d, slow", _vary_impedance(), slow=True)
-    yield Curve("sag tc, slow", by_tc, slow=True)
-    yield Curve("softness alone, slow", short, slow=True)
-    yield Curve("sag d, slow, nothing acts", _vary_impedance(), slow=True, bare=True)
+    yield SettingCurve("sag d, slow", _vary_impedance(), slow=True)
+    yield SettingCurve("sag tc, slow", by_tc, slow=True)
+    yield SettingCurve("softness alone, slow", short, slow=True)
+    yield SettingCurve(
+        "sag d, slow, nothing acts", _vary_impedance(), slow=True, bare=True
+    )

@@ -27,7 +27,7 @@ from fourbar_validation.advise.worst_errors import (
     compute_errors,
 )
 from fourbar_validation.cost import formulas
-from fourbar_validation.cost.series import SLOW, Curve, Spot, design_curves
+from fourbar_validation.cost.series import SLOW, SettingCurve, Spot, design_curves
 from fourbar_validation.engines.mujoco.trial import Trial
 from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.report.machine import list_versions
@@ -193,7 +193,7 @@ class CostStudy:
             before = sense * (first - 2.0 * math.pi)
         return JudgedSetup(scene, before=before)
 
-    def _try_curve(self, curve: Curve) -> Iterator[CostPoint]:
+    def _try_curve(self, curve: SettingCurve) -> Iterator[CostPoint]:
         settled = (
             curve.settled
             and turns_fully(self.scene.linkage)
