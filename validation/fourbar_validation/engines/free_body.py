@@ -60,8 +60,6 @@ next.
 """
 _FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
-STEPS_FROM_NEARBY = 8
-"""The same from couples of other forces, near those that are sought."""
 _FRICTION_SETTLED = 8.0 * 2.0**-52
 """Residual of a friction couple's equation, over the sum of its terms, that counts as
 rounding.
@@ -310,25 +308,16 @@ def speeds_and_accelerations(
 def balance(
     scene: Scene,
     motion: BodyMotion,
-    start: Array | None = None,
 ) -> tuple[Array, float, Array | float]:
     """Return the thirteen unknowns (n, 13) in N and N m, their residual and jamming.
 
     The last is the distance of friction from jamming.
-
-    `start`: friction couples near those that are sought, (n, p), N m; without them they
-    are followed from none.
     """
     unknowns, loads, arms, residual = solve_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
     if len(arms):
-        if start is None:
-            couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
-        else:
-            couples, _, _ = solve_couples(
-                loads[..., 0], loads[..., 1:], arms, start, STEPS_FROM_NEARBY
-            )
+        couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
         from_jamming = _compute_distance_from_jamming(
             loads[..., 0], loads[..., 1:], arms, couples
         )
@@ -569,7 +558,6 @@ def solve_couples(
     C: ComplexArray,
     k: Array,
     x: Array,
-    steps: int = _FRICTION_STEPS,
 ) -> tuple[Array, NDArray[np.bool_], Array]:
     """Solve by Newton's method from couples `x`.
 
@@ -581,7 +569,7 @@ def solve_couples(
     settled = np.zeros(n, dtype=bool)
     matrix = np.zeros((n, pins, pins))
     left = np.arange(n)
-    for _ in range(steps):
+    for _ in range(_FRICTION_STEPS):
         couples = x[left]
         size, matrix[left] = _compute_friction_jacobian(
             F[left], C[left], k[left], couples
