@@ -340,6 +340,8 @@ def test_the_cause_that_explains_the_error_stands_first(spoil, key, tmp_path):
         c.row.error for c in report.errors if c.row.quantity in ("torque", "F12", "F43")
     )
     assert cost > 0.1 * worst
+    (mass,) = (one for one in report.differences if one.key.endswith(".mass"))
+    assert 0.0 < mass.cost < min(cost, 0.02)
 
 
 def test_where_no_force_gives_the_acceleration_is_said():

@@ -389,6 +389,13 @@ def test_what_a_second_solver_of_dry_friction_solves_is_said():
     assert not any("noslip" in text for text in without.remarks)
 
 
+def test_a_spring_is_wound_by_whole_turns_of_its_hinge():
+    """The coupler turns back once against the crank in a turn of it."""
+    loop = measure(Planar(base="", joint='stiffness="0.1"').text())
+    assert np.ptp([row.joint for row in loop.states.rows]) == approx(math.tau)
+    assert find_left_out(loop) < 1e-8
+
+
 @pytest.mark.slow
 def test_a_state_after_a_turn_is_that_of_the_same_motion():
     """Beyond its change point the other assembly has the branch of the scene."""
