@@ -235,15 +235,6 @@ def _describe_loop(
             f"{write_degrees(worst.joint)} deg; a step takes "
             f"{1e6 * loop.through_time.seconds_per_step:.2g} us"
         )
-    sticking = {name for row in loop.states.rows for name in row.sticking}
-    for name in sorted(sticking):
-        count = sum(name in row.sticking for row in loop.states.rows)
-        yield (
-            f"note: at {count} of {len(loop.states.rows)} states the dry"
-            f" friction of {name} does not oppose its motion in full: it turns too"
-            " slowly there, or accelerates too fast, for MuJoCo's soft friction"
-            " (solreffriction and solimpfriction of the joint)"
-        )
     yield from _describe_torn(loop)
     for remark in loop.remarks:
         yield f"note: {remark}"

@@ -110,9 +110,9 @@ def test_a_rest_pose_outside_the_ranges_is_closed_inside_them():
     crank = posed.data.qpos[model.joint("crank").qposadr[0]]
     assert math.radians(15.0) - 1e-9 <= crank <= math.radians(60.0)
     assert gap(model, posed.data.qpos) < 1e-9
-    assert posed.notes[0] == "outside their ranges in the rest pose of the file: crank"
+    assert posed.notes[0] == "outside their ranges before closing: crank"
     stated = pose(text, crank="14 deg")
-    assert stated.notes[0] == "outside their ranges as --pose states them: crank"
+    assert stated.notes[0] == "outside their ranges before closing: crank"
 
 
 @pytest.mark.slow

@@ -198,9 +198,6 @@ def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
     angles = tuple(first + math.radians(6.0 * step - 15.0) for step in range(9))
     motion = LoopMotion(angles, speed, 0.0)
     search = SettingsSearch(LoopInside(model, loop), motion)
-    stiff = replace(search.own, solimp=STIFFEST_IMPEDANCE)
-    rows = search._answer(stiff, motion)[0].rows
-    assert [bool(row.sticking) for row in rows] == [step == 2 for step in range(9)]
     advice = search.advise(0.01, file)
     assert advice.reached and "solreffriction" in advice.best.changes
     closure, joint = (one.removesuffix(" />") for one in advice.typed[-2:])

@@ -159,8 +159,6 @@ class InsideRow:
     """Motion of the state that MuJoCo evaluates."""
     condition: float
     """|sin| of the angle between the bars that follow in that closed state."""
-    sticking: tuple[str, ...]
-    """Hinges that turn and whose dry friction does not oppose it in full in MuJoCo."""
 
 
 @dataclass(slots=True)

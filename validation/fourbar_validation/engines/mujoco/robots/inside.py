@@ -121,8 +121,6 @@ _DRIVING = 1e3
 """Armature over all other inertia from which it is a flywheel that drives. The speed
 then ripples by 1e-3.
 """
-_REACHED = 1.0 - 1e-6
-"""Part of its couple at which dry friction acts in full."""
 _SINE_OF_AN_ASSEMBLY = 0.1
 """|sin(theta_4 - theta_3)| from which a loop that has yielded is in one assembly. A gap
 of a thousandth of the bars turns them by its root beside a change point.
@@ -498,7 +496,6 @@ class LoopInside:
             bars=self._read_bars(data),
             gap=self._measure_gap(qpos),
             condition=abs(self._measure_sine(closed.qpos)),
-            sticking=self._list_sticking(),
         )
 
     def list_unmet_stops(self) -> list[int]:
@@ -520,24 +517,6 @@ class LoopInside:
             for bar in MOVING_BARS
         ]
         return BarMotion(*map(frame.angle, MOVING_BARS), *speeds)
-
-    def _list_sticking(self) -> tuple[str, ...]:
-        """List the hinges of the loop that turn and stick.
-
-        A hinge sticks if its dry friction does not oppose its motion in full: the
-        soft constraint may even push it on.
-        """
-        data = self.data
-        kinds = data.efc_type[: data.nefc]
-        names = []
-        for row in np.flatnonzero(kinds == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF):
-            dof = int(data.efc_id[row])
-            speed = data.qvel[dof]
-            reached = _REACHED * self.model.dof_frictionloss[dof]
-            opposes = -data.efc_force[row] * np.sign(speed)
-            if dof in self.moving and speed and opposes < reached:
-                names.append(name_joint(self.model, int(self.model.dof_jntid[dof])))
-        return tuple(names)
 
     def _measure_gap(self, qpos: Array) -> float:
         """Measure the distance of the ends of the closure in the plane, m."""

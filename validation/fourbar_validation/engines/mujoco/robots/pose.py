@@ -72,7 +72,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     InputError : an unknown joint or keyframe, a position without a unit or of another
         kind.
     """
-    stated, origin = _choose_start(model, options)
+    stated = _choose_start(model, options)
     held = {find_joint(model, name, "--hold") for name in options.held}
     fixed = {*held}
     for name, text in options.joints.items():
@@ -86,24 +86,20 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     tied = {*closing.tied, *fixed}
     outside = [joint for joint in find_outside(model, stated) if joint in tied]
     notes: list[str] = []
-    for where, is_stated in ((origin, False), ("as --pose states them", True)):
-        names = [name_joint(model, joint) for joint in outside]
-        names = [name for name in names if (name in options.joints) == is_stated]
-        if names:
-            notes.append(f"outside their ranges {where}: {_list_some(names)}")
+    if outside:
+        names = ", ".join(name_joint(model, joint) for joint in outside)
+        notes.append(f"outside their ranges before closing: {names}")
     closed = stated
     if closing.size(stated) > CLOSED_IN_THE_FILE or {*outside} - fixed:
         motors = {joint for joint, _ in list_motors(model)} - {*outside}
         closed = closing.close(stated, fixed | motors)
-        left = closing.size(closed)
-        if left > CLOSED_IN_THE_FILE:  # the rounding of the file is left, or more
-            start = stated if left > LARGEST_RESIDUAL else closed
-            closed = closing.close(start, fixed)
-    # where a range stops it short of closing
-    for start in closing.list_starts(stated, fixed):
-        if closing.size(closed) <= LARGEST_RESIDUAL:
-            break
-        closed = min(closed, closing.close(start, fixed), key=closing.size)
+        # where a motor or a range stops it short of closing
+        for start in (stated, *closing.list_starts(stated, fixed)):
+            if closing.size(closed) <= LARGEST_RESIDUAL:
+                break
+            closed = min(closed, closing.close(start, fixed), key=closing.size)
+        if closing.size(closed) > CLOSED_IN_THE_FILE:  # but for the file's rounding
+            closed = closing.close(closed, fixed)
     left = closing.size(closed)
     if left > LARGEST_RESIDUAL:
         notes.append(closing.say_open(options, stated, left))
@@ -163,10 +159,10 @@ def find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
     return joints
 
 
-def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, str]:
-    """Return the positions to begin with, and where they are from."""
+def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> Array:
+    """Return the positions to begin with, (nq,)."""
     if options.key is None:
-        return model.qpos0.copy(), "in the rest pose of the file"
+        return np.array(model.qpos0)
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, options.key)
     if number < 0 and options.key.isdigit() and int(options.key) < model.nkey:
         number = int(options.key)
@@ -177,7 +173,7 @@ def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> tuple[Array, s
             options.key,
             f"no such keyframe; the file has: {names or 'none'}",
         )
-    return model.key_qpos[number].copy(), f"in keyframe {options.key}"
+    return np.array(model.key_qpos[number])
 
 
 def _read_joint_position(name: str, text: str, unit: str) -> float:
@@ -215,11 +211,6 @@ def _evaluate_kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
     return data
 
 
-def _list_some(names: list[str], most: int = 6) -> str:
-    listed = ", ".join(names[:most])
-    return f"{listed} and {len(names) - most} more" if names[most:] else listed
-
-
 class _Closing:
     """Least squares of a model's active equalities over the joints that may move."""
 
@@ -251,29 +242,22 @@ class _Closing:
         return float(np.abs(residuals).max(initial=0.0))
 
     def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
-        """List poses from which closing may end elsewhere, (nq,), the nearest first.
+        """List poses from which closing may end elsewhere, (nq,).
 
-        A hinge without a range is turned by quarters. Then all joints with one are
-        mid-range, and one of them besides is moved. Fixed joints stay.
+        Each moves one joint: a hinge without a range by quarter turns, a joint with one
+        over the quarters of it. Fixed joints stay.
         """
-        middle = stated.copy()
-        turned = []
-        moved = []
         for joint in self.tied:
-            if joint in fixed:
-                continue
             place = self.model.jnt_qposadr[joint]
-            low = self.low[place]
-            high = self.high[place]
-            if math.isfinite(low):
-                middle[place] = 0.5 * (low + high)
-                moved += [(place, low + part * (high - low)) for part in (0.25, 0.75)]
+            values = np.zeros(0)
+            if math.isfinite(self.low[place]):
+                values = np.linspace(self.low[place], self.high[place], 5)[1:-1]
             elif self.model.jnt_type[joint] == HINGE_JOINT:
-                quarters = 0.5 * math.pi * np.arange(1, 4)
-                turned += [(place, value) for value in stated[place] + quarters]
-        yield from (_put(stated, *change) for change in turned)
-        yield middle
-        yield from (_put(middle, *change) for change in moved)
+                values = stated[place] + 0.5 * math.pi * np.arange(1, 4)
+            for value in () if joint in fixed else values:
+                start = stated.copy()
+                start[place] = value
+                yield start
 
     def close(self, start: Array, fixed: set[int]) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,).
@@ -324,14 +308,7 @@ class _Closing:
         closed = self.close(stated, self.held)
         if options.joints and self.size(closed) <= LARGEST_RESIDUAL:
             return (
-                f"--pose holds {_list_some([*options.joints])}, around which the other"
+                f"--pose holds {', '.join(options.joints)}, around which the other"
                 f" joints cannot close {text}: state fewer joints, or more digits"
             )
         return f"no pose near this one closes {text}: state one by --pose or --key"
-
-
-def _put(qpos: Array, place: int, value: float) -> Array:
-    """Return a copy of a pose with one position replaced, (nq,)."""
-    moved = qpos.copy()
-    moved[place] = value
-    return moved
