@@ -269,12 +269,13 @@ def printed(tmp_path, capsys):
     [(2.5e-7, 1e-5, "2.5e-07 of 1e-05"), (1.16e-9, 1.28e-9, "1.2e-09 of 1.3e-09")],
 )
 def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
-    tmp_path, printed, error, allowed, cell
+    tmp_path, printed, error, allowed, cell, monkeypatch
 ):
     """Beside the error what is allowed to it; a share of undecided numbers is no error.
 
     Our own rows are one.
     """
+    monkeypatch.setenv("COLUMNS", "100")
     simulated = ("first", "mujoco-simulated", "RK4", "F12")
     row = Row(
         *simulated,
@@ -298,7 +299,10 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
         quantity="torque",
         error=0.0,
     )
-    rows, left_out = [row, share, identity], ["equilibria: too near"]
+    torque = replace(row, quantity="torque", error=1e-12, allowed=1e-6)
+    refused = replace(row, quantity="theta_3", verdict=REFUSES, reason="too fast")
+    rows = [row, share, identity, torque, refused]
+    left_out = ["equilibria: too near"]
     summary = summary_of([record_of("first", rows, left_out=left_out)])
     first, second = summary.engines
     assert (first.engine, second.engine) == ("mujoco-simulated", "formulas")
@@ -306,13 +310,14 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     text = printed(summary)
     words = " ".join(text.split())
     version = summary.versions["mujoco"]
-    assert re.search(rf"MuJoCo \S+ (simulated )?- {re.escape(cell)} - \d", words), words
+    cells = re.escape(f"1.0e-12 of 1e-06 {cell}")
+    assert re.search(rf"MuJoCo \S+ (simulated )?{cells} - 3", words), words
     for part in (
         # the numbers say what they are
         "error of allowed torque pin forces motion compared",
         "without an engine: 1 identity of the formulas",
         "all hold",
-        "1 not compared: 1 where a check does not apply",
+        "2 not compared: 1 where a check does not apply",
     ):
         assert part in words
     assert "study" not in words, "what is no engine's stands in no row"
@@ -325,7 +330,9 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     head, _, line = text[text.index("| largest") :].splitlines()[:3]
     cells = "error of allowed | torque | pin forces | motion | compared"
     assert head == f"| largest {cells} |"
-    assert line.startswith(f"| MuJoCo {version}, simulated | - | {cell}")
+    assert line.startswith(
+        f"| MuJoCo {version}, simulated | 1.0e-12 of 1e-06 | {cell} | - | 3"
+    )
 
 
 def record_of(name, rows, **parts):
