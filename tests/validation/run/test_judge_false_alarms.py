@@ -191,3 +191,15 @@ def test_a_right_law_is_right_at_every_step(draw, kind):
         scene = crank_rocker(motion=Motion(law=draw(rng, kind)))
         (row,) = check_law(make_question("law", scene, ()))
         assert not row.failed, row
+
+
+@pytest.mark.parametrize(
+    "ends, other", [("rest", "free"), ("free", "rest"), ("periodic", "free")]
+)
+def test_a_spline_with_other_ends_is_not_the_law(ends, other, monkeypatch):
+    """Its pieces fit each other, and its speeds are those of its angles."""
+    law = draw_table(np.random.default_rng(5), ends)
+    at = Law.at
+    monkeypatch.setattr(Law, "at", lambda law, time: at(replace(law, ends=other), time))
+    (row,) = check_law(make_question("law", crank_rocker(motion=Motion(law=law)), ()))
+    assert row.failed

@@ -28,7 +28,6 @@ from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.templating import (
     count_or_size,
     render,
-    write_share,
 )
 
 ALL_OPEN = 8
@@ -60,7 +59,7 @@ class _Cell(NamedTuple):
         """Return the text of its cell."""
         if self.kind in (REFUSES, UNDECIDED):
             return self.kind
-        return write_share(self.row.used)
+        return f"{self.row.used:.2g}"
 
 
 class SectionFigure(NamedTuple):

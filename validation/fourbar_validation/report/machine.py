@@ -1,6 +1,6 @@
 """Describe where and with what a run was made.
 
-Stated are versions, machine, this code, and the build of each engine.
+Stated are versions, machine, and this code.
 """
 
 import ctypes
@@ -8,7 +8,7 @@ import hashlib
 import os
 import platform
 from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +29,6 @@ DISTRIBUTIONS = REPORTED_DISTRIBUTIONS | {
 CODE = (".py", ".toml")
 """Endings of the files that numbers come from. Templates and accepted states change
 none.
-"""
-_BUILT = (".so", ".pyd", ".dylib", ".py")
-"""Endings of the files of an engine that decide its numbers. Others hold where and when
-it was installed.
 """
 
 
@@ -122,17 +118,7 @@ def name_code(*further: Path) -> dict[str, str]:
 
     `further`: packages among it.
     """
-    builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
-    build_hashes = {
-        f"build of {name}": digest
-        for name, digest in builds.items()
-        if digest and name != "fourbar"
-    }
-    return {
-        "code": hash_modules(FORMULAS_FOLDER, PACKAGE, *further),
-        **list_versions(),
-        **build_hashes,
-    }
+    return {"code": hash_modules(FORMULAS_FOLDER, PACKAGE, *further), **list_versions()}
 
 
 def hash_modules(*packages: Path) -> str:
@@ -152,18 +138,3 @@ def hash_modules(*packages: Path) -> str:
                 place = path.relative_to(package.parent).as_posix()
                 digest.update(f"{place} {len(data)}\n".encode() + data)
     return digest.hexdigest()[:16]
-
-
-def build(package: str) -> str:
-    """Hash what an installer wrote down of the files of a package.
-
-    Two builds of one version differ in it.
-    """
-    try:
-        lines = (distribution(package).read_text("RECORD") or "").splitlines()
-    except PackageNotFoundError:
-        return ""
-    files = sorted(line for line in lines if line.partition(",")[0].endswith(_BUILT))
-    if files:
-        return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16]
-    return ""

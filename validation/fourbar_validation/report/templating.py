@@ -44,7 +44,6 @@ def render(package: str, name: str, /, **what: object) -> str:
         "degrees": lambda radians: (
             "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
         ),
-        "share": write_share,
         "cell": escape_cell,
         "packed": (
             lambda text: base64.b64encode(
@@ -67,19 +66,6 @@ def escape_cell(text: object) -> str:
     for mark in "\\|`*_[]<>#":
         shown = shown.replace(mark, f"\\{mark}")
     return shown.replace("\\<", "&lt;").replace("\\>", "&gt;")
-
-
-def write_share(value: float) -> str:
-    """Write error/allowed in two digits."""
-    if math.isinf(value):
-        return "∞"
-    if value == 0.0:
-        return "0"
-    if value < 0.01:
-        return "<0.01"
-    if value < 10.0:
-        return f"{value:.2f}"
-    return f"{value:.1e}"
 
 
 def write_error(value: float) -> str:

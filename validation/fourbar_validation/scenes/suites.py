@@ -5,13 +5,12 @@ Scenes are the mechanisms of `models/`, the files given, or random linkages.
 
 import hashlib
 import math
-import tomllib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
@@ -208,8 +207,8 @@ LARGEST_LIST = 16 * 2**20
 def read_suite(path: Path) -> Files:
     """Read the scenes that a file lists, named from its own folder.
 
-    The file is TOML with `scenes = [...]`, or has one per line. An entry may hold * for
-    any name. InputError where an entry leaves the folder or names no file.
+    The file has one per line. An entry may hold * for any name. InputError where an
+    entry leaves the folder or names no file.
     """
     refuse = partial(InputError, "--suite", file=str(path))
     if not path.exists():
@@ -220,27 +219,13 @@ def read_suite(path: Path) -> Files:
     text = writing.read_text(path, "--suite", LARGEST_LIST)
     # one entry each; # begins a comment
     lines = (line.partition("#")[0].strip() for line in text.splitlines())
-    entries: Any = [*filter(None, lines)]
-    if path.suffix == ".toml":
-        try:
-            entries = tomllib.loads(text).get("scenes")
-        except (ValueError, RecursionError):  # no TOML
-            raise refuse(path.name, "is no list of scenes") from None
-    if not isinstance(entries, list) or not all(
-        isinstance(entry, str) and entry for entry in entries
-    ):
-        raise refuse(
-            path.name, 'must have scenes = ["a.toml", ...], or one scene file per line'
-        )
     files: list[Path] = []
-    for entry in entries:
+    for entry in filter(None, lines):
         if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
             raise refuse(entry, "must lie in the folder of the list, or below it")
         matches = [path.parent / entry]
         if "*" in entry:
-            matches = sorted(
-                file for file in path.parent.glob(entry) if not file.samefile(path)
-            )
+            matches = sorted(path.parent.glob(entry))
         if not matches:
             raise refuse(entry, "names no file")
         files += matches
