@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fourbar.show.plot.labels import add_label, settle_labels
-from fourbar.show.plot.style import Drawing, apply_style
+from fourbar.show.plot.style import apply_style
 from fourbar.writing import write_text
 from fourbar_validation.cost.conclusion import (
     ERROR_IN_WORDS,
@@ -125,15 +125,12 @@ def draw_pictures(
     title: str,
     folder: Path,
 ) -> list[Path]:
-    """Draw all pictures of a scene as SVG and PNG; the files written."""
+    """Draw all pictures of a scene; the files written."""
     with apply_style():
-        made = make_pictures(curves, title)
         written = []
-        for name, figure in made.items():
+        for name, figure in make_pictures(curves, title).items():
             written.append(folder / f"{name}.svg")
             write_text(written[-1], write_alone(figure, name))
-            written.append(folder / f"{name}.png")
-            Drawing(figure).save(written[-1])
     return written
 
 
@@ -330,8 +327,6 @@ class SettingPicture(NamedTuple):
     looks: Mapping[str, Look]
     abscissa: Callable[[CostPoint], float]
     xlabel: str
-    slopes: tuple[tuple[float, float, float], ...] = ()
-    """Exponents that are drawn, and where."""
 
 
 _TIMESTEP = "timestep, part of a revolution"
@@ -349,7 +344,6 @@ SETTING_PICTURES = {
         INTEGRATOR_LOOKS,
         _take_timestep,
         _TIMESTEP,
-        ((1.0, 4e-4, 2e-4), (4.0, 3e-3, 1e-9)),
     ),
     "softness": SettingPicture(
         "softness d",
@@ -357,7 +351,6 @@ SETTING_PICTURES = {
         SOFTNESS_LOOKS,
         lambda point: point.setting_value,
         "1 - d (d: impedance of solimp; MuJoCo's own 0.9)",
-        ((1.0, 2e-3, 1e-5),),
     ),
     "solver": SettingPicture(
         "tolerance, Newton",
@@ -383,16 +376,6 @@ def _draw_setting(curves: Curves, title: str, picture: SettingPicture) -> Any:
     axes.set_ylabel("worst error of torque and pin forces")
     axes.set_xlabel(picture.xlabel)
     set_axes(axes)
-    for exponent, left, low in picture.slopes:
-        axes.plot([left, 4.0 * left], [low, low * 4.0**exponent], color=INK, lw=1.0)
-        axes.annotate(
-            f"slope {exponent:g}",
-            (2.0 * left, low * 2.0**exponent),
-            xytext=(6, -10),
-            textcoords="offset points",
-            fontsize=TEXT,
-            color=INK,
-        )
     if picture.looks is SOLVERS:
         named = ["1e-15", "1e-12", "1e-9", "1e-6"]
         places = [ZERO_TOLERANCE_PLACE, *map(float, named)]

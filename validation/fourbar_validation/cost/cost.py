@@ -10,12 +10,11 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.writing import write_text
 from fourbar_validation.advise.judged_setup import JudgedSetup
-from fourbar_validation.advise.matters import MATTERS, measure_influences
+from fourbar_validation.advise.matters import measure_influences
 from fourbar_validation.compare.rows import write_csv_rows
 from fourbar_validation.cost.conclusion import (
     Curves,
     conclude,
-    find_cheapest,
     list_stepped,
 )
 from fourbar_validation.cost.laws import (
@@ -38,8 +37,6 @@ from fourbar_validation.report.templating import render
 from fourbar_validation.scenes.suites import read_scene_files
 
 _DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
-_WANTED = (1e-3, 1e-6)
-"""Errors whose price the table of several scenes has."""
 COST_HEADINGS = ("setting", "error", "ms per simulated second", "ms a revolution")
 
 
@@ -73,7 +70,6 @@ def cost(
 
     files = read_scene_files(scenes or _DEFAULT_SCENES)
     fitted: list[ErrorLaw] = []
-    rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
         name = files.name(index)
         scene = files.scene(index)
@@ -105,20 +101,7 @@ def cost(
             ):
                 print_sentence(line)
         click.echo(f"Pictures, laws and every point: {out / name / 'cost.md'}")
-        matters = influences and influences[0].times >= MATTERS
-        rows.append(
-            (
-                name,
-                *(_write_price(curves, error) for error in _WANTED),
-                f"{sum(law.holds for law in decided)} of {len(decided)}",
-                influences[0].setting if matters else "none by itself",
-            )
-        )
         fitted += decided
-    if len(rows) > 1:
-        prices = (f"ms for {error:g}" for error in _WANTED)
-        head = ("scene", *prices, "laws hold", "matters most")
-        Console().print(make_words_table(head, rows, show_edge=False))
     if not fitted:
         print_sentence("Nothing was compared: no law has points enough for a fit.")
     if fitted and all(law.holds for law in fitted):
@@ -141,7 +124,7 @@ def write_cost(
         "title": title,
         "conclusion": conclusion,
         "setup": describe_setup(),
-        "pictures": [path.stem for path in pictures if path.suffix == ".svg"],
+        "pictures": [path.stem for path in pictures],
         "laws": write_laws(laws),
         "head": COST_HEADINGS,
         "front": list_front(curves),
@@ -168,17 +151,6 @@ def write_subtitle(scene: Scene, title: str) -> str:
     if acting:
         parts.append(" and ".join(acting))
     return ", ".join(parts)
-
-
-def _write_price(curves: Curves, error: float) -> str:
-    """Write the least ms of a simulated second within an error.
-
-    A dash stands where nothing reaches it.
-    """
-    point = find_cheapest(curves, "worst", error)
-    if point is None:
-        return "-"
-    return f"{1e3 * point.seconds_per_second:.2g}"
 
 
 def list_front(curves: Curves) -> list[tuple[str, ...]]:
