@@ -1,7 +1,6 @@
 """Places of bars: from the first pin, from the mass centre, or at a named point."""
 
 from collections.abc import Callable, Iterable, Mapping
-from operator import is_
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
@@ -266,7 +265,5 @@ class Line(Placed):
 
 
 def change_each(terms: Any, change: Callable[[Place], Place]) -> Any:
-    """Return terms with their places changed: the same tuple where no place is."""
-    changed = [term.with_places(change) for term in terms]
-    same = all(map(is_, changed, terms))
-    return terms if same else tuple(changed)
+    """Return terms with their places changed."""
+    return tuple(term.with_places(change) for term in terms)

@@ -54,7 +54,6 @@ from fourbar.quantities.units import half_unit_of_text
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import (
-    BAR_OF_ANGLE,
     BRANCH_OF_NAME,
     DEFAULT_STEPS,
     LAW_KINDS,
@@ -366,12 +365,7 @@ def _read_motion(
         stated = motion[name]
         if stated.value is None:
             continue
-        if name in (*BAR_OF_ANGLE, "stroke"):
-            arguments[name] = _read_commanded(stated, by.unit)
-        elif isinstance(stated.value, list):
-            arguments[name] = stated.quantities(by.unit)
-        else:
-            arguments[name] = stated.quantity(by.unit)
+        arguments[name] = _read_commanded(stated, by.unit)
     for name, words in (("branch", BRANCH_OF_NAME), ("side", SIDES)):
         if name in motion.value:
             arguments[name] = motion[name].check(OneOf((*words,)))
@@ -386,12 +380,8 @@ def _read_law(entry: Entry) -> Law | Rise | Sine:
     """Read a table; a sine; or a rise, a dwell, a fall and a rest by a standard law."""
     law: Any = Law
     if isinstance(entry.value, dict) and "kind" in entry.value:
-        law = Rise
-        if entry["kind"].check(OneOf(LAW_KINDS)) == SINE_LAW:
-            law = Sine
-            numbers = dict(entry.value)
-            del numbers["kind"]
-            entry = entry.holding(numbers)
+        kind = entry["kind"].check(OneOf(LAW_KINDS))
+        law = Sine if kind == SINE_LAW else Rise
     return entry.described(law)  # type: ignore[no-any-return]
 
 

@@ -27,18 +27,16 @@ from fourbar.linkage import (
     MOVING_BARS,
     PINS,
     Bar,
+    Described,
     FourBar,
 )
-from fourbar.quantities import Array
 from fourbar.quantities.units import IMPERIAL, find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
     BRANCH_NAMES,
-    SINE_LAW,
     FromLimit,
     Motion,
-    Sine,
     Sweep,
 )
 from fourbar.studies.keys import OF_A_UNIFORM_BAR, find_misfit, list_entries
@@ -172,42 +170,35 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
     theta, omega, alpha = motion.names
-    unit = motion.numbers[theta].unit
-    angle: Any = motion.angle
-    if isinstance(angle, Sweep):
-        angle = {
-            "from": write_quantity(angle.start, unit),
-            "to": write_quantity(angle.stop, unit),
-            "steps": angle.steps,
-        }
-    elif isinstance(angle, FromLimit):
-        angle = write_described(angle)
-    else:
-        angle = _write_quantities(angle, unit)
     entry = {
-        theta: angle,
-        omega: _write_quantities(motion.speed, motion.numbers[omega].unit),
-        alpha: _write_quantities(motion.acceleration, motion.numbers[alpha].unit),
+        theta: motion.angle,
+        omega: motion.speed,
+        alpha: None if motion.law else motion.acceleration,
+        "law": motion.law,
+        "branch": BRANCH_NAMES[motion.branch],
+        "side": motion.side,
+        "free": motion.free,
     }
-    if motion.law is not None:
-        del entry[alpha]
-        entry["law"] = write_described(motion.law)
-        if isinstance(motion.law, Sine):
-            entry["law"] = {"kind": SINE_LAW, **entry["law"]}
-    entry["branch"] = BRANCH_NAMES[motion.branch]
-    entry["side"] = motion.side
-    if motion.free is not None:
-        entry["free"] = write_described(motion.free)
-    return {key: value for key, value in entry.items() if value is not None}
+    stated = {name: value for name, value in entry.items() if value is not None}
+    for name, value in stated.items():
+        if name in motion.numbers:
+            stated[name] = _write_commanded(value, motion.numbers[name].unit)
+        elif isinstance(value, Described):
+            stated[name] = write_described(value)
+    return stated
 
 
-def _write_quantities(numbers: float | Array | None, unit: str) -> Any:
-    """Write a number with its unit, or a list of them; None of none."""
-    if numbers is None:
-        return None
-    if isinstance(numbers, np.ndarray):
-        return [write_quantity(number, unit) for number in numbers]
-    return write_quantity(numbers, unit)
+def _write_commanded(value: Any, unit: str) -> Any:
+    """Write a number with its unit, a list of them, or what stands for many."""
+    if isinstance(value, Sweep):
+        start = write_quantity(value.start, unit)
+        stop = write_quantity(value.stop, unit)
+        return {"from": start, "to": stop, "steps": value.steps}
+    if isinstance(value, FromLimit):
+        return write_described(value)
+    if isinstance(value, np.ndarray):
+        return [write_quantity(number, unit) for number in value]
+    return write_quantity(value, unit)
 
 
 def _write_toml_value(key: str, value: object) -> str:

@@ -260,11 +260,6 @@ class Law(Described, _OverTime):
         with needing("SciPy is needed for a motion law", "studies"):
             from scipy.interpolate import CubicSpline
         time = require_numbers("time", time)
-        if self.omega is not None:
-            rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
-            curves = _fit_rates(self.time, self.angle, *rates)
-            theta, omega, alpha = (np.asarray(curve(time)) for curve in curves)
-            return theta, omega, alpha
         t = np.array(self.time)
         angle = np.array(self.angle)
         mean = 0.0
@@ -273,7 +268,11 @@ class Law(Described, _OverTime):
             mean = (angle[-1] - angle[0]) / (t[-1] - t[0])
             angle = angle - mean * (t - t[0])
             angle[-1] = angle[0]
-        curve = CubicSpline(t, angle, bc_type=SPLINES[self.ends])
+        if self.omega is None:
+            curve = CubicSpline(t, angle, bc_type=SPLINES[self.ends])
+        else:
+            rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
+            curve = _fit_rates(self.time, self.angle, *rates)
         theta, omega, alpha = (np.asarray(curve(time, order)) for order in range(3))
         return theta + mean * (time - t[0]), omega + mean, alpha
 
@@ -396,8 +395,8 @@ class Sine(Described, _OverTime):
     duration: _Duration
     phase: _Angle = 0.0
     steps: _Steps = 360
+    kind: Annotated[str, OneOf((SINE_LAW,))] = SINE_LAW
     stated_at: ClassVar[str] = "motion.law"
-    kind: ClassVar[str] = SINE_LAW
     bar: ClassVar[int] = 2
 
     @property
@@ -414,16 +413,14 @@ class Sine(Described, _OverTime):
 
 
 @lru_cache(maxsize=16)
-def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> tuple[Any, ...]:
+def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> Any:
     """Fit the polynomials through angles and their rates at the times of a table.
 
-    Return the functions of the angle, the speed and the acceleration by time. An
-    engine asks for them at each of its steps.
+    An engine asks for them at each of its steps.
     """
     from scipy.interpolate import BPoly
 
-    pieces = BPoly.from_derivatives(np.array(time), np.stack(values, axis=1))
-    return pieces, pieces.derivative(1), pieces.derivative(2)
+    return BPoly.from_derivatives(np.array(time), np.stack(values, axis=1))
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -481,7 +478,7 @@ class Motion:
         for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
     }
 
-    def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
+    def __init__(
         self,
         theta_2: float | Array | Sweep | FromLimit | None = None,
         omega_2: float | Array | None = None,
@@ -489,36 +486,19 @@ class Motion:
         branch: int = OPEN,
         free: Free | None = None,
         law: Law | Rise | Sine | None = None,
-        theta_3: float | Array | Sweep | FromLimit | None = None,
-        omega_3: float | Array | None = None,
-        alpha_3: float | Array = 0.0,
-        theta_4: float | Array | Sweep | FromLimit | None = None,
-        omega_4: float | Array | None = None,
-        alpha_4: float | Array = 0.0,
-        stroke: float | Array | Sweep | None = None,
-        stroke_speed: float | Array | None = None,
-        stroke_acceleration: float | Array = 0.0,
         side: str | None = None,
+        **others: Any,
     ) -> None:
-        given: dict[str, Any] = {
-            "theta_2": theta_2,
-            "omega_2": omega_2,
-            "alpha_2": alpha_2,
-            "theta_3": theta_3,
-            "omega_3": omega_3,
-            "alpha_3": alpha_3,
-            "theta_4": theta_4,
-            "omega_4": omega_4,
-            "alpha_4": alpha_4,
-            "stroke": stroke,
-            "stroke_speed": stroke_speed,
-            "stroke_acceleration": stroke_acceleration,
-        }
+        given = {"theta_2": theta_2, "omega_2": omega_2, "alpha_2": alpha_2, **others}
+        if foreign := given.keys() - Motion.numbers:
+            raise TypeError(f"a motion has no {min(foreign)!r}")
+        stroke = given.get("stroke")
         expect("motion.law", law, Law, Rise, Sine, type(None))
-        stated = _find_bar("motion", {name: given[name] for name in _NAMES_OF_BARS})
+        of_bars = {name: given.get(name) for name in _NAMES_OF_BARS}
+        stated = _find_bar("motion", of_bars)
         bar = (stated or 2) if law is None else law.bar
         names = COMMAND_NAMES[bar]
-        if stroke is not None or side is not None or stroke_speed is not None:
+        if not (stroke is side is given.get("stroke_speed") is None):
             if stroke is None:
                 allowed = "is missing: side and stroke_speed are of a stroke"
                 raise InputError("motion.stroke", None, allowed)
@@ -535,7 +515,9 @@ class Motion:
             raise InputError("motion.law", "a law", allowed)
         if isinstance(branch, str):
             branch = BRANCH_OF_NAME.get(branch, branch)
-        checked = _require_command(names, *(given[name] for name in names))
+        theta, omega, alpha = names
+        rates = given.get(omega), given.get(alpha, 0.0)
+        checked = _require_command(names, given.get(theta), *rates)
         expect("motion.branch", branch, int, np.integer, str)
         expect("motion.free", free, Free, type(None))
         if branch not in (OPEN, CROSSED):
