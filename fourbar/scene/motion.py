@@ -478,7 +478,7 @@ class Motion:
         for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
     }
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
         self,
         theta_2: float | Array | Sweep | FromLimit | None = None,
         omega_2: float | Array | None = None,
@@ -486,19 +486,37 @@ class Motion:
         branch: int = OPEN,
         free: Free | None = None,
         law: Law | Rise | Sine | None = None,
+        theta_3: float | Array | Sweep | FromLimit | None = None,
+        omega_3: float | Array | None = None,
+        alpha_3: float | Array = 0.0,
+        theta_4: float | Array | Sweep | FromLimit | None = None,
+        omega_4: float | Array | None = None,
+        alpha_4: float | Array = 0.0,
+        stroke: float | Array | Sweep | None = None,
+        stroke_speed: float | Array | None = None,
+        stroke_acceleration: float | Array = 0.0,
         side: str | None = None,
-        **others: Any,
     ) -> None:
-        given = {"theta_2": theta_2, "omega_2": omega_2, "alpha_2": alpha_2, **others}
-        if foreign := given.keys() - Motion.numbers:
-            raise TypeError(f"a motion has no {min(foreign)!r}")
-        stroke = given.get("stroke")
+        given: dict[str, Any] = {
+            "theta_2": theta_2,
+            "omega_2": omega_2,
+            "alpha_2": alpha_2,
+            "theta_3": theta_3,
+            "omega_3": omega_3,
+            "alpha_3": alpha_3,
+            "theta_4": theta_4,
+            "omega_4": omega_4,
+            "alpha_4": alpha_4,
+            "stroke": stroke,
+            "stroke_speed": stroke_speed,
+            "stroke_acceleration": stroke_acceleration,
+        }
         expect("motion.law", law, Law, Rise, Sine, type(None))
-        of_bars = {name: given.get(name) for name in _NAMES_OF_BARS}
+        of_bars = {name: given[name] for name in _NAMES_OF_BARS}
         stated = _find_bar("motion", of_bars)
         bar = (stated or 2) if law is None else law.bar
         names = COMMAND_NAMES[bar]
-        if not (stroke is side is given.get("stroke_speed") is None):
+        if stroke is not None or side is not None or stroke_speed is not None:
             if stroke is None:
                 allowed = "is missing: side and stroke_speed are of a stroke"
                 raise InputError("motion.stroke", None, allowed)
@@ -515,9 +533,7 @@ class Motion:
             raise InputError("motion.law", "a law", allowed)
         if isinstance(branch, str):
             branch = BRANCH_OF_NAME.get(branch, branch)
-        theta, omega, alpha = names
-        rates = given.get(omega), given.get(alpha, 0.0)
-        checked = _require_command(names, given.get(theta), *rates)
+        checked = _require_command(names, *(given[name] for name in names))
         expect("motion.branch", branch, int, np.integer, str)
         expect("motion.free", free, Free, type(None))
         if branch not in (OPEN, CROSSED):

@@ -76,6 +76,13 @@ def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     assert (f"omega_{bar} = [" in text) == (rates > 0)
 
 
+def test_a_cubic_between_two_points_has_their_speeds():
+    law = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 2.0))
+    _, omega, _ = law.at(np.array([0.0, 1.0]))
+    assert_allclose(omega, [0.0, 2.0], atol=EXACT)
+    assert "alpha" not in dump(Scene(uniform(0.2, 0.3, 0.25, 0.28), Motion(law=law)))
+
+
 POINTS = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, tau)
 CAM = {"rise": (1.0, 0.5), "dwell": 0.2, "fall": 0.4, "rest": 0.1}
 LATE = (10.0, 11.0, 12.5, 14.0), (0.3, 2.0, 4.0, 0.3 + tau)

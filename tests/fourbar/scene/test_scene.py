@@ -195,6 +195,8 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
 {"theta_2": [1, 2], "omega_2": [1, NaN]} | must be finite
 {"stroke": [1, 2], "stroke_speed": [1, 1, 1], "side": "left"} | 2: one for each
 {"stroke": 1, "stroke_speed": [1, 1], "side": "left"} | must be one number
+{"side": "left"} | are of a stroke
+{"stroke_speed": 1} | are of a stroke
 """),
 )
 def test_rates_that_belong_to_no_angle_are_refused(motion, said):

@@ -20,7 +20,7 @@ WANTED = """
 motion.theta_2.from, motion.theta_3.from, motion.theta_4.from, motion.stroke.from,
 drive.bar = 2, drive.bar = 3, drive.bar = 4, effects.torsion.O2.rest,
 effects.torsion.A.rest, effects.torsion.B.rest, effects.torsion.O4.rest,
-effects.springs.acts = push, effects.springs.acts = pull, loads.from_pin.x,
+effects.springs.acts = push, effects.springs.acts = pull,
 loads.from_centre, loads.point, loads.arm, loads.frame = world, loads.frame = bar,
 loads.table.factor, tolerances.lengths.input, tolerances.points.P.drawn.0, points.P.bar,
 pins.O2, motion.law.ends = rest, motion.law.kind = cycloidal,
