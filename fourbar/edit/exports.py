@@ -27,13 +27,13 @@ import numpy as np
 
 from fourbar.edit.dragging import list_handles
 from fourbar.errors import DependencyError, NotAssembledError, say_install
-from fourbar.formulas.mobility import limit_positions
-from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import SceneBlock
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
+from fourbar.show.plot.view import list_limits
 from fourbar.show.shown_units import COMMON, write_short
 from fourbar.show.studies import write_type
 from fourbar.show.summary import Facts
@@ -86,7 +86,11 @@ def evaluate_scene(
             "shift": scene.origin,
         }
     data["drawn"] = None if scene.drawing is None else scene.drawing.angle(2)
-    data["turns"] = _list_turns(scene)
+    data["turns"] = [
+        (words, *limit[:3])
+        for words, _, limits in list_limits(scene)
+        for limit in limits
+    ]
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     shown_units = {**COMMON, **units}
     facts = None
@@ -98,18 +102,6 @@ def evaluate_scene(
             data["peaks"] = list_peaks(solution, facts)
     data["headline"] = write_headline(solution, shown_units, facts)
     return data
-
-
-def _list_turns(scene: Scene) -> list[tuple[str, float, float, float]]:
-    """List limits of the commanded bar and dead centres, in words, with the angles."""
-    turns = []
-    for bar in {2, 4, scene.motion.bar}:
-        word = "limit" if bar == scene.motion.bar else "dead centre"
-        one, other = (number for number in MOVING_BARS if number != bar)
-        words = f"{word}: bars {one}, {other} in line"
-        for limit in limit_positions(scene.linkage, bar):
-            turns.append((words, limit.theta_2, limit.theta_3, limit.theta_4))
-    return turns
 
 
 def write_headline(

@@ -15,6 +15,7 @@ from tomlkit.items import AoT, Item, Table, Whitespace
 
 from fourbar.effects import Load, PointDrive, list_kinds
 from fourbar.errors import InputError
+from fourbar.files.scene_text import write_toml_value
 from fourbar.linkage import (
     BAR_NAMES,
     MOVING_BARS,
@@ -279,15 +280,5 @@ def _make_toml_table(entries: dict[str, Any], *after: Whitespace) -> Table:
 
 
 def _write_inline(value: Any) -> Any:
-    """Write tables and lists in one line."""
-    if isinstance(value, dict):
-        made = tomlkit.inline_table()
-        for key, entry in value.items():
-            made[key] = _write_inline(entry)
-        return made
-    if isinstance(value, list):
-        row = tomlkit.array()
-        for entry in value:
-            row.append(_write_inline(entry))
-        return row
-    return value
+    """Write a value, tables and lists in one line."""
+    return tomlkit.value(write_toml_value("workbench", value))

@@ -98,7 +98,7 @@ def dump(scene: Scene) -> str:
         if entries:
             lines = [f"[{name}]\n"] if name else []
             for key, value in entries.items():
-                lines.append(f"{key} = {_write_toml_value(key, value)}\n")
+                lines.append(f"{key} = {write_toml_value(key, value)}\n")
             texts.append("".join(lines))
     return "\n".join(texts)
 
@@ -201,15 +201,15 @@ def _write_commanded(value: Any, unit: str) -> Any:
     return write_quantity(value, unit)
 
 
-def _write_toml_value(key: str, value: object) -> str:
+def write_toml_value(key: str, value: object) -> str:
     """Write a TOML value; strings escape as in JSON, and DEL too."""
     if isinstance(value, dict):
-        pairs = (f"{name} = {_write_toml_value(key, x)}" for name, x in value.items())
+        pairs = (f"{name} = {write_toml_value(key, x)}" for name, x in value.items())
         return f"{{ {', '.join(pairs)} }}"
     if isinstance(value, list):
         # one line each where there are many: no line has more than MOST_DOTS_OF_A_LINE
         between = ", " if len(value) <= 3 else ",\n  "
-        return f"[{between.join(_write_toml_value(key, entry) for entry in value)}]"
+        return f"[{between.join(write_toml_value(key, entry) for entry in value)}]"
     if not isinstance(value, str):
         return repr(value)
     try:

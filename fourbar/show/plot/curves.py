@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import find_signs
@@ -38,7 +37,7 @@ from fourbar.show.plot.style import (
     set_degree_ticks,
     write_labelled_quantity,
 )
-from fourbar.show.plot.view import View, collect_point_vectors
+from fourbar.show.plot.view import View, collect_point_vectors, list_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -357,18 +356,17 @@ def list_transmission(view: View) -> Chart:
 def _list_limits(view: View) -> Iterator[Curve]:
     """List limits of the commanded bar and dead centres, by their places and angles."""
     at = view.sweep.at
-    linkage = view.scene.linkage
     order = np.argsort(at.angle)
     low, high = at.angle[order[[0, -1]]]
     middle = 0.5 * (low + high)
     one, follower = (bar for bar in MOVING_BARS if bar != at.bar)
-    signs = find_signs(linkage, at.angle, at.branch, at.bar)
-    for bar in dict.fromkeys((at.bar, 2, 4)):
+    signs = find_signs(view.scene.linkage, at.angle, at.branch, at.bar)
+    for name, bar, limits in list_limits(view.scene):
         # a sweep that ends at a limit ends short of it
         beside = 1.5 * (high - low) / len(order) if bar == at.bar else 0.0
         places = []
         heights = []
-        for limit in limit_positions(linkage, bar):
+        for limit in limits:
             theta = dict(zip(MOVING_BARS, limit[:3], strict=True))
             place = middle + math.remainder(theta[at.bar] - middle, math.tau)
             nearest = np.argmin(np.abs(at.angle - place))
@@ -378,12 +376,10 @@ def _list_limits(view: View) -> Iterator[Curve]:
                 places.append(place)
                 heights.append(abs(math.remainder(theta[4] - theta[3], math.pi)))
         if places:
-            mark, word = ("s", "limit") if bar == at.bar else ("D", "dead centre")
-            pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
+            mark = "s" if bar == at.bar else "D"
             over = np.interp(places, at.angle[order], view.axis.values[order])
             look = {"marker": mark, "ls": "none", "ms": 6.0, "mew": 1.1, "zorder": 5}
             look |= RING_MARK | {"clip_on": False}
-            name = f"{word}: bars {pair} in line"
             yield Curve(name, np.array(heights), look, over)
 
 

@@ -121,9 +121,9 @@ def choose_frames(shown: View, count: int) -> list[int]:
     positions = shown.sweep.at
     distances = np.abs(positions.places - shown.here.at.places[0])
     here = int(np.argmin(distances))
-    gaps = np.flatnonzero(~assembled)
-    first = max(gaps[gaps < here], default=-1) + 1
-    last = min(gaps[gaps > here], default=len(assembled)) - 1
+    gaps_before = np.cumsum(~assembled)
+    segment = np.flatnonzero(assembled & (gaps_before == gaps_before[here]))
+    first, last = segment[[0, -1]]
 
     over_time = shown.time is not None
     covered = positions.angle[last] - positions.angle[first]

@@ -44,14 +44,13 @@ FORCE_COLOURS = {
     "F43": "#8A3B78",
     "F14": "#007A5A",
 }
-FORCE_DASHES: dict[str, Any] = {
-    "F12": "-",
-    "F32": (0, (5, 1.6)),
-    "F43": (0, (1.4, 1.4)),
-    "F14": (0, (7, 1.6, 1.4, 1.6)),
+_FORCE_LINES: dict[str, tuple[Any, float]] = {
+    "F12": ("-", 2.6),
+    "F32": ((0, (5, 1.6)), 2.0),
+    "F43": ((0, (1.4, 1.4)), 1.6),
+    "F14": ((0, (7, 1.6, 1.4, 1.6)), 1.1),
 }
-_FORCE_WIDTHS = {"F12": 2.6, "F32": 2.0, "F43": 1.6, "F14": 1.1}
-"""Thick beneath thin: forces that are equal still show all four lines."""
+"""Dashes and width. Thick beneath thin: forces that are equal still show all lines."""
 
 
 def choose_bar_line(bar: int) -> dict[str, Any]:
@@ -61,12 +60,9 @@ def choose_bar_line(bar: int) -> dict[str, Any]:
 
 def choose_force_line(name: str) -> dict[str, Any]:
     """Return the style and the label of the curve of a pin force."""
-    return {
-        "color": FORCE_COLOURS[name],
-        "ls": FORCE_DASHES[name],
-        "lw": _FORCE_WIDTHS[name],
-        "label": write_force_name(name),
-    }
+    dashes, width = _FORCE_LINES[name]
+    look = {"color": FORCE_COLOURS[name], "ls": dashes, "lw": width}
+    return look | {"label": write_force_name(name)}
 
 
 def write_force_name(name: str) -> str:

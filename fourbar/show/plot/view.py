@@ -13,7 +13,7 @@ import numpy as np
 
 from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.evaluation.case import compute_shown_state
-from fourbar.formulas.mobility import find_circuit
+from fourbar.formulas.mobility import LimitPosition, find_circuit, limit_positions
 from fourbar.formulas.motion import State
 from fourbar.formulas.points import list_circuit
 from fourbar.linkage import MOVING_BARS
@@ -32,8 +32,8 @@ CLEAR = 0.3
 dwarf all others.
 """
 _LEAD = math.radians(60.0)
-"""Angle of the drawn position from the start of the longest stretch that assembles,
-rad. In a shorter stretch it is half of the stretch.
+"""Angle of the drawn position from the first that is well conditioned, rad. In a
+shorter sweep it is half of the sweep.
 """
 BARREL = 0.85
 """Length of a cylinder's barrel over the shortest stroke of the sweep. The rod is what
@@ -236,6 +236,22 @@ def where_in_words(solution: Solution) -> str:
     return f"{solution.commanded} = {where}"
 
 
+def list_limits(scene: Scene) -> list[tuple[str, int, tuple[LimitPosition, ...]]]:
+    """List limits of the commanded bar and dead centres.
+
+    An entry has words, the bar that reverses or that the drive cannot move, and the
+    positions.
+    """
+    linkage = scene.linkage
+    found = []
+    for bar in dict.fromkeys((scene.motion.bar, 2, 4)):
+        word = "limit" if bar == scene.motion.bar else "dead centre"
+        one, other = (number for number in MOVING_BARS if number != bar)
+        words = f"{word}: bars {one}, {other} in line"
+        found.append((words, bar, limit_positions(linkage, bar)))
+    return found
+
+
 def collect_point_vectors(
     scene: Scene,
     solution: Solution,
@@ -313,7 +329,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     ----------
     position : what is commanded where the linkage is drawn to scale, rad or m; left
         out: the scene's own where it names one (the start of a motion through time),
-        else 60 deg into the longest stretch that assembles, clear of poles.
+        else 60 deg into what assembles, clear of poles.
 
     Raises
     ------
@@ -371,18 +387,11 @@ def _view_motion(sweep: Solution, position: float | None) -> View:
 
 def _choose_position(sweep: Solution) -> float:
     """Choose a well-conditioned position that shows the bars apart."""
-    edges = np.flatnonzero(np.diff([False, *sweep.assembled, False]))
-    starts, stops = edges.reshape(-1, 2).T
-    longest = int(np.argmax(stops - starts))
-    run = slice(starts[longest], stops[longest])
-    places = sweep.at.places[run]
-    quality = np.full(len(places), np.inf)
-    for condition in (sweep.condition, sweep.drive_condition):
-        if condition is not None:
-            quality = np.minimum(quality, np.nan_to_num(condition[run]))
-    good = places[quality >= min(CLEAR, float(quality.max()))]
-    lead = 0.5 * (places[-1] - places[0])
+    conditions = [sweep.condition, sweep.drive_condition]
+    known = [condition for condition in conditions if condition is not None]
+    quality = np.nan_to_num(np.min(known, axis=0))
+    good = sweep.at.places[quality >= min(CLEAR, float(quality.max()))]
+    lead = 0.5 * float(np.ptp(good))
     if not sweep.at.moves_stroke:
         lead = min(_LEAD, lead)
-    nearest = np.argmin(np.abs(good - (places[0] + lead)))
-    return float(good[nearest])
+    return float(good[np.argmin(np.abs(good - good[0] - lead))])

@@ -159,9 +159,22 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes(part):
     before = document.text()
     rows = len(document.at(place[:-1]) or ()) if place[-1] == -1 else 0
     document.put(place, part["value"])
-    assert document.text() != before or place[0] == "effects"
+    is_stated = place[0] == "effects" or part.get("label") == "sweep"
+    assert document.text() != before or is_stated
     assert place[-1] != -1 or len(document.at(place[:-1])) == rows + 1
     loads(document.text())
+
+
+def test_the_page_has_the_angles_of_each_dead_centre(session):
+    turns = session.answer()["data"]["turns"]
+    assert {words for words, *_ in turns} == {"dead centre: bars 2, 3 in line"}
+    for _, theta_2, theta_3, _ in turns:
+        assert math.sin(theta_3 - theta_2) == approx(0.0, abs=1e-12)
+    assert math.cos(session.now.scene.linkage.ground_angle) == 1.0
+    closes = [
+        math.sin(three) * 0.25 + math.sin(two) * 0.1 for _, two, three, _ in turns
+    ]
+    assert closes == approx([0.22 * math.sin(four) for *_, four in turns], abs=1e-9)
 
 
 def test_a_new_tolerance_is_a_thousandth_in_the_unit_of_its_number(session):

@@ -572,6 +572,13 @@ def test_a_film_of_what_swings_goes_there_and_back(scene):
     assert (np.diff(order[:20]) > 0).all() and (np.diff(order[19:]) < 0).all()
 
 
+def test_a_film_leaps_over_no_gap():
+    scene = thesis(Sweep(0.0, 4 * pi, 240))
+    shown = make_view(scene)
+    order = film.choose_frames(shown, 40)
+    assert shown.sweep.assembled[min(order) : max(order) + 1].all()
+
+
 def test_a_film_of_what_turns_goes_round():
     assert np.all(np.diff(film.choose_frames(make_view(CRANK_ROCKER), 30)) == 2)
 
