@@ -21,7 +21,6 @@ from fourbar_validation.cost.laws import (
     ErrorLaw,
     find_pareto,
     fit_laws,
-    list_warnings,
     write_laws,
 )
 from fourbar_validation.cost.series import BEST
@@ -52,7 +51,7 @@ COST_HEADINGS = ("setting", "error", "ms per simulated second", "ms a revolution
 @click.option(
     "--verbose",
     is_flag=True,
-    help="Print the cheapest settings of every error, the laws and the warnings too.",
+    help="Print the cheapest settings of every error and the laws too.",
 )
 def cost(
     scenes: tuple[Path, ...],
@@ -96,7 +95,6 @@ def cost(
             Console().print(make_words_table(COST_HEADINGS, list_front(curves)))
             for line in (
                 *write_laws(laws),
-                *(f"warning: {line}" for line in list_warnings(curves)),
                 *(f"left out: {line}" for line in study.left_out),
             ):
                 print_sentence(line)
@@ -128,7 +126,6 @@ def write_cost(
         "laws": write_laws(laws),
         "head": COST_HEADINGS,
         "front": list_front(curves),
-        "warnings": list_warnings(curves),
         "left_out": study.left_out,
     }
     rows = map(list_cells, chain.from_iterable(curves.values()))

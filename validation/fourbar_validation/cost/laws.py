@@ -11,7 +11,7 @@ from itertools import groupby
 import numpy as np
 
 from fourbar_validation.advise.worst_errors import ERROR_NAMES
-from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
+from fourbar_validation.cost.work_precision import CostPoint
 
 LARGEST_LAWFUL_ERROR = 0.1
 """A larger error is not small enough for its law: the motion itself is another."""
@@ -136,14 +136,11 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Return the error that more steps no longer lessen, None if it still falls."""
-    errors = _list_errors(_list_by_steps(points), quantity)
+    ladder = sorted(points, key=lambda point: point.steps_per_revolution)
+    errors = _list_errors(ladder, quantity)
     if len(errors) < 2 or not FLOORED * errors[-2] <= errors[-1] < math.inf:
         return None
     return errors[-1]  # before it two sources may cancel: a dip is not a floor
-
-
-def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
-    return sorted(points, key=lambda point: point.steps_per_revolution)
 
 
 def _list_errors(points: Sequence[CostPoint], quantity: str) -> list[float]:
@@ -243,54 +240,6 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
     slope = fit([*floors], [*floors.values()])
     name = "floor of RK4 in tc/h"
     return ErrorLaw(name, quantity, *slope, -_FOURTH_ORDER, len(floors))
-
-
-def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
-    """List warnings where a quantity jumps, and where it has passed its floor.
-
-    Jumps are towards finer steps.
-    """
-    warnings = []
-    for name, points in curves.items():
-        ladder = _list_by_steps(
-            [p for p in points if p.kind == STEPPED_MOTION and p.setting_value >= 2.0]
-        )
-        steps = {round(point.steps_per_revolution) for point in ladder}
-        if (
-            name == "recommended"
-            or len(steps) < 4
-            or ladder[0].setting_value == ladder[-1].setting_value
-        ):
-            continue
-        jumps = []
-        floors = []
-        never = []
-        for quantity in ERROR_NAMES:
-            jumps += [(quantity, text) for text in _describe_jumps(ladder, quantity)]
-            floors += [(quantity, text) for text in _describe_floor(ladder, quantity)]
-            if min(_list_errors(ladder, quantity)) >= LARGEST_LAWFUL_ERROR:
-                never.append(quantity)
-        lines = _group_quantities(jumps) + _group_quantities(floors)
-        if never:
-            lines.append(
-                f"no timestep of the ladder brings {', '.join(never)} below"
-                f" {LARGEST_LAWFUL_ERROR:g}"
-            )
-        warnings += [f"{name}: {line}" for line in lines]
-    return warnings
-
-
-def _describe_floor(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]:
-    """Say from how many steps on more steps do not lessen an error."""
-    floor = find_floor(ladder, quantity)
-    if floor is None:
-        return
-    errors = _list_errors(ladder, quantity)
-    steps = [f"{point.steps_per_revolution:.0f}" for point in ladder]
-    first = len(errors) - 1
-    while first and FLOORED * floor <= errors[first - 1] <= floor / FLOORED:
-        first -= 1
-    yield f"{floor:.1e} from {steps[first]} steps a revolution on"
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
