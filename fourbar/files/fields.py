@@ -255,8 +255,9 @@ class Entry:
                 raise self.refuse("must have a finite size")
             return convert_to_polar(x, y)
         if not isinstance(self.value, list) or len(self.value) != 2:
-            one, other = ("1" if unit == "1" else f'"1 {unit}"' for unit in by.units)
-            form = f"[{one}, {other}]"
+            form = f'["1 {by.unit}", "1 {by.pair}"]'
+            if by.unit == "1":
+                form = "[1, 1]"
             if is_polar:
                 form = f"{self.POLAR} {self.COORDINATES}".strip()
                 form = form.format(name_unit(by.unit))
@@ -468,7 +469,7 @@ def write_described(description: Any) -> Any:
         elif isinstance(by, Entries):
             if not value and not by.is_value:
                 continue
-            value = [write_described(entry) for entry in value]
+            value = [*map(write_described, value)]
         elif isinstance(by, Part):
             value = write_described(value)
         elif isinstance(by, Listed):
@@ -537,7 +538,7 @@ def _shorten_for_error(value: object) -> object:
         if len(value) <= 3 and all(
             isinstance(entry, (str, float, bool)) for entry in value
         ):
-            return [_shorten_for_error(entry) for entry in value]
+            return [*map(_shorten_for_error, value)]
         return _Words(f"a list of {write_count(len(value), 'entry')}")
     if isinstance(value, int) and value.bit_length() > 64:
         return _Words("a huge whole number")

@@ -81,6 +81,9 @@ def dump(scene: Scene) -> str:
     read_back = scene
     if "lengths" in dict(pins_or_lengths):
         read_back = replace(scene, drawing=None)
+    traced = {}
+    if scene.picture is not None:
+        traced = write_described(scene.picture)
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
         *pins_or_lengths,
@@ -91,7 +94,7 @@ def dump(scene: Scene) -> str:
         *(("[loads]", load) for load in described["loads"]),
         ("effects", described["effects"]),
         ("tolerances", _write_tolerances(read_back)),
-        ("picture", write_described(scene.picture) if scene.picture else {}),
+        ("picture", traced),
     ]
     texts = []
     for name, entries in tables:
@@ -163,17 +166,20 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
         "bars": bars,
         "drive": drive if scene.drive is None else write_described(scene.drive),
         "points": {point.name: write_described(point) for point in scene.points},
-        "loads": [write_described(load) for load in scene.loads],
+        "loads": [*map(write_described, scene.loads)],
         "effects": {effect.key: write_described(effect) for effect in scene.effects},
     }
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
     theta, omega, alpha = motion.names
+    acceleration: Any = motion.acceleration
+    if motion.law is not None:  # whose angles have theirs
+        acceleration = None
     entry = {
         theta: motion.angle,
         omega: motion.speed,
-        alpha: None if motion.law else motion.acceleration,
+        alpha: acceleration,
         "law": motion.law,
         "branch": BRANCH_NAMES[motion.branch],
         "side": motion.side,
@@ -285,7 +291,7 @@ def write_drawn_scene(
         places.append(Entry(file, pin, [x, y]).pair(DRAWN_PLACE))
         rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
     drawing = DrawnPins(*places)
-    moving = [drawing.length(bar) for bar in MOVING_BARS]
+    moving = [*map(drawing.length, MOVING_BARS)]
     return _fill_in(rows, moving, "", find_unit(pins["A"][0], "m"), template)
 
 
@@ -337,7 +343,9 @@ def _fill_in(
 
     `unit`: of its lengths; imperial ones have comments in such units.
     """
-    examples = _IMPERIAL_EXAMPLES if unit.casefold() in IMPERIAL else _EXAMPLES
+    examples = _EXAMPLES
+    if unit.casefold() in IMPERIAL:
+        examples = _IMPERIAL_EXAMPLES
     per_metre = float(examples["per_length"]) / to_si(f"1 {examples['long']}", "m")
     masses = {
         name: repr(float(f"{per_metre * length:.4g}"))
