@@ -34,7 +34,7 @@ from fourbar.show.plot.style import (
     plot_points,
     write_pin_name,
 )
-from fourbar.show.plot.view import Plane, View, collect_point_vectors
+from fourbar.show.plot.view import DrawingPlane, View, collect_point_vectors
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ def _join_ends(kind: str, name: str, line: Any) -> Symbol:
 class Pose(NamedTuple):
     """Position of the linkage in the coordinates of a drawing."""
 
-    plane: Plane
+    plane: DrawingPlane
     u: dict[int, complex]
     """Direction of each bar, 1 to 4."""
     pins: dict[str, complex]

@@ -45,7 +45,7 @@ be a long chord.
 """
 
 
-class Plane(NamedTuple):
+class DrawingPlane(NamedTuple):
     """Coordinates of a drawing to scale, as complex numbers."""
 
     factor: float
@@ -110,7 +110,7 @@ class View:
         return f"{theta}, t = {place:.4g} s".replace("-", "−")
 
     @property
-    def plane(self) -> Plane:
+    def plane(self) -> DrawingPlane:
         """Coordinates that hold all positions of the sweep."""
         sweep = self.sweep
         bars = self.scene.linkage
@@ -126,7 +126,7 @@ class View:
             barrel = BARREL * factor * float(np.nanmin(sweep.stroke))
         size = 0.03 * factor * float(extent)
         corner = factor * complex(reached.real.max(), reached.imag.max()) + 2.0 * size
-        return Plane(factor, unit, origin, origin + corner, size, barrel)
+        return DrawingPlane(factor, unit, origin, origin + corner, size, barrel)
 
     @property
     def goes_round(self) -> bool:
