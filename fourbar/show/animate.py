@@ -195,7 +195,7 @@ def _collect_shown(
     for sign in signs if name == "theta_2" else (motion.branch,):
         if over_time:
             solution = solve(scene, stage, at=at)
-        elif solved is not None:
+        elif solved is not None and sign == motion.branch:
             solution = solved
         else:
             one = set_branch(scene, sign)

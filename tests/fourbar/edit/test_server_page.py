@@ -308,7 +308,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
     page.save()
     scene = load(path)
     assert scene.drive and scene.effects and scene.motion.stroke is not None
-    assert 'from_pin = {x = "300 mm", y = "-250 mm"}' in path.read_text()
+    assert 'from_pin = { x = "300 mm", y = "-250 mm" }' in path.read_text()
     solution = solve(scene)
     stroke = page.value("data.over.values[17]")
     assert force == approx(
