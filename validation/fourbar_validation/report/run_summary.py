@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from heapq import nlargest
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 
 from fourbar.errors import HOLDS, write_count
 from fourbar.quantities import PIN_FORCES
@@ -152,7 +152,8 @@ class Summary:
         self._lines: dict[str, EngineLine] = {}
         self._left_out: dict[str, AlikeTexts] = {}
         self._worst: list[Row] = []
-        self._shown: list[Record] = []
+        self._nearest: list[tuple[float, Record]] = []
+        """The scenes nearest to failing, each with the most that a row used."""
 
     def add(self, scene: Record) -> None:
         """Add one more scene."""
@@ -186,7 +187,9 @@ class Summary:
         self._add_agreement(rows)
         self._add_times(scene)
         # a row that fails has used more than all that it is allowed
-        self._shown = nlargest(SCENES_SHOWN, [*self._shown, scene], key=USED)
+        used = max((row.used for row in worst.values()), default=0.0)
+        scenes = [*self._nearest, (used, scene)]
+        self._nearest = nlargest(SCENES_SHOWN, scenes, key=itemgetter(0))
 
     def _line(self, engine: str) -> EngineLine:
         return self._lines.setdefault(engine, EngineLine(engine))
@@ -403,6 +406,10 @@ class Summary:
         ]
 
     @property
+    def _shown(self) -> list[Record]:
+        return [scene for _, scene in self._nearest]
+
+    @property
     def shown(self) -> list[Record]:
         """Return the scenes shown, by name, at most SCENES_SHOWN.
 
@@ -416,7 +423,7 @@ class Summary:
 
         All that fail have one, then those that used most of their allowed error.
         """
-        failing = sum(scene.used > 1.0 for scene in self._shown)
+        failing = sum(used > 1.0 for used, _ in self._nearest)
         return self._shown[: max(PICTURED, failing)]
 
     @property

@@ -61,11 +61,6 @@ class Record:
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
 
-    @property
-    def used(self) -> float:
-        """Return the largest error/allowed of its rows."""
-        return max((row.used for row in self.rows), default=0.0)
-
     def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
         answers = self.answers
