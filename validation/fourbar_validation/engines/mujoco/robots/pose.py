@@ -244,20 +244,16 @@ class _Closing:
     def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
         """List poses from which closing may end elsewhere, (nq,).
 
-        Each moves one joint: a hinge without a range by quarter turns, a joint with one
-        over the quarters of it. Fixed joints stay.
+        Each moves one joint that has a range to a quarter of it. Fixed joints stay.
         """
-        for joint in self.tied:
+        for joint in sorted({*self.tied} - fixed):
             place = self.model.jnt_qposadr[joint]
-            values = np.zeros(0)
             if math.isfinite(self.low[place]):
-                values = np.linspace(self.low[place], self.high[place], 5)[1:-1]
-            elif self.model.jnt_type[joint] == HINGE_JOINT:
-                values = stated[place] + 0.5 * math.pi * np.arange(1, 4)
-            for value in () if joint in fixed else values:
-                start = stated.copy()
-                start[place] = value
-                yield start
+                ends = (self.low[place], self.high[place])
+                for value in np.linspace(*ends, 5)[1:-1]:
+                    start = stated.copy()
+                    start[place] = value
+                    yield start
 
     def close(self, start: Array, fixed: set[int]) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,).
