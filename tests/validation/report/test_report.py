@@ -41,7 +41,7 @@ from fourbar_validation.report.html import (
     write_html,
     write_summary_page,
 )
-from fourbar_validation.report.run_summary import Summary
+from fourbar_validation.report.run_summary import PICTURED, Summary
 from fourbar_validation.report.scene_pictures import (
     STRETCHES,
     draw_scene_figure,
@@ -535,6 +535,12 @@ def test_pin_forces_of_which_one_fails_do_not_agree():
 def test_an_engine_that_broke_down_alone_is_named_without_a_quantity():
     words = "mine is wrong: no answer: exit status 3 after 4 s, in 1 scene; a."
     assert summary_of([record_of("a", [DEAD])]).headline == f"FAILS: {words}"
+
+
+@pytest.mark.parametrize("row, pictured", [(fail(OF_MINE), 30), (OF_MINE, PICTURED)])
+def test_all_scenes_that_fail_have_pictures_and_some_that_hold(row, pictured):
+    summary = summary_of(record_of(f"s{k}", [row]) for k in range(30))
+    assert len(summary.pictured) == pictured
 
 
 def refuse(scene, reason):
