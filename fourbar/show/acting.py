@@ -12,13 +12,14 @@ from fourbar.effects import Spring, Springs, Torsion
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN, PINS
-from fourbar.quantities import Array
+from fourbar.quantities import CHANGE_POINT, WOUND, Array
 from fourbar.scene import Command, Scene, command, command_at
-from fourbar.scene.motion import FEWEST_POINTS, Law
+from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
 from fourbar.solution import Conversion, Solution, where_assembled
+from fourbar.solving import solve
 from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
 from fourbar.studies.passing import SAME_POSITION
 
@@ -66,6 +67,32 @@ def list_arm_notes(scene: Scene) -> list[str]:
         if load.arm is not None
         and scene.linkage.bar(load.bar).mass == 0.0
         and scene.linkage.bar(load.bar).centre is None
+    ]
+
+
+def list_drawn_notes(scene: Scene, units: Conversion) -> list[str]:
+    """Say where a sweep to or from the drawn angle goes by more than half a turn.
+
+    The direction of a drawn bar leaves open which of its angles was meant.
+    """
+    sweep = scene.motion.angle
+    if scene.drawing is None or not isinstance(sweep, Sweep):
+        return []
+    drawn = scene.drawing.angle(scene.motion.bar)
+    if drawn not in (sweep.start, sweep.stop):
+        return []
+    key, other = ("to", sweep.stop) if drawn == sweep.start else ("from", sweep.start)
+    away = math.remainder(other - drawn, TURN)
+    width = abs(other - drawn)
+    if width - abs(away) < SAME_POSITION or abs(away) < SAME_POSITION:
+        return []
+    swept, start, stop, nearer, gap = (
+        write_short(angle, "rad", units)
+        for angle in (width, sweep.start, sweep.stop, drawn + away, abs(away))
+    )
+    return [
+        f"{scene.motion.commanded} goes by {swept} from {start} to {stop}; {key} ="
+        f' "{nearer}" is the same direction, {gap} from the drawn one'
     ]
 
 
@@ -148,27 +175,62 @@ def list_torsion_notes(
     solution: Solution,
     units: Conversion,
 ) -> list[str]:
-    """Say how far torsion springs are wound at one position, and from what line."""
-    if len(solution) > 1 or not solution.assembled[0]:
-        return []
+    """Say how far torsion springs are wound at one position, and from what line.
+
+    Of a motion it is said where springs are wound too far, and that springs on the
+    ground count from its line, where that is not along x: the angle at O2 is not
+    theta_2 then.
+    """
     write = partial(write_short, unit="rad", units=units, digits=POSITION_DIGITS)
     effects = scene.settled().effects
     torsions = [effect for effect in effects if isinstance(effect, Torsion)]
     springs = [row for effect in torsions for row in effect.springs]
+    theta_1 = math.remainder(scene.linkage.ground_angle, TURN)
+    on_ground = [pin for pin, *_ in springs if PINS[pin][0] == 1]
+    turned = on_ground and abs(theta_1) >= SAME_POSITION
+    lies = f"the ground's line, which lies at {write(theta_1)}" if turned else ""
+    notes = _list_wound(scene, solution, springs, units)
+    if len(solution) > 1 or not solution.assembled[0] or notes:
+        if lies:
+            one = f"torsion spring{'s' if len(on_ground) > 1 else ''}"
+            notes.append(f"{one} at {' and '.join(on_ground)}: rest counts from {lies}")
+        return notes
     state = compute_shown_state(scene, solution.at)
     windings = [wound for effect in torsions for wound in effect.list_windings(state)]
-    theta_1 = math.remainder(scene.linkage.ground_angle, TURN)
-    ground = "the ground's line"
-    if abs(theta_1) >= SAME_POSITION:
-        ground += f", which lies at {write(theta_1)}"
-    notes = []
     for winding, (pin, _, rest, _) in zip(windings, springs, strict=True):
         wound = np.ravel(winding)[0]
         i = PINS[pin][0]
         shown = drop_rounding(np.array([rest + wound, wound]), 1.0).tolist()
         angle, by = map(write, shown)
-        line = f"the line of bar {i}" if i > 1 else ground
+        line = f"the line of bar {i}" if i > 1 else lies or "the ground's line"
         notes.append(f"torsion spring at {pin}: wound by {by}, at {angle} from {line}")
+    return notes
+
+
+def _list_wound(
+    scene: Scene,
+    solution: Solution,
+    springs: list[tuple[str, float, float, float]],
+    units: Conversion,
+) -> list[str]:
+    """Say which torsion springs are half a turn or more from rest, and where."""
+    notes = []
+    known = solution.status_code != CHANGE_POINT
+    places = solution.at.places[known]
+    for spring in springs if WOUND in solution.status_code else []:
+        alone = replace(scene, loads=(), effects=(Torsion((spring,)),))
+        wound = solve(alone, at=solution.at).status_code[known] == WOUND
+        edges = np.flatnonzero(np.diff(wound))
+        ends = np.where(wound[edges], places[edges], places[edges + 1])
+        where = " and ".join(
+            _write_stretch(solution, stretch, units)
+            for stretch in pair_ends(bool(wound[0]), ends, bool(wound[-1]))
+        )
+        if where:
+            notes.append(
+                f"torsion spring at {spring[0]}: half a turn or more from rest {where},"
+                " where there are no forces"
+            )
     return notes
 
 

@@ -10,8 +10,10 @@ import numpy as np
 from fourbar.errors import clean_line, write_count
 from fourbar.formulas.mobility import (
     PARALLELOGRAM,
+    TURN,
     change_points,
     classify,
+    find_intervals,
     find_miss,
     list_met_equalities,
     name_assembly,
@@ -21,19 +23,23 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import (
     JAMMED,
     LINE,
+    OK,
     PIN_FORCES,
     SEVERAL,
     STATUS_NAMES,
     WOUND,
+    Array,
 )
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
     list_arm_notes,
     list_couple_notes,
+    list_drawn_notes,
     list_law_notes,
     list_spring_notes,
     list_torsion_notes,
 )
+from fourbar.show.change_point import has_growing_forces
 from fourbar.show.columns import explain_static
 from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import MotorDuty
@@ -54,6 +60,7 @@ from fourbar.show.shown_units import (
 )
 from fourbar.show.summary import Facts
 from fourbar.solution import Conversion, Solution
+from fourbar.studies.passing import move_inside_limit
 
 _NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
@@ -63,18 +70,34 @@ INDENT = 11
 """Width of what stands before a row."""
 _HALF_OF_LAST = 0.5
 """Part of the last digit shown from which on an error bar changes it."""
+_FEW_DIGITS = 1e-8
+"""Error bar over the value from which on the block says where digits are lost. Half of
+the digits of a double are lost then.
+"""
 OF_ONE_PREFIX = 1e-4
 """Part of the largest of its kind below which a quantity has a prefix of its own."""
 FAR_BELOW_PEAK = 0.1
 """Part of its peak below which a mean has a prefix of its own: it would begin with 0.0.
 In a table all of one kind have one prefix, to be compared at a glance.
 """
+_BESIDE_CHANGE_POINT = 1e-9
+"""rad; an angle nearer to a change point is rounded from it: files state angles with
+nine decimals and more.
+"""
+_MOST_POLES = 4
+"""Number of places at which a quantity grows without bound that are listed."""
+_MOST_HELD = 4
+"""Number of places at which dry friction holds a pin that are listed."""
+_IN_LINE = 1e-9
+"""Sine below which two bars are in line: places are located to some 1e-12."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 _NOT_IN_PEAKS = (WOUND, JAMMED, SEVERAL)
 """Statuses of positions between which no forces exist either."""
 _BENDING = [f"bending_{bar}" for bar in MOVING_BARS]
 """Names of the curves of the bending moments."""
+BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
+"""Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
 
 def write_block(
@@ -190,6 +213,16 @@ class SceneBlock(Facts):
         text = f"at {one.commanded} = {place}"
         if one.time is not None:
             text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
+        for bar, pair in BARS_IN_LINE.items():
+            first, second = (one[f"theta_{word}"] for word in pair.split(" and "))
+            theta = f"theta_{bar}"
+            _, is_limit = move_inside_limit(self.scene, bar, float(one[theta][0]))
+            # at a change point each bar moves on
+            is_alone = bar != one.at.bar and one.status_code[0] == OK
+            sine = math.sin((second - first)[0])
+            if is_limit and is_alone and abs(sine) <= _IN_LINE:
+                bars = f"bars {pair} are {_name_meeting(pair)}"
+                return f"{text}, where {theta} is at a limit: {bars}"
         return text
 
     def _value(
@@ -259,17 +292,39 @@ class SceneBlock(Facts):
         """Write how many positions have which status, where one is not ok."""
         codes = np.bincount(self.solution.status_code)
         counts = {STATUS_NAMES[code]: codes[code] for code in np.flatnonzero(codes)}
-        if {*counts} == {"ok"}:
+        beside = self._find_beside_change_points()
+        parts = []
+        if len(beside):
+            away = self._angle(float(beside.max()))
+            parts = [f"{len(beside)} within {away} of a change point"]
+            counts["ok"] -= len(beside)
+        elif {*counts} == {"ok"}:
             return
         words = {"change_point": "at a change point"}
-        parts = [
+        parts[:0] = [
             f"{count} {words.get(name, name.replace('_', ' '))}"
             for name, count in counts.items()
+            if count
         ]
         total = write_count(len(self.solution), "position")
         yield f"{total}: {', '.join(parts)}"
         if self.pins and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
             yield "    peaks and means are without the positions that have no forces"
+
+    def _find_beside_change_points(self) -> Array:
+        """Return the distances of positions evaluated beside a change point, rad, (n,).
+
+        The rounding of the angle keeps such a position from the change point that is
+        meant.
+        """
+        at = self.solution.at
+        angle = at.angle[self.solution.status_code == OK]
+        points = change_points(self.linkage, at.bar)
+        if not points:
+            return np.empty(0)
+        away = angle[:, None] - np.array(points)
+        away = np.abs(away - TURN * np.rint(away / TURN)).min(axis=1)
+        return np.asarray(away[away <= _BESIDE_CHANGE_POINT])
 
     def _write_static_hint(self) -> Iterator[str]:
         """Say what asks for forces, if a scene with loads states positions alone."""
@@ -336,11 +391,26 @@ class SceneBlock(Facts):
             begin = f"{name} {self._write_swing(bar)} by a law over {over} s"
         else:
             name = "stroke" if self.unit == "m" else name
-            begin = f"{name} from {start} to {stop}"
+            begin = f"{name} from {start} to {stop}{self._write_inset()}"
         swings = [
             f"{BAR_NAMES[other]} {self._write_swing(other)}" for other in following
         ]
         return "; ".join([begin, *swings])
+
+    def _write_inset(self) -> str:
+        """Write how far a range that the scene leaves out stays inside the limits."""
+        motion = self.scene.motion
+        stated = motion.angle is not None or motion.stroke is not None
+        if stated or turns_fully(self.linkage, motion.bar):
+            return ""
+        first, last = self.ends
+        inset = min(
+            (first - low) % TURN
+            for low, high in find_intervals(self.linkage, motion.bar)
+            if (first - low) % TURN <= high - low
+        )
+        inside, low, high = map(self._angle, (inset, first - inset, last + inset))
+        return f", {inside} inside its limits {low} and {high}"
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.angles[bar]
@@ -404,7 +474,8 @@ class SceneBlock(Facts):
         yield self._write_drive_head()
         yield _row("force" if self.linear else "torque", self._write_peak())
         if self.held and self.peak is not None:
-            yield _row("at rest", self._write_held(self.drive.unit))
+            name = "at rest" if self.is_held_at_rest else "range"
+            yield _row(name, self._write_held(self.drive.unit))
         yield from self._write_stroke()
         yield from self._write_power()
         if self.pressure is not None and self.stroke_range is not None:
@@ -431,7 +502,9 @@ class SceneBlock(Facts):
         """Write where a quantity grows without bound."""
         poles = self.motion.panels.list_poles(name)
         places = [self._place(poles[0])]
-        places += [self._place(pole, named=False) for pole in poles[1:]]
+        places += [self._place(pole, named=False) for pole in poles[1:_MOST_POLES]]
+        if len(poles) > _MOST_POLES:
+            places.append(f"{len(poles) - _MOST_POLES} more places")
         return f"grows without bound at {' and '.join(places)}"
 
     @property
@@ -441,18 +514,27 @@ class SceneBlock(Facts):
 
     def _write_held(self, unit: str) -> str:
         """Write between which torques or forces dry friction holds, and where."""
+        held = self.held
+        rests = "dry friction holds"
+        if not self.is_held_at_rest:
+            rests = "a pin with dry friction rests"
         parts = []
-        for least, most, (first, last) in self.held:
+        for least, most, (first, last), varies in held[:_MOST_HELD]:
             bounds = [*map(self._without_rounding, (least, most))]
             size = max(map(abs, bounds))
             holds = " to ".join(self._value(bound, unit, size) for bound in bounds)
-            if first != last:
+            if len(self.solution) == 1:
+                return f"{holds}: {rests}"
+            if first == last:
+                parts.append(f"{holds} at {self._place(first)}")
+            else:
                 until = self._place(last, named=False)
-                holds = f"within {holds} over {self._place(first)} to {until}"
-            elif len(self.solution) > 1:
-                holds += f" at {self._place(first)}"
-            parts.append(holds)
-        return f"{', '.join(parts)}: dry friction holds"
+                over = f"{self._place(first)} to {until}"
+                share = ", a part of it at each position" if varies else ""
+                parts.append(f"{holds} over {over}{share}")
+        if len(held) > _MOST_HELD:
+            parts.append(f"and at {len(held) - _MOST_HELD} more places")
+        return f"{', '.join(parts)}: {rests}"
 
     def _without_rounding(self, value: float) -> float:
         """Return zero for a torque or force of the drive within its rounding."""
@@ -710,6 +792,12 @@ class SceneBlock(Facts):
         """Write where pin forces jump, and what rounding does."""
         scene = self.scene
         solution = self.solution
+        passes = self.pins and solution.change_points
+        if passes and has_growing_forces(solution):
+            yield (
+                "at a change point pin forces grow without bound: the peaks are those "
+                "of these instants"
+            )
         if self.pins and not self.motion.is_steady:
             yield "the positions are passed at no one speed: no RMS values, no energies"
         yield from self.motion.list_jumps(
@@ -721,6 +809,8 @@ class SceneBlock(Facts):
                 "to move: the largest as it begins to move, against the whole of dry "
                 "friction; the rows above take friction at rest as 0"
             )
+        yield from self._warn()
+        yield from list_drawn_notes(scene, self.units)
         yield from list_arm_notes(scene)
         yield from list_law_notes(scene, self.units)
         yield from list_spring_notes(scene, solution, self.units)
@@ -738,6 +828,45 @@ class SceneBlock(Facts):
                 " value)"
             )
 
+    def _warn(self) -> Iterator[str]:
+        """Write where the drive's torque or force has few digits left.
+
+        The warning names the collinear bars that cost the digits.
+        """
+        solution = self.solution
+        drive = self.drive
+        if drive is None or drive.error is None or solution.drive_condition is None:
+            return
+        # of those that matter: one that passes through zero has no digits, and needs
+        # none
+        sizes = drive.sizes
+        with np.errstate(invalid="ignore"):
+            reference = np.maximum(sizes, np.nanmedian(sizes))
+            reference[reference == 0.0] = np.nan
+            share = drive.error / reference
+        if not self._without_rounding(float(np.nanmax(sizes, initial=0.0))):
+            return  # nothing has digits to lose
+        if not np.nanmax(share, initial=0.0) > _FEW_DIGITS:
+            return
+        worst = int(np.nanargmax(share))
+        digits = max(math.floor(-math.log10(share[worst])), 0)
+        place = self._place(float(solution.at.places[worst]))
+        start = f"{digits} digits left of {drive.symbol} at {place}"
+        commanded = BARS_IN_LINE[solution.at.bar]
+        sines = {commanded: solution.condition[worst]}
+        condition = solution.drive_condition[worst]
+        if solution.drive is not None:
+            yield (
+                f"{start}: of its lever {condition:.2g}, of the sine of bars"
+                f" {commanded} {sines[commanded]:.2g} is left"
+            )
+            return
+        sines[BARS_IN_LINE[solution.drive_bar]] = condition
+        bars = min(sines, key=lambda pair: sines[pair])
+        gap = math.asin(min(sines[bars], 1.0))
+        apart = write_short(gap, "rad", self.units, digits=2)
+        yield f"{start}: bars {bars} are {apart} from being {_name_meeting(bars)}"
+
 
 def _row(label: str, text: str) -> str:
     return f"  {label:<{INDENT - 2}}{text}"
@@ -748,6 +877,11 @@ def _drop_small(values: list[float | None]) -> list[float | None]:
     largest = max((abs(value) for value in values if value), default=0.0)
     least = SHOWN_AS_ZERO * largest
     return [0.0 if value and abs(value) <= least else value for value in values]
+
+
+def _name_meeting(bars: str) -> str:
+    """Name what two bars of `BARS_IN_LINE` are; bars 2 and 4 share no pin."""
+    return "parallel" if bars == BARS_IN_LINE[3] else "in line"
 
 
 def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:

@@ -1,5 +1,6 @@
 """Pin forces on a change point: the limits to which they tend along the assembly."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -7,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
+from fourbar.evaluation.free_motion import release_at
 from fourbar.quantities import CHANGE_POINT, PIN_FORCES, Array
-from fourbar.scene import command_at
+from fourbar.scene import Command, command_at
 from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -29,28 +31,26 @@ ZERO_LIMIT = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
+class _NoSideError(Exception):
+    """A change point of which a side cannot be asked; says why."""
+
+
 def find_limits(solution: Solution) -> tuple[Solution, str]:
     """Return the solution of one position, and what is said of its pin forces.
 
     At a change point these are the limits from both sides; a force without a limit
-    keeps NaN, and so do all of a motion over time, and where a cylinder is at an end of
-    its range. Other positions, and those without forces, stay as they are, without a
-    word.
+    keeps NaN, and so do all where a side cannot be asked: where a law or a release
+    begins or ends, or stands still, and where a cylinder is at an end of its range.
+    Other positions, and those without forces, stay as they are, without a word.
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return solution, ""
-    scene = solution.scene
     rising, order = np.unique(MULTIPLES, return_inverse=True)
-    here = float(solution.at.places[0])
     try:
-        if solution.time is not None:
-            raise InputError("at", None, "is a time")
-        # a stroke changes by as much as turns its bar by the step; an angle has turn 1
-        _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
-        places = command_at(scene, here + ANGLE_STEP / abs(turn) * rising)
-    except InputError:
-        return solution, "on the change point pin forces have no value"
-    beside = solve(scene, "force", at=places)
+        places = _list_places(solution, rising)
+    except _NoSideError as error:
+        return solution, f"on the change point pin forces have no value: {error}"
+    beside = solve(solution.scene, "force", at=places)
     limits = _extrapolate_forces(beside, order)
     forces: Any = {name: limit[None] for name, limit in limits.items()}
     bounded = [np.isfinite(limit).all() for limit in limits.values()]
@@ -59,6 +59,71 @@ def find_limits(solution: Solution) -> tuple[Solution, str]:
         said = "on the change point: the limits from both sides"
         said += "" if all(bounded) else "; - has none"
     return replace(solution, **forces), said
+
+
+def has_growing_forces(solution: Solution) -> bool:
+    """Return True if pin forces grow without bound at a change point of a release.
+
+    A change point at which the motion begins or ends has one side alone, and is not
+    asked.
+
+    `solution`: of the release, over time.
+    """
+    assert solution.time is not None
+    assert solution.command_at is not None
+    instants = np.array([0.0, *(solution.change_points or ())])
+    speed = np.asarray(solution.command_at(instants).speed, dtype=float)
+    # a motion that comes to rest before it meets the last of them has fewer instants
+    instants = instants[: len(speed)]
+    moving = speed != 0.0
+    time_steps = ANGLE_STEP / np.abs(speed[moving])
+    times = instants[moving, None] + time_steps[:, None] * MULTIPLES
+    within_motion = (times >= 0.0) & (times <= solution.time[-1])
+    times = times[within_motion.all(axis=1)]
+    # the release begins at time 0, which is the first row
+    rising, rows = np.unique([0.0, *times.ravel()], return_inverse=True)
+    beside = solve(solution.scene, "force", at=solution.command_at(rising))
+    for rows_of_one in rows[1:].reshape(times.shape):
+        limits = _extrapolate_forces(beside, rows_of_one)
+        if np.isnan([*limits.values()]).any():
+            return True
+    return False
+
+
+def _list_places(solution: Solution, multiples: Array) -> Command:
+    """List the positions at multiples of the step, which rise.
+
+    Along a motion over time the bar has the speed and acceleration of each instant.
+    """
+    scene = solution.scene
+    at = solution.at
+    law = scene.motion.law
+    if law is None and scene.motion.free is None:
+        # a stroke changes by as much as turns its bar by the step; an angle has turn 1
+        here = float(at.places[0])
+        _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
+        try:
+            return command_at(scene, here + ANGLE_STEP / abs(turn) * multiples)
+        except InputError as error:
+            raise _NoSideError("the cylinder is at an end of its range") from error
+
+    moving = "the law" if law else "the release"
+    speed = abs(float(np.ravel(np.asarray(at.speed, dtype=float))[0]))
+    if speed == 0.0:
+        raise _NoSideError(f"{moving} stands still there")
+    assert at.time is not None
+    times = float(np.ravel(at.time)[0]) + ANGLE_STEP / speed * multiples
+    begin = 0.0
+    end = math.inf
+    if law:
+        begin, *_, end = law.time
+    if begin <= times[0] and times[-1] <= end:
+        if law:
+            return command_at(scene, times)
+        released = release_at(scene, np.array([0.0, *times])).command
+        if len(released.angle) > len(times):
+            return released.part(slice(1, None))
+    raise _NoSideError(f"{moving} begins or ends there, and has one side alone")
 
 
 def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
@@ -62,14 +63,16 @@ class PinLoad(NamedTuple):
 
 
 class HeldRange(NamedTuple):
-    """Neighbouring positions at which dry friction holds a linkage at rest."""
+    """Neighbouring positions at which dry friction holds a pin at rest."""
 
     low: float
     """Least torque or force of the drive that holds one of them."""
     high: float
     """Greatest torque or force that holds one of them."""
     ends: tuple[float, float]
-    """Commanded angle or stroke of the first and the last, rad or m."""
+    """Commanded angle or stroke of the first and the last, rad or m, or the time, s."""
+    varies: bool
+    """False if each of them is held from `low` to `high`, as in a dwell."""
 
 
 class Facts:
@@ -217,26 +220,45 @@ class Facts:
 
     @cached_property
     def held(self) -> list[HeldRange]:
-        """Where dry friction holds a linkage at rest, in the order of the positions."""
+        """Where dry friction holds a pin at rest, in the order of the positions.
+
+        A turn that begins at such a position ends at the same, which is listed once.
+        """
         solution = self.solution
-        drive = self.drive
-        if drive is None or getattr(solution, drive.keys.low) is None:
+        rows = self._find_held(solution)
+        if self.drive is None or not len(rows):
             return []
         if not np.any(solution.at.speed):  # held between the positions too
             solution = self.motion.solve_between()
-        low = getattr(solution, drive.keys.low)
-        high = getattr(solution, drive.keys.high)
-        is_held = np.isfinite(low) & np.isfinite(high) & (low < high)
-        is_held &= np.asarray(solution.at.speed) == 0.0
+            rows = self._find_held(solution)
+        low = getattr(solution, self.drive.keys.low)
+        high = getattr(solution, self.drive.keys.high)
         places = solution.at.places
-        return [
-            HeldRange(
-                float(low[run].min()),
-                float(high[run].max()),
-                (float(places[run[0]]), float(places[run[-1]])),
-            )
-            for run in split_runs(np.flatnonzero(is_held))
-        ]
+        ranges = list[HeldRange]()
+        for run in split_runs(rows):
+            is_end = run[0] == len(solution) - 1 and rows[0] == 0
+            if self.kind == "turn" and ranges and is_end:
+                continue
+            ends = float(places[run[0]]), float(places[run[-1]])
+            least, most = float(low[run].min()), float(high[run].max())
+            gap = max(np.ptp(low[run]), np.ptp(high[run]))
+            varies = bool(gap > TIED * (most - least))
+            ranges.append(HeldRange(least, most, ends, varies))
+        return ranges
+
+    def _find_held(self, solution: Solution) -> NDArray[np.intp]:
+        """Find the rows of positions at which dry friction holds a pin, (k,)."""
+        low = self.drive and getattr(solution, self.drive.keys.low)
+        if self.drive is None or low is None:
+            return np.zeros(0, dtype=np.intp)
+        high = getattr(solution, self.drive.keys.high)
+        return np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
+
+    @cached_property
+    def is_held_at_rest(self) -> bool:
+        """Return True if nothing moves where dry friction holds a pin."""
+        rows = self._find_held(self.solution)
+        return not np.any(self.solution.at.part(rows).speed)
 
     @cached_property
     def stroke_limits(self) -> tuple[float, float] | None:

@@ -39,12 +39,16 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+MOST_DIGITS = 16
+"""Largest number of significant digits of a double."""
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
 MOST_ROWS_PRINTED = 40
 """Rows of the table on a terminal if --every does not state them. They can be read at a
 glance.
 """
+ROW_STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
+"""Steps of the rows on a terminal. Of a longer sweep it is a multiple of the last."""
 
 
 def write_table(
@@ -125,7 +129,9 @@ def print_positions(
     """
     step = every or 1
     if every is None and width is not None:
-        step = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1)) or 1
+        wanted = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1))
+        multiple = ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1])
+        step = next((step for step in ROW_STEPS if step >= wanted), multiple)
     cells = dict[str, list[str]]()
     for column in columns:
         cells |= _write_column(column, column.name, units)
@@ -138,7 +144,11 @@ def print_positions(
     notes = [line for note in told for line in wrap_line(note)]
     if step > 1:
         more = "; --all shows each" if every is None else ""
-        notes.append(f"shown: 1 in {step} of the {len(rows)} positions{more}")
+        suffix = {1: "st", 2: "nd", 3: "rd"}.get(step % 10, "th")
+        if step % 100 in (11, 12, 13):
+            suffix = "th"
+        which = f"every {step}{suffix} of the {len(rows)} positions"
+        notes.append(f"shown: {which}{more}")
     if left_out := [name.split("\n")[0] for name in cells if name not in kept]:
         notes.append(
             f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has"
@@ -177,6 +187,10 @@ def list_columns(
     for name in _list_names(solution):
         column = read_column(solution, name)
         shown |= _write_column(column, headings.get(name, name), units)
+        if name != "sin_mu" or solution.time is not None or drive.error is None:
+            continue
+        digits = _count_torque_digits(drive.values, drive.error)
+        shown[f"digits\nof {drive.symbol[0]}"] = digits
     return shown
 
 
@@ -242,6 +256,16 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     # not the largest, which may stand beside a pole
     usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
     return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
+
+
+def _count_torque_digits(torque: Array, error: Array) -> list[str]:
+    """Count the digits of the torque that are not round-off."""
+    with np.errstate(all="ignore"):
+        digits = np.floor(np.log10(np.abs(torque) / error))
+    digits = np.clip(digits, 0, MOST_DIGITS)
+    digits = np.where(error == 0.0, MOST_DIGITS, digits)
+    finite = np.isfinite(torque) & np.isfinite(error)
+    return write_cells(np.where(finite, digits, np.nan))
 
 
 @contextmanager

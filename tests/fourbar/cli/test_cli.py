@@ -213,8 +213,20 @@ def test_a_terminal_gets_some_forty_rows():
     rows = [line for line in lines if ROW.match(line)]
     assert len(rows) == 37
     assert [rows[n].split()[0] for n in (1, -1)] == ["10.0000", "360.0000"]
-    shown = "shown: 1 in 10 of the 361 positions; --all shows each"
+    shown = "shown: every 10th of the 361 positions; --all shows each"
     assert lines.index(rows[-1]) < lines.index(shown)
+
+
+def test_the_digits_of_the_torque():
+    solution = solve(crank_rocker(), "error")
+    columns = tables.list_columns(solution)
+    (cells,) = (columns[name] for name in columns if "digits" in name)
+    for cell, torque, error in zip(
+        cells, solution.torque, solution.torque_error, strict=True
+    ):
+        digits, relative = int(cell), error / abs(torque)
+        assert digits == 0 or relative <= 10.0**-digits
+        assert digits == tables.MOST_DIGITS or relative > 10.0 ** -(digits + 1)
 
 
 def test_no_command_is_a_question_for_help(run, capsys):

@@ -3,14 +3,16 @@
 import re
 import tomllib
 from dataclasses import replace
-from math import acos, degrees, pi, radians, sqrt, tau
+from math import acos, degrees, floor, log10, pi, radians, sqrt, tau
 
 import numpy as np
 import pytest
 from pytest import approx
 
 from fourbar import (
+    Bar,
     Flywheel,
+    FourBar,
     Free,
     Friction,
     Gravity,
@@ -223,6 +225,44 @@ never = "Parallelogram"
 lengths = { ground = "3 m", input = "1 m", coupler = "3 m", output = "1 m" }
 motion = { theta_2 = ["0 rad", "1 rad", "180 deg"], omega_2 = "1 rad/s" }
 says = ["3 positions: 1 ok, 2 at a change point"]
+never = " within "
+["a change point to its decimals"]
+lengths = { ground = "3 m", input = "1 m", coupler = "3 m", output = "1 m" }
+motion = { theta_2 = ["0 rad", "1 rad", "3.14159265359 rad"], omega_2 = "1 rad/s" }
+says = ["1 ok, 1 at a change point, 1 within 1.186e-11"]
+never = "2 at a change point"
+["two to their decimals"]
+lengths = { ground = "3 m", input = "1 m", coupler = "3 m", output = "1 m" }
+motion = { theta_2 = ["2e-11 rad", "1 rad", "9.42477796077 rad"], omega_2 = "1 rad/s" }
+says = ["3 positions: 1 ok, 2 within 1.146e-09 deg"]
+never = "at a change point"
+["a change point missed"]
+lengths = { ground = "3 m", input = "1 m", coupler = "3 m", output = "1 m" }
+motion = { theta_2 = ["1 rad", "3.1416 rad"], omega_2 = "1 rad/s" }
+says = ["Parallelogram"]
+never = " within "
+["a release over change points"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.3 m", output = "0.1 m" }
+bars.input.mass = "0.1 kg"
+bars.coupler.mass = "0.3 kg"
+bars.output.mass = "0.1 kg"
+motion.theta_2 = "0.5 rad"
+motion.omega_2 = "25 rad/s"
+motion.free = { duration = "0.4 s", steps = 50 }
+loads = [{ bar = 2, moment = "0.05 N m" }]
+effects.gravity = ["9.81 m/s^2", "-90 deg"]
+says = ["at a change point pin forces grow without bound"]
+never = "motor"
+["a release of equal halves, each of which its arm carries"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.3 m", output = "0.1 m" }
+bars.input.mass = "0.1 kg"
+bars.coupler.mass = "0.3 kg"
+bars.output.mass = "0.1 kg"
+motion.theta_2 = "0.5 rad"
+motion.omega_2 = "6 rad/s"
+motion.free = { duration = "0.5 s", steps = 100 }
+effects.gravity = ["9.81 m/s^2", "-90 deg"]
+says = ["released"]
 never = "without bound"
 ["strokes"]
 motion.stroke = { from = "0.17 m", to = "0.33 m", steps = 40 }
@@ -319,6 +359,16 @@ SAID = {
         ],
         "of these positions",
     ),
+    "a range that is left out": (
+        move(LIMITED, omega_2=1.0),
+        [f"1 deg inside its limits {write(-LIMIT)} and {write(LIMIT)}; "],
+        "change point",
+    ),
+    "that range as it is stated": (
+        move(LIMITED, theta_2=Sweep(radians(1.0) - LIMIT, LIMIT - radians(1.0), 72)),
+        ["input from"],
+        "inside its limits",
+    ),
     "a lamp that a spring balances": (
         balanced_lamp(0.0),
         [" torque peak 0 N m at ", "RMS 0 N m", "the torque is zero within rounding"],
@@ -331,6 +381,9 @@ QUICK = {*FILES, *SAID} - {
     "a release",
     "three rockers",
     "both turns of one change point",
+    "a release over change points",
+    "a release of equal halves, each of which its arm carries",
+    "a range that is left out",
 }
 
 
@@ -400,12 +453,34 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     where = ": dry friction holds"
     if steps > 1:
         digits = 4
-        where = " over theta_2 = 11.46 deg to 80.21 deg: dry friction holds"
+        where = " over theta_2 = 11.46 deg to 80.21 deg, a part of it at each"
         assert np.ptp(static) > 0.1
     low, high = 1e3 * (static.min() - 0.5), 1e3 * (static.max() + 0.5)
-    within = "within " if steps > 1 else ""
-    said = f"at rest {within}{low:.{digits}g} mN m to {high:.{digits}g} mN m{where}"
+    said = f"at rest {low:.{digits}g} mN m to {high:.{digits}g} mN m{where}"
     assert said in block(held)
+
+
+@pytest.mark.slow
+def test_each_position_at_rest_has_its_own_range():
+    """Pin B stands against the coupler at 0 and 180 deg, pin O4 between positions.
+
+    The torque jumps by each range while B reverses.
+    """
+    pins = dict.fromkeys(("O2", "A", "B", "O4"), (0.15, 0.005))
+    scene = Scene(
+        FourBar(0.3, Bar(0.04), Bar(0.29), Bar(0.065)),
+        Motion(Sweep(0.0, tau, 72), tau),
+        effects=(Friction.at(O4=20.0), PinFriction.at(**pins)),
+    )
+    ranges = []
+    for place, name in ((0.0, "0"), (pi, "180")):
+        beside = Motion(place + np.array([-1e-9, 1e-9]), tau)
+        low, high = sorted(solve(replace(scene, motion=beside)).torque)
+        ranges.append(f"{low:.4g} N m to {high:.4g} N m at theta_2 = {name} deg")
+    text = block(scene)
+    assert f"range {', '.join(ranges)}: a pin with dry friction rests" in text
+    assert "at theta_2 = 0 deg (B), 10.52 deg (O4), 180 deg (B), 188.7 deg (O4)" in text
+    assert "of these positions" not in text and "without bound" not in text
 
 
 def test_what_is_held_or_moved_across_a_pole_has_no_bound():
@@ -448,7 +523,7 @@ def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero(
     effects = (*WEIGHT, Friction.at(O2=5.0))
     text = block(crank_rocker(motion=Motion(law=law), effects=effects))
     first, last = (f"{x - 5.0:.4g} N m to {x + 5.0:.4g} N m" for x in torques)
-    at_rest = f"{first} at t = 0 s, within {last} over t = 0.2 s to 0.3 s"
+    at_rest = f"{first} at t = 0 s, {last} over t = 0.2 s to 0.3 s"
     assert f"at rest {at_rest}, {first} at t = 0.4 s: dry" in text
     said = "stop or start, and torque or pin forces jump, at t = "
     assert f"{said}0.2 s (O2), 0.3 s (O2)" in text and "reverses" not in text
@@ -518,6 +593,19 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     low, high = Facts(solve(pushed)).stroke_limits
     assert low == 0.0 and "assembles from 0 mm to" in block(pushed)
     assert bar == 3 or high == approx(0.2, rel=1e-12)
+
+
+@pytest.mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))
+def test_digits_left_are_those_that_the_error_bar_leaves(away):
+    """A torque on bar 4 beside its dead centre, where bars 2 and 3 are in line."""
+    stretched = opposite(0.22, 0.3, 0.35)
+    motion = {"theta_2": stretched + away, "omega_2": 3.0}
+    scene = replace(move((0.3, 0.1, 0.25, 0.22), WEIGHT, **motion), drive_bar=4)
+    s = solve(scene, "error")
+    digits = floor(log10(abs(s.torque[0]) / s.torque_error[0]))
+    assert (digits < 8) == (away < 1e-8)
+    said = f"{digits} digits left of T4 at" in block(scene)
+    assert said == (digits < 8)
 
 
 def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():

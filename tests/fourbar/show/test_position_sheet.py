@@ -13,6 +13,7 @@ from pytest import approx
 from fourbar import (
     Bar,
     FourBar,
+    Free,
     Gravity,
     Load,
     Motion,
@@ -30,6 +31,7 @@ from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import COMMON, units
 from fourbar.studies import course
 from tests.support.scenes import crank_rocker
+from tests.support.shares import slow_but
 from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6
@@ -144,10 +146,40 @@ def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value():
     assert rows[-1] == "on the change point no pin force has a limit"
 
 
-def test_the_pin_forces_of_a_motion_over_time_have_no_value_on_a_change_point():
-    law = Motion(law=Rise("cycloidal", (1.0, 1.0), theta_2=0.0))
-    rows, _ = write_forces(law, at=("time", "0 s"))
-    assert rows[-1] == "on the change point pin forces have no value"
+@pytest.mark.slow
+@pytest.mark.parametrize("gravity", [ALONG, ACROSS])
+def test_a_release_has_the_limits_of_its_own_motion(gravity):
+    """No torque acts: forces are bounded under any weight.
+
+    On the frame the bars act with their weights less m a. Each arm turns about the
+    same angle, so that half of it all is at each pin.
+    """
+    motion = Motion(0.5, 6.0, free=Free(2.0, 100))
+    rows, solution = write_forces(motion, gravity, ("theta_2", "0 rad"))
+    assert rows[-1] == LIMITS
+    lost = 0.1 * solution.a_G2 + 0.3 * solution.a_G3 + 0.1 * solution.a_G4
+    direction = np.array([np.cos(gravity.angle), np.sin(gravity.angle)])
+    shaking = numbers(rows[5])[:2]
+    assert shaking == approx(9.81 * 0.5 * direction - lost[0], rel=SIX_DIGITS, abs=1e-6)
+    halves = [-0.5 * x for x in shaking]
+    assert numbers(rows[1])[:2] == approx(halves, rel=SIX_DIGITS, abs=1e-6)
+
+
+RELEASED = Motion(0.0, 6.0, free=Free(1.0, 10))
+REASONS = [
+    (
+        Motion(law=Rise("cycloidal", (1.0, 1.0), theta_2=0.0)),
+        "the law stands still there",
+    ),
+    (RELEASED, "the release begins or ends there, and has one side alone"),
+    (RELEASED.replace(speed=0.0), "the release stands still there"),
+]
+
+
+@pytest.mark.parametrize("motion, why", slow_but(REASONS[:1], REASONS))
+def test_the_reason_is_said_where_a_motion_begins(motion, why):
+    rows, _ = write_forces(motion, at=("time", "0 s"))
+    assert rows[-1] == f"on the change point pin forces have no value: {why}"
     assert numbers(rows[1]) == []
 
 
