@@ -15,6 +15,7 @@ from fourbar_validation.cli import status
 from fourbar_validation.places import MODELS
 from fourbar_validation.run import plan
 from fourbar_validation.run.plan import read_part
+from fourbar_validation.run.store import Store
 from tests.support.here import judge_here
 
 OPTIONS = ["--random", "7", "--engines", "free-body", "--no-pictures"]
@@ -112,12 +113,37 @@ def test_of_two_copies_of_a_part_one_that_is_whole_is_enough(parts, run, tmp_pat
     assert status(["collect", copy, *parts, *out]) == HOLDS
 
 
-def test_a_resumed_run_says_how_many_answers_it_keeps(run, capsys):
+@pytest.mark.slow
+def test_two_copies_of_a_part_that_differ_are_refused(
+    parts, run, tmp_path, monkeypatch, refusal
+):
+    monkeypatch.setattr(Store, "put", worsen(Store.put))
+    copy = run("copy", "--part", "2/3")
+    said = refusal(*parts, copy)
+    assert f"DIR = '{copy}': holds another result than {parts[1]}: " in said
+    assert " of free-body in random-0-000000002" in said
+    out = ["-o", str(tmp_path / "all")]
+    assert status(["collect", parts[0], copy, parts[2], *out]) == HOLDS
+
+
+def worsen(put):
+    """A store that writes another error into one row of its results."""
+
+    def put_worse(store, task, results):
+        row = next(row for row in results[0]["rows"] if row[1] == "free-body")
+        row[4] = 0.5
+        put(store, task, results)
+
+    return put_worse
+
+
+def test_a_resumed_run_says_which_answers_it_keeps(run, capsys):
     for _ in range(2):
         capsys.readouterr()
         run("part-1", "--part", "1/3")
     said = " ".join(capsys.readouterr().err.split())
     assert "kept from an interrupted run: the answers of all engines on 3 of 7" in said
+    assert "scenes, random-0-000000000, random-0-000000001, random-0-000000006" in said
 
 
 @pytest.mark.slow

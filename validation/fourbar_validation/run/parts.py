@@ -3,6 +3,7 @@
 A part has many tasks; `run/store.py` keeps the file of each.
 """
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,10 +37,10 @@ def judge_part(plan: Plan, request: Request, progress: Progress) -> None:
 
 
 def _gather(plan: Plan, folders: Sequence[Path], parts: int) -> dict[int, Store]:
-    """Find a folder that has each finished task of a run.
+    """Find the folder of each finished task of a run.
 
-    InputError if a folder is of another run, or names the parts with missing or damaged
-    tasks.
+    InputError if a folder is of another run, if two copies of a task differ, or if
+    tasks are missing or damaged, whose parts it names.
     """
     stores: dict[int, Store] = {}
     spoilt = []
@@ -50,7 +51,10 @@ def _gather(plan: Plan, folders: Sequence[Path], parts: int) -> dict[int, Store]
             if damage:
                 spoilt.append(f"{path} {damage}")
             else:
-                stores.setdefault(int(path.name), store)
+                task = int(path.name)
+                first = stores.setdefault(task, store)
+                if first is not store:
+                    _require_alike(task, first, store)
     tasks = range(len(plan.tasks))
     missing = [task for task in tasks if task not in stores]
     if missing:
@@ -61,6 +65,25 @@ def _gather(plan: Plan, folders: Sequence[Path], parts: int) -> dict[int, Store]
         why = f"{len(missing)} of {len(tasks)} tasks are missing: run {words} again"
         raise InputError("DIR", "; ".join(spoilt[:_MOST_NAMED]) or None, why)
     return stores
+
+
+def _require_alike(task: int, first: Store, second: Store) -> None:
+    """Raise InputError unless two copies of a task have the same rows.
+
+    Times and what engines printed may differ from machine to machine.
+    """
+    rows = [
+        {json.dumps(row) for kept in store.read(task) for row in kept["rows"]}
+        for store in (first, second)
+    ]
+    if differing := sorted(rows[0] ^ rows[1]):
+        scene, engine, _, quantity, *_ = json.loads(differing[0])
+        raise InputError(
+            "DIR",
+            str(second.folder),
+            f"holds another result than {first.folder}: {quantity} of {engine} in"
+            f" {scene}; name one of the two folders, or judge that part again",
+        )
 
 
 def collect_parts(

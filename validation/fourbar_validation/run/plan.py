@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.errors import FAILED, DependencyError, InputError
-from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.compare.rows import FAILS, escape_controls
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
@@ -26,6 +26,8 @@ SCENES_OF_A_QUICK_TASK = 20
 """Scenes per task otherwise: a second together."""
 _MOST_TASKS = 10_000
 """Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
+_MOST_KEPT_NAMED = 5
+"""Scenes whose kept answers a resumed run names; further ones are counted."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 """Stages of a run, as its progress is told."""
 
@@ -137,18 +139,25 @@ class Plan:
         for line in store.notes:
             progress.note(line)
         left = [task for task in self.part_tasks if task not in done]
-        kept = self.part_scenes - sum(len(self.tasks[task]) for task in left)
+        kept = [i for task in self.part_tasks if task in done for i in self.tasks[task]]
         if kept:
-            progress.note(
-                "kept from an interrupted run: the answers of all engines on"
-                f" {kept} of {len(self.suite)} scenes"
-            )
-        progress.advance(JUDGING, kept)
+            progress.note(self._tell_kept(kept))
+        progress.advance(JUDGING, len(kept))
         how = self.engines, self.draw_at_once, self.sketch
         jobs = ((task, make_jobs(self.suite, self.tasks[task], *how)) for task in left)
         for task, records in judge_tasks(self.suite, self.engines, jobs, self.workers):
             store.put(task, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
+
+    def _tell_kept(self, scenes: Sequence[int]) -> str:
+        """Say which answers of an interrupted run are kept."""
+        names = [escape_controls(self.suite.name(i)) for i in scenes[:_MOST_KEPT_NAMED]]
+        more = len(scenes) - len(names)
+        listed = ", ".join(names) + f" and {more} more" * bool(more)
+        return (
+            "kept from an interrupted run: the answers of all engines on"
+            f" {len(scenes)} of {len(self.suite)} scenes, {listed}"
+        )
 
     def summarise(self) -> Summary:
         """Return a summary that knows the engines, and no scene yet."""
