@@ -16,10 +16,10 @@ import numpy as np
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, Array
+from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import is_once_round, read_drive_demand
-from fourbar.show.panels import SHALLOW, ZERO, Panels, Peak, fit_panels, split_runs
+from fourbar.show.panels import SHALLOW, Panels, Peak, Wanted, fit_panels, split_runs
 from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution, where_assembled
 from fourbar.solving import solve, split
@@ -241,14 +241,14 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     def compute(places: Array) -> dict[str, Array]:
         return _list_curves(scene, solve(scene, stage, at=command_at(scene, places)))
 
-    roundings = _list_roundings(scene, solution)
-    positions = fit_panels(compute_positions, edges, roundings)
+    wanted = _list_wanted(scene, solution)
+    positions = fit_panels(compute_positions, edges, wanted)
     positions = positions.with_points(exact, compute_positions(exact))
     for bar in MOVING_BARS:
         _join_turns(positions, solution, bar)
     panels = positions
     if solution.omega_4 is not None:
-        panels = fit_panels(compute, edges, roundings, SHALLOW)
+        panels = fit_panels(compute, edges, wanted, SHALLOW)
         panels = panels.with_points(exact, compute(exact))
     reversals, rests = (
         [(place, name) for place, name in found if name in PINS]
@@ -348,7 +348,7 @@ def _locate_breaks(
     names = compute(edges[:1])
     if not names:
         return [], []
-    panels = fit_panels(compute, edges, {}, settled=ZERO)
+    panels = fit_panels(compute, edges, dict.fromkeys(names, Wanted(zeros=True)))
     width = _SAME_EDGE * panels.length
     breaks: _Named = []
     rests: _Named = []
@@ -366,25 +366,29 @@ def _locate_breaks(
     return sorted(breaks, reverse=backwards), sorted(rests, reverse=backwards)
 
 
-def _list_roundings(scene: Scene, solution: Solution) -> dict[str, float]:
-    """List the size of the rounding of each curve that does not settle."""
+def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
+    """List what is asked of each curve, with the size of its rounding."""
     longest = max(scene.linkage.lengths)
     roundings = dict.fromkeys(_POSITION_CURVES, SHOWN_AS_ZERO)
     roundings["stroke"] = SHOWN_AS_ZERO * longest
+    wanted = {name: Wanted(size, ranged=True) for name, size in roundings.items()}
+    wanted |= dict.fromkeys(RATES, Wanted())
     if solution.F12 is None:
-        return roundings
+        return wanted
     drive = read_drive_demand(solution)
     rounding = find_drive_rounding(solution)
     speed = float(np.nanmax(np.abs(getattr(solution, drive.speed_key)), initial=0.0))
     loads = compute_pin_loads(solution)
     largest = max(float(np.nanmax(load, initial=0.0)) for load in loads.values())
-    for bar in MOVING_BARS:
-        roundings[f"bending_{bar}"] = SHOWN_AS_ZERO * largest * longest
-    roundings |= dict.fromkeys(PIN_FORCES, SHOWN_AS_ZERO * largest)
-    roundings["speed"] = SHOWN_AS_ZERO * speed
-    roundings["power"] = rounding * speed
-    roundings[drive.keys.value] = rounding
-    return roundings
+    bending = Wanted(SHOWN_AS_ZERO * largest * longest)
+    wanted |= {f"bending_{bar}": bending for bar in MOVING_BARS}
+    wanted["speed"] = Wanted(SHOWN_AS_ZERO * speed)
+    wanted |= dict.fromkeys(
+        PIN_FORCES, Wanted(SHOWN_AS_ZERO * largest, integrated=True)
+    )
+    wanted["power"] = Wanted(rounding * speed, integrated=True)
+    wanted[drive.keys.value] = Wanted(rounding, integrated=True)
+    return wanted
 
 
 def _list_position_curves(solution: Solution) -> dict[str, Array]:

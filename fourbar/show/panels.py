@@ -24,10 +24,17 @@ NODES = 10
 exact up to 19.
 """
 SETTLED = 1e-10
-"""Error of a panel below which it is not halved, over the usual size of the curve."""
+"""Error of one panel below which it is not halved for the integrals. It is the part of
+the motion that the panel is, times the last terms of the polynomial over the size of
+the curve.
+"""
+EXTREME_ERROR = 1e-9
+"""Error of a panel that may hold an extreme value below which it is not halved, over
+the largest value.
+"""
 ZERO = 1e-12
-"""The same of a curve whose zeros are wanted. Forces jump at a zero, so that it must
-not lie beside a node.
+"""Error of a panel that may hold a zero below which it is not halved, over the largest
+value. Forces jump at a zero, so that it must not lie beside a node.
 """
 HELD = 1e-6
 """Error of a panel, over the largest value, above which its polynomial is not used for
@@ -90,6 +97,19 @@ class Peak(NamedTuple):
     """Commanded angle or stroke at the peak, rad or m. For a motion over time it is the
     time, s.
     """
+
+
+class Wanted(NamedTuple):
+    """What is asked of a curve, and how far it settles."""
+
+    rounding: float = 0.0
+    """Size of its rounding, which does not settle."""
+    integrated: bool = False
+    """True if its integrals are wanted besides its largest size."""
+    ranged: bool = False
+    """True if both ends of its range are wanted."""
+    zeros: bool = False
+    """True if its zeros are wanted, and nothing else."""
 
 
 @dataclass
@@ -342,12 +362,30 @@ def _find_panel_zeros(series: Array) -> Array:
     return zeros[(zeros > -1.0) & (zeros < 1.0)]
 
 
+class _Fit(NamedTuple):
+    """Polynomials of some panels for one curve."""
+
+    values: Array
+    """Values at the nodes, (p, NODES, k)."""
+    error: Array
+    """Estimate of the error of each, (p,); infinite where some values are missing, zero
+    where all are.
+    """
+    most: Array
+    """Largest value, or size of a vector, (p,); -inf where all are missing."""
+    least: Array
+    """Least value of a scalar, (p,); inf where all are missing, and of a vector."""
+    size: Array
+    """Largest size, (p,); 0 where all are missing."""
+    unsettled: NDArray[np.bool_]
+    """True for a panel that would have been halved again, (p,)."""
+
+
 def fit_panels(
     compute: ComputeCurves,
     edges: Array,
-    roundings: Mapping[str, float],
+    wanted: Mapping[str, Wanted],
     most_halvings: int = DEEP,
-    settled: float = SETTLED,
 ) -> Panels:
     """Halve panels until each curve is settled.
 
@@ -355,59 +393,83 @@ def fit_panels(
     ----------
     compute : curves to represent.
     edges : ends of the first panels, (p + 1,), in the order of the motion.
-    roundings : by name of a curve, the size of its rounding, which does not settle.
+    wanted : by name of a curve, what is asked of it.
     most_halvings : number of rounds after which a curve is taken as it is.
-    settled : error of a panel that is not halved, over the usual size of the curve.
     """
     start = edges[:-1]
     stop = edges[1:]
-    enough = {}
+    length = edges[-1] - edges[0]
+    fits = _fit_panels(compute, start, stop)
+    usual = {}
+    for name, fit in fits.items():
+        # a node next to a pole does not change the size of a curve
+        medians = np.median(np.nan_to_num(np.abs(_measure(fit.values))), axis=1)
+        scale = medians.max() or 1.0
+        usual[name] = float(scale * np.sqrt(np.square(medians / scale).mean()))
+    kept: dict[str, list[_Fit]] = {name: [] for name in fits}
     ends = []
-    kept: dict[str, list[tuple[Array, Array, NDArray[np.bool_]]]] = {}
     for halvings in range(most_halvings + 1):
-        fits = _fit_panels(compute, start, stop)
+        share = (stop - start) / length
         opens = {}
-        for name, (values, error, size) in fits.items():
-            if not halvings:
-                enough[name] = settled * _find_usual(values) + roundings.get(name, 0.0)
-                kept[name] = []
-            noise = _NOISE * 2.0**halvings * size
-            opens[name] = ~(error <= np.maximum(enough[name], noise))
+        for name, fit in fits.items():
+            # a node that a halving leaves out may have been next to a pole
+            known = [*kept[name], fit]
+            most = max(part.most.max(initial=-np.inf) for part in known)
+            least = min(part.least.min(initial=np.inf) for part in known)
+            is_open = _find_open(fit, share, usual[name], (most, least), wanted[name])
+            noise = _NOISE * 2.0**halvings * fit.size
+            opens[name] = is_open & ~(fit.error <= noise)
         is_open = np.any([*opens.values()], axis=0)
         most_open = 0 if halvings == most_halvings else _MOST_OPEN
         is_last = not 0 < is_open.sum() <= most_open
         keep = ~is_open | is_last
         ends.append((start[keep], stop[keep]))
-        for name, (values, error, _) in fits.items():
-            unsettled = opens[name][keep] & is_last
-            kept[name].append((values[keep], error[keep], unsettled))
+        for name, fit in fits.items():
+            part = fit._replace(unsettled=opens[name] & is_last)
+            kept[name].append(_Fit(*(column[keep] for column in part)))
         if is_last:
             break
         middle = 0.5 * (start[is_open] + stop[is_open])
         start = np.concatenate((start[is_open], middle))
         stop = np.concatenate((middle, stop[is_open]))
+        fits = _fit_panels(compute, start, stop)
     start, stop = map(np.concatenate, zip(*ends, strict=True))
     order = np.argsort(start if stop[0] > start[0] else -start)
     curves = {}
     for name, parts in kept.items():
-        columns = zip(*parts, strict=True)
-        values, error, unsettled = (np.concatenate(part)[order] for part in columns)
-        curves[name] = PanelCurve(values, error, [])
-        curves[name].poles = _find_panels_at_poles(curves[name], unsettled)
+        whole = _Fit(*(np.concatenate(c)[order] for c in zip(*parts, strict=True)))
+        curves[name] = PanelCurve(whole.values, whole.error, [])
+        curves[name].poles = _find_panels_at_poles(curves[name], whole.unsettled)
     start = start[order]
     stop = stop[order]
     share = (stop - start) / (stop - start).sum()
     return Panels(start, stop, share, curves)
 
 
-def _find_usual(values: Array) -> float:
-    """Return the usual size of a curve, by its values at the nodes, (p, N, k).
-
-    A node next to a pole does not change it.
-    """
-    medians = np.median(np.nan_to_num(np.abs(_measure(values))), axis=1)
-    scale = medians.max() or 1.0
-    return float(scale * np.sqrt(np.square(medians / scale).mean()))
+def _find_open(
+    fit: _Fit,
+    share: Array,
+    usual: float,
+    extremes: tuple[float, float],
+    wanted: Wanted,
+) -> NDArray[np.bool_]:
+    """Mark the panels that are halved: for an extreme value, or for the integrals."""
+    most, least = extremes
+    scale = max(abs(most), abs(least)) if np.isfinite(least) else abs(most)
+    highest = fit.most + fit.error
+    with np.errstate(invalid="ignore"):
+        lowest = fit.least - fit.error
+    if wanted.zeros:
+        return (lowest <= 0.0) & (highest >= 0.0) & ~(fit.error <= ZERO * scale)
+    may_exceed = highest >= most
+    if wanted.ranged:
+        may_exceed |= lowest <= least
+    else:
+        may_exceed |= -lowest >= scale
+    is_open = may_exceed & ~(fit.error <= EXTREME_ERROR * scale + wanted.rounding)
+    if wanted.integrated:
+        is_open |= ~(share * fit.error <= SETTLED * usual + wanted.rounding)
+    return is_open
 
 
 def split_runs(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
@@ -433,14 +495,11 @@ def _find_panels_at_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> li
     return poles
 
 
-def _fit_panels(
-    compute: ComputeCurves, start: Array, stop: Array
-) -> dict[str, tuple[Array, Array, Array]]:
-    """Fit the polynomials of panels to curves: values, errors and largest sizes.
+def _fit_panels(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, _Fit]:
+    """Fit the polynomials of panels to curves, and estimate their errors.
 
-    Values are those at the nodes, (p, N, k). An error, (p,), is that of the last two
-    terms, of which one is even and the other odd, or that beside the ends; it is
-    infinite where some values are missing, and zero where all are. Sizes are (p,).
+    An error is that of the last two terms, of which one is even and the other odd, or
+    that beside the ends.
     """
     middle = 0.5 * (start + stop)
     half = 0.5 * (stop - start)
@@ -457,6 +516,10 @@ def _fit_panels(
         error = np.maximum(terms, beside).max(axis=-1)
         error = np.where(missing.any(axis=1), np.inf, error)
         error[missing.all(axis=1)] = 0.0
-        size = np.where(missing, 0.0, np.abs(_measure(curve))).max(axis=1)
-        fits[name] = values, error, size
+        single = curve.shape[-1] == 1
+        sizes = _measure(curve)
+        most = np.where(missing, -np.inf, sizes).max(axis=1)
+        least = np.where(missing | (not single), np.inf, sizes).min(axis=1)
+        size = np.where(missing, 0.0, np.abs(sizes)).max(axis=1)
+        fits[name] = _Fit(values, error, most, least, size, missing[:, 0])
     return fits

@@ -23,7 +23,7 @@ from fourbar.show.motion_curves import (
     compute_pin_loads,
     describe_motion,
 )
-from fourbar.show.panels import TIED, PanelCurve, Peak, split_runs
+from fourbar.show.panels import EXTREME_ERROR, TIED, PanelCurve, Peak, split_runs
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
@@ -294,7 +294,7 @@ class Facts:
         panels = describe_motion(whole).positions
         least, most = (panels.find_peak("stroke", sense).value for sense in (-1, 1))
         # a cylinder whose ends meet has a corner there
-        return 0.0 if least <= TIED * most else least, most
+        return 0.0 if least <= EXTREME_ERROR * most else least, most
 
     @cached_property
     def period(self) -> float | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from fourbar.show.panels import ZERO, fit_panels
+from fourbar.show.panels import Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
 
@@ -19,7 +19,7 @@ def fit(curve, edges=EDGES, rounding=0.0):
     def compute(places):
         return {"curve": curve(places)}
 
-    return fit_panels(compute, edges, {"curve": rounding})
+    return fit_panels(compute, edges, {"curve": Wanted(rounding, integrated=True)})
 
 
 def integrate_product(x):
@@ -85,7 +85,8 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
         curve = np.abs(places - POLE) ** -power
         return {"curve": curve, "other": np.exp(places)}
 
-    panels = fit_panels(compute, EDGES, {})
+    wanted = dict.fromkeys(("curve", "other"), Wanted(integrated=True))
+    panels = fit_panels(compute, EDGES, wanted)
     assert panels.growing == {"curve"} and not panels.has_value("curve")
     assert panels.list_poles("curve") == [approx(POLE, abs=1e-7)]
     right = exp(2.0) - 1.0
@@ -140,5 +141,5 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, e
     def compute(places):
         return {"curve": curve(places)}
 
-    panels = fit_panels(compute, edges, {}, settled=ZERO)
+    panels = fit_panels(compute, edges, {"curve": Wanted(zeros=True)})
     assert panels.find_zeros("curve") == approx(zeros, abs=1e-9)
