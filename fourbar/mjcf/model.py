@@ -247,10 +247,14 @@ class Model:
         """Return True if loads or springs need actuators."""
         return bool(self.loads) or not all(map(_is_slack_somewhere, self.springs))
 
+    def used(self, attribute: str) -> bool:
+        """Return True if any pin carries the attribute."""
+        return any(attribute in attributes for attributes in self.pin.values())
+
     def add_option(self) -> None:
         """Add the timestep, integrator, solver and what effects state, as gravity.
 
-        Flags switch off what a closed loop does not need.
+        Flags switch off what a closed loop and this model do not need.
         """
         settings = self.settings
         option = add_element(
@@ -263,7 +267,14 @@ class Model:
             iterations=settings.iterations,
             **self.option,
         )
-        add_element(option, "flag", **dict.fromkeys(_NEVER_NEEDED, "disable"))
+        unneeded = list(_NEVER_NEEDED)
+        if not self.springs and not self.used("stiffness"):
+            unneeded.append("spring")
+        if not self.used("frictionloss"):
+            unneeded.append("frictionloss")
+        if not self.used("damping"):
+            unneeded.append("damper")
+        add_element(option, "flag", **dict.fromkeys(unneeded, "disable"))
         # the viewer looks straight down on the plane
         visual = add_element(self.root, "visual")
         add_element(visual, "global", azimuth=90, elevation=-90)

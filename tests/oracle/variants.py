@@ -121,7 +121,7 @@ class SceneFile:
     def __init__(self, scene):
         self.scene = scene
         # tolerances may be of coordinates, which a file by lengths does not have
-        stated = replace(scene, coordinates=(), tolerances=())
+        stated = replace(scene, tolerances=())
         self._by_pins = tomllib.loads(dump(stated))
         self._by_lengths = tomllib.loads(dump(replace(stated, drawing=None)))
         if scene.drawing is not None:

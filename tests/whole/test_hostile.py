@@ -281,12 +281,11 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.linux
 def test_running_out_of_memory_costs_its_own_row(tmp_path, monkeypatch):
-    suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n", "suite.txt"))
+    suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(f"fourbar_validation.run.plan.{size}", 2)
     greedy = Engine("greedy", Greedy, EQUIVALENCE)
-    options = dict(workers=1, drawn=False)
-    run(Plan(suite, (*EXACT, greedy), **options), tmp_path / "run")
+    run(Plan(suite, (*EXACT, greedy), workers=1, drawn=False), tmp_path / "run")
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     (failing,) = (row for row in rows if row.verdict == FAILS)
     assert (failing.scene, failing.engine) == ("b", "greedy")
