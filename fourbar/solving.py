@@ -22,7 +22,7 @@ from fourbar.evaluation.evaluate import (
     withhold_infinite,
 )
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import A_BRANCH, require_bar, require_whole
+from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
     COUPLE,
@@ -252,6 +252,9 @@ class Results:
                 value = value.reshape(shape)  # noqa: PLW2901
             if name in SCALARS:
                 array[index] = value
+            elif array.strides[-1] == array.itemsize:
+                # x and y next to each other: one copy
+                array.view(complex)[*index, 0] = value
             else:
                 array[*index, 0] = value.real
                 array[*index, 1] = value.imag
@@ -321,26 +324,36 @@ def _require_command_at(at: Command) -> None:
     """Raise an InputError unless a command is well formed."""
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
-    expect("at.origin", at.origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
     theta, omega, alpha = COMMAND_NAMES[at.bar]
-    expect(f"at.{theta}", at.angle, np.ndarray)
-    each = [at.angle.shape] if at.angle.ndim == 1 else []
-    for name, value, shapes in (
-        (theta, at.angle, each),
-        ("branch", at.branch, each),
-        (omega, at.speed, [(), *each]),
-        (alpha, at.acceleration, [(), *each]),
-        ("time", at.time, each),
-    ):
-        if value is None and name in (omega, "time"):
-            continue
-        array = np.asarray(value)
-        is_list = array.ndim > 0 and array is not value
-        if is_list or array.shape not in shapes or array.dtype.kind not in "iuf":
-            allowed = f"must be numbers, shape {' or '.join(map(str, shapes))}"
-            raise InputError(f"at.{name}", value, allowed)
-    if not (np.abs(at.branch) == 1).all():
-        raise InputError("at.branch", at.branch, f"{A_BRANCH} at each position")
+    angle, branch, speed, acceleration, _, time, origin = at
+    expect("at.origin", origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
+    expect(f"at.{theta}", angle, np.ndarray)
+    n = angle.size
+    arrays: dict[str, Any] = {theta: angle, "branch": branch}
+    if time is not None:
+        arrays["time"] = time
+    for key, value in arrays.items():
+        expect(f"at.{key}", value, np.ndarray)
+        if value.shape != (n,) or value.dtype.kind not in "iuf":
+            raise InputError(f"at.{key}", value, f"must be numbers, shape {(n,)}")
+    are_branches = branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()
+    if not are_branches:
+        raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
+    if speed is not None:
+        _require_rate(omega, speed, n)
+    _require_rate(alpha, acceleration, n)
+
+
+def _require_rate(name: str, value: Any, n: int) -> None:
+    """Raise an InputError unless a rate is a number, or one for each of n positions."""
+    if isinstance(value, float):
+        return
+    if not isinstance(value, np.ndarray):
+        expect(f"at.{name}", value, float, int, np.integer, np.floating)
+        require(f"at.{name}", value)
+    elif value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
+        allowed = f"must be numbers, shape () or {(n,)}"
+        raise InputError(f"at.{name}", value, allowed)
 
 
 def find_last_stage(scene: Scene) -> str:

@@ -130,15 +130,24 @@ class Case(NamedTuple):
         The command is that of bar 2, 3 or 4.
         """
         scene = scene.settled()
-        points = [
+        terms = (*scene.loads, *scene.effects)
+        linkage = scene.linkage
+        path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
+        points = tuple(
             (point.name, point.bar, point.place.vector()) for point in scene.points
-        ]
+        )
+        lengths = _restore_unit(linkage, path)
+        bodies = list_bodies(linkage, terms)
         return cls(
-            **_describe(scene.linkage, (*scene.loads, *scene.effects), bar),
-            drive_bar=scene.drive_bar,
-            points=tuple(points),
-            impending=impending,
-            drive=scene.drive,
+            linkage,
+            lengths,
+            bodies,
+            terms,
+            scene.drive_bar,
+            path,
+            points,
+            impending,
+            scene.drive,
         )
 
     def beside(self, nominal: Scene) -> "Case":
@@ -165,9 +174,18 @@ class Case(NamedTuple):
             (self.linkage, self.terms, self.drive),
             lengthen,
         )
-        described = _describe(linkage, terms, self.path.bar)
-        described["path"] = described["path"]._replace(passing=self.path.passing)
-        return self._replace(**described, drive=drive)
+        path = prepare_path(linkage.lengths, linkage.ground_angle, self.path.bar)
+        path = path._replace(passing=self.path.passing)
+        bodies = list_bodies(linkage, terms)
+        lengths = _restore_unit(linkage, path)
+        return self._replace(
+            linkage=linkage,
+            lengths=lengths,
+            bodies=bodies,
+            terms=terms,
+            path=path,
+            drive=drive,
+        )
 
     @property
     def drive_names(self) -> DriveNames:
@@ -319,15 +337,6 @@ class Case(NamedTuple):
         )
         return half, index
 
-    def generalized_force(self, state: State) -> Any:
-        """Compute the generalized force of all that acts, N m."""
-        actions = Actions(state, self.bodies).add(self.terms)
-        return actions.generalized_forces()[0]
-
-    def inertia(self, state: State) -> Any:
-        """Compute the equivalent inertia, kg m^2."""
-        return sum(inertia(self.lengths.a, self.bodies, state.position, state.k))
-
     def _compute_inertial_forces(
         self,
         state: State,
@@ -428,19 +437,12 @@ class Case(NamedTuple):
         return low, high, JAMMED * np.any(np.equal(statuses, JAMMED), axis=0)
 
 
-def _describe(linkage: FourBar, terms: Any, bar: int) -> dict[str, Any]:
-    """Return the fields of a case that follow from a linkage and what acts on it."""
-    path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
+def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:
+    """Return the lengths in m, and what they decide together in m^2."""
     square = path.unit * path.unit
     E1 = path.lengths.E1 * square
     E2 = path.lengths.E2 * square
-    return {
-        "linkage": linkage,
-        "lengths": Loop(*linkage.lengths, E1, E2),
-        "bodies": list_bodies(linkage, terms),
-        "terms": terms,
-        "path": path,
-    }
+    return Loop(*linkage.lengths, E1, E2)
 
 
 class _InertialForces(NamedTuple):

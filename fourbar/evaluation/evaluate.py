@@ -10,7 +10,6 @@ in numbers that round at most a thousandth as much as doubles.
 import cmath
 from collections.abc import Callable, Iterable, Set
 from functools import reduce
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,7 +23,6 @@ from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
-from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     CHANGE_POINT,
     COUPLE,
@@ -365,11 +363,12 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "theta_4": lambda state: state.q if state.bar == 4 else angle(state.position.u4),
     "sin_mu": lambda state: state.position.sin_mu,
     "condition": lambda state: abs(state.sine),
-    **{
-        f"{rate}_{bar}": attrgetter(f"moving.{rate}_{bar}")
-        for rate in ("omega", "alpha")
-        for bar in MOVING_BARS
-    },
+    "omega_2": lambda state: state.moving.omega_2,
+    "omega_3": lambda state: state.moving.omega_3,
+    "omega_4": lambda state: state.moving.omega_4,
+    "alpha_2": lambda state: state.moving.alpha_2,
+    "alpha_3": lambda state: state.moving.alpha_3,
+    "alpha_4": lambda state: state.moving.alpha_4,
 }
 """Formulas of the scalars that come before the forces, by name."""
 POINT_VECTORS = frozenset(

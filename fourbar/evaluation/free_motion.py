@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.effects.effect import Actions
 from fourbar.errors import (
     FourBarError,
     InputError,
@@ -32,7 +33,7 @@ from fourbar.formulas.arithmetic import angle
 from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine, prepare_path
-from fourbar.formulas.torque import half_slope
+from fourbar.formulas.torque import half_slope, inertia
 from fourbar.quantities import NO_DIRECTION, Array
 from fourbar.scene import Command, ReleaseOrigin, Scene, command
 
@@ -189,6 +190,16 @@ class _Reading(NamedTuple):
         at = Command(q, np.float64(self.branch), rate, 0.0, self.bar)  # type: ignore[arg-type]
         return self.case.assemble(at, self.case.path.half_angle(q))
 
+    def generalized_force(self, state: State) -> Any:
+        """Compute the generalized force of all that acts, N m."""
+        actions = Actions(state, self.case.bodies).add(self.case.terms)
+        return actions.generalized_forces()[0]
+
+    def inertia(self, state: State) -> Any:
+        """Compute the equivalent inertia, kg m^2."""
+        a = self.case.lengths.a
+        return sum(inertia(a, self.case.bodies, state.position, state.k))
+
     def compute_rates(self, y: Any) -> list[Any]:
         """Compute the rates of the numbers y.
 
@@ -199,10 +210,10 @@ class _Reading(NamedTuple):
         if self.side:
             moving = self.side * np.maximum(self.side * rate, VANISHING_SPEED)
         state = self.state(y, moving)
-        Q = self.case.generalized_force(state)
+        Q = self.generalized_force(state)
         bodies = self.case.bodies
         slope = half_slope(self.case.lengths.a, bodies, state.position, state.k)
-        equivalent_inertia = self.case.inertia(state)
+        equivalent_inertia = self.inertia(state)
         # NumPy's division raises no error where the inertia vanishes
         growth = np.divide(Q - slope * rate * rate, equivalent_inertia)
         return [state.k.h2 * rate, state.k.h4 * rate, growth, Q * rate]
@@ -224,7 +235,7 @@ class _Reading(NamedTuple):
         if numbers[2]:
             return self._replace(side=math.copysign(1.0, numbers[2]))
         ahead, back = (
-            float(self.case.generalized_force(self.state(numbers, slow)))
+            float(self.generalized_force(self.state(numbers, slow)))
             for slow in (VANISHING_SPEED, -VANISHING_SPEED)
         )
         if ahead <= 0.0 <= back:
@@ -297,7 +308,7 @@ class _Run:
             reading = self._read_in(6 - reading.bar, state, y)
         if speed:
             y[2] = state.omega(reading.bar)
-        if not float(reading.case.inertia(reading.state(y.tolist()))) > 0.0:
+        if not float(reading.inertia(reading.state(y.tolist()))) > 0.0:
             raise FourBarError(
                 "nothing that moves has inertia: the free motion is undetermined"
             )
@@ -456,7 +467,7 @@ class _Run:
             moving.omega_2,
             moving.alpha_2,
             drive_sine(state.position, 2),
-            0.5 * reading.case.inertia(state) * rate * rate,
+            0.5 * reading.inertia(state) * rate * rate,
             work,
             reading.bar,
             q,

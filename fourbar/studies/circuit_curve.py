@@ -250,18 +250,20 @@ class CircuitCurve:
         """Compute positions with their derivatives along the curve."""
         return on_curve(self.lengths, self.theta_1, points[:, 0], points[:, 1])
 
+    def _force_of(self, state: State) -> Any:
+        actions = Actions(state, self.case.bodies).add(self.case.terms)
+        return actions.generalized_forces()[0]
+
     def generalized_force(self, points: Array) -> Array:
         """Compute Q of all but dry friction, by the curve's parameter."""
-        Q = self.case.generalized_force(self.state(points))
-        return np.broadcast_to(Q, len(points))
+        return np.broadcast_to(self._force_of(self.state(points)), len(points))
 
     def slope(self, points: Array) -> Array:
         """Compute dQ/ds along the curve."""
         k = self.state(points).k
         psi = Sloped(points[:, 0], k.h2[None])
         mu = Sloped(points[:, 1], k.h43[None])
-        state = on_curve(self.lengths, self.theta_1, psi, mu)
-        Q = self.case.generalized_force(state)
+        Q = self._force_of(on_curve(self.lengths, self.theta_1, psi, mu))
         return np.broadcast_to(np.ravel(take_slopes(Q)), len(points))
 
     def size(self, points: Array) -> Array:

@@ -25,6 +25,7 @@ from fourbar.errors import expect
 from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.position import Loop
+from fourbar.formulas.torque import inertia
 from fourbar.quantities import (
     CHANGE_POINT,
     JAMMED,
@@ -250,9 +251,9 @@ def _describe_equilibrium(
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(points)[0])
     moving = _drop_standing_bar(curve.lengths, state.k)
+    inertias = inertia(curve.lengths.a, curve.case.bodies, state.position, moving)
     slope = along_curve / square
-    inertia = curve.case.inertia(state._replace(k=moving))
-    J = float(inertia[0]) / square
+    J = float(np.sum(inertias)) / square
     stability = "undecided"
     if abs(along_curve) > _A_JUMP * size:  # never of NaN
         stability = "stable" if slope < 0.0 else "unstable"

@@ -283,26 +283,49 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
         acting = [*recorder.items, *supports]
         if not uniform:
             acting += inertial
-        feet = []
-        forces = []
-        couples = []
-        for place, force, couple in acting:
-            feet.append(np.zeros(n) + np.real(place))
-            forces.append(0.0j * feet[-1] + force)
-            # with the couple of a force beside the line
-            couples.append(feet[-1] * 0.0 + couple + cross(-force, 1j * np.imag(place)))
+        foot, force, couple = _sum_by_foot(
+            acting, np.zeros(n), SAME_FOOT * described.length
+        )
         density = described.mass / described.length if uniform else 0.0
         return _Beam(
             described.length,
-            np.stack(feet, axis=1),
-            np.stack(forces, axis=1),
-            np.stack(couples, axis=1),
+            foot,
+            force,
+            couple,
             uniform,
             density,
             pull * back,
             omega,
             alpha,
         )
+
+
+def _sum_by_foot(
+    items: list[_Item],
+    zero: Array,
+    same: float,
+) -> tuple[Array, ComplexArray, Array]:
+    """Sum what acts at the same foot at every position.
+
+    Feet, forces and couples are (n, f) each.
+    """
+    feet = list[Array]()
+    forces = list[Any]()
+    couples = list[Array]()
+    for place, force, couple in items:
+        foot = zero + np.real(place)
+        # the couple of a force beside the line
+        beside = couple + cross(-force, 1j * np.imag(place))
+        k = 0
+        while k < len(feet) and (np.abs(feet[k] - foot) > same).any():
+            k += 1
+        if k == len(feet):
+            feet.append(foot)
+            forces.append(0.0j * zero)
+            couples.append(zero)
+        forces[k] = forces[k] + force
+        couples[k] = couples[k] + beside
+    return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
 
 def _support(

