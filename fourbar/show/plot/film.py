@@ -138,6 +138,7 @@ def choose_frames(shown: View, count: int) -> list[int]:
 
 def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], None]]":
     """Make the figure, and the function that moves it to a position of the sweep."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patheffects import withStroke
 
@@ -177,4 +178,15 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Non
     figure.draw_without_rendering()
     axes.set_autoscale_on(False)  # nothing jumps from frame to frame
     figure.set_layout_engine(None)
+    # what stands still is drawn once: a picture lies under the frames
+    for artist in {*axes.lines, *axes.patches, *axes.texts} - still:
+        artist.remove()
+    axes.set_title("")
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.array(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+    figure.figimage(pixels, zorder=-1.0)
+    for artist in (figure.patch, *figure.texts, axes.get_legend(), *still):
+        artist.set_visible(False)
+    axes.set_axis_off()
     return figure, move

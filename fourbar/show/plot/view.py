@@ -125,7 +125,15 @@ class View:
         if sweep.stroke is not None:
             barrel = BARREL * factor * float(np.nanmin(sweep.stroke))
         size = 0.03 * factor * float(extent)
-        corner = factor * complex(reached.real.max(), reached.imag.max()) + 2.0 * size
+        first_pin = {2: 0j, 3: join_points(sweep.A), 4: O4}
+        for load in self.scene.settled().loads:
+            if load.bar in first_pin:
+                foot = load.foot(bars.bar(load.bar).to_centre)
+                turned = foot * np.exp(1j * sweep[f"theta_{load.bar}"])
+                arm = 0j if load.arm is None else cmath.rect(*load.arm)
+                reached = np.append(reached, first_pin[load.bar] + turned + arm)
+        highest = complex(np.nanmax(reached.real), np.nanmax(reached.imag))
+        corner = factor * highest + 2.0 * size
         return DrawingPlane(factor, unit, origin, origin + corner, size, barrel)
 
     @property
