@@ -140,6 +140,7 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Non
     """Make the figure, and the function that moves it to a position of the sweep."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
     from matplotlib.patheffects import withStroke
 
     sweep = shown.sweep
@@ -186,7 +187,7 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Non
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.array(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     figure.figimage(pixels, zorder=-1.0)
-    for artist in (figure.patch, *figure.texts, axes.get_legend(), *still):
+    for artist in (figure.patch, *figure.texts, *axes.findobj(Legend), *still):
         artist.set_visible(False)
     axes.set_axis_off()
     return figure, move
