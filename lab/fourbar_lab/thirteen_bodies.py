@@ -16,7 +16,7 @@ from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.published import thirteen
+from fourbar_lab import thirteen
 
 
 def make_bodies(scene: Scene, command: Command) -> thirteen.EquationTerms:

@@ -74,14 +74,13 @@ validation/engines/mujoco/robots/test_closures.py | ancestry frame loop_facts
 validation/engines/mujoco/robots/test_measure.py | planes
 validation/robots/test_files.py | validation/engines/mujoco/robots: compiled
 validation/robots/test_loops.py | options
-validation/published/test_published.py | comparison printed_figures textbook
-validation/published/test_published.py | thesis thirteen
+validation/published/test_published.py | comparison printed_figures textbook thesis
 validation/regression/test_regression.py | accept engines history record render rules
 validation/regression/test_regression.py | scenes
 validation/report/test_report.py | machine overview run_summary
 validation/report/test_report.py | scene_record svg templating words
 # studies: each through its command
-lab/test_bench.py | contenders starts thirteen_bodies
+lab/test_bench.py | contenders starts thirteen thirteen_bodies
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
 lab/test_faults.py | fault_scenes injection

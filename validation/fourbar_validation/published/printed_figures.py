@@ -1,6 +1,7 @@
 """Printed figures, ours beside them, and what the named errata make of ours."""
 
 import csv
+import math
 import tomllib
 from collections.abc import Iterator
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
@@ -9,7 +10,6 @@ from typing import NamedTuple
 
 FOLDER = Path(__file__).parent
 FIGURE_VERDICTS = ("rounded", "truncated", "differs")
-POSITIONS = "2.4 positions"
 
 
 class Erratum(NamedTuple):
@@ -33,51 +33,18 @@ ERRATA = {entry["id"]: Erratum(**entry) for entry in _FILE["erratum"]}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
-class PrintedFigure(NamedTuple):
-    """Digits as printed, and the errata that lead from ours to them, as they are made.
-
-    The errata are named by their ids.
-    """
-
-    printed: str
-    errata: tuple[str, ...] = ()
-    noise: float = 0.0
-    """Round-off of whoever printed 15 digits or more, in the unit printed."""
-
-
-def read_printed() -> dict[str, dict[str, PrintedFigure]]:
-    """Read the figures of the thesis and of a Maple worksheet, by table and name."""
-    tables: dict[str, dict[str, PrintedFigure]] = {POSITIONS: {}}
-    for pair in (("theta3_1", "theta4_2"), ("theta3_2", "theta4_1")):
-        for row in _read_rows("positions.csv"):
-            for name in pair:
-                place = f"{row['theta2_deg']} {name}"
-                made = ("6",) if place == "136 theta3_1" else ()
-                tables[POSITIONS][place] = PrintedFigure(row[f"{name}_deg"], made)
-    for row in _read_rows("figures.csv"):
-        errata = tuple(row["errata"].split())
-        figure = PrintedFigure(row["printed"], errata, float(row["noise"] or 0.0))
-        tables.setdefault(row["table"], {})[row["name"]] = figure
-    return tables
-
-
-def _read_rows(name: str) -> Iterator[dict[str, str]]:
-    text = (FOLDER / "data" / name).read_text(encoding="utf-8")
-    yield from csv.DictReader(text.splitlines())
-
-
 class PublishedFigure(NamedTuple):
     """One printed figure and ours, in the unit printed."""
 
     table: str
     name: str
     printed: str
-    ours: float
+    ours: float = math.nan
     errata: tuple[str, ...] = ()
     """Ids of the errata that lead from ours to what is printed, in the order in which
     they are made.
     """
-    made: float | None = None
+    made: float = math.nan
     """Ours after those of these errata that can be computed."""
     noise: float = 0.0
     """Round-off of whoever printed 15 digits or more, in the unit printed."""
@@ -88,10 +55,38 @@ class PublishedFigure(NamedTuple):
 
     def reproduced(self) -> bool:
         """Tell whether the errata give the published digits, rounded or truncated."""
-        return (
-            self.made is not None
-            and compare_figure(self.printed, self.made, self.noise) != "differs"
+        return compare_figure(self.printed, self.made, self.noise) != "differs"
+
+    def explained(self) -> bool:
+        """Tell whether the errata account for a difference.
+
+        A misprint that no erratum can give is accounted for too.
+        """
+        known = all(ERRATA[name].reproduced for name in self.errata)
+        return bool(self.errata) and (self.reproduced() or not known)
+
+
+def read_printed() -> Iterator[PublishedFigure]:
+    """Read the figures of the thesis and of a Maple worksheet, without ours."""
+    for row in _read_rows("positions.csv"):
+        for name in ("theta3_1", "theta4_2", "theta3_2", "theta4_1"):
+            place = f"{row['theta2_deg']} {name}"
+            errata = ("6",) if place == "136 theta3_1" else ()
+            printed = row[f"{name}_deg"]
+            yield PublishedFigure("2.4 positions", place, printed, errata=errata)
+    for row in _read_rows("figures.csv"):
+        yield PublishedFigure(
+            row["table"],
+            row["name"],
+            row["printed"],
+            errata=tuple(row["errata"].split()),
+            noise=float(row["noise"] or 0.0),
         )
+
+
+def _read_rows(name: str) -> Iterator[dict[str, str]]:
+    text = (FOLDER / "data" / name).read_text(encoding="utf-8")
+    yield from csv.DictReader(text.splitlines())
 
 
 def compare_figure(printed: str, value: float, noise: float) -> str:

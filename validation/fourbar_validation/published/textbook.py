@@ -1,5 +1,6 @@
 """Printed answers of public test cases, listed in `textbook.toml`, against ours."""
 
+import re
 import tomllib
 from collections.abc import Iterator
 from functools import cache
@@ -10,7 +11,8 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.published.printed_figures import FOLDER, PublishedFigure
 
 TEXTBOOK_FOLDER = MODELS / "textbook"
-COMPONENT_AXES = {"_x": 0, "_y": 1}
+_TERM = re.compile(r"(-?) ?(\w+?)(?:_([xy]))?(?: |$)")
+"""Term of a quantity: its sign, the name of a result, and its component."""
 
 
 class _TextbookAnswer(NamedTuple):
@@ -31,28 +33,18 @@ def list_answers() -> list[_TextbookAnswer]:
 
 
 def compare_textbooks() -> Iterator[PublishedFigure]:
-    """Compare each answer with ours."""
+    """Compare each answer with ours: a result, its negative, or a difference of two."""
 
     @cache
     def solve_scene(name: str) -> fourbar.Solution:
         return fourbar.solve(fourbar.load(TEXTBOOK_FOLDER / f"{name}.toml"))
 
     for answer in list_answers():
-        solution = solve_scene(answer.scene)
-        ours = _compute_value(solution, answer.quantity, answer.position)
+        ours = 0.0
+        for minus, result, axis in _TERM.findall(answer.quantity):
+            value = solve_scene(answer.scene)[result][answer.position]
+            if axis:
+                value = value["xy".index(axis)]
+            ours += -value if minus else value
         name = f"{answer.scene} {answer.quantity}"
-        yield PublishedFigure("public test cases", name, answer.printed, ours)
-
-
-def _compute_value(solution: fourbar.Solution, quantity: str, position: int) -> float:
-    """Compute a result, its negative, or the difference of two, at one position."""
-    total = -0.0  # leaves a single term as it is, a zero with its sign too
-    for term in quantity.replace("- ", "-").split():
-        name = term.removeprefix("-")
-        axis = COMPONENT_AXES.get(name[-2:])
-        if axis is None:
-            value = float(solution[name][position])
-        else:
-            value = float(solution[name[:-2]][position, axis])
-        total += value if name == term else -value
-    return total
+        yield PublishedFigure("public test cases", name, answer.printed, float(ours))

@@ -19,18 +19,18 @@ from typing import Any
 import numpy as np
 
 import fourbar
-from fourbar.formulas.mobility import limit_positions
+from fourbar.formulas.mobility import TURN, limit_positions
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import Array
-from fourbar_validation.places import MODELS
-from fourbar_validation.published.printed_figures import POSITIONS, read_printed
-from fourbar_validation.published.thirteen import (
-    FORCES,
-    EquationTerms,
-    assemble_equations,
+from fourbar.quantities import PIN_FORCES, Array
+from fourbar_validation.engines.free_body import (
+    DRIVE_COLUMN,
+    FORCE_COLUMNS,
+    solve_wrenches,
+    speeds_and_accelerations,
 )
+from fourbar_validation.engines.free_body_effects import BodyWrenches
+from fourbar_validation.places import MODELS
 
-PRINTED_UNKNOWNS = (*(f"{pin}{axis}" for pin in FORCES for axis in "xy"), "T4")
 BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
 """Bars 1 to 4, cm."""
 _MASSES = np.array([57.0, 0.544, 0.2])
@@ -41,8 +41,17 @@ THETA_1, THETA_2 = math.radians(225.0), math.radians(135.0)
 """Angles of sections 4.12 and 5.7 in the thesis's convention, rad."""
 _CENTRE_3 = 27.5
 """Distance from pin A to G3, cm."""
-_ARMS = np.array([-76.5, 48.0 - 76.5, -27.5, 27.5, 10.0, -10.0])
-"""Places of `FORCES` from their bar's G along it, cm; bar 4 points from B to O4."""
+_ARMS = {
+    "R12": -76.5,
+    "R32": 48.0 - 76.5,
+    "R23": -27.5,
+    "R43": 27.5,
+    "R14": 10.0,
+    "R34": -10.0,
+}
+"""Places of the forces from their bar's G along it, cm, by two on each of bars 2 to 4;
+bar 4 points from B to O4.
+"""
 _FORCE_ON_BAR_2 = 10.0
 """Force along x on bar 2, N."""
 _ACCELERATIONS = ("a_A", "a_G2", "a_G3", "a_G4")
@@ -73,9 +82,10 @@ def to_degrees(angle: float) -> float:
     return math.degrees(angle) % 360.0
 
 
-def truncate(value: float, decimals: int) -> float:
-    """Cut off further decimals."""
-    return math.trunc(value * 10.0**decimals) / 10.0**decimals
+def truncate(values: Any, decimals: Any) -> Any:
+    """Cut off further decimals, of complex numbers in both parts."""
+    unit = 10.0 ** np.array(decimals)
+    return (np.trunc(values.real * unit) + 1j * np.trunc(values.imag * unit)) / unit
 
 
 def to_ours(theta: float) -> float:
@@ -83,7 +93,7 @@ def to_ours(theta: float) -> float:
 
     The thesis's polygon sums to zero.
     """
-    return math.remainder(theta + math.pi, 2.0 * math.pi)
+    return math.remainder(theta + math.pi, TURN)
 
 
 _load = cache(fourbar.load)
@@ -93,14 +103,6 @@ def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     """Make the model mechanism for our formulas, SI, uniform bars 2.54 cm wide."""
     scene = _load(MODELS / "thesis.toml")
     return replace(scene, motion=scene.motion.replace(angle=theta_2, branch=branch))
-
-
-def compute_right_unknowns() -> Numbers:
-    """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
-    s = fourbar.solve(make_model_scene(THETA_2))
-    pins = (s.F12, s.F32, -s.F32, s.F43, s.F14, -s.F43)
-    values = [*np.concatenate(pins, 1)[0].tolist(), 100.0 * float(s.torque[0])]
-    return dict(zip(PRINTED_UNKNOWNS, values, strict=True))
 
 
 @cache
@@ -114,26 +116,29 @@ def compute_model(errata: tuple[str, ...] = (), decimals: int = 6) -> Numbers:
     errata : ids of the errata that are made, and the name of the manual's inertias.
     decimals : of theta_3, deg, that erratum 12 leaves in the arms of bar 3.
     """
-    s = fourbar.solve(make_model_scene(THETA_2), "acceleration")
-    theta = [THETA_2, float(s.theta_3[0]), to_ours(float(s.theta_4[0]))]
+    scene = make_model_scene(THETA_2)
+    s = fourbar.solve(scene)
+    theta = np.array([THETA_2, s.theta_3[0], to_ours(s.theta_4[0])])
     omega, alpha = (
         np.array([s[f"{name}_{bar}"][0] for bar in MOVING_BARS])
         for name in ("omega", "alpha")
     )
     a_A, *a_G = (100.0 * complex(*s[name][0]) for name in _ACCELERATIONS)
+    inertias = _MASSES * (_ALONG**2 + _ACROSS**2) / 12.0
+    right_force, right_moment = _TO_N * _MASSES * a_G, _TO_N * inertias * alpha
     if "4" in errata:
         # -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20
         a_G[1] += 2.0 * _CENTRE_3 * alpha[1] * math.sin(theta[1])
     if "5" in errata:  # index 5 for 6
         a_G[2] = complex(alpha[1], a_G[2].imag)
     if "12c" in errata:
-        a_G[0], a_G[2] = _truncate_both(a_G[0], 6), _truncate_both(a_G[2], 10)
-    directions = np.array(theta)
+        a_G = truncate(np.array(a_G), (6, 10, 10))
+    directions = theta.copy()
     if "12" in errata:
-        directions[1] = math.radians(truncate(to_degrees(theta[1]), decimals))
-    arms = _ARMS * np.exp(1j * np.repeat(directions, 2))
-    along = _ALONG * (1.0, 0.0, 0.0) if "3" in errata else _ALONG
-    inertias = _MASSES * (along**2 + _ACROSS**2) / 12.0
+        directions[1] = math.radians(truncate(to_degrees(theta[1]), decimals).real)
+    arms = [*_ARMS.values()] * np.exp(1j * np.repeat(directions, 2))
+    if "3" in errata:
+        inertias = _MASSES * (_ALONG**2 * (1.0, 0.0, 0.0) + _ACROSS**2) / 12.0
     for name, typed in _TYPED_INERTIAS.items():
         if name in errata:
             inertias[1:] = typed
@@ -142,14 +147,14 @@ def compute_model(errata: tuple[str, ...] = (), decimals: int = 6) -> Numbers:
     moment = per_inertia * inertias * alpha
     if "7" in errata:
         moment[1] *= -1.0
-    moment -= _COUPLE_ON_A_BAR
+    wrong = right_force - force, right_moment - moment
+    values = _compute_unknowns(scene, s, *wrong)
     force[0] -= _FORCE_ON_BAR_2
+    moment -= _COUPLE_ON_A_BAR
     moment[0] += _LOAD.imag * _FORCE_ON_BAR_2  # minus the moment of the load, -y F
-    terms = EquationTerms(_split(arms).reshape(3, 2, 2), _split(force), moment)
-    matrix, right = assemble_equations(terms, 4)
     # A alpha_3 + B alpha_4 = C and D alpha_3 + E alpha_4 = F
-    centripetal = -np.sum((a, b, c) * omega**2 * np.exp(1j * np.array(theta)))
-    values: Numbers = {
+    centripetal = -np.sum((a, b, c) * omega**2 * np.exp(1j * theta))
+    values |= {
         "theta3_deg": to_degrees(theta[1]),
         "theta4_deg": to_degrees(theta[2]),
         "A": b * math.sin(theta[1]),
@@ -158,32 +163,57 @@ def compute_model(errata: tuple[str, ...] = (), decimals: int = 6) -> Numbers:
         "D": -b * math.cos(theta[1]),
         "E": -c * math.cos(theta[2]),
         "F": centripetal.imag,
-        "T4 in row 9": matrix[8, 12],
+        "T4 in row 9": 1.0,
         "R_ext_i": _LOAD.real,
         "R_ext_j": _LOAD.imag,
         "moment_of_force_N_cm": -_LOAD.imag * _FORCE_ON_BAR_2,
     }
+    values |= dict.fromkeys((f"right side, row {row}" for row in range(10, 14)), 0.0)
     vectors = {"A_A": a_A, "A_G3/A": a_G[1] - a_A}
-    vectors |= {f"R{name[1:]}": arm for name, arm in zip(FORCES, arms, strict=True)}
+    vectors |= dict(zip(_ARMS, arms, strict=True))
     for k, bar in enumerate(MOVING_BARS):
         vectors[f"A_G{bar}"] = a_G[k]
-        of_arms = matrix[3 * k + 2, 4 * k : 4 * k + 4]
-        of_bar = {
+        one, other = arms[2 * k : 2 * k + 2]
+        terms = -one.imag, one.real, -other.imag, other.real, moment[k]
+        values |= {f"k{bar}_{number}": term for number, term in enumerate(terms, 1)}
+        values |= {
             f"omega{bar}": omega[k],
             f"alpha{bar}": alpha[k],
             f"I_G{bar}": inertias[k],
             f"k{bar}x": force[k].real,
             f"k{bar}y": force[k].imag,
         }
-        for number, value in enumerate((*of_arms, moment[k]), 1):
-            of_bar[f"k{bar}_{number}"] = value
-        values |= of_bar
-    values |= _name_parts(vectors, by_arctangent="10" in errata)
-    for row in range(10, 14):
-        values[f"right side, row {row}"] = right[row - 1]
-    unknowns = np.linalg.solve(matrix, right)
-    values |= dict(zip(PRINTED_UNKNOWNS, unknowns, strict=True))
-    return {name: float(value) for name, value in values.items()}
+    return values | _name_parts(vectors, by_arctangent="10" in errata)
+
+
+def _compute_unknowns(
+    scene: fourbar.Scene, right: fourbar.Solution, force: Array, moment: Array
+) -> Numbers:
+    """Compute pin forces, N, and torque, N cm, under forces and moments besides.
+
+    They act at G of bars 2, 3 and 4, N and N cm: what their inertia lacks.
+    """
+    motion = speeds_and_accelerations(
+        scene.linkage,
+        right.theta_2,
+        right.omega_2,
+        right.alpha_2,
+        right.theta_3,
+        right.theta_4,
+    )
+    acting = BodyWrenches(1)
+    for k, bar in enumerate(MOVING_BARS):
+        acting.push(bar, force[k], motion.to_centre(bar))
+        acting.couple(bar, _TO_N * moment[k])
+    (added,), _ = solve_wrenches(scene, motion, [acting])
+    values = {"T4": 100.0 * (right.torque[0] + added[DRIVE_COLUMN, 0])}
+    for name in PIN_FORCES:
+        column = FORCE_COLUMNS[name]
+        x, y = right[name][0] + added[column : column + 2, 0]
+        opposite = f"F{name[2]}{name[1]}"
+        values |= {f"{name}x": x, f"{name}y": y}
+        values |= {f"{opposite}x": -x, f"{opposite}y": -y}
+    return values
 
 
 def _name_parts(vectors: dict[str, complex], *, by_arctangent: bool) -> Numbers:
@@ -200,69 +230,47 @@ def _name_parts(vectors: dict[str, complex], *, by_arctangent: bool) -> Numbers:
     return values
 
 
-def _truncate_both(vector: complex, decimals: int) -> complex:
-    return complex(truncate(vector.real, decimals), truncate(vector.imag, decimals))
-
-
-def _split(vectors: Any) -> Array:
-    """Split complex numbers into x and y, (n, 2)."""
-    return np.stack((vectors.real, vectors.imag), axis=-1)
-
-
 @cache
 def compute_numbers(errata: tuple[str, ...] = ()) -> Numbers:
     """Compute the figures of every table by their names, with these errata made."""
     in_eq_5_6 = compute_model(errata, decimals=8)
+    roots = _compute_roots()
+    if "6" in errata:
+        roots["136 theta3_1"] *= 10.0
     return {
-        **_compute_positions("6" in errata),
-        **_compute_half_angle_constants(),
+        **roots,
+        **_compute_half_angle_constants(roots),
         **_compute_limits("14" in errata),
-        **_compute_window(),
+        **_compute_window(roots),
         **compute_model(errata),
-        **({} if errata else compute_right_unknowns()),
         **{f"k3_{n}_in_eq_5_6": in_eq_5_6[f"k3_{n}"] for n in range(1, 5)},
         **_compute_worksheet(),
     }
 
 
-def _solve_roots(theta_2: Array) -> dict[str, Array]:
-    """Solve theta_3 and theta_4 of both roots, deg, by the thesis's names."""
+def _compute_roots() -> Numbers:
+    """Compute theta_3 and theta_4 of both roots at whole degrees of theta_2, deg."""
+    degrees = range(361)
     roots = {}
     for branch, third, fourth in ((1, 1, 2), (-1, 2, 1)):
-        s = fourbar.solve(make_model_scene(theta_2, branch), "position")
-        roots[f"theta3_{third}"] = np.degrees(s.theta_3)
-        roots[f"theta4_{fourth}"] = np.degrees([*map(to_ours, s.theta_4)])
+        s = fourbar.solve(make_model_scene(np.radians(degrees), branch), "position")
+        for at in degrees:
+            theta_3 = math.remainder(s.theta_3[at], TURN)
+            roots[f"{at} theta3_{third}"] = math.degrees(theta_3)
+            roots[f"{at} theta4_{fourth}"] = math.degrees(to_ours(s.theta_4[at]))
     return roots
 
 
-def _compute_positions(tenfold: bool) -> Numbers:
-    """Compute section 2.4's table of 281 positions, angles to the turn as printed.
-
-    `tenfold`: one of them is printed with its point one digit too far (erratum 6).
-    """
-    printed = read_printed()[POSITIONS]
-    places = [name.split() for name in printed]
-    roots = _solve_roots(np.radians([float(theta_2) for theta_2, _ in places]))
-    ours = {}
-    for row, (place, figure) in enumerate(printed.items()):
-        degrees = float(roots[places[row][1]][row])
-        turns = round((float(figure.printed) - degrees) / 360.0)
-        ours[place] = degrees + 360.0 * turns
-    if tenfold:
-        ours["136 theta3_1"] *= 10.0
-    return ours
-
-
-def _compute_half_angle_constants() -> Numbers:
+def _compute_half_angle_constants(roots: Numbers) -> Numbers:
     """Compute section 2.4 at theta_2 = 90 deg.
 
     k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2).
     """
-    theta_2 = math.radians(90.0)
-    tip = cmath.rect(a, theta_2) + cmath.rect(d, THETA_1)
-    roots = _solve_roots(np.array([theta_2]))
-    ours = {f"{name}_deg": float(angle[0]) for name, angle in roots.items()}
+    tip = cmath.rect(a, math.radians(90.0)) + cmath.rect(d, THETA_1)
+    ours = {}
     for name, length, second in (("theta4", c, b), ("theta3", b, c)):
+        for root in (f"{name}_1", f"{name}_2"):
+            ours[f"{root}_deg"] = roots[f"90 {root}"]
         k1 = 2.0 * length * tip.real
         k2 = 2.0 * length * tip.imag
         k3 = abs(tip) ** 2 - second**2
@@ -273,15 +281,17 @@ def _compute_half_angle_constants() -> Numbers:
     return ours
 
 
-def _compute_window() -> Numbers:
+def _compute_window(roots: Numbers) -> Numbers:
     """Compute the manual's window: angles e1..e4 in rad and deg, of theta_2 = 0."""
-    s = fourbar.solve(make_model_scene(0.0), "position")
-    angles = (THETA_1, 0.0, float(s.theta_3[0]), to_ours(s.theta_4[0]))
-    names = ("teta1", "tetaDos", "anguloTres", "anguloCuatro")
-    ours = {}
-    for bar, (name, angle) in enumerate(zip(names, angles, strict=True), 1):
-        ours[f"e{bar}_rad"] = angle
-        ours[f"{name}_deg"] = to_degrees(angle)
+    angles = {
+        "teta1": math.degrees(THETA_1),
+        "tetaDos": 0.0,
+        "anguloTres": roots["0 theta3_1"],
+        "anguloCuatro": roots["0 theta4_2"],
+    }
+    ours = {f"{name}_deg": angle for name, angle in angles.items()}
+    for bar, angle in enumerate(angles.values(), 1):
+        ours[f"e{bar}_rad"] = math.radians(angle)
     return ours
 
 
