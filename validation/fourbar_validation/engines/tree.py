@@ -304,34 +304,10 @@ def solve_closed(
 ) -> Array:
     """Solve J rates + (x, y) = 0, turn . rates = rate.
 
-    The rates are those of the coordinates; LinAlgError at a toggle. By Cramer's rule:
-    for bar 2 the determinant is that of `newton` to the last digit. Beside a toggle
-    the rule alone leaves a residual of eps/s of its terms, and accelerations differ by
-    that over s once more; a step of refinement leaves eps.
+    The rates are those of the coordinates; LinAlgError at a toggle.
     """
-    (e, a, b), (f, c, d) = jacobian.tolist()
-    p, q, r = turn.tolist()
-    u = a * d - b * c
-    v = b * f - e * d
-    w = e * c - a * f
-    det = p * u + q * v + r * w
-    if det == 0.0:
-        raise np.linalg.LinAlgError("the bars are in one line")
-
-    def solve(rate: float, x: float, y: float) -> Components3:
-        return (
-            (rate * u - x * (c * r - d * q) - y * (b * q - a * r)) / det,
-            (rate * v - x * (d * p - f * r) - y * (e * r - b * p)) / det,
-            (rate * w - x * (f * q - c * p) - y * (a * p - e * q)) / det,
-        )
-
-    i, j, k = solve(rate, x, y)
-    di, dj, dk = solve(
-        rate - (p * i + q * j + r * k),
-        x + (e * i + a * j + b * k),
-        y + (f * i + c * j + d * k),
-    )
-    return np.array([i + di, j + dj, k + dk])
+    rows = (*jacobian.tolist(), turn.tolist())
+    return np.array(_solve_three(rows, (-x, -y, rate)))
 
 
 def solve_multipliers(
@@ -339,32 +315,45 @@ def solve_multipliers(
     turn: Array,
     needed: Sequence[float],
 ) -> Components3:
-    """Solve [J^T turn] [lambda; T] = tau, with a step of refinement.
+    """Solve [J^T turn] [lambda; T] = tau.
 
-    Raises LinAlgError if no torque on that bar balances tau. By Cramer's rule: of bar 2
-    the determinant is that of `solve_closed` to the last digit: there are forces
-    wherever there are speeds, as far as rounding leaves them digits; elimination may
-    find the matrix singular there.
+    Raises LinAlgError if no torque on that bar balances tau.
     """
-    (a, b, c), (d, e, f) = jacobian.tolist()
-    p, q, r = turn.tolist()
-    u = b * f - c * e
-    v = c * d - a * f
-    w = a * e - b * d
-    det = p * u + q * v + r * w
+    columns = (*jacobian.tolist(), turn.tolist())
+    return _solve_three(zip(*columns, strict=True), needed)
+
+
+def _solve_three(
+    rows: Iterable[Sequence[float]], right: Sequence[float]
+) -> Components3:
+    """Solve three linear equations; LinAlgError where they are singular.
+
+    By Cramer's rule, in plain numbers: for bar 2 the determinant is that of Newton's
+    steps to the last digit, so there are speeds and forces wherever the loop closes, as
+    far as rounding leaves them digits; elimination may find the matrix singular there.
+    Beside a toggle the rule alone leaves a residual of eps/s of its terms, and
+    accelerations differ by that over s once more; a step of refinement leaves eps.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    p = b * f - c * e
+    q = c * d - a * f
+    r = a * e - b * d
+    det = g * p + h * q + i * r
     if det == 0.0:
-        raise np.linalg.LinAlgError("the torque is at a pole")
+        raise np.linalg.LinAlgError("the bars are in one line, or the drive at a pole")
 
     def solve(x: float, y: float, z: float) -> Components3:
-        force_x = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
-        force_y = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
-        return force_x / det, force_y / det, (x * u + y * v + z * w) / det
+        return (
+            (x * (e * i - f * h) + y * (c * h - b * i) + z * p) / det,
+            (x * (f * g - d * i) + y * (a * i - c * g) + z * q) / det,
+            (x * (d * h - e * g) + y * (b * g - a * h) + z * r) / det,
+        )
 
-    x, y, z = needed
-    i, j, k = solve(x, y, z)
-    di, dj, dk = solve(
-        x - (a * i + d * j + p * k),
-        y - (b * i + e * j + q * k),
-        z - (c * i + f * j + r * k),
+    x, y, z = right
+    u, v, w = solve(x, y, z)
+    du, dv, dw = solve(
+        x - (a * u + b * v + c * w),
+        y - (d * u + e * v + f * w),
+        z - (g * u + h * v + i * w),
     )
-    return i + di, j + dj, k + dk
+    return u + du, v + dv, w + dw
