@@ -19,32 +19,14 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import place
 
-STARTING_ANGLES = (
-    (30, 30),
-    (15, 15),
-    (45, 45),
-    (5, 5),
-    (5, 120),
-    (120, 5),
-    (60, 60),
-    (2, 150),
-    (150, 2),
-    (1, 1),
-)
-"""Degrees that bars 3 and 4 first make with the diagonal from A to O4, tried in turn
-where the triangle of the lengths is none to start from; they alone served 8000 of 8000
-linkages, in four times as many steps.
-"""
-LONGEST_CLOSURE_STEP = 0.5
-"""rad; a longer Newton step leaves the region in which the gap is nearly linear."""
-MOST_HALVINGS = 40
-"""A step halved this often moves nothing that a gap above the rounding could tell."""
 NEWTON_STEPS = 100
 """Newton steps. Near a toggle Newton halves its distance: fifty steps reach the last
 digit from any start.
 """
 NEARLY_IN_LINE = 2.0**-26
-"""rad; so far from a line the gap is as small as rounding."""
+"""Least angle of the shorter bar with the diagonal at a start, rad: the gap there is as
+small as rounding.
+"""
 ROUNDING_OF_FOUR_BARS = 16.0 * 2.0**-52
 """Gap that the roundings of a sum of four bars can leave, relative to the sum of the
 lengths.
@@ -69,11 +51,10 @@ def close(
     branch: NDArray[np.int8],
     bar: int = 2,
 ) -> Closed:
-    """Close the loop by Newton's method.
+    """Close the loop by Newton's method from the triangle of the lengths.
 
-    Where a start does not converge, the next one is tried. Bar 2 commanded, bars 3 and
-    4 span the diagonal from A to O4; of bar 3 they are bars 2 and 4, of bar 4 bars 3
-    and 2, bar 2 from A to O2.
+    Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars
+    2 and 4, of bar 4 bars 3 and 2, bar 2 from A to O2.
     """
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
@@ -84,29 +65,28 @@ def close(
     phi = np.angle(diagonal)
     closed = ROUNDING_OF_FOUR_BARS * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
-    possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
+    least_gap = np.maximum(e - (b + c), abs(b - c) - e)
+    possible = np.flatnonzero(least_gap <= closed)
+    start = np.array(
+        [
+            phi + branch * _compute_angle_between(e, b, c),
+            phi + np.pi - branch * _compute_angle_between(e, c, b),
+        ]
+    )
     angles = np.full((2, len(e)), np.nan)
     gap = np.full(len(e), np.nan)
-    for alpha, beta in [
-        (_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)),
-        *np.radians(STARTING_ANGLES),
-    ]:
-        remaining = np.flatnonzero(possible & np.isnan(gap))
-        if not len(remaining):
-            break
-        start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[
-            :, remaining
-        ]
-        angles[:, remaining], gap[remaining] = _solve_newton(
-            diagonal[remaining], b, c, branch[remaining], start, closed
-        )
-    assembled = np.isfinite(gap)
-    missed = possible & ~assembled & (np.maximum(e - (b + c), abs(b - c) - e) < -closed)
+    angles[:, possible], gap[possible] = _solve_newton(
+        diagonal[possible], b, c, branch[possible], start[:, possible]
+    )
+    assembled = gap <= closed
+    missed = ~assembled & (least_gap < -closed)
     if missed.any():
         raise ArithmeticError(
             f"the loop closes at theta_{bar} = {theta[np.argmax(missed)]!r}, but"
             " Newton's method does not find it"
         )
+    angles[:, ~assembled] = np.nan
+    gap[~assembled] = np.nan
     if bar == 4:
         angles = np.array([angles[1] + np.pi, angles[0]])
     return Closed(assembled, np.angle(np.exp(1j * angles)), gap)
@@ -115,71 +95,53 @@ def close(
 def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     """Compute the angle between the sides e and near, by half-angle tangents.
 
-    Bars 3 and 4 are never collinear.
+    Bars 3 and 4 are never collinear: the corner between them is at least so far off the
+    diagonal as the shorter one is at `NEARLY_IN_LINE`.
     """
     above = (e - near + far) * (far + near - e)
     below = (e + near - far) * (e + near + far)
     angle = 2.0 * np.arctan2(
         np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0))
     )
-    return np.clip(angle, NEARLY_IN_LINE, np.pi - 2.0 * NEARLY_IN_LINE)
+    least = NEARLY_IN_LINE * min(near, far) / near
+    return np.clip(angle, least, np.pi - least)
 
 
+@np.errstate(all="ignore")
 def _solve_newton(
     diagonal: ComplexArray,
     b: float,
     c: float,
     branch: NDArray[np.int8],
     theta: Array,
-    closed: float,
 ) -> tuple[Array, Array]:
-    """Return theta_3, theta_4 (2, n) and the gap left (n,).
+    """Return theta_3, theta_4 (2, n) and the gap left (n,), by Newton's steps.
 
-    NaN where it does not come down to `closed`. The Jacobian's determinant is b
-    c sin(theta_4 - theta_3), whose sign is the branch's. A step is halved until the gap
-    falls and that sign is kept; so it ends where no smaller gap is to be had.
+    The Jacobian's determinant is b c sin(theta_4 - theta_3), whose sign is the
+    branch's. The last step is the one after which the gap falls no further on the
+    branch.
     """
 
-    def look(theta: Array, at: Any) -> tuple[ComplexArray, ComplexArray, Array, Array]:
+    def look(theta: Array) -> tuple[ComplexArray, ComplexArray, Array, Array]:
         """Return e^{i theta}, the gap, its size, inf off a branch, and the sine."""
         unit = np.exp(1j * theta)
-        gap = b * unit[0] - c * unit[1] - diagonal[at]
+        gap = b * unit[0] - c * unit[1] - diagonal
         sine = cross_products(*unit)
-        return unit, gap, np.where(sine * branch[at] > 0.0, np.abs(gap), np.inf), sine
+        return unit, gap, np.where(sine * branch > 0.0, np.abs(gap), np.inf), sine
 
-    theta = theta.copy()
-    _, _, size, _ = look(theta, slice(None))
-    moving = np.flatnonzero(np.isfinite(size))
+    (u_3, u_4), gap, size, sine = look(theta)
     for _ in range(NEWTON_STEPS):
-        if not len(moving):
-            break
-        (u_3, u_4), gap, _, sine = look(theta[:, moving], moving)
         # b step_3 u_3 - c step_4 u_4 = i gap
-        step = np.array(
-            [
-                cross_products(1j * gap, u_4) / (b * sine),
-                cross_products(1j * gap, u_3) / (c * sine),
-            ]
-        )
-        longest = np.maximum(np.abs(step).max(axis=0), LONGEST_CLOSURE_STEP)
-        part = LONGEST_CLOSURE_STEP / longest
-        pending = np.arange(len(moving))
-        moved = np.zeros(len(moving), dtype=bool)
-        for _ in range(MOST_HALVINGS):
-            indices = moving[pending]
-            trial = theta[:, indices] + part[pending] * step[:, pending]
-            _, _, trial_size, _ = look(trial, indices)
-            falls = trial_size < size[indices]
-            theta[:, indices[falls]] = trial[:, falls]
-            size[indices[falls]] = trial_size[falls]
-            moved[pending[falls]] = True
-            pending = pending[~falls & (size[indices] > closed)]
-            if not len(pending):
-                break
-            part[pending] *= 0.5
-        moving = moving[moved]
-    arrived = size <= closed
-    return np.where(arrived, theta, np.nan), np.where(arrived, size, np.nan)
+        step_3 = cross_products(1j * gap, u_4) / (b * sine)
+        step_4 = cross_products(1j * gap, u_3) / (c * sine)
+        trial = theta + np.array([step_3, step_4])
+        _, _, trial_size, _ = look(trial)
+        falls = trial_size < size
+        if not falls.any():
+            break
+        theta = np.where(falls, trial, theta)
+        (u_3, u_4), gap, size, sine = look(theta)
+    return theta, size
 
 
 def cross_products(u: Any, v: Any) -> Any:

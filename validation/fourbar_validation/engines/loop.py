@@ -33,16 +33,12 @@ from fourbar_validation.engines.description import (
     reduce_angle,
 )
 from fourbar_validation.engines.free_body_closure import (
-    LONGEST_CLOSURE_STEP,
+    NEARLY_IN_LINE,
     NEWTON_STEPS,
-    STARTING_ANGLES,
     find_angle,
 )
-from fourbar_validation.engines.loaded import Assembled, BarValues, Loaded
+from fourbar_validation.engines.loaded import Assembled, BarValues, Components, Loaded
 
-_START_ANGLES = np.radians(STARTING_ANGLES).tolist()
-_SHORTEST_STEP = 2.0**-40
-"""A step halved this often moves nothing that a gap above the rounding could tell."""
 NOT_ANSWERED = frozenset(
     (
         "theta_2",
@@ -100,7 +96,8 @@ class Assembler:
         }
         self.ground = points["O4"]
         self.along = along[bar]
-        self.near, self.far = (abs(along[other]) for other in _CLOSING[bar])
+        self.closing = _CLOSING[bar]
+        self.near, self.far = (abs(along[other]) for other in self.closing)
         lengths = abs(self.ground), abs(self.along), self.near, self.far
         self.closed = ROUNDING_OF_THREE_BARS * sum(lengths)
 
@@ -122,112 +119,82 @@ class Assembler:
         least_gap = max(e - (near + far), abs(near - far) - e)
         if least_gap > closed:
             return None
-        # the triangle as measured is the nearest start, also where a bar is a millionth
-        # of the others
-        triangle = (
-            _compute_triangle_angle(e, near, far),
-            _compute_triangle_angle(e, far, near),
+        first, second = self.closing
+        angles = {
+            bar: theta,
+            first: phi + branch * _compute_triangle_angle(e, near, far),
+            second: phi + math.pi - branch * _compute_triangle_angle(e, far, near),
+        }
+        if bar == 4:
+            angles[2] += math.pi
+        q = (
+            angles[2],
+            math.remainder(angles[3] - angles[2], math.tau),
+            math.remainder(angles[4], math.tau),
         )
-        for alpha, beta in (triangle, *_START_ANGLES):
-            first = phi + branch * alpha
-            second = phi + math.pi - branch * beta
-            theta_2, theta_3, theta_4 = {
-                2: (theta, first, second),
-                3: (first, theta, second),
-                4: (second + math.pi, first, theta),
-            }[bar]
-            q = (
-                theta_2,
-                math.remainder(theta_3 - theta_2, math.tau),
-                math.remainder(theta_4, math.tau),
-            )
-            assembled = self._close_gap(q, branch)
-            if assembled is not None:
-                return assembled
-        if least_gap < -closed:
+        assembled = self._close_gap(q, branch)
+        if assembled is None and least_gap < -closed:
             raise ArithmeticError(
                 f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does"
                 " not find it"
             )
-        return None
+        return assembled
 
     def _close_gap(self, q: JointAngles, branch: int) -> JointAngles | None:
         """Close the gap with a bar held, never leaving the branch.
 
         The determinant of the gap's derivative by the angles of the others, for bar 2
-        -b c sin(theta_4 - theta_3), has the branch's sign. A step is halved until the
-        gap falls and the sign is kept. The last step is the one after which a gap below
-        `closed` (m) falls no further. An answer that stops a step earlier has other
-        last digits, and near a change point these decide whether forces can be told.
+        -b c sin(theta_4 - theta_3), has the branch's sign. The last step is the one
+        after which the gap falls no further. An answer that stops a step earlier has
+        other last digits, and near a change point these decide whether forces can be
+        told.
         """
-        tree = self.tree
-        closed = self.closed
-        theta_3 = q[0] + q[1]
-        tree.place(q)
-        x, y = tree.gap()
-        size = math.hypot(x, y)
-        a, b, c, d = self._find_slopes()
-        det = a * d - b * c
-        if det * branch >= 0.0:
-            return None
+        first, second = self.closing
+        size, (step_1, step_2) = self._look(q, branch)
         for _ in range(NEWTON_STEPS):
-            first = (b * y - d * x) / det
-            second = (c * x - a * y) / det
-            longest = max(abs(first), abs(second), LONGEST_CLOSURE_STEP)
-            part = LONGEST_CLOSURE_STEP / longest
-            while True:
-                trial = self._turn_others(q, theta_3, part * first, part * second)
-                # a step that is lost in the rounding of the angles leaves the gap as it
-                # is
-                if trial != q:
-                    tree.place(trial)
-                    x, y = tree.gap()
-                    trial_size = math.hypot(x, y)
-                    if trial_size < size:
-                        a, b, c, d = self._find_slopes()
-                        det = a * d - b * c
-                        if det * branch < 0.0:
-                            break
-                part /= 2.0
-                if size <= closed or part < _SHORTEST_STEP:
-                    tree.place(q)
-                    return q if size <= closed else None
+            turned = {self.bar: 0.0, first: step_1, second: step_2}
+            trial = (
+                q[0] + turned[2],
+                q[1] + (turned[3] - turned[2]),
+                q[2] + turned[4],
+            )
+            trial_size, steps = self._look(trial, branch)
+            if not trial_size < size:
+                break
             q = trial
             size = trial_size
-        return q if size <= closed else None
+            step_1, step_2 = steps
+        self.tree.place(q)
+        return q if size <= self.closed else None
 
-    def _turn_others(
-        self, q: JointAngles, theta_3: float, one: float, other: float
-    ) -> JointAngles:
-        """Turn the two bars that close the loop, the commanded one held.
+    def _look(self, q: JointAngles, branch: int) -> tuple[float, Components]:
+        """Return the gap at joint angles, m, and Newton's steps of the closing bars.
 
-        `theta_3`: direction of bar 3, held where it is commanded.
+        The gap is infinite off the branch.
         """
-        if self.bar == 2:
-            return q[0], q[1] + one, q[2] + other
-        if self.bar == 3:
-            return q[0] + one, theta_3 - (q[0] + one), q[2] + other
-        return q[0] + other, q[1] + (one - other), q[2]
-
-    def _find_slopes(self) -> tuple[float, float, float, float]:
-        """Return the derivatives of the gap by the angles of the bars that close it.
-
-        In order: of x by the first and the second angle, then of y.
-        """
-        (e, a, b), (f, c, d) = self.tree.jacobian().tolist()
-        if self.bar == 3:
-            # bar 2 turns alone where its own joint turns and that of bar 3 turns back
-            return e - a, b, f - c, d
-        if self.bar == 4:
-            return a, e - a, c, f - c
-        return a, b, c, d
+        tree = self.tree
+        tree.place(q)
+        x, y = tree.gap()
+        (e, a, b), (f, c, d) = tree.jacobian().tolist()
+        # a bar turns alone where the joints of those that it carries turn back
+        slopes = {2: (e - a, f - c), 3: (a, c), 4: (b, d)}
+        (a, c), (b, d) = (slopes[bar] for bar in self.closing)
+        det = a * d - b * c
+        if not det * branch < 0.0:
+            return math.inf, (0.0, 0.0)
+        return math.hypot(x, y), ((b * y - d * x) / det, (c * x - a * y) / det)
 
 
 def _compute_triangle_angle(e: float, near: float, far: float) -> float:
-    """Compute the angle between the sides e and near, by half-angle tangents."""
+    """Compute the angle between the sides e and near, by half-angle tangents.
+
+    The corner is never on the side e, as for the free bodies.
+    """
     above = (e - near + far) * (far + near - e)
     below = (e + near - far) * (e + near + far)
-    return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
+    angle = 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
+    least = NEARLY_IN_LINE * min(near, far) / near
+    return min(max(angle, least), math.pi - least)
 
 
 @dataclass(slots=True)
