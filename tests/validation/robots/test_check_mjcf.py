@@ -244,7 +244,7 @@ def described(text, scene=CRANK_ROCKER):
     """Describe a file without measuring it."""
     found = find_loop_of_scene(RobotFile(MINE_XML, text), scene, AS_DRAWN)
     inside, _ = put_loop_inside(found)
-    seen = SeenLoop(found.robot.model, found.loop, found.turned, 2)
+    seen = SeenLoop(found.robot.model, found.loop, 2)
     return describe_model(seen, inside.flywheel)
 
 

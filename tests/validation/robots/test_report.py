@@ -60,7 +60,7 @@ def test_the_states_are_those_that_were_asked_at():
     first, row = rows[0], loop.states.rows[0]
     assert float(first["drive [N m or N]"]) == row.soft.torque
     assert float(first["gap [mm]"]) == 1e3 * row.gap
-    size = sum(part**2 for part in row.rigid.forces["F43"]) ** 0.5
+    size = sum(part**2 for part in row.rigid["F43"]) ** 0.5
     assert float(first["F43 of rigid pins [N]"]) == pytest.approx(size, rel=1e-15)
 
 
@@ -171,9 +171,7 @@ def test_advice_begins_with_what_was_reached(solref, error, reached, said):
     tried = TriedSettings(SETTINGS, changes, worst, WorstState(0.0), 0.0, 1e-6)
     advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None)
     assert advice.reached == bool(reached)
-    loop = SimpleNamespace(
-        refusal="too many steps", scene=SCENE, turned=0.0, joint="knee"
-    )
+    loop = SimpleNamespace(refusal="too many steps", scene=SCENE, joint="knee")
     about, first, *others = describe_advice(loop, advice)
     assert about.startswith("Errors are the worst")
     assert first.startswith(said)

@@ -29,7 +29,7 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.answers import (
-    BarMotion,
+    MOTION_OF_BARS,
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
@@ -356,7 +356,7 @@ def list_answers(measured: LoopMeasurement) -> list[Answer]:
     setting = f"{settings.integrator} {settings.timestep:g} s"
     through = measured.through_time
     if through is not None:
-        if through.rows:
+        if len(through.rows):
             answers.append(_make_answer(measured, through, FILE_THROUGH_TIME, setting))
     elif measured.moves:
         answers.append(Answer(FILE_THROUGH_TIME, setting, refusal=measured.refusal))
@@ -369,13 +369,9 @@ def _make_answer(
     rows = inside.rows
     at = measured.command(inside)
     quantities = measured.collect(inside, "soft")
-    for name in BarMotion._fields:
-        if name.endswith(f"_{at.bar}"):
-            continue
-        values = np.array([getattr(row.bars, name) for row in rows])
-        if name.startswith("theta"):
-            values = values - measured.turned
-        quantities[name] = values
+    for name in MOTION_OF_BARS:
+        if not name.endswith(f"_{at.bar}"):
+            quantities[name] = rows.bars[name]
     for name, values in quantities.items():
         missing = np.full((len(inside.open), *values.shape[1:]), np.nan)
         quantities[name] = np.concatenate([values, missing])

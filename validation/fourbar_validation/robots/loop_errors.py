@@ -125,7 +125,7 @@ def list_errors_by_method(loop: LoopMeasurement) -> list[InsideError]:
     """
     errors = list(_compare(RIGID, loop, loop.states))
     errors += _compare(STATES, loop, loop.states)
-    if loop.through_time is not None and loop.through_time.rows:
+    if loop.through_time is not None and len(loop.through_time.rows):
         errors += _compare(MEASURED_THROUGH_TIME, loop, loop.through_time)
     return errors
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
+import numpy as np
 
 from fourbar.errors import write_count
 from fourbar.formulas.mobility import (
@@ -156,13 +157,13 @@ def _describe_differences(judgement: LoopJudgement) -> Iterator[ReportBlock]:
 
 def write_driven_range(loop: LoopMeasurement) -> str:
     """Write the driven joint of a loop and the range in which it is measured."""
-    joints = [row.joint for row in loop.states.rows]
+    joints = loop.states.rows.joint
     first, last = (write_degrees(end) for end in (min(joints), max(joints)))
     return f"{loop.joint} from {first} to {last} deg"
 
 
 def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
-    speeds = [row.speed for row in loop.states.rows]
+    speeds = loop.states.rows.speed
     speed = " to ".join(
         f"{end:.4g}" for end in dict.fromkeys((min(speeds), max(speeds)))
     )
@@ -229,7 +230,7 @@ def _describe_loop(
                 f" point, seen at {loop.joint} = {place} deg: no state from there on is"
                 " in a percentage"
             )
-        worst = max(loop.through_time.rows, key=lambda row: row.gap)
+        worst = loop.through_time.rows[loop.through_time.rows.gap.argmax()]
         yield (
             f"gap through time: {1e3 * worst.gap:.3g} mm at {loop.joint} = "
             f"{write_degrees(worst.joint)} deg; a step takes "
@@ -326,9 +327,8 @@ def _describe_torn(loop: LoopMeasurement) -> Iterator[ReportBlock]:
     if not math.isfinite(worst.gap):
         yield "under the torque the loop comes apart: MuJoCo lost the motion"
         return
-    forces = ", ".join(
-        f"{name} {math.hypot(*force):.4g} N" for name, force in worst.forces.items()
-    )
+    sizes = zip(PIN_FORCES, np.hypot(*worst.forces.T), strict=True)
+    forces = ", ".join(f"{name} {size:.4g} N" for name, size in sizes)
     yield (
         "under the torque, let go from rest at"
         f" {write_count(len(loop.torn), 'position')} for ten time constants of the"
@@ -387,7 +387,7 @@ def _describe_deciding(
     if math.isfinite(state.error):
         through_time = state is advice.best.through_time
         method = MEASURED_THROUGH_TIME if through_time else f"at {STATES}"
-        near = _describe_limit(loop, state.angle - loop.turned)
+        near = _describe_limit(loop, state.angle)
         yield (
             f"{state.quantity} {method} decides, at {loop.joint} ="
             f" {write_degrees(state.joint)} deg{', ' if near else ''}{near}"
@@ -464,7 +464,7 @@ def _list_states(
                 numbers = [math.degrees(row.joint), row.speed, row.acceleration]
                 numbers += [one.torque for one in both]
                 for one in both:
-                    numbers += [math.hypot(*one.forces[name]) for name in PIN_FORCES]
+                    numbers += [math.hypot(*one[name]) for name in PIN_FORCES]
                 numbers.append(1e3 * row.gap)
                 yield escape_controls(loop.name), method, *map(float, numbers)
 

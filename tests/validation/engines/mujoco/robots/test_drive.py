@@ -139,7 +139,7 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
     posed = find_loop_of_scene(file, made, AS_DRAWN)
     bars = made.linkage.moving
     crank = 2 + int(np.argmin([one.length for one in bars]))
-    start = posed.loop.angles[crank - 1] - posed.turned + math.pi * away
+    start = posed.loop.angles[crank - 1] + math.pi * away
     turn = start + np.linspace(0.0, 0.2, 9)
     circuit = find_circuit_of(made)
     in_circuit = next(

@@ -72,8 +72,8 @@ def test_pin_forces_are_those_of_the_free_body(scene, flags):
     assert answer.quantities["F14"][at, 1] == right
     loop = measure(text, scene, loop="B")
     rows = {round(math.degrees(row.angle)) % 360: row for row in loop.states.rows}
-    assert rows[90].soft.forces["F14"][1] == right
-    assert rows[90].rigid.forces["F14"][1] == right
+    assert rows[90].soft["F14"][1] == right
+    assert rows[90].rigid["F14"][1] == right
 
 
 SOLVED = 1e-6

@@ -21,7 +21,7 @@ from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.mujoco.robots.answers import (
     FORCE_QUANTITIES,
-    LoopMotion,
+    make_motion,
     measure_sizes,
 )
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
@@ -124,7 +124,7 @@ def ask_again(inside, theta_2, alpha_2):
 def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(name):
     inside, made = open_loop(name)
     theta_2 = float(spread_over_range(inside, made, 3)[-1])
-    (row,) = inside.answer_states(LoopMotion((theta_2,), 2.0, 3.0)).rows
+    (row,) = inside.answer_states(make_motion([theta_2], (2.0, 3.0))).rows
     assert row.soft.torque == approx(
         ask_again(inside, theta_2, 3.0),
         rel=ASKED_TWICE,
@@ -141,7 +141,7 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     found = find_loop_of_scene(file_of(text), scene, AS_DRAWN)
     inside, motion = put_loop_inside(found)
     assert inside.flywheel > 1e6
-    (row,) = inside.answer_states(motion.thin_out(3)._replace(angle=(2.0,))).rows
+    (row,) = inside.answer_states(make_motion([2.0], motion[0, 1:])).rows
     state = inside.state(2.0, row.speed)
     model, data = inside.model, mujoco.MjData(inside.model)
     data.qpos[:], data.qvel[:] = state.qpos, state.qvel
@@ -163,7 +163,7 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     torque = mass[0, passive] @ solved[:2] + bias[0] - jacobian[:, 0] @ solved[2:]
     assert row.soft.torque == approx(torque, rel=ROUNDED)
     force = np.linalg.norm(solved[2:5])
-    assert np.linalg.norm(row.soft.forces["F43"]) == approx(force, rel=ROUNDED)
+    assert np.linalg.norm(row.soft["F43"]) == approx(force, rel=ROUNDED)
 
 
 ROUNDED = 1e-12
@@ -177,7 +177,7 @@ def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     """
     inside, made = open_loop(name)
     angles = spread_over_range(inside, made, 5)
-    rows = inside.answer_states(LoopMotion(tuple(angles), 2.0, 3.0)).rows
+    rows = inside.answer_states(make_motion(angles, (2.0, 3.0))).rows
     assert len(rows) == len(angles)
     branch = np.full(
         len(rows),
@@ -188,7 +188,7 @@ def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     formulas = solve(made.scene, "force", at=command)
     free_bodies = FreeBody().answer(made.scene, command).quantities
     for quantity in FORCE_QUANTITIES:
-        rigid = np.array([row.rigid.values()[quantity] for row in rows])
+        rigid = rows.rigid[quantity]
         for right in (getattr(formulas, quantity), free_bodies[quantity]):
             size = measure_sizes(right).max()
             assert measure_sizes(rigid - right).max() <= RIGID * size
@@ -207,15 +207,11 @@ def test_the_start_of_a_simulation_is_not_judged():
     inside, _ = open_loop("excavator")
     assert inside.find_constant() == 0.02
     start = inside.loop.angles[1]
-    motion = LoopMotion(
-        tuple(start + np.linspace(0.0, 0.6, 31)),
-        1.0,
-        0.0,
-    )
+    motion = make_motion(start + np.linspace(0.0, 0.6, 31), (1.0, 0.0))
     through = inside.answer_through_time(motion)
     assert min(row.angle for row in through.rows) >= start + 0.1 - 1e-3
     errors, scales = through.errors(), through.scales(inside.loop.longest)
-    single = inside.answer_states(motion._replace(angle=motion.angle[5:]))
+    single = inside.answer_states(motion[5:])
     for quantity in FORCE_QUANTITIES:
         scale = scales[quantity]
         settled = errors[quantity].max() / scale

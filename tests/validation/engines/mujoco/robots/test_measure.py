@@ -229,7 +229,7 @@ def test_axes_sides_and_twins_have_the_same_errors():
 
 
 def angles_of(loop):
-    return np.array([row.angle for row in loop.states.rows]) - loop.turned
+    return loop.states.rows.angle
 
 
 HALVES = Planar(
@@ -304,7 +304,7 @@ def test_one_scale_for_a_column_where_the_torque_is_rounding():
     """The torque is a sum that cancels: 12.6 % of 8042 N m, not 1e6 %."""
     loop = measure(RHOMBUS, speed=1.0)
     torques = errors_of(loop)
-    force = max(np.hypot(*row.rigid.forces["F12"]) for row in loop.states.rows)
+    force = max(np.hypot(*row.rigid["F12"]) for row in loop.states.rows)
     for torque in torques.values():
         assert torque.vanishes
         assert torque.scale == approx(4.0 * force, rel=1e-9)
@@ -361,7 +361,7 @@ def test_dry_friction_along_a_tendon_is_that_of_its_hinge():
         "</tendon></mujoco>"
     )
     one, other = (
-        measure(text, speed=2.0).states.collect("rigid")
+        measure(text, speed=2.0).states.rows.rigid
         for text in (joint, SINGLE.replace("</mujoco>", tendon))
     )
     for name in FORCE_QUANTITIES:
@@ -465,5 +465,5 @@ def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies():
     loop = measure(FILE.format(ROCKER_BODY.format(HALF), CRANK, weld), speed=1.0)
     formulas = fourbar.solve(loop.scene, "position")
     theta_3 = np.interp(angles_of(loop), formulas.theta_2, formulas.theta_3)
-    found = [row.bars.theta_3 - loop.turned for row in loop.states.rows]
+    found = loop.states.rows.bars.theta_3
     assert np.abs(np.sin(found - theta_3)).max() < CHORD

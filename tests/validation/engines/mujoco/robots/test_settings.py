@@ -11,7 +11,7 @@ from pytest import approx, raises
 from scipy.optimize import brentq
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.answers import LoopMotion
+from fourbar_validation.engines.mujoco.robots.answers import make_motion
 from fourbar_validation.engines.mujoco.robots.closures import find_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
@@ -48,7 +48,7 @@ def search(file):
     model, loop = find_loop(file)
     middle = loop.angles[1]
     angles = tuple(middle + LIGHT_LOAD * step / 4.0 for step in range(-4, 5))
-    return SettingsSearch(LoopInside(model, loop), LoopMotion(angles, 2.0, 0.0))
+    return SettingsSearch(LoopInside(model, loop), make_motion(angles, (2.0, 0.0)))
 
 
 def paste(text, advice):
@@ -138,7 +138,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     angles = [first + (last - first) * step / 8 for step in range(9)]
 
     def search(low, high):
-        motion = LoopMotion(tuple(angles[low : high + 1]), 2.0, 0.0)
+        motion = make_motion(angles[low : high + 1], (2.0, 0.0))
         return SettingsSearch(LoopInside(model, loop), motion)
 
     whole = search(0, 8)
@@ -196,7 +196,7 @@ def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
     model, loop = find_loop(file)
     first = loop.angles[1] + TURN - math.radians(10.0)
     angles = tuple(first + math.radians(6.0 * step - 15.0) for step in range(9))
-    motion = LoopMotion(angles, speed, 0.0)
+    motion = make_motion(angles, (speed, 0.0))
     search = SettingsSearch(LoopInside(model, loop), motion)
     advice = search.advise(0.01, file)
     assert advice.reached and "solreffriction" in advice.best.changes

@@ -1,16 +1,17 @@
 """Results of MuJoCo on the loops of a robot, as plain data."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.quantities import COUPLE, PIN_FORCES, Array
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
-from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.description import list_unknowns
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 
 FORCE_QUANTITIES = ("torque", *PIN_FORCES)
@@ -26,50 +27,60 @@ difference of two lengths is off by twice as much.
 """
 
 
-class LoopMotion(NamedTuple):
-    """Motion of the commanded bar in the plane of a loop."""
+_FORCES = np.dtype([("torque", float), *((name, float, 2) for name in PIN_FORCES)])
+"""Couple of the drive, N m, or its force, N, and pin forces in the scene's axes, N."""
+MOTION_OF_BARS = [f"{rate}_{b}" for rate in ("theta", "omega") for b in MOVING_BARS]
+"""Angles (rad) and speeds (rad/s) of the moving bars in the scene's axes."""
+STATE = np.dtype(
+    [
+        ("angle", float),
+        ("speed", float),
+        ("acceleration", float),
+        ("joint", float),
+        ("soft", _FORCES),
+        ("rigid", _FORCES),
+        ("gap", float),
+        ("bars", [(name, float) for name in MOTION_OF_BARS]),
+        ("condition", float),
+    ]
+)
+"""One state of a loop in its robot.
 
-    angle: tuple[float, ...]
-    """rad."""
-    speed: float | tuple[float, ...]
-    """rad/s, one of all positions or one of each."""
-    acceleration: float | tuple[float, ...]
-    """rad/s^2."""
-
-    @property
-    def varies(self) -> bool:
-        """Tell whether speed or acceleration differ from position to position."""
-        return bool(np.ptp(self.speed) or np.ptp(self.acceleration))
-
-    def states(self) -> Iterator[tuple[float, float, float]]:
-        """Iterate over angle, speed and acceleration of each position."""
-        yield from np.column_stack(np.broadcast_arrays(*self)).tolist()
-
-    def thin_out(self, most: int) -> "LoopMotion":
-        """Return the motion with at most so many positions, spread evenly.
-
-        Both ends are among them.
-        """
-        count = min(len(self.angle), most)
-        keep = np.linspace(0, len(self.angle) - 1, count).round().astype(int)
-        parts: list[Any] = [
-            tuple(np.array(part)[keep].tolist()) if isinstance(part, tuple) else part
-            for part in self
-        ]
-        return LoopMotion(*parts)
+Angle, speed and acceleration are those of the commanded bar, rad, and the joint is the
+position of the driven one as the file counts it, rad. Soft are torque and pin forces as
+MuJoCo has them, rigid those with rigid pins at the closed state of the same command.
+The gap is the distance of the ends of the closure, m, and the bars are those of the
+state that MuJoCo evaluates. The condition is |sin| of the angle between the bars that
+follow in that closed state.
+"""
 
 
-@dataclass(frozen=True, slots=True)
-class PinsAndTorque:
-    """Drive of a state, and its pin forces in the axes of the plane, (2,) each, N."""
+def record_states(rows: Sequence[Any]) -> Any:
+    """Return states as a record array of STATE, (n,)."""
+    return np.array(rows, STATE).view(np.recarray)
 
-    torque: float
-    """Couple of the drive, N m, or its force, N."""
-    forces: dict[str, Array]
 
-    def values(self) -> dict[str, Any]:
-        """Return the drive as "torque", and the pin forces, by their names."""
-        return {"torque": self.torque, **self.forces}
+def make_motion(angles: Iterable[float], rates: Iterable[float]) -> Array:
+    """Return a motion at one speed, rad/s, and one acceleration, rad/s^2, (n, 3).
+
+    Its columns are angle, speed and acceleration of the commanded bar in the scene's
+    axes. `angles`: (n,), rad.
+    """
+    return np.array([(angle, *rates) for angle in angles])
+
+
+def varies(motion: Array) -> bool:
+    """Tell whether speed or acceleration differ from position to position."""
+    return bool(np.ptp(motion[:, 1:], axis=0).any())
+
+
+def thin_out(motion: Array, most: int) -> Array:
+    """Return a motion with at most so many positions, spread evenly.
+
+    Both ends are among them.
+    """
+    places = np.linspace(0, len(motion) - 1, min(len(motion), most))
+    return np.asarray(motion[places.round().astype(int)])
 
 
 def measure_sizes(values: Any) -> Array:
@@ -128,45 +139,13 @@ class WorstState(NamedTuple):
     """Angle of the commanded bar in the plane of the loop, rad."""
 
 
-class BarMotion(NamedTuple):
-    """Angles (rad) and speeds (rad/s) of the moving bars in the plane of a loop."""
-
-    theta_2: float
-    theta_3: float
-    theta_4: float
-    omega_2: float
-    omega_3: float
-    omega_4: float
-
-
-@dataclass(frozen=True, slots=True)
-class InsideRow:
-    """One state of a loop in its robot."""
-
-    angle: float
-    """Angle of the commanded bar, rad."""
-    speed: float
-    acceleration: float
-    joint: float
-    """Position of the driven joint as the file counts it, rad."""
-    soft: PinsAndTorque
-    """Torque and pin forces as MuJoCo has them."""
-    rigid: PinsAndTorque
-    """Values with rigid pins at the closed state of the same command."""
-    gap: float
-    """Distance of the ends of the closure, m."""
-    bars: BarMotion
-    """Motion of the state that MuJoCo evaluates."""
-    condition: float
-    """|sin| of the angle between the bars that follow in that closed state."""
-
-
 @dataclass(slots=True)
 class InsideAnswer:
     """Results of MuJoCo on a loop at some states of the whole robot."""
 
-    rows: list[InsideRow] = field(default_factory=list)
-    in_line: tuple[float, ...] = ()
+    rows: Any = field(default_factory=lambda: record_states([]))
+    """Record array of STATE, (n,)."""
+    in_line: list[float] = field(default_factory=list)
     """Positions of the driven joint that are left out, because the bars that follow are
     in line there, rad.
     """
@@ -185,40 +164,29 @@ class InsideAnswer:
     seconds_per_step: float = math.nan
     """Processor time of a step of the whole robot between two states, the least, s."""
 
-    def collect(self, which: str) -> dict[str, Array]:
-        """Return torque (n,) and pin forces (n, 2), N m and N: "soft" or "rigid"."""
-        states = [getattr(row, which).values() for row in self.rows]
-        return {
-            name: np.array([state[name] for state in states], dtype=float)
-            for name in FORCE_QUANTITIES
-        }
-
-    def differences(self) -> dict[str, Array]:
-        """Return soft less rigid torque (n,) and pin forces (n, 2), N m and N."""
-        rigid = self.collect("rigid")
-        return {name: soft - rigid[name] for name, soft in self.collect("soft").items()}
-
     def errors(self) -> dict[str, Array]:
         """Return the size of the error of torque and pin forces, (n,), N m and N."""
-        errors = self.differences().items()
-        return {name: measure_sizes(error) for name, error in errors}
+        soft = self.rows.soft
+        rigid = self.rows.rigid
+        return {
+            name: measure_sizes(soft[name] - rigid[name]) for name in FORCE_QUANTITIES
+        }
 
     def sizes(self) -> dict[str, Array]:
         """Return the sizes of torque and pin forces of rigid pins, (n,), N m and N."""
-        forces = self.collect("rigid").items()
-        return {name: measure_sizes(force) for name, force in forces}
+        rigid = self.rows.rigid
+        return {name: measure_sizes(rigid[name]) for name in FORCE_QUANTITIES}
 
     def scales(self, lever: float) -> dict[str, float]:
         """Return what errors are divided by, from rigid pins, as `find_scales` does."""
-        conditions = np.array([row.condition for row in self.rows])
-        return find_scales(self.sizes(), conditions, lever)
+        return find_scales(self.sizes(), self.rows.condition, lever)
 
     def find_worst(self, scales: Mapping[str, float]) -> WorstState:
         """Return the state of the worst error of torque and pin forces over its scale.
 
         The error is infinite without an answer.
         """
-        if self.lost or not self.rows:
+        if self.lost or not len(self.rows):
             return WorstState(math.inf)
         return max(
             WorstState(divide(float(error), scales[name]), name, row.joint, row.angle)
@@ -235,7 +203,8 @@ class TornState:
     """Position of the driven joint, rad."""
     gap: float
     """m; infinite where MuJoCo lost the motion."""
-    forces: dict[str, Array]
+    forces: Array
+    """Of PIN_FORCES in the scene's axes, (4, 2), N; empty without an answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,8 +330,6 @@ class LoopMeasurement:
     """Joint that is driven."""
     scene: Scene
     """Scene of the loop, in which the formulas are asked."""
-    turned: float
-    """Angle of the scene's axes in the plane of the loop, rad."""
     remarks: tuple[str, ...]
     settings: RobotSettings
     rounding: float
@@ -396,32 +363,29 @@ class LoopMeasurement:
         return left or self.refusal == OTHER_ASSEMBLY
 
     def command(self, answer: InsideAnswer) -> Command:
-        """Return the command of an answer in the axes of the scene.
+        """Return the command of an answer.
 
         The states that are answered come first, then the angles that are open.
         """
-        rows = [*answer.rows, *answer.rows[:1] * len(answer.open)]
-        angles = [*(row.angle for row in answer.rows), *answer.open]
+        rows = answer.rows
+        more = (0, len(answer.open))
         return Command(
-            np.array(angles) - self.turned,
-            np.full(len(rows), self.scene.motion.branch, dtype=np.int8),
-            np.array([row.speed for row in rows]),
-            np.array([row.acceleration for row in rows]),
+            np.append(rows.angle, answer.open),
+            np.full(len(rows) + len(answer.open), self.scene.motion.branch, np.int8),
+            np.pad(rows.speed, more, "edge"),
+            np.pad(rows.acceleration, more, "edge"),
             bar=command(self.scene).bar,
         )
 
     def collect(self, answer: InsideAnswer, which: str) -> dict[str, Array]:
         """Return what the drive exerts (n,), and the pin forces (n, 2), of an answer.
 
-        The names and axes are those of the scene, N m and N. `which`: "soft" or
-        "rigid".
+        The names are those of the scene, N m and N. `which`: "soft" or "rigid".
         """
-        forces = answer.collect(which)
-        drive = forces.pop(COUPLE.value)
-        turned = np.exp(-1j * self.turned)
-        axes = np.array([[turned.real, turned.imag], [-turned.imag, turned.real]])
-        values = {name: force @ axes for name, force in forces.items()}
-        return {name_driving(self.scene): drive, **values}
+        forces = answer.rows[which]
+        names = list_unknowns(self.scene, FORCE_QUANTITIES)
+        pairs = zip(names, FORCE_QUANTITIES, strict=True)
+        return {name: np.asarray(forces[field]) for name, field in pairs}
 
     def find_vanishing(self, quantity: str) -> float | None:
         """Return the scale of the terms of a quantity that is their rounding."""
@@ -434,8 +398,8 @@ class LoopMeasurement:
     @property
     def moves(self) -> bool:
         """Tell whether the scene names a motion and not a few states at rest."""
-        speeds = [row.speed for row in self.states.rows]
-        return any(speeds) and len(speeds) + len(self.states.open) > 1
+        speeds = self.states.rows.speed
+        return bool(speeds.any()) and len(speeds) + len(self.states.open) > 1
 
 
 @dataclass(frozen=True, slots=True)

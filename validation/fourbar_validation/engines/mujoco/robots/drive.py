@@ -83,23 +83,15 @@ class LoopDrive:
     The ground bears the opposite of each.
     """
 
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        loop: RobotLoop,
-        scene: Scene,
-        turned: float,
-    ) -> None:
-        """Take a scene whose axes are turned by an angle in the loop's plane, rad."""
+    def __init__(self, model: mujoco.MjModel, loop: RobotLoop, scene: Scene) -> None:
         self.model = model
         self.loop = loop
         self.drive = scene.settled_drive()
         self.couple_bar = None if scene.drive is not None else scene.drive_bar
         """Bar on which a couple acts, if that is the drive."""
-        self.turned = turned
 
     def _list_wrenches(self, data: mujoco.MjData) -> list[_Wrench]:
-        frame = LoopFrame(self.loop, data, self.turned)
+        frame = LoopFrame(self.loop, data)
         none = np.zeros(3)
         bodies = self.loop.bodies
         if self.couple_bar is not None:

@@ -30,6 +30,7 @@ from fourbar_validation.engines.mujoco.describe import (
     mend_entry,
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
+    InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
     measure_sizes,
@@ -161,18 +162,16 @@ def predict_softness(
         stiff, softer = (_answer_at_yield(found, times) for times in (1.0, 2.0))
     softness = {}
     for at_stiff, at_softer in zip(stiff, softer, strict=True):
-        pairs = list(zip(at_stiff, at_softer, strict=False))
-        for name in at_stiff[0] if pairs else ():
-            changes = np.array([one[name] - other[name] for one, other in pairs])
+        both = min(len(at_stiff), len(at_softer))
+        for name in at_stiff.dtype.names:
+            changes = at_stiff[name][:both] - at_softer[name][:both]
             if name.startswith("theta"):
                 changes = wrap_difference(changes)
             softness[name] = float(np.nanmax(measure_sizes(changes), initial=0.0))
     return softness
 
 
-def _answer_at_yield(
-    found: LoopOfScene, times: float
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def _answer_at_yield(found: LoopOfScene, times: float) -> tuple[Any, Any]:
     """Return torque and pin forces of single states at a multiple of the least yield,
     and the motion of the bars through time; nothing where it is not simulated.
     """
@@ -180,9 +179,8 @@ def _answer_at_yield(
     impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
     seen.model.eq_solimp[[*found.loop.closures], :2] = impedance
     inside, motion = put_loop_inside(found, seen.model)
-    forces = [row.soft.values() for row in inside.answer_states(motion).rows]
-    moved: list[dict[str, Any]] = []
+    states = inside.answer_states(motion)
+    through = InsideAnswer()
     with suppress(LimitError):
         through = inside.answer_through_time(motion)
-        moved += (row.bars._asdict() for row in through.rows)
-    return forces, moved
+    return states.rows.soft, through.rows.bars

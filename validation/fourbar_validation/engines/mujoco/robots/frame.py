@@ -25,20 +25,17 @@ def list_bars(model: mujoco.MjModel, loop: RobotLoop) -> list[int | None]:
 class LoopFrame:
     """Plane of a loop in a state whose kinematics are evaluated."""
 
-    def __init__(
-        self, loop: RobotLoop, data: mujoco.MjData, turned: float = 0.0
-    ) -> None:
-        """Take axes that are turned by an angle in the plane of the loop, rad."""
+    def __init__(self, loop: RobotLoop, data: mujoco.MjData) -> None:
         self.loop = loop
         self.data = data
         ground = data.xmat[loop.bodies[1][0]].reshape(3, 3)
         self.normal = ground @ loop.axis
         along = ground @ loop.along
         across = np.cross(self.normal, along)
-        cos = math.cos(turned)
-        sin = math.sin(turned)
+        cos = math.cos(loop.turned)
+        sin = math.sin(loop.turned)
         self.axes = np.array([cos * along + sin * across, cos * across - sin * along])
-        """x and y in world axes, (2, 3)."""
+        """x and y of the scene in world axes, (2, 3)."""
 
     def in_plane(self, vector: Array) -> Array:
         """Project a vector of the world on the plane, (2,)."""

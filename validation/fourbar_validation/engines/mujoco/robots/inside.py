@@ -26,7 +26,7 @@ import math
 import time
 from collections.abc import Iterable, Iterator
 from copy import copy
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -51,12 +51,10 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.answers import (
     OTHER_ASSEMBLY,
-    BarMotion,
     InsideAnswer,
-    InsideRow,
-    LoopMotion,
-    PinsAndTorque,
     TornState,
+    record_states,
+    varies,
 )
 from fourbar_validation.engines.mujoco.robots.drive import FileCylinder, LoopDrive
 from fourbar_validation.engines.mujoco.robots.forces import (
@@ -431,10 +429,11 @@ class LoopInside:
         rates = self.step + self.basis @ self._find_rates(qpos)
         return _RobotState(qpos, speed * rates)
 
-    def ask(self, qpos: Array, qvel: Array, wanted: float) -> InsideRow:
+    def ask(self, qpos: Array, qvel: Array, wanted: float) -> Any:
         """Evaluate a state in which the commanded bar accelerates as wanted, rad/s^2.
 
-        The couple on it, or what its drive exerts, is solved for.
+        The couple on it, or what its drive exerts, is solved for. A record of STATE is
+        returned.
 
         Raises
         ------
@@ -485,18 +484,19 @@ class LoopInside:
         self.stopped.update(data.efc_id[: data.nefc][limits].tolist())
         forces = self._read_forces(data)
         if math.isnan(size):
-            forces = {name: np.full(2, np.nan) for name in forces}
-        return InsideRow(
+            forces *= np.nan
+        row = (
             angle,
             speed,
             wanted,
             self._read_position(qpos),
-            soft=PinsAndTorque(size, forces),
-            rigid=rigid,
-            bars=self._read_bars(data),
-            gap=self._measure_gap(qpos),
-            condition=abs(self._measure_sine(closed.qpos)),
+            (size, *forces),
+            rigid,
+            self._measure_gap(qpos),
+            self._read_bars(data),
+            abs(self._measure_sine(closed.qpos)),
         )
+        return record_states([row])[0]
 
     def list_unmet_stops(self) -> list[int]:
         """List the hinges of the loop whose stops ended no state."""
@@ -507,7 +507,7 @@ class LoopInside:
             if limits and self.model.jnt_limited[joint] and joint not in self.stopped
         ]
 
-    def _read_bars(self, data: mujoco.MjData) -> BarMotion:
+    def _read_bars(self, data: mujoco.MjData) -> tuple[float, ...]:
         """Return angles and speeds of the moving bars in an evaluated state."""
         self._evaluate_closure(data.qpos)
         frame = LoopFrame(self.loop, self.closing)
@@ -516,7 +516,7 @@ class LoopInside:
             float((data.cvel[self.loop.bodies[bar][0]] - ground)[:3] @ frame.normal)
             for bar in MOVING_BARS
         ]
-        return BarMotion(*map(frame.angle, MOVING_BARS), *speeds)
+        return (*map(frame.angle, MOVING_BARS), *speeds)
 
     def _measure_gap(self, qpos: Array) -> float:
         """Measure the distance of the ends of the closure in the plane, m."""
@@ -541,7 +541,7 @@ class LoopInside:
         self,
         state: _RobotState,
         wanted: float,
-    ) -> tuple[PinsAndTorque, Array]:
+    ) -> tuple[tuple[Any, ...], Array]:
         """Solve for the drive and pin forces with rigid pins at a closed state.
 
         Return all accelerations too, (nv,).
@@ -579,7 +579,7 @@ class LoopInside:
         forces = self._read_forces(data)
         if self.acting is not None:
             self.acting.exert(data, 0.0)
-        return PinsAndTorque(size, forces), accelerations
+        return (size, *forces), accelerations
 
     def _rub(self, state: _RobotState) -> Array:
         """Return the joint forces against dry friction in full, (nv,)."""
@@ -624,10 +624,13 @@ class LoopInside:
         start = np.zeros(len(self.passive))
         return find_forces(root(leave, start, jac=differ, tol=_BALANCED).x)
 
-    def _read_forces(self, data: mujoco.MjData) -> dict[str, Array]:
-        """Return the pin forces of an evaluated state in the plane's axes, (2,), N."""
+    def _read_forces(self, data: mujoco.MjData) -> Array:
+        """Return the pin forces of an evaluated state, (4, 2), N.
+
+        Their order is that of PIN_FORCES.
+        """
         frame = LoopFrame(self.loop, data)
-        forces = {}
+        forces = []
         for pin, name in FORCE_AT.items():
             _, acted_on = FORCE_BETWEEN[name]
             if pin in self.loop.hinges:
@@ -645,28 +648,28 @@ class LoopInside:
                 force if self._bars[body] == acted_on else -force
                 for body, force in parts
             ]
-            forces[name] = frame.in_plane(np.sum(signed, axis=0))
-        return forces
+            forces.append(frame.in_plane(np.sum(signed, axis=0)))
+        return np.array(forces)
 
-    def answer_states(self, motion: LoopMotion) -> InsideAnswer:
+    def answer_states(self, motion: Array) -> InsideAnswer:
         """Answer at closed states, each by itself.
 
         States in which the bars that follow are in line are left out and listed.
         """
         answer = InsideAnswer()
-        in_line = []
-        for angle, speed, acceleration in motion.states():
+        rows = []
+        for angle, speed, acceleration in motion.tolist():
             state = self.state(angle, speed)
             if state is None:
                 answer.open.append(angle)
             elif self._is_in_line(state.qpos):
-                in_line.append(self._read_position(state.qpos))
+                answer.in_line.append(self._read_position(state.qpos))
             else:
-                answer.rows.append(self.ask(state.qpos, state.qvel, acceleration))
-        answer.in_line = tuple(in_line)
+                rows.append(self.ask(state.qpos, state.qvel, acceleration))
+        answer.rows = record_states(rows)
         return answer
 
-    def answer_through_time(self, motion: LoopMotion) -> InsideAnswer:
+    def answer_through_time(self, motion: Array) -> InsideAnswer:
         """Step the whole robot through the angles.
 
         Timestep, integrator and solver are those of the file. Each joint that is held,
@@ -674,24 +677,23 @@ class LoopInside:
         inertia. The couple that a state asks for acts on the bar until the next, so
         that its speed is kept.
         """
-        if motion.varies:
+        if varies(motion):
             raise LimitError(
                 "omega or alpha differs from position to position: that is no one"
                 " motion through time"
             )
         answer = InsideAnswer()
-        _, omega, alpha = next(motion.states())
-        angles = sorted(motion.angle, reverse=omega < 0.0)
+        _, omega, alpha = motion[0].tolist()
+        angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
         model, armature = self._keep_speeds()
         data = mujoco.MjData(self.model)
-        timestep = float(model.opt.timestep)
         state = self.state(angles[0], omega)
         if state is None:
             raise LimitError("the loop does not close where the motion starts")
         data.qpos[:] = state.qpos
         data.qvel[:] = state.qvel
 
-        def drive(row: InsideRow) -> None:
+        def drive(row: Any) -> None:
             """Exert a couple on the bar with the power of a row's drive."""
             couple = row.soft.torque if math.isfinite(row.soft.torque) else 0.0
             if couple and self.acting is not None:
@@ -700,16 +702,11 @@ class LoopInside:
 
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
-        stepper = Stepper(model, data, timestep)
-        instants = _list_instants(angles, omega, alpha)
-        if not 1.0 <= instants[-1] / timestep <= MOST_TIMESTEPS:
-            raise LimitError(
-                f"its timestep of {timestep:g} s makes {instants[-1] / timestep:.3g}"
-                f" steps of the motion; must be 1 to {MOST_TIMESTEPS}: --speed states"
-                " another speed"
-            )
+        stepper = Stepper(model, data, model.opt.timestep)
+        instants = _list_instants(angles, omega, alpha, model.opt.timestep)
         answer.seconds_per_step = math.inf
-        doubtful: list[InsideRow] = []  # they may be in the other assembly
+        rows: list[Any] = []
+        doubtful: list[Any] = []  # they may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
         settled = SETTLING_TIME * self.find_constant()
@@ -730,12 +727,14 @@ class LoopInside:
                 answer.lost = "MuJoCo lost the motion: a value not finite, or too large"
                 break
             row = self.ask(data.qpos, data.qvel, float(self.turn @ data.qacc))
-            answer.rows.append(row)
+            rows.append(row)
             drive(row)
-            if self._left_assembly(answer, doubtful, data.qpos):
+            answer.other_assembly = self._leave_assembly(rows, doubtful, data.qpos)
+            if answer.other_assembly is not None:
                 break
-        if answer.other_assembly is not None and not answer.rows:
+        if answer.other_assembly is not None and not rows:
             raise LimitError(OTHER_ASSEMBLY)
+        answer.rows = record_states(rows)
         return answer
 
     def _keep_speeds(self) -> tuple[mujoco.MjModel, float]:
@@ -750,27 +749,26 @@ class LoopInside:
             model.body_inertia[self.loop.bodies[self.bar][0]] += armature
         return model, armature
 
-    def _left_assembly(
-        self, answer: InsideAnswer, doubtful: list[InsideRow], qpos: Array
-    ) -> bool:
-        """Tell whether the last row is in the other assembly, and drop such rows.
+    def _leave_assembly(
+        self, rows: list[Any], doubtful: list[Any], qpos: Array
+    ) -> float | None:
+        """Drop the last rows if they are in the other assembly.
 
-        Beside a change point, where a loop that has yielded is in neither, the rows
-        before tell.
+        Return the joint's position at the first of them, rad, else None. Beside a
+        change point, where a loop that has yielded is in neither, the rows before tell.
         """
-        row = answer.rows[-1]
+        row = rows[-1]
         closed = self.close(row.angle)
         assert closed is not None  # the row was evaluated there
         now, due = (self._measure_sine(pose) for pose in (qpos, closed))
         if now * due > 0.0:
             doubtful.clear()
-            return False
+            return None
         doubtful.append(row)
         if min(abs(now), abs(due)) <= _SINE_OF_AN_ASSEMBLY:
-            return False
-        answer.other_assembly = doubtful[0].joint
-        del answer.rows[-len(doubtful) :]
-        return True
+            return None
+        del rows[-len(doubtful) :]
+        return float(doubtful[0].joint)
 
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""
@@ -806,7 +804,8 @@ class LoopInside:
                 mujoco.mj_forward(model, data)
                 mujoco.mj_rnePostConstraint(model, data)
                 if _has_warned(data):
-                    yield TornState(self._read_position(qpos), math.inf, {})
+                    joint = self._read_position(qpos)
+                    yield TornState(joint, math.inf, np.empty((0, 2)))
                     return
                 joint = self._read_position(data.qpos)
                 gap = self._measure_gap(data.qpos)
@@ -850,10 +849,12 @@ def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | Non
     return LoopInside(model, loop, bar=bar).reflect()
 
 
-def _list_instants(angles: list[float], omega: float, alpha: float) -> list[float]:
+def _list_instants(
+    angles: list[float], omega: float, alpha: float, timestep: float
+) -> list[float]:
     """List the times at which a motion passes angles, the first at 0, s.
 
-    Raises LimitError if it comes to rest before.
+    Raises LimitError if it comes to rest before, or takes too few steps or too many.
     """
     instants = []
     for angle in angles:
@@ -863,4 +864,10 @@ def _list_instants(angles: list[float], omega: float, alpha: float) -> list[floa
             raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
         speed = math.copysign(math.sqrt(squared), omega)
         instants.append(2.0 * turned / (omega + speed))
+    steps = instants[-1] / timestep
+    if not 1.0 <= steps <= MOST_TIMESTEPS:
+        raise LimitError(
+            f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
+            f" must be 1 to {MOST_TIMESTEPS}: --speed states another speed"
+        )
     return instants

@@ -113,6 +113,8 @@ class RobotLoop:
     digits of the file cannot tell the linkage from one with a change point.
     """
 
+    turned: float = 0.0
+    """Angle of the axes of its scene in the plane, with whole turns, rad."""
     from_other_end: "RobotLoop | None" = None
     """The loop with its output for its input, in the same plane."""
 
@@ -128,8 +130,8 @@ class RobotLoop:
 
     @property
     def angles(self) -> tuple[float, ...]:
-        """theta_1 to theta_4 in the pose, rad."""
-        return tuple(map(cmath.phase, self.lines))
+        """theta_1 to theta_4 in the pose, in the axes of its scene, rad."""
+        return tuple(cmath.phase(line) - self.turned for line in self.lines)
 
     @property
     def met(self) -> tuple[float, ...]:

@@ -233,7 +233,7 @@ class SceneOfLoop:
         self.model = posed.model
         self.data = posed.data
         self.loop = loop
-        self.seen = SeenLoop(posed.model, loop, 0.0)
+        self.seen = SeenLoop(posed.model, loop)
         self.remarks: list[str] = []
         self.shift = 0.0
         """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""

@@ -14,6 +14,7 @@ import numpy as np
 from fourbar.effects import Flywheel
 from fourbar.errors import InputError, LimitError, write_count
 from fourbar.linkage import FIRST_PIN
+from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     describe_actuator,
@@ -22,10 +23,12 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
     LoopMeasurement,
-    LoopMotion,
     MeasureOptions,
     RobotMeasurement,
     TornState,
+    make_motion,
+    thin_out,
+    varies,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
@@ -49,7 +52,7 @@ from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
     find_loop_of_scene,
-    find_turn,
+    turn,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.engines.mujoco.robots.settings import (
@@ -104,14 +107,13 @@ def _find_loops(file: RobotFile, options: MeasureOptions) -> Iterator[LoopOfScen
     posed = pose_robot(compiled.model, options.pose)
     for loop in find_loops(posed, options.pose, options.loop):
         made = make_loop_scene(compiled, posed, loop, options.speed, loop.name)
-        turned = find_turn(made.scene, made.loop)
-        remarked = replace(made.loop, remarks=made.remarks)
-        yield LoopOfScene(file, compiled, posed, remarked, turned, (), made.scene)
+        remarked = replace(turn(made.loop, made.scene), remarks=made.remarks)
+        yield LoopOfScene(file, compiled, posed, remarked, (), made.scene)
 
 
 def put_loop_inside(
     found: LoopOfScene, model: mujoco.MjModel | None = None
-) -> tuple[LoopInside, LoopMotion]:
+) -> tuple[LoopInside, Array]:
     """Return a loop as its scene drives it, and the motion of the scene in it.
 
     The file's own cylinder drives it if it can. `model`: changed model of the file;
@@ -123,15 +125,14 @@ def put_loop_inside(
     inside = LoopInside(
         model,
         found.loop,
-        own or LoopDrive(model, found.loop, scene, found.turned),
+        own or LoopDrive(model, found.loop, scene),
         bar=command(scene).bar,
         branch=scene.motion.branch,
         as_it_is=found.as_it_is,
     )
     flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
     inside.find_flywheel(sum(one.inertia for one in flywheels))
-    motion = _choose_motion(scene, found.turned)
-    return inside, motion.thin_out(POSITIONS_OF_A_LOOP)
+    return inside, thin_out(_choose_motion(scene), POSITIONS_OF_A_LOOP)
 
 
 def measure_loop(
@@ -157,13 +158,13 @@ def measure_loop(
         motion, cut = _take_span(motion, inside, options.span)
         remarks += cut
     states = inside.answer_states(motion)
-    if not states.rows and states.in_line:
+    if not len(states.rows) and states.in_line:
         raise LimitError(
             f"{loop.name} is measured at no position: the bars that follow are in line"
             " at all of them, where the loop may go on in two ways; choose others by"
             " the motion of a SCENE"
         )
-    if not states.rows:
+    if not len(states.rows):
         raise LimitError(
             f"{loop.name} closes at none of the positions of the scene; its lengths "
             f"are {loop.describe_lengths()}"
@@ -172,10 +173,10 @@ def measure_loop(
     through: InsideAnswer | None = None
     refusal = ""
     closing = motion
-    if not motion.varies:
-        closing = motion._replace(angle=_find_longest_run(states))
+    if not varies(motion):
+        closing = make_motion(_find_longest_run(states), motion[0, 1:])
     try:
-        if not np.any(motion.speed) or len(closing.angle) < 2:
+        if not motion[:, 1].any() or len(closing) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
         through = inside.answer_through_time(closing)
     except LimitError as error:
@@ -183,11 +184,11 @@ def measure_loop(
     torn: list[TornState] = []
     if options.torque is not None:
         seconds = _CONSTANTS * inside.find_constant()
-        starts = closing.thin_out(_TORN_POSITIONS).angle
+        starts = thin_out(closing, _TORN_POSITIONS)[:, 0].tolist()
         torn = inside.answer_under_torque(starts, options.torque, seconds)
     advice = None
     if options.error is not None and not briefly:
-        if motion.varies:
+        if varies(motion):
             raise LimitError(
                 f"settings are tried in one motion through time: {refusal}"
             )
@@ -199,7 +200,6 @@ def measure_loop(
         loop.name,
         inside.name,
         found.scene,
-        found.turned,
         tuple(remarks),
         read_settings(inside.model, loop),
         loop.rounding,
@@ -219,7 +219,7 @@ def measure_loop(
 
 def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
     """Return the most angles in a row at which the loop closes, in their order."""
-    closed = {row.angle for row in states.rows}
+    closed = {*states.rows.angle.tolist()}
     angles = sorted({*closed, *states.open})
     runs = groupby(angles, key=closed.__contains__)
     return max((tuple(run) for is_closed, run in runs if is_closed), key=len)
@@ -278,8 +278,8 @@ def _describe_findings(
         )
 
 
-def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
-    """Return the motion of a scene in the plane of the loop, by rising angles."""
+def _choose_motion(scene: Scene) -> Array:
+    """Return the motion of a scene by rising angles, (n, 3)."""
     commanded = command(scene)
     if commanded.speed is None:
         raise InputError(
@@ -287,16 +287,13 @@ def _choose_motion(scene: Scene, turned: float) -> LoopMotion:
             None,
             "is needed: without a speed there is no torque to compare",
         )
-    rates = (commanded.speed, commanded.acceleration)
-    states = np.column_stack(np.broadcast_arrays(commanded.angle + turned, *rates))
-    angles, *rows = np.unique(states, axis=0).T.tolist()
-    speed, acceleration = (tuple(row) if np.ptp(row) else row[0] for row in rows)
-    return LoopMotion(tuple(angles), speed, acceleration)
+    states = (commanded.angle, commanded.speed, commanded.acceleration)
+    return np.unique(np.column_stack(np.broadcast_arrays(*states)), axis=0)
 
 
 def _take_span(
-    motion: LoopMotion, inside: LoopInside, span: tuple[float, float]
-) -> tuple[LoopMotion, list[str]]:
+    motion: Array, inside: LoopInside, span: tuple[float, float]
+) -> tuple[Array, list[str]]:
     """Return a motion evenly over a range of the driven joint, and what was cut of it.
 
     A motion of a whole turn goes on in any range of a joint without limits; another
@@ -306,11 +303,12 @@ def _take_span(
     ------
     InputError : a range that the motion does not reach.
     """
-    joints = [inside.position(angle) for angle in motion.angle]
+    angles = motion[:, 0].tolist()
+    joints = [inside.position(angle) for angle in angles]
     low, high = span
     cut = []
     limited = inside.joint is not None and inside.model.jnt_limited[inside.joint]
-    if limited or np.ptp(motion.angle) < WHOLE_TURN:
+    if limited or np.ptp(angles) < WHOLE_TURN:
         low = max(low, min(joints))
         high = min(high, max(joints))
         moved, wanted = (
@@ -325,9 +323,8 @@ def _take_span(
             )
         if (low, high) != span:
             cut = [f"--range is cut to the motion of {inside.name}, {moved} deg"]
-    if motion.varies:
+    if varies(motion):
         raise InputError("--range", None, "needs a motion of one speed")
-    sense = inside.position(motion.angle[0] + 1.0) - joints[0]
+    sense = inside.position(angles[0] + 1.0) - joints[0]
     places = np.linspace(low, high, POSITIONS_OF_A_LOOP) - joints[0]
-    angles = np.sort(motion.angle[0] + sense * places)
-    return motion._replace(angle=tuple(angles.tolist())), cut
+    return make_motion(np.sort(angles[0] + sense * places), motion[0, 1:]), cut

@@ -93,8 +93,6 @@ class LoopOfScene:
     """Robot in a pose of the assembly of the scene."""
     loop: RobotLoop
     """Loop as the scene has it: its input is driven, and seen from the same side."""
-    turned: float
-    """Angle of the scene's axes in the plane of the loop, rad."""
     parts: tuple[str, ...]
     """Sentences that say which joint is which pin, and which body which bar."""
     scene: Scene
@@ -106,7 +104,7 @@ class LoopOfScene:
     def see(self) -> SeenLoop:
         """Return the loop as its entries are described."""
         bar = command(self.scene).bar
-        return SeenLoop(self.robot.model, self.loop, self.turned, bar)
+        return SeenLoop(self.robot.model, self.loop, bar)
 
 
 def find_loop_of_scene(
@@ -195,13 +193,11 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
     loop, robot = close_onto(scene, posed, loop)
     described = SceneOfLoop(compiled, robot, loop)
     described.meet_lengths()
-    turned = find_turn(scene, described.loop)
     return LoopOfScene(
         file,
         compiled,
         robot,
-        described.loop,
-        turned,
+        turn(described.loop, scene),
         described.write_parts(),
         scene,
         as_it_is=not loop.held,
@@ -295,10 +291,8 @@ def _place(loop: RobotLoop, posed: PosedRobot) -> RobotLoop:
 def _leave_flat(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> Array:
     """Return a pose at an angle of the scene at which the bars are not in line."""
     commanded = command(scene)
-    inside = LoopInside(posed.model, loop, bar=commanded.bar)
-    turned = find_turn(scene, loop)
-    angles = np.unique(commanded.angle) + turned
-    poses = [inside.close(float(angle)) for angle in angles]
+    inside = LoopInside(posed.model, turn(loop, scene), bar=commanded.bar)
+    poses = [inside.close(angle) for angle in np.unique(commanded.angle).tolist()]
     closed = [loop.qpos, *(qpos for qpos in poses if qpos is not None)]
     return max(closed, key=inside.measure_transmission)
 
@@ -319,7 +313,8 @@ def _fits_gravity(
             wanted = wanted + effect.vector
     turned = loop.angles[0] - scene.linkage.ground_angle
     gravity = model.opt.gravity * is_enabled(model, "gravity")
-    of_robot = LoopFrame(loop, posed.data, turned).in_plane(gravity)
+    in_scene = replace(loop, turned=turned)
+    of_robot = LoopFrame(in_scene, posed.data).in_plane(gravity)
     sizes = np.linalg.norm([of_robot, wanted], axis=1)
     if not sizes.all():
         return False
@@ -345,8 +340,8 @@ def miss_lengths(scene: Scene, loop: RobotLoop) -> float:
     return float(np.abs(apart).sum())
 
 
-def find_turn(scene: Scene, loop: RobotLoop) -> float:
-    """Return the angle from a scene's axes to those of the loop's plane, rad.
+def turn(loop: RobotLoop, scene: Scene) -> RobotLoop:
+    """Return a loop in the axes of a scene.
 
     Whole turns bring it near the pose. With one change point a turn leads to the other
     assembly: of two turns the one counts after which the scene has that of the pose.
@@ -365,4 +360,4 @@ def find_turn(scene: Scene, loop: RobotLoop) -> float:
 
     nearest = math.ceil(away - 0.5 - 1e-6)
     turns = min((nearest, nearest - 1, nearest + 1), key=rank)
-    return turned - math.tau * turns
+    return replace(loop, turned=turned - math.tau * turns)

@@ -42,20 +42,17 @@ class Lump(NamedTuple):
 class SeenLoop(LoopFrame):
     """Bars, pins and closure of a loop in its pose; everything else is held."""
 
-    def __init__(
-        self, model: mujoco.MjModel, loop: RobotLoop, turned: float, bar: int = 2
-    ) -> None:
-        """Take a loop in whose plane the axes of the scene are turned, rad.
+    def __init__(self, model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> None:
+        """Take a loop.
 
         `bar`: the commanded one, whose motors are the drive.
         """
         self.model = model
-        self.turned = turned
         data = mujoco.MjData(model)
         data.qpos[:] = loop.qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        super().__init__(loop, data, turned)
+        super().__init__(loop, data)
         self.commanded = bar
         driven = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
         self.drives = [] if driven is None else list_actuators(model, driven)
@@ -67,7 +64,7 @@ class SeenLoop(LoopFrame):
     def with_model(self) -> "SeenLoop":
         """Return the same loop in a model of its own, which may be changed."""
         model = copy(self.model)
-        return SeenLoop(model, self.loop, self.turned, self.commanded)
+        return SeenLoop(model, self.loop, self.commanded)
 
     @property
     def plane(self) -> str:

@@ -16,17 +16,20 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import mujoco
+import numpy as np
 
 from fourbar.errors import LimitError
+from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.describe import number_of_word, word_of_number
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
-    LoopMotion,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
     WorstState,
+    make_motion,
+    thin_out,
 )
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, RobotLoop
@@ -114,12 +117,10 @@ def _set_settings(
 class SettingsSearch:
     """Settings tried on one loop of a robot, for one motion."""
 
-    def __init__(
-        self, inside: LoopInside, motion: LoopMotion, share: float = 1.0
-    ) -> None:
+    def __init__(self, inside: LoopInside, motion: Array, share: float = 1.0) -> None:
         self.inside = inside
         self.whole = motion
-        self.motion = motion.thin_out(POSITIONS_OF_A_TRIAL)
+        self.motion = thin_out(motion, POSITIONS_OF_A_TRIAL)
         self.own = read_settings(inside.given, inside.loop)
         self.rubbing = _list_rubbing(inside.given, inside.loop)
         self.tried: dict[RobotSettings, TriedSettings] = {}
@@ -138,7 +139,7 @@ class SettingsSearch:
         joints = model.dof_jntid[self.rubbing].tolist()
         return SettingsAdvice(
             wanted,
-            len(self.motion.angle),
+            len(self.motion),
             before,
             tuple(alone),
             best,
@@ -148,7 +149,7 @@ class SettingsSearch:
         )
 
     def _answer(
-        self, settings: RobotSettings, motion: LoopMotion, wanted: float = math.inf
+        self, settings: RobotSettings, motion: Array, wanted: float = math.inf
     ) -> list[InsideAnswer]:
         """Return the answers at single states and through time.
 
@@ -177,7 +178,7 @@ class SettingsSearch:
         answers = self._answer(settings, self.whole)
         if len(answers) < 2 or answers[1].lost:
             return None
-        places = sorted({row.angle for row in answers[0].rows})
+        places = np.unique(answers[0].rows.angle).tolist()
         ranges = (
             places[first : first + count]
             for count in range(len(places), 2, -1)
@@ -188,8 +189,8 @@ class SettingsSearch:
             low = inside[0]
             high = inside[-1]
             states, through = (
-                InsideAnswer([row for row in one.rows if low <= row.angle <= high])
-                for one in answers
+                InsideAnswer(rows[(low <= rows.angle) & (rows.angle <= high)])
+                for rows in (one.rows for one in answers)
             )
             if tried == RANGES_TRIED:
                 return None
@@ -197,10 +198,11 @@ class SettingsSearch:
             if max(one.find_worst(scales) for one in (states, through)).error > wanted:
                 continue
             tried += 1
-            motion = self.whole._replace(angle=tuple(inside))
+            motion = make_motion(inside, self.whole[0, 1:])
             search = SettingsSearch(self.inside, motion)
             if search.measure(settings).error <= wanted:
-                ends = [row.joint for row in states.rows if row.angle in (low, high)]
+                at_ends = np.isin(states.rows.angle, (low, high))
+                ends = states.rows.joint[at_ends].tolist()
                 return min(ends), max(ends)
         return None
 
@@ -224,7 +226,7 @@ class SettingsSearch:
             answer = answers[1]
             through = answer.find_worst(scales)
             seconds = answer.seconds_per_step
-            gap = max((row.gap for row in answer.rows), default=math.inf)
+            gap = float(answer.rows.gap.max()) if len(answer.rows) else math.inf
         changes = settings.list_changes(self.own)
         measured = TriedSettings(settings, changes, states, through, gap, seconds)
         self.tried[settings] = measured
