@@ -1074,6 +1074,36 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(re
     assert judge(still, "F12").not_assembled == [5]
 
 
+@pytest.mark.parametrize(
+    "decimals, factor, said",
+    [
+        (6, 1.0, ""),
+        (6, 0.0, "alpha_2 is left out"),
+        (6, 1.1, "alpha_2 1.1 times ours (fitted)"),
+        (2, 1.0, "what differs is within half a digit of theta_2, omega_2, alpha_2"),
+        (2, 1.1, NO_CAUSE),
+    ],
+)
+def test_the_speed_and_acceleration_of_a_row_are_rounded_too(
+    decimals, factor, said, read
+):
+    omega = 8.0 + np.sin(np.arange(12.0))
+    alpha = 20.0 * np.cos(np.arange(12.0))
+    log = right(OURS, speed=omega, acceleration=factor * alpha)
+    rates = {"omega_2": omega.round(decimals), "alpha_2": alpha.round(decimals)}
+    columns = {"theta_2": log["theta_2"], **rates, "torque": log["torque"]}
+    still = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
+    judgement = judge_table(still, read(tabulate(columns)))
+    if not said:
+        assert judgement.status == HOLDS
+        return
+    (found, *_) = [
+        *(one.text for one in judgement.explanations),
+        judgement.describe_unexplained(),
+    ]
+    assert found.startswith(said)
+
+
 @pytest.fixture
 def torques(read):
     """Reads theta_2 of a crank-rocker in whole degrees and its torque in a form."""

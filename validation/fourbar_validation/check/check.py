@@ -119,12 +119,14 @@ class Judgement:
 
     def describe_unexplained(self) -> str:
         """Say that no mistake explains what differs, or that the angle's digits do."""
-        table = self.judge.table
-        rounded = replace(table, places_rounding=table.place.rounding)
-        judge = Judge(self.judge.scene, rounded, self.judge.tolerance)
+        stated, rates = self.judge.stated, self.judge.rows.rates
+        judge = Judge(
+            self.judge.scene, replace(stated, is_rounded=True), self.judge.tolerance
+        )
         if not Judgement(judge).differing:
-            within = f"what differs is within half a digit of {table.found_by}"
-            return f"{within}: print more of its digits"
+            rounded = [stated.found_by, *filter(stated.columns.__contains__, rates)]
+            within = f"what differs is within half a digit of {', '.join(rounded)}"
+            return f"{within}: print more digits there"
         what = "the rest" if self.explanations else "it"
         found = f"no single known mistake explains {what}"
         if self.judge.tolerance is None:

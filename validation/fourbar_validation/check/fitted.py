@@ -328,8 +328,9 @@ def _list_commands(
     judge: Judge, scene: Scene, at: Command, columns: list[JudgedColumn]
 ) -> Iterator[_Family]:
     """List commands that may be others, as functions of a number."""
-    if at.speed is not None:
-        yield _Family((1.0,), partial(_hasten, scene, at, at.speed))
+    for field, rate in zip(("speed", "acceleration"), at.names[1:], strict=True):
+        if np.any(getattr(at, field)):
+            yield _Family((1.0,), partial(_hasten, scene, at, field, rate))
     law, times = judge.scene.motion.law, judge.table.times
     if law is not None and times is not None:
         yield _Family((0.0,), partial(_delay, scene, at, law, times[:, 0]))
@@ -357,9 +358,9 @@ def _turn(scene: Scene, at: Command, offset: float) -> Variant:
     return Variant(text, scene, at._replace(angle=at.angle + offset))
 
 
-def _hasten(scene: Scene, at: Command, speed: float | Array, factor: float) -> Variant:
-    text = f"omega_{at.bar} {factor:.6g} times ours (fitted)"
-    return Variant(text, scene, at._replace(speed=factor * speed))
+def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Variant:
+    text = f"{rate} {factor:.6g} times ours (fitted)"
+    return Variant(text, scene, at._replace(**{field: factor * getattr(at, field)}))
 
 
 def _delay(scene: Scene, at: Command, law: Any, time: Array, lag: float) -> Variant:

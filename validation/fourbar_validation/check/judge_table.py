@@ -337,6 +337,7 @@ class Judge:
             rows = find_row_commands(scene, table)
         self.rows = rows
         self.at = rows.at
+        self.stated = table
         columns = {k: own for k, own in table.columns.items() if k not in rows.rates}
         left_out = {
             heading: why
@@ -389,9 +390,9 @@ class Judge:
 
     @cached_property
     def near(self) -> list[Solution]:
-        """Solutions half a unit of a rounded angle away, to either side.
+        """Solutions half a unit of rounded angles and rates away, to either side.
 
-        The list is empty if the angle is not rounded.
+        The list is empty if none is rounded.
         """
         return [solve(self.scene, self.stage, at=at) for at in self.rows.near]
 

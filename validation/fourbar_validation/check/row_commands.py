@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +40,7 @@ class RowCommands(NamedTuple):
 
     at: Command
     near: tuple[Command, ...] = ()
-    """Commands half a unit of a rounded angle or time away, to either side."""
+    """Commands half a unit of a rounded angle, time or rate away, to either side."""
     rates: tuple[str, ...] = ()
     """Names of the speed and acceleration that the table states, and not the scene."""
     by_time: bool = False
@@ -96,19 +97,35 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
         if rate in table.columns
     }
     base = base._replace(**stated)
-    if not commanded and same:
-        return RowCommands(base, rates=rates)
     if not commanded:
-        return _find_by_another_bar(scene, table, base)._replace(rates=rates)
-    own = None if same else _find_own_positions(base, table)
-    if own is not None:
-        return RowCommands(_command_each(base, own, scene), rates=rates)
-    at = base if same else _command_each(base, table.places, scene)
+        found = RowCommands(base) if same else _find_by_another_bar(scene, table, base)
+    elif not same and (own := _find_own_positions(base, table)) is not None:
+        found = RowCommands(_command_each(base, own, scene))
+    else:
+        at = base if same else _command_each(base, table.places, scene)
 
-    def command_at(shift: Array) -> Command:
-        return at.as_doubles()._replace(angle=at.angle + shift)
+        def command_at(shift: Array) -> Command:
+            return at.as_doubles()._replace(angle=at.angle + shift)
 
-    return RowCommands(at, _command_beside(table, command_at), rates)
+        found = RowCommands(at, _command_beside(table, command_at))
+    near = found.near or (found.at,)
+    for field in stated:
+        half = table.find_half(table.columns[rates[field == "acceleration"]])
+        near = _command_rates_beside(near, field, half)
+    near = tuple(at for at in near if at is not found.at)
+    return found._replace(near=near, rates=rates)
+
+
+def _command_rates_beside(
+    near: tuple[Command, ...], field: str, half: Array
+) -> tuple[Command, ...]:
+    """Command the rows at both ends of the rounding of a speed or acceleration."""
+    if not half.any():
+        return near
+    return tuple(
+        at._replace(**{field: getattr(at, field) + end})
+        for at, end in product(near, (-half, half))
+    )
 
 
 def _command_beside(

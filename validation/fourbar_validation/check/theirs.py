@@ -183,10 +183,6 @@ class TheirTable:
     columns: dict[str, TheirColumn]
     lines: list[int]
     """The line of the file that each row stands in."""
-    places_rounding: Array
-    """Rounding of the angle, rad, (n,): half a unit of its last digit if the column is
-    printed with _DECIMALS, else 0: somebody chose it.
-    """
     left_out: dict[str, str]
     """Headings of columns that are not judged, and why."""
     notes: tuple[str, ...] = ()
@@ -195,6 +191,22 @@ class TheirTable:
     """Name of the angle by which rows are found."""
     times: Array | None = None
     """Time of each row and half a unit of its last digit, s, (n, 2)."""
+    is_rounded: bool = False
+    """True to take no place, speed or acceleration for one that somebody chose."""
+
+    @property
+    def places_rounding(self) -> Array:
+        """Return half a unit of the last digit of each angle, rad, (n,), or 0."""
+        return self.find_half(self.place)
+
+    def find_half(self, column: TheirColumn) -> Array:
+        """Find half a unit of the last digit of each place or rate of a row.
+
+        It is 0 in a column without _DECIMALS: somebody chose its numbers.
+        """
+        if self.is_rounded:
+            return column.rounding
+        return _find_rounding(column.rounding, column.unit)
 
     @property
     def places(self) -> Array:
@@ -315,7 +327,6 @@ def _read_columns(
         place,
         read_columns,
         lines,
-        _find_rounding(place.rounding, place.unit),
         left_out | blank,
         notes,
         found_by,

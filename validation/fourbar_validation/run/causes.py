@@ -147,4 +147,4 @@ def make_answer_table(
             values[blank] = np.nan
             columns[name] = TheirColumn(values, exact, exact, Unit(UNITS[name], 1.0))
     lines = list(range(1, len(angle) + 1))
-    return TheirTable(place, columns, lines, exact, {})
+    return TheirTable(place, columns, lines, {})
