@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import fourbar
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
+from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -19,6 +20,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
 )
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
+from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.files import read_robot
 from tests.support.robots import judge_path
 from tests.support.rows import read_rows
@@ -280,6 +282,37 @@ def write_halves():
     )
 
 
+def write_urdf(closing):
+    """Write the linkage as a URDF, in the plane of x and z."""
+    text = '<robot name="r"><link name="base"/>'
+    for name, parent, along, angle, length in (
+        ("crank", "base", 0.0, START, A),
+        ("rod", "crank", A, ROD - START, B),
+        ("rocker", "base", D, ROCKER, C),
+    ):
+        bar = make_bar(length)
+        text += (
+            f'<link name="{name}"><inertial><origin xyz="{length / 2} 0 0"/>'
+            f'<mass value="{bar.mass}"/><inertia ixx="1" ixy="0" ixz="0"'
+            f' iyy="{bar.inertia}" iyz="0" izz="1"/></inertial></link>'
+            f'<joint name="pin of {name}" type="continuous"><parent link="{parent}"/>'
+            f'<child link="{name}"/><origin xyz="{along} 0 0" rpy="0 {-angle} 0"/>'
+            '<axis xyz="0 -1 0"/></joint>'
+        )
+    return f"{text}{closing}</robot>"
+
+
+LOOP_JOINT = (
+    f'<loop_joint name="B" type="spherical"><link1 link="rod" xyz="{B} 0 0" rpy="0 0 0"'
+    f'/><link2 link="rocker" xyz="{C} 0 0" rpy="0 0 0"/></loop_joint>'
+)
+STATED["loop joint of a URDF"] = write_urdf(LOOP_JOINT)
+STATED["ball constraint of a URDF"] = write_urdf(
+    '<drake:ball_constraint><drake:ball_constraint_body_A name="rod"/>'
+    f'<drake:ball_constraint_p_AP value="{B} 0 0"/>'
+    '<drake:ball_constraint_body_B name="rocker"/>'
+    f'<drake:ball_constraint_p_BQ value="{C} 0 0"/></drake:ball_constraint>'
+)
 STATED["two frames of each joint"] = write_drake()
 STATED["weld constraint"] = write_halves()
 ROD_MODEL = f"""<sdf version="1.9"><model name="rod"><pose>9 9 9 0 0 0</pose>
@@ -646,15 +679,49 @@ def test_a_model_that_is_missing_and_in_no_loop_is_left_out_and_named(tmp_path):
 
 
 @pytest.mark.slow
-def test_settings_are_not_asked_of_a_file_that_cannot_state_them(tmp_path):
+@pytest.mark.parametrize("way", ["plain", "loop joint of a URDF"])
+def test_settings_are_not_asked_of_a_file_that_cannot_state_them(way, tmp_path):
     path = tmp_path / "robot.sdf"
-    path.write_text(PLAIN, encoding="utf-8")
+    path.write_text(STATED[way], encoding="utf-8")
     judgement = judge_path("linkage", SCENE, path)
     written = {one.key: one.write() for one in judgement.differences}
     assert "in the file" not in written["closure.solimp"]
     assert SETTINGS_OF_AN_SDF in judgement.notes
     said = " ".join(judgement.sentences())
     assert "is off by" in said and "What to type" not in said
+    assert "not looked at" not in " ".join(judgement.notes)
+
+
+@pytest.mark.slow
+def test_the_pin_of_a_urdf_is_what_advice_changes(tmp_path):
+    file = read(tmp_path, STATED["loop joint of a URDF"])
+    (measured,) = measure_loops(
+        file, MeasureOptions(PoseOptions(), error=0.01), None
+    ).loops
+    assert measured.advice.typed == (
+        '<connect name="B" solimp="0.9999 0.9999 0.001 0.5 2" />',
+    )
+
+
+@pytest.mark.parametrize(
+    "old, new, said",
+    [
+        ("</loop_joint>", "<limit/><dynamics/></loop_joint>", "lost: dynamics, limit"),
+        ("spherical", "fixed", "left out of the URDF: loop_joint"),
+        ('"rocker" xyz', '"racker" xyz', "must name two links"),
+        (f'xyz="{C} 0 0"', "", "must name two links"),
+        (f'xyz="{C} 0 0"', 'xyz="1 0"', "must name two links"),
+    ],
+)
+def test_what_a_loop_joint_of_a_urdf_loses_or_lacks_is_said(old, new, said, tmp_path):
+    text = write_urdf(LOOP_JOINT.replace(old, new))
+    if said.startswith("must"):
+        with raises(fourbar.InputError, match=said):
+            read(tmp_path, text)
+        return
+    notes = read(tmp_path, text).notes
+    assert said in " ".join(notes)
+    assert ("a URDF is a tree" in " ".join(notes)) == ("fixed" in text)
 
 
 URDF = """<robot name="r"><link name="base"/>

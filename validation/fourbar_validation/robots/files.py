@@ -14,7 +14,11 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import InputError
 from fourbar.writing import read_text
-from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    PIN_AS_CONNECT,
+    RobotFile,
+    UrdfPin,
+)
 
 _DROPPED = r"<!--.*?-->|<\?.*?\?>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
 """Comments, declarations and control characters, which MuJoCo's reader lets stand
@@ -37,6 +41,8 @@ NOT_THERE = (
     "is not there; it must lie in the folder of the file, in a folder beside it, or in "
     "that of --assets DIR"
 )
+_TURNING = ("revolute", "continuous", "spherical", None)
+"""Types of a pin that closes a loop of a URDF; Drake's states none."""
 _REACHING_OUT = ("attach", "model")
 """Elements that load other models, in which a loop may be."""
 _FOR_THE_EYE = ("texture", "skin", "layer", "sensor")
@@ -118,6 +124,7 @@ class _RobotReading:
     contents: dict[str, bytes] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    pins: list[UrdfPin] = field(default_factory=list)
     kind: str = field(init=False)
     """Format of the file, which begins each message about it."""
 
@@ -153,8 +160,8 @@ class _RobotReading:
         for element in root.iter():
             self._screen(element)
         text = ET.tostring(root, encoding="unicode")
-        notes = tuple(self.notes)
-        return RobotFile(self.path, text, self.kind, self.contents, self.missing, notes)
+        said = (tuple(self.notes), tuple(self.pins))
+        return RobotFile(self.path, text, self.kind, self.contents, self.missing, *said)
 
     def _convert_sdf(self, root: ET.Element) -> ET.Element:
         """Return an SDF as MJCF; its includes lie in its folder or beside it."""
@@ -184,6 +191,7 @@ class _RobotReading:
 
         A polynomial is judged by the motion alone, so that links without mass get one.
         """
+        self._take_pins(root)
         left_out = {child.tag for child in root} - {"link", "joint", "material"}
         if any("xacro}" in tag for tag in left_out):
             raise self._refuse(
@@ -203,11 +211,45 @@ class _RobotReading:
                 f" ({', '.join(closing)}): "
                 '"gz sdf -p FILE > robot.sdf" writes an SDF that has it'
             )
+        if self.pins:
+            return
         self.notes.append(
             "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
             "FILE --mimic JOINT judges one; to close another, save it as MJCF "
             "(mj_saveLastXML) and add a <connect> between two sites, one on each link"
         )
+
+    def _take_pins(self, root: ET.Element) -> None:
+        """Take the pins that close loops, which MuJoCo's own reader leaves out.
+
+        They are the <loop_joint> of Isaac Sim and Drake's <drake:ball_constraint>.
+        """
+        known = {link.get("name") for link in root.iter("link")}
+        for pin in [*root.iter("loop_joint"), *root.findall("{*}ball_constraint")]:
+            if pin.get("type") not in _TURNING:
+                continue
+            root.remove(pin)
+            named = [end for end in pin if end.get("link", end.get("name"))]
+            links = [end.get("link", end.get("name", "")) for end in named]
+            places = [end.get("value", "") for end in pin if "value" in end.attrib]
+            places = places or [end.get("xyz", "") for end in named]
+            name = pin.get("name", "-".join(links))
+            try:
+                ends = [
+                    (link, [float(number) for number in place.split()])
+                    for link, place in zip(links, places, strict=True)
+                ]
+            except ValueError:
+                ends = []
+            sizes = [len(place) for _, place in ends]
+            if sizes != [3, 3] or not known.issuperset(links):
+                raise self._refuse(
+                    name, "must name two links, with the pin's x, y and z in each"
+                )
+            self.pins.append((name, ends))
+            lost = {end.tag for end in pin}.intersection(("dynamics", "limit"))
+            losses = f"; lost: {', '.join(sorted(lost))}" if lost else ""
+            self.notes.append(f"{name} {PIN_AS_CONNECT}{losses}")
 
     def _refuse(self, what: object, allowed: str) -> InputError:
         return InputError(self.kind, what, allowed, str(self.path))

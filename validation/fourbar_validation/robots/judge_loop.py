@@ -210,9 +210,9 @@ def judge_file(
                 lambda changes: examined(_MENDED, scene, file, held, changes),
             )
     notes = [*theirs.notes]
-    if parts := list_unread(file.text):
+    if file.kind != "URDF" and (parts := list_unread(file.text)):
         notes.append(f"not looked at: {', '.join(parts)}")
-    if file.kind == "SDF":
+    if file.kind != "MJCF":
         differences = [
             replace(one, written="") if is_setting(one.key) else one
             for one in differences

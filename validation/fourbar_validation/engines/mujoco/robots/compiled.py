@@ -79,6 +79,13 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
                 None,
                 f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
             )
+        for name, ends in file.pins:
+            sites = [f"{name} {number}" for number in (1, 2)]
+            for site, (link, place) in zip(sites, ends, strict=True):
+                spec.body(link).add_site(name=site, pos=place)
+            pin = spec.add_equality(name=name, name1=sites[0], name2=sites[1])
+            pin.type = mujoco.mjtEq.mjEQ_CONNECT
+            pin.objtype = mujoco.mjtObj.mjOBJ_SITE
         left_out, unknown = _take_out_meshes(spec, file)
         quaternions = {
             number: tuple(body.quat.tolist())

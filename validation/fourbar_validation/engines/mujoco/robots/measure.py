@@ -95,7 +95,7 @@ def measure_loops(
         share = 1.0 / len(found)
         measured = tuple(measure_loop(one, options, share=share) for one in found)
     notes = [*found[0].compiled.notes, *found[0].robot.notes]
-    if file.kind == "SDF" and options.error is not None:
+    if file.kind != "MJCF" and options.error is not None:
         notes.append(SETTINGS_OF_AN_SDF)
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return RobotMeasurement(measured, tuple(notes))

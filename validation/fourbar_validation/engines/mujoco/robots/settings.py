@@ -335,8 +335,9 @@ def _write_elements(
     root = ET.fromstring(file.text)
     elements = root.findall(".//equality/*")
     equalities = [one for one in elements if one.tag != "equality"]
+    pins = [ET.Element("connect", {"name": name}) for name, _ in file.pins]
     for number in loop.closures if closure else ():
-        one = equalities[number]
+        one = pins[number - model.neq] if pins else equalities[number]
         written.append(write(one.tag, one.attrib | closure))
     joints = [
         one.attrib
