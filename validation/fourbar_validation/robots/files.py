@@ -14,11 +14,7 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import InputError
 from fourbar.writing import read_text
-from fourbar_validation.engines.mujoco.robots.loop_facts import (
-    PIN_AS_CONNECT,
-    RobotFile,
-    UrdfPin,
-)
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 
 _DROPPED = r"<!--.*?-->|<\?.*?\?>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
 """Comments, declarations and control characters, which MuJoCo's reader lets stand
@@ -124,7 +120,6 @@ class _RobotReading:
     contents: dict[str, bytes] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    pins: list[UrdfPin] = field(default_factory=list)
     kind: str = field(init=False)
     """Format of the file, which begins each message about it."""
 
@@ -160,8 +155,8 @@ class _RobotReading:
         for element in root.iter():
             self._screen(element)
         text = ET.tostring(root, encoding="unicode")
-        said = (tuple(self.notes), tuple(self.pins))
-        return RobotFile(self.path, text, self.kind, self.contents, self.missing, *said)
+        notes = tuple(self.notes)
+        return RobotFile(self.path, text, self.kind, self.contents, self.missing, notes)
 
     def _convert_sdf(self, root: ET.Element) -> ET.Element:
         """Return an SDF as MJCF; its includes lie in its folder or beside it."""
@@ -191,14 +186,14 @@ class _RobotReading:
 
         A polynomial is judged by the motion alone, so that links without mass get one.
         """
-        self._take_pins(root)
+        pins = self._take_pins(root)
         left_out = {child.tag for child in root} - {"link", "joint", "material"}
         if any("xacro}" in tag for tag in left_out):
             raise self._refuse(
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
             )
         closing = [one.get("name", "") for one in root.findall("gazebo/joint")]
-        root[:] = [child for child in root if child.tag in ("link", "joint")]
+        root[:] = [child for child in root if child.tag in ("link", "joint")] + pins
         for link in root.iter("link"):
             link[:] = link.findall("inertial")
         bounds = {"boundmass": "1e-6", "boundinertia": "1e-9", "balanceinertia": "true"}
@@ -211,7 +206,7 @@ class _RobotReading:
                 f" ({', '.join(closing)}): "
                 '"gz sdf -p FILE > robot.sdf" writes an SDF that has it'
             )
-        if self.pins:
+        if pins:
             return
         self.notes.append(
             "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
@@ -219,37 +214,35 @@ class _RobotReading:
             "(mj_saveLastXML) and add a <connect> between two sites, one on each link"
         )
 
-    def _take_pins(self, root: ET.Element) -> None:
-        """Take the pins that close loops, which MuJoCo's own reader leaves out.
+    def _take_pins(self, root: ET.Element) -> list[ET.Element]:
+        """Return the pins that close loops, which MuJoCo's own reader passes over.
 
-        They are the <loop_joint> of Isaac Sim and Drake's <drake:ball_constraint>.
+        They are the <loop_joint> of Isaac Sim, in whose form Drake's
+        <drake:ball_constraint> is written.
         """
+        for ball in root.findall("{*}ball_constraint"):
+            ball.tag = "loop_joint"
+            bodies, points = (ball.findall(f"*[@{key}]") for key in ("name", "value"))
+            for body, point in zip(bodies, points, strict=False):
+                body.attrib["link"] = body.attrib["name"]
+                body.attrib["xyz"] = point.attrib["value"]
         known = {link.get("name") for link in root.iter("link")}
-        for pin in [*root.iter("loop_joint"), *root.findall("{*}ball_constraint")]:
-            if pin.get("type") not in _TURNING:
-                continue
-            root.remove(pin)
-            named = [end for end in pin if end.get("link", end.get("name"))]
-            links = [end.get("link", end.get("name", "")) for end in named]
-            places = [end.get("value", "") for end in pin if "value" in end.attrib]
-            places = places or [end.get("xyz", "") for end in named]
-            name = pin.get("name", "-".join(links))
-            try:
-                ends = [
-                    (link, [float(number) for number in place.split()])
-                    for link, place in zip(links, places, strict=True)
-                ]
-            except ValueError:
-                ends = []
-            sizes = [len(place) for _, place in ends]
-            if sizes != [3, 3] or not known.issuperset(links):
+        pins = [pin for pin in root.iter("loop_joint") if pin.get("type") in _TURNING]
+        for pin in pins:
+            links = [end.attrib["link"] for end in pin.findall("*[@link][@xyz]")]
+            name = pin.attrib.setdefault("name", "-".join(links))
+            if len(links) != 2 or not known.issuperset(links):
                 raise self._refuse(
                     name, "must name two links, with the pin's x, y and z in each"
                 )
-            self.pins.append((name, ends))
-            lost = {end.tag for end in pin}.intersection(("dynamics", "limit"))
-            losses = f"; lost: {', '.join(sorted(lost))}" if lost else ""
-            self.notes.append(f"{name} {PIN_AS_CONNECT}{losses}")
+            self.notes.append(
+                f"{name} closes a loop: it is a <connect>, which holds its point and "
+                "not its axis"
+            )
+            root.remove(pin)
+            # what it states besides is named as left out
+            root.extend([*pin.iter("dynamics"), *pin.iter("limit")])
+        return pins
 
     def _refuse(self, what: object, allowed: str) -> InputError:
         return InputError(self.kind, what, allowed, str(self.path))

@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 
 from fourbar.errors import InputError
 from fourbar.quantities import Array
-from fourbar_validation.engines.mujoco.robots.loop_facts import PIN_AS_CONNECT
 
 DEFAULT_GRAVITY = "0 0 -9.8"
 DEFAULT_DENSITY = "1000"
@@ -615,7 +614,10 @@ class _Conversion:
                 self.left_out.add(f"the {edge.kind} joint {name} of a loop")
             else:
                 self._close("connect", name, ends)
-                text = f"{name} {PIN_AS_CONNECT}"
+                text = (
+                    f"{name} closes a loop: it is a <connect>, which holds its point "
+                    "and not its axis"
+                )
                 if losses := edge.list_losses():
                     text += f"; lost: {', '.join(losses)}"
                 self.notes.append(text)

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -79,13 +80,15 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
                 None,
                 f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
             )
-        for name, ends in file.pins:
-            sites = [f"{name} {number}" for number in (1, 2)]
-            for site, (link, place) in zip(sites, ends, strict=True):
-                spec.body(link).add_site(name=site, pos=place)
-            pin = spec.add_equality(name=name, name1=sites[0], name2=sites[1])
-            pin.type = mujoco.mjtEq.mjEQ_CONNECT
-            pin.objtype = mujoco.mjtObj.mjOBJ_SITE
+        for pin in ET.fromstring(file.text).iter("loop_joint"):  # of a URDF
+            name = pin.attrib["name"]
+            closure = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_CONNECT)
+            closure.objtype = mujoco.mjtObj.mjOBJ_SITE
+            for number, end in enumerate(pin.findall("*[@link]"), 1):
+                site = f"{name} {number}"
+                place = [float(part) for part in end.attrib["xyz"].split()]
+                spec.body(end.attrib["link"]).add_site(name=site, pos=place)
+                setattr(closure, f"name{number}", site)
         left_out, unknown = _take_out_meshes(spec, file)
         quaternions = {
             number: tuple(body.quat.tolist())

@@ -26,11 +26,6 @@ FLAT = 2e-3
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
 in line.
 """
-UrdfPin = tuple[str, list[tuple[str, list[float]]]]
-"""Name of a pin that closes a loop of a URDF, and its place in two links, m."""
-PIN_AS_CONNECT = (
-    "closes a loop: it is a <connect>, which holds its point and not its axis"
-)
 SETTINGS_OF_AN_SDF = (
     "an SDF or a URDF states neither softness nor solver: MuJoCo's defaults act, and"
     " only an MJCF of the robot can state others"
@@ -50,7 +45,6 @@ class RobotFile:
     missing: Mapping[str, str] = field(default_factory=dict)
     """Mesh files that are not there: name in the text, and name in the file."""
     notes: tuple[str, ...] = ()
-    pins: tuple[UrdfPin, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -335,9 +335,11 @@ def _write_elements(
     root = ET.fromstring(file.text)
     elements = root.findall(".//equality/*")
     equalities = [one for one in elements if one.tag != "equality"]
-    pins = [ET.Element("connect", {"name": name}) for name, _ in file.pins]
     for number in loop.closures if closure else ():
-        one = pins[number - model.neq] if pins else equalities[number]
+        # that of a URDF is no element of it
+        one = (
+            equalities[number] if equalities else ET.Element("connect", name=loop.name)
+        )
         written.append(write(one.tag, one.attrib | closure))
     joints = [
         one.attrib
