@@ -30,7 +30,7 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines import loop, tree
+from fourbar_validation.engines import free_body_closure, loop, tree
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.scenes.random import DrawnType
@@ -252,6 +252,28 @@ def test_assembles_up_to_a_limit_and_not_beyond(name, offset, branch):
         (assembled,) = answer.assembled
         assert assembled == (sign > 0)
         assert np.isnan(answer.quantities["torque"][0]) == (not assembled)
+
+
+@present(*TREES, "free-body")
+@pytest.mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4"])
+def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypatch):
+    """And leave one that cannot close open."""
+    for module, start in (
+        (loop, "_compute_triangle_angle"),
+        (free_body_closure, "_compute_angle_between"),
+    ):
+        right = getattr(module, start)
+        monkeypatch.setattr(module, start, lambda *sides, f=right: f(*sides) + 0.02)
+    motion = Motion(**{commanded: np.linspace(0.05, 6.25, 40)})
+    answer = answered(name, Scene(TRIPLE_ROCKER, motion))
+    right = fourbar.solve(Scene(TRIPLE_ROCKER, motion), "position")
+    np.testing.assert_array_equal(answer.assembled, right.assembled)
+    assert right.assembled.any()
+    for bar in {2, 3, 4} - {int(commanded[-1])}:
+        theta = getattr(right, f"theta_{bar}")
+        got = answer.quantities[f"theta_{bar}"]
+        assert np.abs(np.sin(got - theta))[right.assembled].max() < 1e-14
+        assert np.isnan(got)[~right.assembled].all()
 
 
 def with_bar(number, **values):
