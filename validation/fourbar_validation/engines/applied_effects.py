@@ -4,7 +4,6 @@ Each kind is one row of a table. No engine is named here, and nothing of the for
 `act` is used, so that this is a second derivation.
 """
 
-import bisect
 import math
 from collections.abc import Callable, Container
 from functools import partial
@@ -15,7 +14,7 @@ import numpy as np
 from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import resolve
-from fourbar_validation.engines.description import declares, find_field
+from fourbar_validation.engines.description import declares, find_field, look_up
 from fourbar_validation.engines.loaded import Act, Loaded
 
 if TYPE_CHECKING:
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
         Load,
         PinFriction,
         Springs,
-        Table,
         Torsion,
         Viscous,
     )
@@ -123,7 +121,9 @@ def _carry_load(load: "Load", bars: Loaded) -> None:
 
     A couple is applied too.
     """
-    factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
+    factor = 1.0
+    if load.table is not None:
+        factor = float(look_up(load.table, bars.angle(2)))
     if load.force is not None:
         force = resolve(*load.force)
         if load.frame == "bar":
@@ -137,24 +137,6 @@ def _carry_load(load: "Load", bars: Loaded) -> None:
             point = bars.end(load.place)
         bars.push(load.bar, (factor * force[0], factor * force[1]), point)
     bars.couple(load.bar, factor * load.moment)
-
-
-def look_up(table: "Table", theta_2: float) -> float:
-    """Interpolate a table at one angle, by the chord of its two neighbours.
-
-    The formulas' `at` is not used: this is a second derivation.
-    """
-    angles = table.theta_2
-    turned = math.fmod(theta_2 - angles[0], math.tau)
-    angle = angles[0] + math.fmod(turned + math.tau, math.tau)
-    points_before = bisect.bisect_right(angles, angle)
-    after = min(max(points_before, 1), len(angles) - 1)
-    before = after - 1
-    a = angles[before]
-    b = angles[after]
-    f = table.factor[before]
-    g = table.factor[after]
-    return (f * (b - angle) + g * (angle - a)) / (b - a)
 
 
 TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Effect, ForceDrive, Gravity
+from fourbar.effects import Effect, ForceDrive, Gravity, Table
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, UNKNOWNS, Array
 from fourbar.scene import Command, Scene
@@ -121,6 +121,22 @@ def find_field(gravity: Gravity) -> tuple[float, float]:
     return gravity.magnitude * (x if abs(x) > _TELLS else 0.0), gravity.magnitude * (
         y if abs(y) > _TELLS else 0.0
     )
+
+
+def find_from_middle(table: Table, theta_2: float | Array) -> Any:
+    """Return angles (rad) from the middle of a table, within half a turn."""
+    middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
+    return np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
+
+
+def look_up(table: Table, theta_2: float | Array) -> Any:
+    """Interpolate a table between its points, at one angle or several.
+
+    Beyond the ends the nearer one counts. The formulas' `at` is not used.
+    """
+    middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
+    angle = middle + find_from_middle(table, theta_2)
+    return np.interp(angle, table.theta_2, table.factor)
 
 
 class MovingPart(NamedTuple):

@@ -15,7 +15,7 @@ from fourbar.linkage import MOVING_BARS, PINS, FourBar
 from fourbar.quantities import Array, ComplexArray
 from fourbar.scene import Scene, command, find_signs
 from fourbar_validation.compare.pins import find_centre, find_mass
-from fourbar_validation.engines.description import declares
+from fourbar_validation.engines.description import declares, look_up
 from fourbar_validation.engines.free_body_closure import close, cross_products
 
 GREATEST_WINDING = math.pi * (1.0 - 1e-12)
@@ -259,9 +259,7 @@ def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
 
 def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply a force where it acts, from the bar's first pin, and a couple."""
-    factor = (
-        1.0 if load.table is None else _interpolate_table(load.table, motion.theta_2)
-    )
+    factor = 1.0 if load.table is None else look_up(load.table, motion.theta_2)
     if load.force is not None:
         force: Any = make_vector(load.force)
         if load.frame == "bar":
@@ -280,16 +278,6 @@ def find_arm(load: Any, motion: BodyMotion) -> Any:
     if load.place is not None:
         return motion.unit[load.bar] * make_vector(load.place.from_pin)
     return motion.to_centre(3) if load.bar == 3 else 0.0 * motion.unit[load.bar]
-
-
-def _interpolate_table(table: Any, theta_2: Array) -> Array:
-    """Interpolate between the points.
-
-    The angle is taken within half a turn of the middle of the table.
-    """
-    middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
-    around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
-    return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
 
 
 def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:

@@ -13,13 +13,11 @@ are solved for the acceleration of the input from MuJoCo's own state at each sta
 which the motor of its flywheel is given.
 """
 
-import bisect
 import math
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -33,8 +31,11 @@ from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Law, Motion
-from fourbar_validation.engines.applied_effects import look_up
-from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.description import (
+    find_from_middle,
+    list_speeds,
+    look_up,
+)
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
@@ -51,105 +52,51 @@ ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 """The force of an actuator, in units of its gear."""
 
 
-class SteadySegment:
-    """A segment of positions in the order of their angles, at constant alpha_2.
+class Segment:
+    """Some positions of a course that follow one another, run through without a stop.
 
-    As in `LawSegment`, `omega` is the speed at the start, `fastest` the greatest
-    |omega_2|, and `turning` that of the input, rad/s.
+    Attributes are: `fastest`, the greatest speed of what is commanded; `turning`, the
+    greatest of the input, rad/s; `omega`, the commanded speed at the start.
     """
 
-    def __init__(self, course: "RunCourse", segment: Sequence[int]) -> None:
+    def __init__(self, course: "RunCourse", positions: list[int]) -> None:
         self.course = course
-        commanded = course.values[list(segment)]
-        self.run = choose_run(commanded, course.speed, course.acceleration)
-        self.width = len(np.unique(commanded)) - 1
-        self.omega = course.speed
-        self.turning = self.fastest = self.run.fastest
+        times = course.times(positions)
+        self.began = float(times.min())
+        self.duration = float(np.ptp(times))
+        self.seconds = dict(zip(positions, (times - self.began).tolist(), strict=True))
+        """Time at which each position is passed, from the start of the segment, s."""
+        self.width = len(np.unique(times)) - 1
+        self.turned = float(np.ptp(course.input[positions]))
+        instants = np.linspace(0.0, self.duration, INSTANTS_OF_A_LAW)
+        speeds = course.speeds(self.began + instants)
+        self.omega = float(speeds[0])
+        self.fastest = float(np.abs(speeds).max())
+        self.turning = course.turning(positions, self.fastest)
 
-    def timestep(self, settings: Settings) -> float:
+    def timestep(self, settings: Settings, at_least: int | None = None) -> float:
         """Return the timestep for this segment, s.
 
-        The segment has at least as many steps as positions; one alone takes any
-        timestep.
+        The steps are as many as at the greatest speed of the input throughout, and at
+        least as many as positions. One position alone takes any timestep.
         """
-        if self.width:
-            return self.run.timestep(settings, at_least=self.width)
-        return 1e-3
-
-    def seconds(self, index: int) -> float:
-        """Return the time at which it passes a position.
-
-        The angle from the start of the segment gives it.
-        """
-        return self.run.time(float(self.course.values[index]))
-
-    def speed(self, turned: float, seconds: float) -> float:
-        """Return |omega_2| that is due after a turn (rad) and a time.
-
-        The angle turned gives it.
-        """
-        squared = self.run.omega**2 + 2.0 * self.run.alpha * turned
-        return math.sqrt(max(squared, 0.0))
-
-    def accelerate(self) -> ActuatorForce | None:
-        """Return the input's acceleration at a state, None if the file states it."""
-        return None
-
-
-class LawSegment(SteadySegment):
-    """A segment of positions in the order of their times, by a motion law."""
-
-    course: "LawCourse"
-
-    def __init__(self, course: "LawCourse", segment: Sequence[int]) -> None:
-        self.course = course
-        self.intervals = len(segment) - 1
-        self.began = float(course.time[segment[0]])
-        ends = float(course.time[segment[-1]])
-        self.duration = ends - self.began
-        instants = np.linspace(self.began, ends, INSTANTS_OF_A_LAW)
-        angles, speeds, _ = course.law.at(instants)
-        self.omega = float(speeds[0])
-        self.turning = self.fastest = float(np.abs(speeds).max())
-        self.turned = float(np.ptp(angles))
-
-    def timestep(self, settings: Settings) -> float:
-        """Divide the time from each position to the next into whole steps."""
-        if not self.intervals:
+        if not self.width or not self.turned:
             return 1e-3
-        most = self.duration * self.fastest
-        steps = count_steps(settings, most, self.turned)
-        pieces = math.ceil(steps / self.intervals * (1.0 - 1e-9))
-        timestep = self.duration / (self.intervals * pieces)
-        return timestep * settings.timestep_scale
+        most = self.duration * self.turning
+        steps = most / math.tau * settings.steps_per_revolution
+        if self.turned < FULL_TURN:
+            steps = max(steps, settings.steps_per_window * most / self.turned)
+        least = self.width if at_least is None else at_least
+        # what is a whole number must not become one more by a rounding
+        unit = self.width if self.course.read_at_steps else 1
+        steps = math.ceil(steps / unit * (1.0 - 1e-9)) * unit
+        steps = max(steps, least)
+        return self.duration / steps * settings.timestep_scale
 
-    def seconds(self, index: int) -> float:
-        """Return the time of a position since the segment began, s."""
-        return float(self.course.time[index]) - self.began
-
-    def speed(self, turned: float, seconds: float) -> float:
-        """Return |omega_2| at a time from the segment's begin, rad/s."""
-        instant = np.array([self.began + seconds])
-        _, speed, _ = self.course.law.at(instant)
-        return float(abs(speed[0]))
-
-    def accelerate(self) -> ActuatorForce | None:
-        """Return what evaluates the law at MuJoCo's time."""
-        return lambda _, data: self.course.alpha(self.began + data.time)
-
-
-def count_steps(settings: Settings, most: float, turned: float) -> float:
-    """Count the steps of a segment, as many as at its greatest speed throughout.
-
-    Parameters
-    ----------
-    most : what the input would turn at that speed, rad.
-    turned : what it turns, rad.
-    """
-    steps = most / (2.0 * math.pi) * settings.steps_per_revolution
-    if 0.0 < turned < FULL_TURN:
-        steps = max(steps, settings.steps_per_window * most / turned)
-    return steps
+    def speed(self, seconds: float) -> float:
+        """Return the speed that is due after a time, without its sign."""
+        due = self.course.speeds(np.array([self.began + seconds]))
+        return float(abs(due[0]))
 
 
 class RunCourse:
@@ -157,6 +104,8 @@ class RunCourse:
 
     bar: int | None = 2
     """Number of the bar that moves as commanded; None for the stroke."""
+    read_at_steps: bool = False
+    """True if the positions are evenly spaced in time, and each is one of the steps."""
 
     def __init__(self, scene: Scene, command: Command) -> None:
         self.command = self.of_input = command
@@ -171,14 +120,39 @@ class RunCourse:
         self.scene = replace(scene, motion=motion)
         """The scene whose MJCF is run through."""
 
+    @property
+    def input(self) -> Array:
+        """Return theta_2 at the positions, rad."""
+        return self.command.theta_2
+
     def order(self) -> NDArray[np.intp]:
         """Order the positions as they are passed, as indices."""
         values = self.values if self.speed > 0.0 else -self.values
         return np.argsort(values, kind="stable")
 
-    def segment(self, positions: Sequence[int]) -> SteadySegment:
-        """Choose how the input moves through some positions."""
-        return SteadySegment(self, positions)
+    def times(self, positions: list[int]) -> Array:
+        """Return when positions that follow one another are passed, s.
+
+        The first is passed at 0.
+        """
+        values = self.values[positions]
+        run = choose_run(values, self.speed, self.acceleration)
+        return np.array([run.time(value) for value in values.tolist()])
+
+    def speeds(self, times: Array) -> Array:
+        """Return the commanded speed at times."""
+        return self.speed + self.acceleration * times
+
+    def turning(self, positions: list[int], fastest: float) -> float:
+        """Return the greatest speed of the input, rad/s; `fastest`: the commanded."""
+        return fastest
+
+    def accelerate(self, began: float) -> ActuatorForce | None:
+        """Return the input's acceleration at a state, None if the file states it.
+
+        `began`: time at which the segment begins, s.
+        """
+        return None
 
     def least_sine(self, closes: NDArray[np.bool_]) -> float:
         """Return the least |sin(theta_4 - theta_3)| on the way."""
@@ -191,17 +165,15 @@ class LawCourse(RunCourse):
     Flywheel and closure are laid out for its greatest |omega_2| and |alpha_2|.
     """
 
+    read_at_steps = True
+
     def __init__(self, scene: Scene, command: Command) -> None:
         law = scene.motion.law
         assert law is not None and command.time is not None
         self.law = law
         self.time: Array = command.time
         self.command = self.of_input = command
-        self.knots = list(law.time)
-        _, _, at_knots = law.at(np.array(law.time))
-        self.at_knots = at_knots.tolist()
-        # the stages of a step share their instants
-        self.evaluate_alpha = lru_cache(maxsize=4)(self._evaluate_alpha)
+        _, _, self.at_knots = law.at(np.array(law.time))
         instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
         _, *rates = law.at(instants)
         omega, alpha = (float(np.abs(rate).max()) for rate in rates)
@@ -214,18 +186,8 @@ class LawCourse(RunCourse):
         A law of cubic pieces is linear between knots in acceleration, and is
         interpolated; another law is evaluated.
         """
-        if not (isinstance(self.law, Law) and self.law.omega is None):
-            return self.evaluate_alpha(instant)
-        times = self.knots
-        knots_before = bisect.bisect_right(times, instant)
-        after = min(max(knots_before, 1), len(times) - 1)
-        before = after - 1
-        part = (instant - times[before]) / (times[after] - times[before])
-        start = self.at_knots[before]
-        stop = self.at_knots[after]
-        return float(start + part * (stop - start))
-
-    def _evaluate_alpha(self, instant: float) -> float:
+        if isinstance(self.law, Law) and self.law.omega is None:
+            return float(np.interp(instant, self.law.time, self.at_knots))
         _, _, alpha = self.law.at(np.array([instant]))
         return float(alpha[0])
 
@@ -233,9 +195,18 @@ class LawCourse(RunCourse):
         """Order the positions by their times."""
         return np.argsort(self.time, kind="stable")
 
-    def segment(self, positions: Sequence[int]) -> SteadySegment:
-        """Choose how the input moves through some positions."""
-        return LawSegment(self, positions)
+    def times(self, positions: list[int]) -> Array:
+        """Return the times of the law."""
+        return self.time[positions]
+
+    def speeds(self, times: Array) -> Array:
+        """Return omega_2 of the law."""
+        _, speeds, _ = self.law.at(times)
+        return speeds
+
+    def accelerate(self, began: float) -> ActuatorForce | None:
+        """Return what evaluates the law at MuJoCo's time."""
+        return lambda _, data: self.alpha(began + data.time)
 
 
 LIGHT_FLYWHEEL = 1e4
@@ -307,7 +278,7 @@ class SimulatedRun:
 
     def __init__(
         self,
-        motion_segment: SteadySegment,
+        motion_segment: Segment,
         start: Found,
         settings: Settings,
         compile_loop: Callable[[Settings], ClosedLoop],
@@ -328,19 +299,11 @@ class SimulatedRun:
         them.
         """
         loop.set_state(wound, motion_segment.omega, course.bar)
-        self.begins = self.progress()
         self.stepper = Stepper(loop.model, loop.data, settings.timestep)
-
-    def progress(self) -> float:
-        """Return the angle or stroke of what moves as commanded."""
-        bar = self.course.bar
-        if bar is None:
-            return self.loop.stroke()
-        return self.loop.angle(bar)
 
     def to(self, index: int) -> None:
         """Step on to the step nearest to a position."""
-        self.stepper.to(self.motion_segment.seconds(index))
+        self.stepper.to(self.motion_segment.seconds[index])
 
     def read(self) -> tuple[float | None, dict[str, Array]]:
         """Read the drive and the pin forces of the state last forwarded.
@@ -442,15 +405,15 @@ class Lead(RunCourse):
         closes = np.array([q is not None for q in assembled])
         if not closes.any():
             raise LimitError("the loop closes at none of the positions")
-        self.input = np.full((3, len(assembled)), np.nan)
-        """theta_2, omega_2, alpha_2."""
+        found = np.full((3, len(assembled)), np.nan)
         branch = command.branch.copy()
         for index, q in enumerate(assembled):
             if q is not None:
-                self.input[:, index] = self._find_input(q)
+                found[:, index] = self._find_input(q)
                 branch[index] = loop.branch()
-        self.input[0, closes] = np.unwrap(self.input[0, closes])
-        theta_2, omega_2, alpha_2 = self.input[:, closes]
+        found[0, closes] = np.unwrap(found[0, closes])
+        self.led, self.omega_2, _ = found
+        theta_2, omega_2, alpha_2 = found[:, closes]
         # greatest speed and acceleration, as for a law: flywheel and closure are sized
         # by them
         fastest = float(np.abs(omega_2).max())
@@ -459,9 +422,27 @@ class Lead(RunCourse):
         self.scene = replace(scene, motion=largest)
         self.of_input = Command(theta_2, branch[closes], fastest, most_accelerated)
 
-    def segment(self, positions: Sequence[int]) -> SteadySegment:
-        """Choose how the input is led through some positions."""
-        return LedSegment(self, positions)
+    @property
+    def input(self) -> Array:
+        """Return theta_2 at the positions, rad, NaN where the loop does not close."""
+        return self.led
+
+    def turning(self, positions: list[int], fastest: float) -> float:
+        """Return the greatest speed of the input; LimitError if it must hurry."""
+        greatest = float(np.abs(self.omega_2[positions]).max())
+        turned = float(np.ptp(self.led[positions]))
+        if turned:
+            uneven = float(np.ptp(self.times(positions))) * greatest / turned
+            if uneven > _MOST_UNEVEN:
+                raise LimitError(
+                    f"the input is at most {uneven:.0f} times as fast as on the mean;"
+                    f" up to {_MOST_UNEVEN:g} it is led"
+                )
+        return greatest
+
+    def accelerate(self, began: float) -> ActuatorForce | None:
+        """Return what solves for the acceleration at MuJoCo's state."""
+        return self.alpha_2
 
     def _find_input(self, q: tuple[float, float, float]) -> tuple[float, float, float]:
         """Find theta_2, omega_2 and alpha_2 of the input at joint angles.
@@ -502,37 +483,6 @@ class Lead(RunCourse):
         return compute_least_sine(self.scene.linkage, command.theta_2, everywhere)
 
 
-class LedSegment(SteadySegment):
-    """A segment of positions in the order of what is commanded."""
-
-    def __init__(self, lead: Lead, segment: Sequence[int]) -> None:
-        super().__init__(lead, segment)
-        self.lead = lead
-        theta_2, omega_2, _ = lead.input[:, list(segment)]
-        self.turning = float(np.abs(omega_2).max())
-        self.turned = float(np.ptp(theta_2))
-
-    def timestep(self, settings: Settings) -> float:
-        """Divide the time by what the input turns."""
-        if not self.width or not self.turned:
-            return 1e-3
-        duration = self.run.time(self.run.stop)
-        most = duration * self.turning
-        uneven = most / self.turned
-        if uneven > _MOST_UNEVEN:
-            raise LimitError(
-                f"the input is at most {uneven:.0f} times as fast as on the mean; up to"
-                f" {_MOST_UNEVEN:g} it is led"
-            )
-        steps = count_steps(settings, most, self.turned)
-        timestep = duration / max(math.ceil(steps), self.width)
-        return timestep * settings.timestep_scale
-
-    def accelerate(self) -> ActuatorForce | None:
-        """Return what solves for the acceleration at MuJoCo's state."""
-        return self.lead.alpha_2
-
-
 OVERRUN = 1e-7
 """Angle by which a simulated crank may turn too far, rad; 1e-9 was seen in healthy
 runs, and the angle is judged to 1e-5.
@@ -567,28 +517,17 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 
     The value is the factor at MuJoCo's own theta_2, over the largest.
     """
-    forces = {}
-    for number, load in enumerate(scene.loads, 1):
-        if load.table is not None:
-            forces[f"load_{number}"] = _evaluate_table(load.table)
-    return forces
+    return {
+        f"load_{number}": _evaluate_table(load.table)
+        for number, load in enumerate(scene.loads, 1)
+        if load.table is not None
+    }
 
 
 def _evaluate_table(table: Table) -> ActuatorForce:
     """Return the function that evaluates a table over its largest factor."""
     peak = _find_peak(table)
-    first = table.theta_2[0]
-    last = table.theta_2[-1]
-
-    def factor(_: mujoco.MjModel, data: mujoco.MjData) -> float:
-        turned = (float(data.qpos[O2]) - first) % math.tau
-        angle = first + turned
-        if angle > last:  # the stages of a step may look beyond the end of a table
-            to_first = first + math.tau - angle
-            angle = last if angle - last < to_first else first
-        return look_up(table, angle) / peak
-
-    return factor
+    return lambda _, data: float(look_up(table, data.qpos[O2])) / peak
 
 
 def clip_angles(scene: Scene, theta_2: Array) -> Array:
@@ -602,18 +541,14 @@ def clip_angles(scene: Scene, theta_2: Array) -> Array:
             continue
         first = load.table.theta_2[0]
         last = load.table.theta_2[-1]
-        angle = first + np.remainder(inside - first, math.tau)
-        over = angle - last
-        under = first + math.tau - angle
-        outside = over > 0.0
-        near = np.minimum(over, under) < OVERRUN
-        if not (~outside | near).all():
+        from_middle = find_from_middle(load.table, inside)
+        over = np.abs(from_middle) - (last - first) / 2.0
+        if (over >= OVERRUN).any():
             raise LimitError(
                 f"the motion leaves the table of a load, which covers {first:g} to"
                 f" {last:g} rad"
             )
-        back = np.where(over < under, -over, under)
-        inside = inside + np.where(outside, back, 0.0)
+        inside = np.where(over > 0.0, inside - np.copysign(over, from_middle), inside)
     return inside
 
 

@@ -39,6 +39,7 @@ from fourbar_validation.engines.mujoco.runner import (
     LawCourse,
     Lead,
     RunCourse,
+    Segment,
     SimulatedRun,
     clip_angles,
     evaluate_loads,
@@ -282,13 +283,13 @@ class _Simulation:
 
     def _run(self, segment: list[int], start: Found) -> None:
         """Step through one segment and read at the step nearest to each position."""
-        motion_segment = self.course.segment(segment)
+        motion_segment = Segment(self.course, segment)
         timestep = motion_segment.timestep(self.settings)
         if len(segment) > 1:
             turn = 2.0 * np.pi / motion_segment.turning
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = dict(self.supplied)
-        if (accelerate := motion_segment.accelerate()) is not None:
+        if (accelerate := self.course.accelerate(motion_segment.began)) is not None:
             supplied["drive"] = lambda m, d: m.dof_armature[O2] * accelerate(m, d)
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0)
         with supply_forces(supplied):
@@ -311,7 +312,7 @@ class _Simulation:
         loop = run.loop
         d = loop.data
         loop.forward()
-        due = run.motion_segment.speed(run.progress() - run.begins, run.stepper.time)
+        due = run.motion_segment.speed(run.stepper.time)
         speed = float(loop.drive_column(self.course.bar) @ d.qvel)
         missed = abs(abs(speed) - due)
         evidence = {

@@ -24,7 +24,6 @@ import numpy as np
 
 from fourbar.errors import LimitError, write_count
 from fourbar.mjcf import Settings, write_mjcf
-from fourbar.mjcf.document import WindowMotion
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
@@ -40,8 +39,8 @@ from fourbar_validation.engines.loop import (
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
     RunCourse,
+    Segment,
     SimulatedRun,
-    SteadySegment,
     find_assembled,
     split_segments,
 )
@@ -185,14 +184,12 @@ class TrialSetup:
                 "the loop closes at no two neighbouring positions: nothing to run"
                 " through in time"
             )
-
-    def _list_runs(self) -> list[WindowMotion]:
-        return [SteadySegment(self.course, one).run for one in self.segments]
+        self._motions = [Segment(course, one) for one in self.segments]
 
     @property
     def simulated_seconds(self) -> float:
         """Time in which the linkage passes all segments."""
-        return sum(run.time(run.stop) for run in self._list_runs())
+        return sum(segment.duration for segment in self._motions)
 
     @property
     def revolutions(self) -> float:
@@ -206,8 +203,8 @@ class TrialSetup:
         """Count the steps of one run, without making it."""
         # a whole number of steps over each segment
         return sum(
-            round(run.time(run.stop) / run.timestep(settings))
-            for run in self._list_runs()
+            round(segment.duration / segment.timestep(settings, 1))
+            for segment in self._motions
         )
 
     def try_out(self, settings: Settings, edit: Edit | None = None) -> Trial:
@@ -257,8 +254,8 @@ class TrialSetup:
         self, segment: list[int], settings: Settings, edit: Edit | None
     ) -> SimulatedRun:
         """Return a run that stands at the first position of a segment."""
-        motion_segment = SteadySegment(self.course, segment)
-        timestep = motion_segment.run.timestep(settings)
+        motion_segment = Segment(self.course, segment)
+        timestep = motion_segment.timestep(settings, 1)
         settings = replace(settings, timestep=timestep, timestep_scale=1.0)
 
         def compile_loop(built: Settings) -> ClosedLoop:
