@@ -12,9 +12,11 @@ from scipy.spatial.transform import Rotation
 import fourbar
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
+from fourbar_validation.engines.mujoco.describe import UNLIMITED_RANGE
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
+from fourbar_validation.engines.mujoco.robots.examine import examine_file
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     SETTINGS_OF_AN_SDF,
     PoseOptions,
@@ -676,6 +678,17 @@ def test_a_model_that_is_missing_and_in_no_loop_is_left_out_and_named(tmp_path):
     assert "models that are missing are left out: model://nowhere" in file.notes
     path.write_text(PLAIN, encoding="utf-8")
     assert file.text == read_robot(path).text
+
+
+def test_a_step_beyond_the_end_of_a_motion_meets_no_stop(tmp_path):
+    stops = "<limit><lower>-1</lower><upper>1</upper></limit></axis>"
+    crank = f"<child>crank</child>{AXIS}"
+    file = read(tmp_path, put((crank, crank.replace("</axis>", stops))))
+    scene = read_loop_scene(file, PoseOptions(), None, 1.0).scene
+    examined = examine_file(scene, file)
+    end = examined.measured.through_time.rows.joint.max()
+    assert end > 1.0
+    assert examined.described["pins.O2.range"].value == UNLIMITED_RANGE
 
 
 @pytest.mark.slow

@@ -115,6 +115,10 @@ _TOUCHED = 1e-9
 """rad; a position that is no farther beyond a limit is at it: scenes state angles with
 twelve digits.
 """
+_PASSED = 10.0
+"""Timesteps by which a simulated motion may pass its end, where a joint may have its
+stop: a hinge may turn faster than the commanded bar. Single states meet other stops.
+"""
 _DRIVING = 1e3
 """Armature over all other inertia from which it is a flywheel that drives. The speed
 then ripples by 1e-3.
@@ -685,6 +689,10 @@ class LoopInside:
         answer = InsideAnswer()
         _, omega, alpha = motion[0].tolist()
         angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
+        instants = _list_instants(angles, omega, alpha, self.model.opt.timestep)
+        self.model.jnt_margin[:] -= (
+            _PASSED * self.model.opt.timestep * np.ptp(angles) / instants[-1]
+        )
         model, armature = self._keep_speeds()
         data = mujoco.MjData(self.model)
         state = self.state(angles[0], omega)
@@ -703,14 +711,12 @@ class LoopInside:
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
         stepper = Stepper(model, data, model.opt.timestep)
-        instants = _list_instants(angles, omega, alpha, model.opt.timestep)
         answer.seconds_per_step = math.inf
         rows: list[Any] = []
         doubtful: list[Any] = []  # they may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
-        settled = SETTLING_TIME * self.find_constant()
-        answer.settling = min(settled, 0.5 * instants[-1])
+        answer.settling = min(SETTLING_TIME * self.find_constant(), 0.5 * instants[-1])
         for instant in instants[1:]:
             if instant < answer.settling:
                 answer.skipped += 1
