@@ -53,6 +53,22 @@ def read_drive_demand(solution: Solution) -> Driving:
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
+def find_held(solution: Solution) -> tuple[Array, Array]:
+    """Mark where dry friction holds a pin at rest, and find where a motion starts.
+
+    At rest with an acceleration it is held by none: the sense is that of its start,
+    elsewhere 0, (n,).
+    """
+    keys = read_drive_demand(solution).keys
+    low, high = (getattr(solution, end) for end in (keys.low, keys.high))
+    if low is None:
+        return np.zeros(0), np.zeros(0)
+    held = np.isfinite(low) & np.isfinite(high) & (low < high)
+    at_rest = held & (solution.at.speed == 0.0)
+    senses = at_rest * np.sign(solution.at.acceleration)
+    return held & (senses == 0.0), senses
+
+
 def name_places(solution: Solution) -> tuple[str, str]:
     """Return the symbol and the SI unit of what the positions of a motion follow."""
     if solution.time is not None:

@@ -219,7 +219,10 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         return peak and abs(peak.value)
 
     effort: dict[str, Any] = {"peak_torque": None, "rms_torque": None}
-    effort[f"peak_{kind}"] = find_largest(name)
+    largest = find_largest(name)
+    if motion.start is not None and largest is not None:
+        largest = max(largest, abs(motion.start.value))
+    effort[f"peak_{kind}"] = largest
     effort[f"rms_{kind}"] = motion.find_rms(name)
     duty = MotorDuty(
         **effort,

@@ -18,7 +18,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
-from fourbar.show.driving import is_once_round, read_drive_demand
+from fourbar.show.driving import find_held, is_once_round, read_drive_demand
 from fourbar.show.panels import SHALLOW, Panels, Peak, Wanted, fit_panels, split_runs
 from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution, where_assembled
@@ -140,6 +140,23 @@ class MotionCurves:
                 least = largest.get(name, 0.0)
                 largest[name] = float(np.nanmax(load, initial=least))
         return largest
+
+    @cached_property
+    def start(self) -> Peak | None:
+        """Largest torque or force of the drive that starts a motion from rest.
+
+        It has the stated acceleration, against dry friction. Along a law it is a limit
+        of what stands between the positions, and None here.
+        """
+        solution = self.solve_between()
+        _, senses = find_held(solution)
+        if not senses.any() or (self.panels.located and self.scene.motion.law):
+            return None
+        at = solution.at._replace(speed=_BEGINNING * senses)
+        begun = solve(self.scene, at=at)[read_drive_demand(solution).keys.value]
+        values = np.where(senses == 0.0, 0.0, begun)
+        row = int(np.nanargmax(np.abs(values)))
+        return Peak(float(values[row]), float(at.places[row]))
 
     @property
     def is_steady(self) -> bool:

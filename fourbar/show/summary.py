@@ -9,14 +9,18 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_intervals
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import find_stroke_ranges
-from fourbar.show.driving import Driving, is_once_round, read_drive_demand
+from fourbar.show.driving import (
+    Driving,
+    find_held,
+    is_once_round,
+    read_drive_demand,
+)
 from fourbar.show.duty import MotorDuty, motor_duty
 from fourbar.show.motion_curves import (
     compute_bending,
@@ -225,12 +229,12 @@ class Facts:
         A turn that begins at such a position ends at the same, which is listed once.
         """
         solution = self.solution
-        rows = self._find_held(solution)
+        rows = np.flatnonzero(find_held(solution)[0])
         if self.drive is None or not len(rows):
             return []
         if not np.any(solution.at.speed):  # held between the positions too
             solution = self.motion.solve_between()
-            rows = self._find_held(solution)
+            rows = np.flatnonzero(find_held(solution)[0])
         low = getattr(solution, self.drive.keys.low)
         high = getattr(solution, self.drive.keys.high)
         places = solution.at.places
@@ -246,18 +250,15 @@ class Facts:
             ranges.append(HeldRange(least, most, ends, varies))
         return ranges
 
-    def _find_held(self, solution: Solution) -> NDArray[np.intp]:
-        """Find the rows of positions at which dry friction holds a pin, (k,)."""
-        low = self.drive and getattr(solution, self.drive.keys.low)
-        if self.drive is None or low is None:
-            return np.zeros(0, dtype=np.intp)
-        high = getattr(solution, self.drive.keys.high)
-        return np.flatnonzero(np.isfinite(low) & np.isfinite(high) & (low < high))
+    @property
+    def start(self) -> Peak | None:
+        """Largest torque or force that starts a motion from rest; None: none does."""
+        return self.drive and self.motion.start
 
     @cached_property
     def is_held_at_rest(self) -> bool:
         """Return True if nothing moves where dry friction holds a pin."""
-        rows = self._find_held(self.solution)
+        rows = find_held(self.solution)[0]
         return not np.any(self.solution.at.part(rows).speed)
 
     @cached_property
