@@ -22,7 +22,6 @@ from fourbar_validation.published.printed_figures import (
 )
 from fourbar_validation.published.textbook import compare_textbooks
 from fourbar_validation.published.thesis import (
-    AS_PRINTED,
     LADDER,
     compute_model,
     compute_numbers,
@@ -39,11 +38,10 @@ def list_figures() -> Iterator[PublishedFigure]:
     The sources are the thesis, the Maple worksheet, and public test cases.
     """
     for figure in read_printed():
-        made = figure.errata
-        if made and figure.table == "manual, unknowns":
-            made = (*made, AS_PRINTED)
-        ours, wrong = (compute_numbers(errata)[figure.name] for errata in ((), made))
-        yield figure._replace(ours=ours, made=wrong)
+        ours, made = (
+            compute_numbers(errata)[figure.name] for errata in ((), figure.errata)
+        )
+        yield figure._replace(ours=ours, made=made)
     yield from compare_textbooks()
 
 
@@ -135,16 +133,11 @@ def list_ladder_rows() -> Iterator[tuple[str, ...]]:
     The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what
     the manual and section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
     """
-    for step in range(len(LADDER) + 1):
-        did = ("I_G3, I_G4 as printed in the manual, ten digits", "see #3")
-        if step == 0:
-            did = (
-                "nothing wrong: SI, uniform bars m (L^2 + w^2)/12",
-                "the answer of this project",
-            )
-        elif (name := LADDER[step - 1]) in ERRATA:
-            did = (f"#{name} {ERRATA[name].title}", ERRATA[name].right)
-        model = compute_model(LADDER[:step])
+    first = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
+    steps = [(first, "the answer of this project")]
+    steps += [(f"#{name} {ERRATA[name].title}", ERRATA[name].right) for name in LADDER]
+    for count, did in enumerate(steps):
+        model = compute_model(LADDER[:count])
         forces = (f"{model[name]:.3f}" for name in ("F12x", "F12y"))
         yield (*did, f"{model['T4']:.9f}", *forces)
 

@@ -61,16 +61,9 @@ _COUPLE_ON_A_BAR = -15.0
 """Couple on each of bars 2, 3, 4, N cm."""
 _TO_N = 0.01
 """1 kg cm/s^2 in N, and 1 kg cm^2/s^2 in N cm."""
-AS_PRINTED = "manual"
-"""Name, beside the errata, of the inertias that the manual prints."""
-_TYPED_INERTIAS = {
-    AS_PRINTED: (0.2924725333, 0.1075266667),
-    "5b": (0.292472, 0.107526),
-}
-"""I_G3, I_G4 of the manual's table and of section 5.7, kg cm^2, solved back from the
-printed unknowns.
-"""
-LADDER = ("3", "1", "2", "4", "5", AS_PRINTED, "5b")
+_TYPED_INERTIAS = 0.292472, 0.107526
+"""I_G3, I_G4 of section 5.7, kg cm^2, solved back from the printed unknowns."""
+LADDER = ("3", "1", "2", "4", "5", "5b")
 """Errata in the order in which they are made, from right to published."""
 d, a, b, c = BAR_LENGTHS
 Numbers = dict[str, float]
@@ -113,7 +106,7 @@ def compute_model(errata: tuple[str, ...] = (), decimals: int = 6) -> Numbers:
 
     Parameters
     ----------
-    errata : ids of the errata that are made, and the name of the manual's inertias.
+    errata : ids of the errata that are made.
     decimals : of theta_3, deg, that erratum 12 leaves in the arms of bar 3.
     """
     scene = make_model_scene(THETA_2)
@@ -139,9 +132,8 @@ def compute_model(errata: tuple[str, ...] = (), decimals: int = 6) -> Numbers:
     arms = [*_ARMS.values()] * np.exp(1j * np.repeat(directions, 2))
     if "3" in errata:
         inertias = _MASSES * (_ALONG**2 * (1.0, 0.0, 0.0) + _ACROSS**2) / 12.0
-    for name, typed in _TYPED_INERTIAS.items():
-        if name in errata:
-            inertias[1:] = typed
+    if "5b" in errata:
+        inertias[1:] = _TYPED_INERTIAS
     per_mass, per_inertia = (1.0 if name in errata else _TO_N for name in ("1", "2"))
     force = per_mass * _MASSES * a_G
     moment = per_inertia * inertias * alpha
