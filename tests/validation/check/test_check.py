@@ -642,6 +642,14 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text(read):
     assert not {text for text in texts if not any(words in text for words in cases)}
 
 
+@pytest.mark.parametrize("name", ["drawn", "loads", "push_output"])
+def test_places_by_points_and_arms_have_hypotheses(name):
+    """A place of one bar is refused on another, and an arm on a force that turns."""
+    scene = fourbar.load(MODELS / "capabilities" / f"{name}.toml")
+    texts = [mistake.text for mistake in list_hypotheses(scene, command(scene))]
+    assert any("(bar 4): its force acts at G" in text for text in texts)
+
+
 @pytest.mark.parametrize("digits", [4, 5])
 def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     digits, judged, read

@@ -6,6 +6,7 @@ mistakes at once.
 """
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import permutations
 from typing import Any, NamedTuple
 
@@ -16,9 +17,8 @@ from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
 from fourbar.solving import solve
-from fourbar_validation.check.csv_columns import compute_column
 from fourbar_validation.check.judge_table import Judge
-from fourbar_validation.check.variants import Mistake
+from fourbar_validation.check.variants import Mistake, drop_remainder, solve_other
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
 from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving
 from fourbar_validation.engines.free_body import (
@@ -47,10 +47,13 @@ SOFT_TORQUE = 1e-6
 dynamics of a loop; 2e-8 was seen.
 """
 _LATE = {
-    "one step late: numbers of the position before": 1,
-    "one step early: numbers of the position after": -1,
+    "one step late: numbers of the position before": (1, 1.0),
+    "one step early: numbers of the position after": (-1, 1.0),
+    "half a step late: numbers between a position and the one before": (1, 0.5),
+    "half a step early: numbers between a position and the one after": (-1, 0.5),
 }
-"""Mistakes in time, and by how many positions the numbers are late."""
+"""Mistakes in time: the side on which the numbers were taken, and the part of a step.
+"""
 _PART_OF_ACCELERATION = {
     -1.0: "is missing",
     -2.0: "has the wrong sign",
@@ -250,23 +253,41 @@ def _list_parts_of_centres(motion: BodyMotion) -> Iterator[_Accelerated]:
 
 
 def _find_late(judge: Judge) -> Iterator[Mistake]:
-    """Give each position the numbers of the one before, or of the one after."""
+    """Give each position the numbers of an earlier one, or of a later one."""
     n = len(judge.at.angle)
     if n < ENOUGH_POSITIONS + 1:
         return
-    for text, step in _LATE.items():
-        rows = np.clip(np.arange(n) - step, 0, n - 1)
+    for text, (step, part) in _LATE.items():
+        at = drop_remainder(judge.at).with_arrays(partial(_shift, step, part))
+        late = solve_other(text, judge.scene, at)
         edge = 0 if step == 1 else n - 1  # its number may be anything
-        moved = {}
-        for name, column in judge.columns.items():
-            values = compute_column(judge.right, name)
-            if values is not None and name != judge.right.commanded:
-                moved[name] = values[rows]
-                moved[name][edge] = column.theirs[edge]
-        forces = {name: moved[name] for name in FORCE_NAMES if name in moved}
-        yield Mistake(text, moved.get)
-        yield Mistake(f"{text} (forces alone)", forces.get)
-        yield Mistake(text, moved.get, whole=False)
+        mistake = late._replace(predict=partial(_free_edge, judge, late, edge))
+        yield mistake
+        yield mistake.within(FORCE_NAMES, " (forces alone)")
+        if part == 1.0:
+            yield mistake._replace(whole=False)
+
+
+def _shift(step: int, part: float, values: Any) -> Any:
+    """Return the values of the positions before, or part of the way there."""
+    if not np.ndim(values):
+        return values
+    shifted = np.roll(values, step, axis=0)
+    if part == 1.0 or values.dtype == np.int8:
+        return shifted
+    return values + part * (shifted - values)
+
+
+def _free_edge(
+    judge: Judge, mistake: Mistake, edge: int, quantity: str
+) -> Array | None:
+    """Return the numbers of a mistake, at one row those of the table."""
+    values = mistake.predict(quantity)
+    column = judge.columns.get(quantity)
+    if values is not None and column is not None:
+        values = values.copy()
+        values[edge] = column.theirs[edge]
+    return values
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
@@ -276,8 +297,8 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
     error, allowed, _ = column.judged_right
     if not (error > allowed).any():
         return
+    opposite = judge.at._replace(branch=-judge.at.branch)
     try:
-        opposite = judge.at._replace(branch=-judge.at.branch)
         other = solve(judge.scene, judge.stage, at=opposite)
     except FourBarError:
         return

@@ -25,8 +25,8 @@ from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
     Mistake,
-    Variant,
     drop_remainder,
+    solve_other,
     state_all,
 )
 from fourbar_validation.check.wrong_scenes import group_numbers, is_place
@@ -215,8 +215,8 @@ class _Family(NamedTuple):
     """Problems that differ by numbers, of which those that fit best are looked for."""
 
     start: tuple[float, ...]
-    make: Callable[..., Variant]
-    """Function of the numbers that returns the problem."""
+    make: Callable[..., Mistake]
+    """Function of the numbers that returns the mistake of a problem."""
 
 
 def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
@@ -236,7 +236,7 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     for family in families:
         fitted = _fit(columns, family)
         if fitted is not None and np.abs(fitted).max() > LEAST_NUMBER:
-            yield family.make(*fitted)._replace(times=CARRIED).mistake()
+            yield family.make(*fitted)._replace(times=CARRIED)
 
 
 def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
@@ -244,7 +244,7 @@ def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
     numbers = np.array(family.start)
 
     def measure(numbers: Array) -> Array:
-        return _compute_residual(columns, family.make(*numbers.tolist()).mistake())
+        return _compute_residual(columns, family.make(*numbers.tolist()))
 
     least = math.inf
     for step in range(NEWTON):
@@ -297,22 +297,22 @@ def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
 
 def _scale(
     scene: Scene, at: Command, name: str, group: dict[str, float], factor: float
-) -> Variant:
+) -> Mistake:
     numbers = {key: factor * value for key, value in group.items()}
     text = f"{name} {factor:.6g} times ours (fitted)"
-    return Variant(text, replace_numbers(scene, numbers), at)
+    return solve_other(text, replace_numbers(scene, numbers), at)
 
 
-def _move_centre(scene: Scene, at: Command, bar: str, x: float, y: float) -> Variant:
+def _move_centre(scene: Scene, at: Command, bar: str, x: float, y: float) -> Mistake:
     r, phi = math.hypot(x, y), math.atan2(y, x)
     numbers = {f"bars.{bar}.centre.0": r, f"bars.{bar}.centre.1": phi}
     text = f"bars.{bar}.centre at {r:.6g} m and {math.degrees(phi):.4f} deg (fitted)"
-    return Variant(text, replace_numbers(scene, numbers), at)
+    return solve_other(text, replace_numbers(scene, numbers), at)
 
 
 def _rub(
     scene: Scene, at: Command, kind: Any, rows: dict[str, float], pin: str, k: float
-) -> Variant:
+) -> Mistake:
     """Return the problem with more damping or friction at a pin."""
     others = [effect for effect in scene.effects if effect.key != kind.key]
     rubbed = kind.at(**{pin: 0.0})
@@ -321,7 +321,7 @@ def _rub(
     text = (
         f"effects.{kind.key}.{pin} {k:.6g} {unit}, which the scene leaves out (fitted)"
     )
-    return Variant(text, replace(scene, effects=(*others, rubbed)), at)
+    return solve_other(text, replace(scene, effects=(*others, rubbed)), at)
 
 
 def _list_commands(
@@ -340,7 +340,7 @@ def _list_commands(
     rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
     part = at.part(rows)
     tried = TURN * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
-    wrong = [_turn(scene, part, offset).mistake() for offset in tried.tolist()]
+    wrong = [_turn(scene, part, offset) for offset in tried.tolist()]
     residuals = [_compute_residual(columns, one, rows) for one in wrong]
     misfits = np.mean(np.fmin(np.abs(residuals), 1.0), axis=1)
     if misfits.min() < PROMISING:
@@ -348,30 +348,30 @@ def _list_commands(
         yield _Family((start,), partial(_turn, scene, at))
 
 
-def _turn(scene: Scene, at: Command, offset: float) -> Variant:
+def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
     """Return the problem of angles that are counted from another zero."""
     degrees = math.degrees(math.remainder(offset, TURN))
     text = (
         f"the angle of the {BAR_NAMES[at.bar]} is measured from another zero:"
         f" {at.commanded} {degrees:+.6g} deg is what they solved"
     )
-    return Variant(text, scene, at._replace(angle=at.angle + offset))
+    return solve_other(text, scene, at._replace(angle=at.angle + offset))
 
 
-def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Variant:
+def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:
     text = f"{rate} {factor:.6g} times ours (fitted)"
-    return Variant(text, scene, at._replace(**{field: factor * getattr(at, field)}))
+    return solve_other(text, scene, at._replace(**{field: factor * getattr(at, field)}))
 
 
-def _delay(scene: Scene, at: Command, law: Any, time: Array, lag: float) -> Variant:
+def _delay(scene: Scene, at: Command, law: Any, time: Array, lag: float) -> Mistake:
     """Return the problem of the law at times that are earlier by a lag, s."""
     side = "before" if lag > 0.0 else "after"
     text = f"each row has the numbers of the time {abs(lag):.6g} s {side} its own"
     earlier = np.clip(time - lag, law.time[0], law.time[-1])
     angle, speed, acceleration = law.at(earlier)
     moved = at._replace(angle=angle, speed=speed, acceleration=acceleration)
-    names = UNITS.keys() - {*at.names}
-    return Variant(f"{text} (fitted)", scene, moved, names)
+    late = solve_other(f"{text} (fitted)", scene, moved)
+    return late.within(UNITS.keys() - {*at.names})
 
 
 def _try_order(judge: Judge) -> Iterator[Mistake]:

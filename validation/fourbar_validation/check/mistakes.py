@@ -6,18 +6,17 @@ The numbers that each would make are held against the table.
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.formulas.mobility import TURN
-from fourbar.quantities import FORCE_NAMES, PIN_FORCES, VECTORS, Array
-from fourbar.scene import Command, Scene, StrokeOrigin
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array
+from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar_validation.check.calculated import (
-    ENOUGH_POSITIONS,
-    find_miscalculated,
-)
+from fourbar_validation.check.calculated import find_miscalculated
 from fourbar_validation.check.fitted import (
     ENOUGH_DIGITS,
     ENOUGH_NUMBERS,
@@ -27,8 +26,8 @@ from fourbar_validation.check.fitted import (
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import (
     Mistake,
-    Variant,
     drop_remainder,
+    solve_other,
     state_all,
 )
 from fourbar_validation.check.wrong_scenes import list_wrong_scenes
@@ -60,156 +59,105 @@ _WHERE = {
     " in what drives alone": tuple({*FORCE_NAMES} - {*PIN_FORCES}),
 }
 """Quantities in which a mistake may show, by what is added to its text."""
-_BETWEEN = {
-    "half a step late: numbers between a position and the one before": 1,
-    "half a step early: numbers between a position and the one after": -1,
-}
-"""Mistakes in time, and the side on which the numbers were taken."""
 
 
 def list_column_mistakes(right: Solution) -> Iterator[Mistake]:
     """List the mistakes that a column can have by itself."""
-    for text, change, applies in _COLUMN_MISTAKES:
-        predict = partial(_change_column, right, change, applies)
+    for text, change, kinds in _COLUMN_MISTAKES:
+        predict = partial(_change_column, right, change, kinds)
         yield Mistake(text, predict, whole=False)
+    rates = _ANGULAR[:1] if right.at.speed is None else _ANGULAR
     for bar in (2, 3):
+        turning = {
+            f"{rate}_{other}": right[f"{rate}_{other}"] - right[f"{rate}_{bar}"]
+            for rate, other in product(rates, MOVING_BARS)
+            if other != bar
+        }
         text = f"relative to bar {bar} instead of the ground"
-        yield Mistake(text, partial(_subtract_angle_of, right, bar), whole=False)
+        yield Mistake(text, turning.get, whole=False)
 
 
 def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     """List every other problem that may have been solved, the simplest first."""
     at = drop_remainder(command)
     stated = state_all(scene)
-    for variant in _list_other_commands(stated, at):
-        yield variant.mistake()
+    yield from _list_other_commands(stated, at)
     for text, other in list_wrong_scenes(stated):
-        mistake = Variant(text, other, at).mistake()
+        mistake = solve_other(text, other, at)
         yield mistake
         if text.startswith(("loads", "effects")):
-            yield from mistake.within(_WHERE)
+            for words, names in _WHERE.items():
+                yield mistake.within(names, words)
 
 
 def _change_column(
     right: Solution,
     change: Callable[[Array], Array],
-    applies: Callable[[str], bool],
+    kinds: str | tuple[str, ...],
     quantity: str,
 ) -> Array | None:
     values = getattr(right, quantity, None)
-    if values is None or not applies(quantity):
+    if values is None or not quantity.startswith(kinds):
         return None
     return change(values)
 
 
-def _subtract_angle_of(right: Solution, bar: int, quantity: str) -> Array | None:
-    """Take an angle, or its rate, from the line of another bar."""
-    values = getattr(right, quantity, None)
-    base = getattr(right, f"{quantity[:-1]}{bar}", None)
-    if values is None or base is None or quantity.endswith(str(bar)):
-        return None
-    return np.asarray(values - base) if _is_angular(quantity) else None
+def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
+    """List other angles, speeds and accelerations of the commanded bar."""
 
+    def change(text: str, **fields: Any) -> Mistake:
+        return solve_other(text, scene, at._replace(**fields))
 
-def _list_other_commands(scene: Scene, command: Command) -> Iterator[Variant]:
-    change = partial(_change_command, scene, command)
-    yield change(_OTHER_BRANCH, branch=-command.branch)
-    if command.speed is not None:
+    yield change(_OTHER_BRANCH, branch=-at.branch)
+    if at.speed is not None:
         yield change("no inertial forces (statics)", speed=0.0, acceleration=0.0)
-        slow = _NEARLY_AT_REST * command.speed
+        slow = _NEARLY_AT_REST * at.speed
         text = "no inertial forces (statics), with friction"
-        yield change(text, speed=slow, acceleration=0.0)._replace(names=FORCE_NAMES)
+        yield change(text, speed=slow, acceleration=0.0).within(FORCE_NAMES)
     if ground := scene.linkage.ground_angle:
         # a cylinder turns its bar with the ground
-        turned = ground if command.moves_stroke else 0.0
-        linkage = replace(scene.linkage, ground_angle=0.0)
-        level = replace(scene, linkage=linkage)
-        at = command._replace(angle=command.angle - turned)
-        yield Variant("ground_angle is left out", level, at)
-    if not command.moves_stroke:
-        yield from _list_other_angles(change, command)
-    if len(command.angle) <= ENOUGH_POSITIONS:
+        turned = ground if at.moves_stroke else 0.0
+        level = replace(scene, linkage=replace(scene.linkage, ground_angle=0.0))
+        level_at = at._replace(angle=at.angle - turned)
+        yield solve_other("ground_angle is left out", level, level_at)
+    if at.moves_stroke:
         return
-    for text, step in _BETWEEN.items():
-        motion = (command.angle, command.speed, command.acceleration)
-        angle, speed, acceleration = (_shift_by_half(rate, step) for rate in motion)
-        origin = command.origin
-        if isinstance(origin, StrokeOrigin):
-            origin = origin._replace(stroke=_shift_by_half(origin.stroke, step))
-        between = change(
-            text, angle=angle, speed=speed, acceleration=acceleration, origin=origin
-        )
-        yield between
-        yield between._replace(text=f"{text} (forces alone)", names=FORCE_NAMES)
-
-
-def _change_command(
-    scene: Scene, command: Command, text: str, **fields: Any
-) -> Variant:
-    """Return the problem of another command."""
-    return Variant(text, scene, command._replace(**fields))
-
-
-def _list_other_angles(
-    change: Callable[..., Variant], command: Command
-) -> Iterator[Variant]:
-    """List other angles, speeds and accelerations of the commanded bar."""
-    name = command.commanded
-    angle = command.angle
-    yield change(f"{name} read as degrees", angle=np.radians(angle))
+    name, omega, alpha = at.names
+    yield change(f"{name} read as degrees", angle=np.radians(at.angle))
     # a whole turn is 6.28 of these degrees
-    in_degrees = np.degrees(np.fmod(angle, TURN))
+    in_degrees = np.degrees(np.fmod(at.angle, TURN))
     text = f"{name} in radians where degrees were announced"
     yield change(text, angle=in_degrees)._replace(times=float(np.degrees(1.0)))
-    clockwise = f"{name} {_CLOCKWISE}"
-    for text, mirror in ((clockwise, 1.0), (f"{clockwise}, and y reversed", -1.0)):
-        yield change(text, angle=-angle)._replace(mirror=mirror)
-    if command.speed is None:
+    clockwise = change(f"{name} {_CLOCKWISE}", angle=-at.angle)
+    yield clockwise.mirrored(1.0)
+    text = f"{clockwise.text}, and y reversed"
+    yield clockwise.mirrored(-1.0)._replace(text=text)
+    if at.speed is None:
         return
-    _, omega, alpha = command.names
     for words, factor in _OF_SPEEDS.items():
-        yield change(f"{omega} {words.format('s')}", speed=command.speed * factor)
-    if np.any(command.acceleration):
+        yield change(f"{omega} {words.format('s')}", speed=at.speed * factor)
+    if np.any(at.acceleration):
         for words, factor in _OF_ACCELERATIONS.items():
-            other = command.acceleration * factor
+            other = at.acceleration * factor
             yield change(f"{alpha} {words.format('s^2')}", acceleration=other)
 
 
-def _shift_by_half(values: Any, step: int) -> Any:
-    """Return numbers half a step before (step 1) or after (-1) each position.
-
-    One number of all positions stays.
-    """
-    if np.ndim(values) == 0:
-        return values
-    ends = 2.0 * values[:1] - values[1:2], 2.0 * values[-1:] - values[-2:-1]
-    extended = np.concatenate((ends[0], values, ends[1]))
-    return np.asarray(0.5 * (values + extended[1 - step : len(extended) - 1 - step]))
-
-
-def _is_angular(quantity: str) -> bool:
-    return quantity.startswith(("theta", "omega", "alpha"))
-
-
-def _is_angle(quantity: str) -> bool:
-    return quantity.startswith("theta")
-
-
+_ANGULAR = ("theta", "omega", "alpha")
 _COLUMN_MISTAKES: tuple[
-    tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...
+    tuple[str, Callable[[Array], Array], str | tuple[str, ...]], ...
 ] = (
-    (REVERSED, np.negative, lambda quantity: True),
-    ("the sign is lost: sizes alone", np.abs, lambda quantity: quantity not in VECTORS),
-    ("degrees where radians were announced", np.degrees, _is_angular),
+    (REVERSED, np.negative, ""),
+    ("the sign is lost: sizes alone", np.abs, ""),
+    ("degrees where radians were announced", np.degrees, _ANGULAR),
     (
         "degrees from -180 to 180 where radians were announced",
         lambda values: np.degrees(np.remainder(values + np.pi, TURN) - np.pi),
-        _is_angle,
+        "theta",
     ),
     (
         "degrees from 0 to 360 where radians were announced",
         lambda values: np.degrees(np.remainder(values, TURN)),
-        _is_angle,
+        "theta",
     ),
     (
         (
@@ -217,11 +165,11 @@ _COLUMN_MISTAKES: tuple[
             " theta_3 from B, theta_2 from A"
         ),
         lambda values: values + np.pi,
-        lambda quantity: quantity.startswith("theta"),
+        "theta",
     ),
 )
-"""Mistakes in a column: name, change of the values, and quantities. The quantities are
-those whose columns can have it.
+"""Mistakes in a column: name, change of the values, and beginnings of the names of
+quantities whose columns can have it.
 """
 
 

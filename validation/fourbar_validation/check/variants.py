@@ -5,9 +5,9 @@ solve as they solve the right one.
 """
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,54 +52,47 @@ class Mistake(NamedTuple):
         """Return True if a number of it was fitted to the table."""
         return self.times > 1.0
 
-    def within(self, parts: Mapping[str, Collection[str]]) -> Iterator["Mistake"]:
-        """List the mistake in some quantities alone, by what is added to its text."""
-        for words, names in parts.items():
-            predict = partial(_predict_some, self.predict, names)
-            yield self._replace(text=f"{self.text}{words}", predict=predict)
+    def within(self, names: Collection[str], words: str = "") -> "Mistake":
+        """Return the mistake in some quantities alone, with words at its end."""
+
+        def predict(quantity: str) -> Array | None:
+            return self.predict(quantity) if quantity in names else None
+
+        return self._replace(text=f"{self.text}{words}", predict=predict)
+
+    def mirrored(self, y: float) -> "Mistake":
+        """Return it with angles, rates and torques reversed, and y times a factor."""
+
+        def predict(quantity: str) -> Array | None:
+            values = self.predict(quantity)
+            if values is None:
+                return None
+            if quantity in VECTORS:
+                return np.asarray(values * (1.0, y))
+            return -values if UNITS[quantity] in _TURNING else values
+
+        return self._replace(predict=predict)
 
 
-def _predict_some(
-    predict: Predict, names: Collection[str], quantity: str
-) -> Array | None:
-    return predict(quantity) if quantity in names else None
+def solve_other(text: str, scene: Scene, at: Command, times: float = 1.0) -> Mistake:
+    """Return the mistake of another problem than the one that was set.
 
-
-class Variant(NamedTuple):
-    """Problem that somebody solved in place of the one that was set."""
-
-    text: str
-    """Mistake that leads to it."""
-    scene: Scene
-    at: Command
-    names: Collection[str] = _COMPUTED
-    """Quantities that were taken from it."""
-    times: float = 1.0
-    """Factor on what is allowed, where the rounding of an angle is magnified."""
-    mirror: float = 0.0
-    """Factor on y where angles, their rates and torques are reversed; 0: they are not.
+    It is solved when its numbers are asked for; without such a scene it has none.
     """
 
-    def mistake(self) -> Mistake:
-        """Return the mistake; the problem is solved when its numbers are asked for."""
-        solved = cache(partial(_solve, self.scene, self.at))
-        predict = partial(self._predict, solved)
-        return Mistake(self.text, predict, times=self.times)
+    @cache
+    def solved() -> Solution | None:
+        try:
+            return solve(scene, at=at)
+        except FourBarError:
+            return None
 
-    def _predict(
-        self, solved: Callable[[], Solution | None], quantity: str
-    ) -> Array | None:
-        if quantity == self.at.commanded or quantity not in self.names:
+    def predict(quantity: str) -> Array | None:
+        if quantity == at.commanded or quantity not in _COMPUTED:
             return None
-        values = getattr(solved(), quantity, None)
-        if values is None:
-            return None
-        factor: Any = 1.0
-        if self.mirror and quantity in VECTORS:
-            factor = 1.0, self.mirror
-        elif self.mirror and UNITS[quantity] in _TURNING:
-            factor = -1.0
-        return np.asarray(values * factor)
+        return getattr(solved(), quantity, None)
+
+    return Mistake(text, predict, times=times)
 
 
 def drop_remainder(command: Command) -> Command:
@@ -107,14 +100,6 @@ def drop_remainder(command: Command) -> Command:
     if isinstance(command.origin, StrokeOrigin):
         return command._replace(origin=command.origin._replace(lost=None))
     return command.as_doubles()
-
-
-def _solve(scene: Scene, at: Command) -> Solution | None:
-    """Solve a problem; None where there is no such scene."""
-    try:
-        return solve(scene, at=at)
-    except FourBarError:
-        return None
 
 
 class OpenTable(Table):
@@ -137,7 +122,7 @@ def open_tables(scene: Scene) -> Scene:
 
 
 def state_all(scene: Scene) -> Scene:
-    """State every number that a mistake may change: bars in full, and gravity."""
+    """State every number that a mistake may change: bars in full, places, gravity."""
     bars = {
         name: replace(
             bar,
@@ -148,6 +133,8 @@ def state_all(scene: Scene) -> Scene:
         )
         for name, bar in list_moving(scene)
     }
+    named = {point.name: point.place for point in scene.points}
+    scene = scene.with_places(lambda place: named.get(place.point or "", place))
     if not any(isinstance(effect, Gravity) for effect in scene.effects):
         scene = replace(scene, effects=(*scene.effects, Gravity(0.0)))
     return replace_bars(scene, **bars)

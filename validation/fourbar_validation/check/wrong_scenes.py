@@ -7,6 +7,7 @@ act elsewhere; a bar may have what belongs to another.
 import cmath
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from fnmatch import filter as choose_names
 from itertools import combinations, permutations
@@ -28,6 +29,7 @@ from fourbar.linkage import BAR_NUMBERS, MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.studies.keys import list_entries, read_number, replace_numbers
 from fourbar_validation.compare.pins import resolve
+from fourbar_validation.engines.free_body_closure import cross_products
 from fourbar_validation.scenes.bars import list_moving
 
 _PLACE_UNITS = ("m", "rad")
@@ -103,10 +105,14 @@ def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     if scene.loads and any(name.startswith("effects") for name in groups):
         bare = replace(scene, loads=(), effects=())
         yield "loads and effects left out: inertia alone", bare
-    for text, numbers in _list_wrong_numbers(scene):
+    for text, numbers in (*_list_wrong_numbers(scene), *_list_wrong_bars(scene)):
         yield text, replace_numbers(scene, numbers)
-    yield from _list_wrong_loads(scene)
-    yield from _list_other_effects(scene)
+    for text, loads in (*_list_wrong_loads(scene), *_list_wrong_weights(scene)):
+        yield text, replace(scene, loads=loads)
+    for number, effect in enumerate(scene.effects):
+        for text, other_effect in _list_other_laws(scene, effect):
+            effects = (*scene.effects[:number], other_effect)
+            yield text, replace(scene, effects=effects + scene.effects[number + 1 :])
     for bar in MOVING_BARS:
         if scene.drive is None and bar != scene.drive_bar:
             text = f"the torque acts on bar {bar} instead of bar {scene.drive_bar}"
@@ -114,12 +120,15 @@ def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 
 def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
-    """List other numbers of bars and of gravity."""
-    (gravity,) = (one for one in scene.effects if isinstance(one, Gravity))
-    moving = list_moving(scene)
+    """List other numbers of inertia, of gravity and of springs.
+
+    Torsion springs are within half a turn of their rest, so that a turn more is a
+    preload.
+    """
+    gravity = _find_gravity(scene)
     for text, (by_mass, by_inertia) in _INERTIAL.items():
         numbers = {"effects.gravity.0": gravity.magnitude / by_mass}
-        for name, bar in moving:
+        for name, bar in list_moving(scene):
             numbers[f"bars.{name}.mass"] = by_mass * bar.mass
             numbers[f"bars.{name}.inertia"] = by_inertia * bar.moment_of_inertia
         yield text, numbers
@@ -129,14 +138,32 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
     with_ground = gravity.angle + scene.linkage.ground_angle
     yield "gravity is taken along -y", {"effects.gravity.1": -math.pi / 2.0}
     yield "gravity is turned with the ground", {"effects.gravity.1": with_ground}
+    for words, turned in (("larger", TURN), ("smaller", -TURN)):
+        wound = {
+            f"effects.torsion.{pin}": preload - turned * k
+            for effect in scene.effects
+            if isinstance(effect, Torsion)
+            for pin, k, _, preload in effect.springs
+        }
+        preloads = {f"{spring}.preload": value for spring, value in wound.items()}
+        for spring, value in wound.items():
+            yield f"{spring}.rest a turn {words}", {f"{spring}.preload": value}
+        if len(wound) > 1:
+            yield f"effects.torsion.*.rest a turn {words}", preloads
+
+
+def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
+    """List other masses, centres and inertias of each bar, and of all of them."""
+    moving = list_moving(scene)
     every: dict[str, Numbers] = {}
     for name, bar in moving:
         r, phi = bar.mass_centre
         x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
         steiner = bar.mass * r * r
-        about_pin = bar.moment_of_inertia + steiner
         wrong = {
-            "inertia about the pin used as the inertia about G": {"inertia": about_pin},
+            "inertia about the pin used as the inertia about G": {
+                "inertia": bar.moment_of_inertia + steiner
+            },
             "inertia about G used as the inertia about the pin": {
                 "inertia": bar.moment_of_inertia - steiner
             },
@@ -152,53 +179,60 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
         for text, numbers in wrong.items():
             keyed = {f"bars.{name}.{key}": value for key, value in numbers.items()}
             yield f"bars.{name}: {text}", keyed
-            every.setdefault(text, {}).update(keyed)
-    for text, numbers in every.items():
-        yield f"bars.*: {text}", numbers
-    for (name, _), (other, second) in permutations(moving, 2):
-        yield f"bars.{name}: mass of the {other}", {f"bars.{name}.mass": second.mass}
-    for (name, bar), (other, second) in combinations(moving, 2):
-        text = f"bars.{name} and bars.{other}: mass and inertia are exchanged"
-        yield (
-            text,
-            {
-                f"bars.{name}.mass": second.mass,
+            every.setdefault(f"bars.*: {text}", {}).update(keyed)
+    yield from every.items()
+    for (name, bar), (other, second) in permutations(moving, 2):
+        masses = {f"bars.{name}.mass": second.mass}
+        yield f"bars.{name}: mass of the {other}", masses
+        if BAR_NUMBERS[name] < BAR_NUMBERS[other]:
+            text = f"bars.{name} and bars.{other}: mass and inertia are exchanged"
+            exchanged = {
                 f"bars.{other}.mass": bar.mass,
                 f"bars.{name}.inertia": second.moment_of_inertia,
                 f"bars.{other}.inertia": bar.moment_of_inertia,
-            },
-        )
+            }
+            yield text, masses | exchanged
 
 
-def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Let each load, and every load, act elsewhere or in another direction."""
-    every: dict[str, list[Load]] = {}
-    for number, load in enumerate(scene.loads):
-        for text, changes in _list_changes(scene, load).items():
-            try:
-                other = replace(load, **changes)
-            except InputError:
-                continue
-            loads = list(scene.loads)
-            loads[number] = other
-            yield (
-                f"loads.{number} (bar {load.bar}): {text}",
-                replace(scene, loads=tuple(loads)),
-            )
-            every.setdefault(text, list(scene.loads))[number] = other
-    if len(scene.loads) > 1:
-        for text, loads in every.items():
-            yield f"loads.*: {text}", replace(scene, loads=tuple(loads))
-    pushing = [
-        (i, load) for i, load in enumerate(scene.loads) if load.force is not None
-    ]
-    for (i, one), (j, other) in combinations(pushing, 2):
-        exchanged = list(scene.loads)
-        exchanged[i], exchanged[j] = _put_at(one, other), _put_at(other, one)
-        text = f"the places of loads.{i} and loads.{j} are exchanged"
-        yield text, replace(scene, loads=tuple(exchanged))
+def _find_gravity(scene: Scene) -> Gravity:
     (gravity,) = (one for one in scene.effects if isinstance(one, Gravity))
-    moved: dict[str, list[Load]] = {}
+    return gravity
+
+
+def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, tuple[Load, ...]]]:
+    """Let each load, and every load, act elsewhere or in another direction."""
+    changed: dict[str, dict[int, dict[str, Any]]] = {}
+    for number, load in enumerate(scene.loads):
+        for text, fields in _list_changes(scene, load).items():
+            with suppress(InputError):
+                replace(load, **fields)
+                one = f"loads.{number} (bar {load.bar}): {text}"
+                changed[one] = {number: fields}
+                changed.setdefault(f"loads.*: {text}", {})[number] = fields
+    pushing = [number for number, load in enumerate(scene.loads) if load.force]
+    for numbers in combinations(pushing, 2):
+        first, second = (
+            {key: getattr(scene.loads[number], key) for key in PLACES_OF_LOADS}
+            for number in numbers
+        )
+        text = "the places of loads.{} and loads.{} are exchanged".format(*numbers)
+        changed[text] = dict(zip(numbers, (second, first), strict=True))
+    for text, others in changed.items():
+        if len(others) > 1 or not text.startswith("loads.*"):
+            with suppress(InputError):  # no load can be so
+                yield (
+                    text,
+                    tuple(
+                        replace(load, **others.get(number, {}))
+                        for number, load in enumerate(scene.loads)
+                    ),
+                )
+
+
+def _list_wrong_weights(scene: Scene) -> Iterator[tuple[str, tuple[Load, ...]]]:
+    """Let each weight, and every weight, act elsewhere; loads carry it there."""
+    gravity = _find_gravity(scene)
+    moved: dict[str, tuple[Load, ...]] = {}
     for name, bar in list_moving(scene):
         pull = gravity.magnitude * bar.mass
         weight, lift = (
@@ -206,20 +240,13 @@ def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
         )
         places = {"its first pin": (0.0, 0.0), "mid-bar": (0.5 * bar.length, 0.0)}
         text = f"the weight of bar {lift.bar}"
-        yield f"{text} is missing", replace(scene, loads=(*scene.loads, lift))
+        yield f"{text} is missing", (*scene.loads, lift)
         for where, place in places.items():
-            elsewhere = [lift, replace(weight, from_centre=None, from_pin=place)]
-            added = replace(scene, loads=(*scene.loads, *elsewhere))
-            yield f"{text} acts at {where}", added
-            moved.setdefault(where, []).extend(elsewhere)
-    for where, elsewhere in moved.items():
-        added = replace(scene, loads=(*scene.loads, *elsewhere))
-        yield f"every weight acts at {where}", added
-
-
-def _put_at(load: Load, other: Load) -> Load:
-    """Return a load at the place of another one, each on its own bar."""
-    return replace(load, **{key: getattr(other, key) for key in PLACES_OF_LOADS})
+            elsewhere = lift, replace(weight, from_centre=None, from_pin=place)
+            yield f"{text} acts at {where}", (*scene.loads, *elsewhere)
+            others = moved.get(f"every weight acts at {where}", scene.loads)
+            moved[f"every weight acts at {where}"] = (*others, *elsewhere)
+    yield from moved.items()
 
 
 def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
@@ -229,7 +256,6 @@ def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
         changes["its table is left out"] = {"table": None}
     if load.force is None:
         return changes
-    nowhere = dict.fromkeys(PLACES_OF_LOADS)
     length = scene.linkage.bar(load.bar).length
     places: dict[str, dict[str, Any]] = {
         "its force acts at G of the bar": {"from_centre": (0.0, 0.0)},
@@ -246,55 +272,32 @@ def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
         from_second = complex(*resolve(*load.from_pin)) + length
         text = "its place is measured from the bar's second pin, not from its first"
         places[text] = {"from_pin": cmath.polar(from_second)}
+    if load.arm is not None:
+        moment = cross_products(
+            complex(*resolve(*load.arm)), complex(*resolve(*load.force))
+        )
+        text = "its arm is measured from the bar's first pin, not from G"
+        places[text] = {"from_pin": (0.0, 0.0), "moment": load.moment + moment}
     for text, place in places.items():
         if None not in place.values():
-            changes[text] = {**nowhere, **place}
+            changes[text] = {**dict.fromkeys(PLACES_OF_LOADS), **place}
     if load.frame == "bar":
         changes["its direction is kept"] = {"frame": "world"}
     else:
         changes["its direction turns with the bar"] = {"frame": "bar"}
-    if load.arm is not None:
-        size, direction = load.force
-        arm_x, arm_y = resolve(*load.arm)
-        x, y = resolve(size, direction)
-        text = "its arm is measured from the bar's first pin, not from G"
-        moment = load.moment + arm_x * y - arm_y * x
-        changes[text] = {**nowhere, "from_pin": (0.0, 0.0), "moment": moment}
     return changes
 
 
-def _list_other_effects(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """List scenes with a flywheel on another bar, or other laws of friction or springs.
-
-    Torsion springs are within half a turn of their rest, so that a turn more is a
-    preload.
-    """
-    for number, effect in enumerate(scene.effects):
-        others: dict[str, Any] = {}
-        if isinstance(effect, Flywheel):
-            bar = {2: 4, 4: 2}[effect.bar]
-            others[f"the flywheel is on bar {bar}"] = replace(effect, bar=bar)
-        if isinstance(effect, Springs):
-            both = tuple(replace(spring, acts=None) for spring in effect.springs)
-            others["the springs act both ways"] = Springs(both)
-        for law, (kind, taken) in _LAWS.items():
-            if isinstance(effect, kind) and not any(
-                isinstance(one, taken) for one in scene.effects
-            ):
-                others[law] = taken(effect.rows)
-        if isinstance(effect, Torsion):
-            every = {"*": effect.springs} if len(effect.springs) > 1 else {}
-            each = {spring[0]: (spring,) for spring in effect.springs}
-            for where, springs in {**every, **each}.items():
-                for words, turned in (("larger", TURN), ("smaller", -TURN)):
-                    moved = {
-                        pin: (pin, k, rest, preload - turned * k)
-                        for pin, k, rest, preload in springs
-                    }
-                    rows = tuple(moved.get(row[0], row) for row in effect.springs)
-                    text = f"effects.torsion.{where}.rest a turn {words}"
-                    others[text] = Torsion(rows)
-        for text, other in others.items():
-            effects = list(scene.effects)
-            effects[number] = other
-            yield text, replace(scene, effects=tuple(effects))
+def _list_other_laws(scene: Scene, effect: Any) -> Iterator[tuple[str, Any]]:
+    """List other laws of friction or springs, or the flywheel on another bar."""
+    if isinstance(effect, Flywheel):
+        bar = {2: 4, 4: 2}[effect.bar]
+        yield f"the flywheel is on bar {bar}", replace(effect, bar=bar)
+    if isinstance(effect, Springs):
+        both = tuple(replace(spring, acts=None) for spring in effect.springs)
+        yield "the springs act both ways", Springs(both)
+    for law, (kind, taken) in _LAWS.items():
+        if isinstance(effect, kind) and not any(
+            isinstance(one, taken) for one in scene.effects
+        ):
+            yield law, taken(effect.rows)
