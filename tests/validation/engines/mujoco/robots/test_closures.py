@@ -242,6 +242,11 @@ def test_a_ball_joint_and_a_floating_body_are_named():
     served = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
     said = f"is a ball joint: the loop is spatial ({served})"
     assert closure_of(spatial).reason == f"A {said}"
+    crossing = 'name="A" axis="0 0 1"/><joint name="across" axis="1 0 0"'
+    hinges = Planar().text().replace('name="A" axis="0 0 1"', crossing)
+    assert "unless hinges in one place are a ball" in closure_of(hinges).reason
+    lengths = loop_of(hinges, held=("across",)).lengths
+    assert lengths == approx(Planar().lengths())
     two = ball.replace('name="O4" axis="0 0 1"', 'name="O4" type="ball"')
     assert closure_of(two).reason.endswith(said)
     loose = (

@@ -386,10 +386,15 @@ class _Finder:
         for joint, kind in chain.others.items():
             yield f"{name_joint(self.model, joint)} {self._explain_joint(chain, kind)}"
         if angle is not None and is_skew:
-            yield (
-                f"the axes of {names} are {math.degrees(angle):.3g} deg apart: "
-                f"the loop is spatial ({_SERVE_SPATIAL})"
-            )
+            spatial = f"the loop is spatial ({_SERVE_SPATIAL})"
+            places = self.data.xanchor[chain.hinges].round(6)
+            if len(np.unique(places, axis=0)) < len(places):
+                spatial += (
+                    ", unless hinges in one place are a ball, and all else is parallel:"
+                    " --hold those of the ball that turn across"
+                )
+            degrees = math.degrees(angle)
+            yield f"the axes of {names} are {degrees:.3g} deg apart: {spatial}"
         if not is_four:
             yield self._explain_count(chain)
         if None in chain.bars:
