@@ -30,9 +30,7 @@ from fourbar_validation.engines.description import (
     find_unknown,
     inertia_about_first_pin,
     list_moving_parts,
-    rotate_by,
 )
-from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -174,7 +172,7 @@ class _DrakeTree(Tree):
         torques: list[float] = self.balancing.tolist()
         return torques
 
-    def joint_forces(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, complex]:
         """Return the force at each bar's first pin from Drake's reaction port, N.
 
         Drake finds the accelerations once more for it, from the applied wrenches and
@@ -193,9 +191,8 @@ class _DrakeTree(Tree):
         )
         borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
         return {
-            b: rotate_by(
-                self.rotation(b).tolist(),
-                *borne[int(joint.index())].translational()[:2].tolist(),
+            b: self.rotate(
+                b, complex(*borne[int(joint.index())].translational()[:2].tolist())
             )
             for b, joint in self.joint.items()
         }

@@ -43,7 +43,6 @@ from fourbar_validation.engines.description import (
     ON_BARS,
     find_unknown,
     list_moving_parts,
-    place,
     reduce_angle,
 )
 from fourbar_validation.engines.linear import solve_refined
@@ -107,10 +106,7 @@ class ExudynBars(Loaded):
             markers = [bodies.direction(bar) for bar in (1, scene.drive_bar)]
             self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
         else:
-            markers = [
-                bodies.point(end.bar, *place(end, scene.linkage.ground_angle))
-                for _, end in scene.drive.ends
-            ]
+            markers = [bodies.end(end) for _, end in scene.drive.ends]
             if isinstance(scene.drive, PointDrive):
                 away = abs(scene.drive.place.distance)
                 self.reach = sum(scene.linkage.lengths) + away
@@ -283,8 +279,9 @@ class ExudynBars(Loaded):
     def _move_behind(self) -> None:
         """Move the end on the ground behind the point that a force drives."""
         [(_, _, point)], along = self.line()
-        x, y = (np.array(point) - self.reach * along).tolist()
-        self.mbs.SetMarkerParameter(self.behind, "localPosition", [x, y, 0.0])
+        behind = point - self.reach * along
+        position = [behind.real, behind.imag, 0.0]
+        self.mbs.SetMarkerParameter(self.behind, "localPosition", position)
 
     def _sum_applied(self) -> Array:
         """Sum what acts, less what the speeds ask for, (9,)."""

@@ -66,6 +66,11 @@ class ExudynBodies:
             MarkerBodyPosition(bodyNumber=self.body[bar], localPosition=[x, y, 0.0])
         )
 
+    def end(self, place_of_end: Any) -> Any:
+        """Mark an end of a spring or a place of the drive."""
+        at = place(place_of_end, self.ground_angle)
+        return self.point(place_of_end.bar, at.real, at.imag)
+
     def direction(self, bar: int) -> Any:
         """Mark the direction of a bar as a coordinate; of the ground a zero."""
         return self.mbs.AddMarker(
@@ -125,10 +130,7 @@ def _add_springs(effect: Any, bodies: ExudynBodies) -> None:
         ends = (spring.start, spring.end)
         bodies.mbs.AddObject(
             ObjectConnectorSpringDamper(
-                markerNumbers=[
-                    bodies.point(point.bar, *place(point, bodies.ground_angle))
-                    for point in ends
-                ],
+                markerNumbers=[bodies.end(point) for point in ends],
                 referenceLength=spring.length,
                 stiffness=spring.stiffness,
                 force=spring.preload,

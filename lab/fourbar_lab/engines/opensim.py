@@ -288,7 +288,8 @@ class _OpenSimBars(Loaded):
         ):
             if place.bar != 1:
                 rate += sense * self._compute_station_jacobian(name)
-        return self.line()[1] @ rate
+        _, along = self.line()
+        return np.array([along.real, along.imag]) @ rate
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
         """Set the commanded speed; return the coordinates' speeds and accelerations.
@@ -335,7 +336,7 @@ class _OpenSimBars(Loaded):
         until its multipliers hold nothing but rounding.
         """
         self.act()
-        pin_a = self.point("end2")
+        pin_a = self.locate("end2")
         drive = 0.0
         closing = np.zeros(2)
         before = (math.inf, math.inf)
@@ -354,8 +355,8 @@ class _OpenSimBars(Loaded):
             drive = drive + couple / leverage
             closing = closing + force
             self.work(couple / leverage)
-            self.push(2, force, pin_a)
-            self.push(3, -force, pin_a)
+            self.push(2, complex(*force), pin_a)
+            self.push(3, -complex(*force), pin_a)
             size = abs(couple), math.hypot(*force)
             # torque, then force, come first
             falls = size[0] < before[0] or size[1] < before[1]

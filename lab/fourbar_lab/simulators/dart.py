@@ -17,9 +17,10 @@ from fourbar_lab.simulators.protocol_engines import (
     bar_directions,
     gravity_field,
     read_flywheel,
+    rotate,
     start,
 )
-from fourbar_validation.engines.description import list_moving_parts, rotate
+from fourbar_validation.engines.description import list_moving_parts
 
 
 class Dart(Simulator):

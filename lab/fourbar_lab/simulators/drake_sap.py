@@ -23,9 +23,10 @@ from fourbar_lab.simulators.protocol_engines import (
     bar_directions,
     gravity_field,
     read_flywheel,
+    rotate,
     start,
 )
-from fourbar_validation.engines.description import PIN_OF_MOVING_BAR, rotate
+from fourbar_validation.engines.description import PIN_OF_MOVING_BAR
 
 
 class DrakeSap(Simulator):

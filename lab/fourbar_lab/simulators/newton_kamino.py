@@ -23,10 +23,10 @@ from fourbar_lab.simulators.protocol_engines import (
     Readings,
     Simulator,
     read_flywheel,
+    rotate,
     start,
     write_temp,
 )
-from fourbar_validation.engines.description import rotate
 
 TOLERANCE_OPTIONS = ("primal_tolerance", "dual_tolerance", "compl_tolerance")
 _PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}

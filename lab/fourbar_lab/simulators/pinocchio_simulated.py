@@ -253,5 +253,5 @@ def _read_joint_forces(
     _set_flywheel(tree, inertia)
     torque = float(-inertia * a[0])
     x, y = loop_force.tolist()
-    forces = {"F43": loop_force, **tree.forces((x, y), torque)}
+    forces = {"F43": loop_force, **tree.forces(complex(x, y), torque)}
     return Instant(bar_directions(q), v[0], a[0], torque, forces)

@@ -3,6 +3,7 @@
 A command is run through in time, or each of its positions is set as a state.
 """
 
+import cmath
 import copy
 import math
 import tempfile
@@ -380,6 +381,12 @@ def write_temp(text: str, name: str) -> Iterator[str]:
         file = Path(folder) / name
         file.write_text(text, encoding="utf-8")
         yield str(file)
+
+
+def rotate(angle: float, x: float, y: float) -> tuple[float, float]:
+    """Rotate (x, y) along and across a line at an angle (rad) into world axes."""
+    turned = complex(x, y) * cmath.rect(1.0, angle)
+    return turned.real, turned.imag
 
 
 def bar_directions(q: Any) -> tuple[Any, Any, Any]:

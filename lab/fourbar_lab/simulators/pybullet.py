@@ -17,10 +17,11 @@ from fourbar_lab.simulators.protocol_engines import (
     Simulator,
     bar_directions,
     gravity_field,
+    rotate,
     start,
     write_temp,
 )
-from fourbar_validation.engines.description import list_moving_parts, rotate
+from fourbar_validation.engines.description import list_moving_parts
 
 _STRONG = 1e9
 """N and N m that constraint and motor may exert: no limit."""

@@ -4,6 +4,7 @@ Each kind is one row of a table. No engine is named here, and nothing of the for
 `act` is used, so that this is a second derivation.
 """
 
+import cmath
 import math
 from collections.abc import Callable, Container
 from functools import partial
@@ -13,7 +14,6 @@ import numpy as np
 
 from fourbar.linkage import PINS
 from fourbar.scene import Scene
-from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import declares, find_field, look_up
 from fourbar_validation.engines.loaded import Act, Loaded
 
@@ -90,11 +90,10 @@ def _apply_torsion(effect: "Torsion", bars: Loaded) -> None:
 def _apply_springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
-        one = bars.end(spring.start)
-        second = bars.end(spring.end)
-        x = second[0] - one[0]
-        y = second[1] - one[1]
-        distance = math.hypot(x, y)
+        start = bars.end(spring.start)
+        end = bars.end(spring.end)
+        across = end - start
+        distance = abs(across)
         if spring.preload == spring.stiffness * spring.length:
             per_metre = spring.stiffness
         else:
@@ -102,10 +101,8 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
             if spring.acts is not None and (tension < 0.0) != (spring.acts == "push"):
                 continue
             per_metre = tension / distance if distance else math.nan
-        x = per_metre * x
-        y = per_metre * y
-        bars.push(spring.start.bar, (x, y), one)
-        bars.push(spring.end.bar, (-x, -y), second)
+        bars.push(spring.start.bar, per_metre * across, start)
+        bars.push(spring.end.bar, -per_metre * across, end)
 
 
 def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
@@ -125,17 +122,15 @@ def _carry_load(load: "Load", bars: Loaded) -> None:
     if load.table is not None:
         factor = float(look_up(load.table, bars.angle(2)))
     if load.force is not None:
-        force = resolve(*load.force)
+        force = cmath.rect(*load.force)
         if load.frame == "bar":
-            force = bars.rotate(load.bar, *force)
+            force = bars.rotate(load.bar, force)
         if load.arm is not None:
-            x, y = bars.locate(f"G{load.bar}")
-            to_x, to_y = resolve(*load.arm)
-            point = x + to_x, y + to_y
+            point = bars.locate(f"G{load.bar}") + cmath.rect(*load.arm)
         else:
             assert load.place is not None
             point = bars.end(load.place)
-        bars.push(load.bar, (factor * force[0], factor * force[1]), point)
+        bars.push(load.bar, factor * force, point)
     bars.couple(load.bar, factor * load.moment)
 
 

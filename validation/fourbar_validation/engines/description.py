@@ -5,8 +5,9 @@ bar's inertia and mass centre where they are left out; a field of gravity; a poi
 bar; the bars as a tree that is open at pin B.
 """
 
+import cmath
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -81,37 +82,6 @@ def reduce_angle(angle: float) -> float:
     if abs(angle) <= math.pi:
         return angle
     return math.atan2(math.sin(angle), math.cos(angle))
-
-
-def rotate(
-    angle: float,
-    x: float,
-    y: float,
-) -> tuple[float, float]:
-    """Rotate (x, y) along and across a line at an angle (rad) into world axes."""
-    cos = math.cos(angle)
-    sin = math.sin(angle)
-    return rotate_by(((cos, -sin), (sin, cos)), x, y)
-
-
-def rotate_by(
-    rotation: Sequence[Sequence[float]],
-    x: float,
-    y: float,
-) -> tuple[float, float]:
-    """Rotate a vector by a matrix of two rows."""
-    (a, b), (c, d) = rotation
-    return a * x + b * y, c * x + d * y
-
-
-def rotate_back_by(
-    rotation: Sequence[Sequence[float]],
-    x: float,
-    y: float,
-) -> tuple[float, float]:
-    """Rotate a vector by the transpose of a matrix of two rows."""
-    (a, b), (c, d) = rotation
-    return a * x + c * y, b * x + d * y
 
 
 def find_field(gravity: Gravity) -> tuple[float, float]:
@@ -193,15 +163,13 @@ def list_moving_parts(linkage: FourBar) -> list[MovingPart]:
     return parts_of_bars
 
 
-def place(point: Any, ground_angle: float) -> tuple[float, float]:
-    """Return (along, across) of a spring's end from the first pin of its bar, m.
+def place(point: Any, ground_angle: float) -> complex:
+    """Return the vector to a spring's end from the first pin of its bar, m.
 
-    On the ground the two are in world axes.
+    It is along and across the bar; on the ground it is in world axes.
     """
-    offset = resolve(point.distance, point.angle)
-    if point.bar == 1:
-        return rotate(ground_angle, *offset)
-    return offset
+    turned = ground_angle if point.bar == 1 else 0.0
+    return cmath.rect(point.distance, point.angle) * cmath.rect(1.0, turned)
 
 
 def list_speeds(command: Command) -> tuple[Array, Array]:

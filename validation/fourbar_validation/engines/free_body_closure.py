@@ -169,7 +169,7 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0j
     return (
         complex(*resolve(on_bar.distance, on_bar.angle)),
-        complex(*place(on_ground, theta_1)) - pivot,
+        place(on_ground, theta_1) - pivot,
     )
 
 

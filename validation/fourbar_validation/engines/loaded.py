@@ -3,8 +3,9 @@
 Loads and effects act on them as wrenches, from its own numbers.
 """
 
+import cmath
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -13,13 +14,10 @@ from fourbar.effects import PointDrive
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.description import (
     FORCE_AT,
     PART_POINTS,
     name_driving,
-    rotate,
-    rotate_by,
 )
 
 if TYPE_CHECKING:
@@ -45,7 +43,8 @@ torque.
 _DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
 Components = tuple[float, float]
-"""A vector of the plane: plain numbers. An array of two costs more than its arithmetic.
+"""A vector of the plane as plain numbers, as an engine's calls take it. Everywhere else
+vectors are complex numbers, x + i y.
 """
 Act = Callable[[], None]
 """Function that applies what acts on the bars at their present motion."""
@@ -162,65 +161,51 @@ class Loaded(Assembled, Protocol):
         """
         if bar == 1:
             return self.ground_angle
-        (cosine, _), (sine, _) = self.rotation(bar).tolist()
-        return math.atan2(sine, cosine)
+        return cmath.phase(self.rotate(bar, 1.0))
 
-    def rotate(
-        self,
-        bar: int,
-        x: float,
-        y: float,
-    ) -> Components:
-        """Rotate (x, y) along and across a bar's line into world axes."""
+    def rotate(self, bar: int, vector: complex) -> complex:
+        """Rotate a vector along and across a bar's line into world axes."""
         if bar == 1:
-            return rotate(self.ground_angle, x, y)
-        return rotate_by(self.rotation(bar).tolist(), x, y)
+            return vector * cmath.rect(1.0, self.ground_angle)
+        return vector * complex(*self.rotation(bar)[:, 0].tolist())
 
-    def locate(self, name: str) -> Components:
+    def locate(self, name: str) -> complex:
         """Locate a point that `description.parts` names, m."""
-        x, y = self.point(name).tolist()
-        return x, y
+        return complex(*self.point(name).tolist())
 
-    def first_pin(self, bar: int) -> Components:
+    def first_pin(self, bar: int) -> complex:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m."""
-        if bar == 1:
-            return (0.0, 0.0)
-        return self.locate(f"first_pin{bar}")
+        return 0j if bar == 1 else self.locate(f"first_pin{bar}")
 
-    def end(self, point: "Place") -> Components:
+    def end(self, point: "Place") -> complex:
         """Locate an end of a spring or a place of the drive, m."""
-        x, y = self.first_pin(point.bar)
-        in_bar = resolve(point.distance, point.angle)
-        along, across = self.rotate(point.bar, *in_bar)
-        return x + along, y + across
+        in_bar = cmath.rect(point.distance, point.angle)
+        return self.first_pin(point.bar) + self.rotate(point.bar, in_bar)
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
-        """Return the cylinder's ends on the bar and the ground as complex numbers, m.
+        """Return the vectors to the cylinder's ends on the bar and the ground, m.
 
         Both are from the bar's first pin, with all bars laid down along +x.
         """
         assert self.force_drive is not None
         self.place((0.0, 0.0, 0.0))
-        ends = [end for _, end in self.force_drive.ends]
-        on_bar, on_ground = sorted(ends, key=lambda end: -end.bar)
-        x_0, y_0 = self.first_pin(bar)
-        x, y = self.end(on_bar)
-        ground_x, ground_y = self.end(on_ground)
-        return complex(x - x_0, y - y_0), complex(ground_x - x_0, ground_y - y_0)
+        places = [place for _, place in self.force_drive.ends]
+        on_bar, on_ground = sorted(places, key=lambda place: -place.bar)
+        pivot = self.first_pin(bar)
+        return self.end(on_bar) - pivot, self.end(on_ground) - pivot
 
-    def line(self) -> tuple[list[tuple[float, int, Components]], Array]:
+    def line(self) -> tuple[list[tuple[float, int, complex]], complex]:
         """Place the drive: sense, bar and point of each end, m; and its direction."""
         drive = self.force_drive
         assert drive is not None
         ends = [(sense, place.bar, self.end(place)) for sense, place in drive.ends]
         if isinstance(drive, PointDrive):
-            along = resolve(1.0, drive.direction)
+            along = cmath.rect(1.0, drive.direction)
             if drive.frame == "bar":
-                along = self.rotate(drive.place.bar, *along)
-            return ends, np.array(along)
+                along = self.rotate(drive.place.bar, along)
+            return ends, along
         (_, _, start), (_, _, end) = ends
-        line = np.subtract(end, start)
-        return ends, line / math.hypot(*line)
+        return ends, (end - start) / abs(end - start)
 
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
@@ -235,24 +220,17 @@ class Loaded(Assembled, Protocol):
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
         self.field = field
 
-    def push(
-        self,
-        bar: int,
-        force: Iterable[float],
-        point: Iterable[float],
-    ) -> None:
-        """Add a force (N, world axes) at a point (m, world axes).
+    def push(self, bar: int, force: complex, point: complex) -> None:
+        """Add a force (N) at a point (m), both in world axes.
 
         Forces on the ground have no effect.
         """
         if bar != 1:
-            x, y = point
-            x_0, y_0 = self.first_pin(bar)
-            f_x, f_y = force
+            arm = point - self.first_pin(bar)
             wrench = self.wrenches[bar]
-            wrench[0] += f_x
-            wrench[1] += f_y
-            wrench[2] += (x - x_0) * f_y - (y - y_0) * f_x
+            wrench[0] += force.real
+            wrench[1] += force.imag
+            wrench[2] += (arm.conjugate() * force).imag
 
     def couple(self, bar: int, couple: float) -> None:
         """Add a couple, N m; on the ground it does nothing."""

@@ -22,10 +22,7 @@ from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     find_unknown,
     list_moving_parts,
-    rotate_back_by,
-    rotate_by,
 )
-from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import KeptTree, keep_tree, solve_closed
 
@@ -149,16 +146,16 @@ class PinocchioTree(KeptTree):
             return torques
         for bar, (x, y, moment) in wrenches.items():
             force, couple = self.external_force[bar]
-            axes = self.turned_to[bar].tolist()
-            force[0], force[1] = rotate_back_by(axes, x, y)
+            inside = complex(x, y) / self.rotate(bar, 1.0)
+            force[:2] = inside.real, inside.imag
             couple[2] = moment
         torques = pin.rnea(*motion, self.external).tolist()
         return torques
 
-    def joint_forces(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, complex]:
         """Read what each joint transmits, which the last pass left in its own axes."""
         return {
-            bar: rotate_by(self.turned_to[bar].tolist(), *force.tolist())
+            bar: self.rotate(bar, complex(*force.tolist()))
             for bar, force in self.joint_force.items()
         }
 

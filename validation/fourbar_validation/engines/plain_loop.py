@@ -67,7 +67,7 @@ class PlainLoop:
             tree.moving(v, a)
             x, y, torque[row] = solve_multipliers(jacobian, self.drive, tree.torques())
             forces["F43"][row] = x, y
-            for name, force in tree.forces((x, y), torque[row]).items():
+            for name, force in tree.forces(complex(x, y), torque[row]).items():
                 forces[name][row] = force
         return {"torque": torque, **forces}
 

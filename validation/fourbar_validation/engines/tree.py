@@ -107,7 +107,7 @@ class Tree(Loaded, Protocol):
         Gravity and what acts are taken off.
         """
 
-    def joint_forces(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, complex]:
         """Return the force on each moving bar at its first pin, N.
 
         Motion and wrenches are those last asked for.
@@ -116,9 +116,8 @@ class Tree(Loaded, Protocol):
     # methods that follow from these
     def gap(self) -> tuple[float, float]:
         """Return B on bar 3 minus B on bar 4."""
-        x, y = self.locate("end3")
-        x_4, y_4 = self.locate("end4")
-        return x - x_4, y - y_4
+        across = self.locate("end3") - self.locate("end4")
+        return across.real, across.imag
 
     def jacobian(self) -> Array:
         """Return the difference of the two points' Jacobians."""
@@ -161,7 +160,7 @@ class Tree(Loaded, Protocol):
         rate = sum(
             sense * self.end_jacobian(place) for sense, place in self.force_drive.ends
         )
-        return along @ rate
+        return np.array([along.real, along.imag]) @ rate
 
     def end_jacobian(self, point: "Place") -> Array:
         """Return the derivative of an end of the drive by the coordinates, (2, 3), m.
@@ -171,12 +170,12 @@ class Tree(Loaded, Protocol):
         """
         if point.bar == 1:
             return np.zeros((2, 3))
-        x, y = np.subtract(self.end(point), self.first_pin(point.bar)).tolist()
+        arm = self.end(point) - self.first_pin(point.bar)
         return self.point_jacobian(f"first_pin{point.bar}") + np.outer(
-            (-y, x), self.turns[point.bar]
+            (-arm.imag, arm.real), self.turns[point.bar]
         )
 
-    def forces(self, loop_force: Components, drive: float) -> dict[str, Components]:
+    def forces(self, loop_force: complex, drive: float) -> dict[str, Components]:
         """Return F12, F32, F14 at the motion and wrenches last set.
 
         The open tree carries what acts. The force of the loop on bar 3, its opposite on
@@ -187,8 +186,8 @@ class Tree(Loaded, Protocol):
         if self.force_drive is not None:
             ends, along = self.line()
             for sense, bar, _ in ends:
-                carry(on, bar, *(sense * drive * along).tolist())
-        return put_back(on, *loop_force)
+                carry(on, bar, sense * drive * along)
+        return put_back(on, loop_force)
 
     def move(self, bar: int, speed: float, acceleration: float) -> BarValues:
         """Return speeds, accelerations and forces by name; {} where they are 0/0."""
@@ -210,9 +209,8 @@ class Tree(Loaded, Protocol):
 
         def balanced() -> dict[str, Any]:
             x, y, drive = solve(self.torques())
-            loop_force = x, y
-            forces: BarValues = dict(self.forces(loop_force, drive))
-            forces["F43"] = loop_force
+            forces: BarValues = dict(self.forces(complex(x, y), drive))
+            forces["F43"] = x, y
             forces[self.driving] = drive
             return forces
 
@@ -270,25 +268,24 @@ def keep_tree(kind: type[KeptTree], scene: Scene) -> KeptTree:
     return _KEPT[kind]
 
 
-def carry(on: dict[int, Components], bar: int, x: float, y: float) -> None:
+def carry(on: dict[int, complex], bar: int, force: complex) -> None:
     """Let the pins of an open tree carry one more force on a bar, N.
 
     The ground takes none.
     """
     for bearer in BEARERS.get(bar, ()):
-        f_x, f_y = on[bearer]
-        on[bearer] = f_x - x, f_y - y
+        on[bearer] -= force
 
 
-def put_back(on: dict[int, Components], x: float, y: float) -> dict[str, Components]:
+def put_back(on: dict[int, complex], loop_force: complex) -> dict[str, Components]:
     """Return the pin forces F12, F32, F14, N, with the loop closed again.
 
-    `on` is what the pins of the open tree carry, (x, y) the force of bar 4 on bar 3.
+    `on` is what the pins of the open tree carry, `loop_force` that of bar 4 on bar 3.
     """
-    carry(on, 3, x, y)
-    carry(on, 4, -x, -y)
-    x, y = on[3]
-    return {"F12": on[2], "F32": (-x, -y), "F14": on[4]}
+    carry(on, 3, loop_force)
+    carry(on, 4, -loop_force)
+    forces = {"F12": on[2], "F32": -on[3], "F14": on[4]}
+    return {name: (force.real, force.imag) for name, force in forces.items()}
 
 
 _BAR_2 = np.array([1.0, 0.0, 0.0])

@@ -23,7 +23,6 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
 )
 from fourbar_validation.engines.limits import LIGHTEST
-from fourbar_validation.engines.loaded import Components
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import KeptTree, keep_tree
 
@@ -194,7 +193,7 @@ class MujocoTree(KeptTree):
         torques: list[float] = (self.data.qfrc_inverse - applied).tolist()
         return torques
 
-    def joint_forces(self) -> dict[int, Components]:
+    def joint_forces(self) -> dict[int, complex]:
         """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, _) in self.wrenches.items():
             # the couples about the mass centres, at which these forces act, ask nothing
@@ -203,11 +202,9 @@ class MujocoTree(KeptTree):
             applied[0] = x
             applied[1] = y
         mujoco.mj_rnePostConstraint(self.model, self.data)
-        forces = {}
-        for bar, force in self.joint_force.items():
-            x, y = force.tolist()
-            forces[bar] = x, y
-        return forces
+        return {
+            bar: complex(*force.tolist()) for bar, force in self.joint_force.items()
+        }
 
 
 MujocoInverse = partial(Exact, "mujoco-inverse", partial(keep_tree, MujocoTree))

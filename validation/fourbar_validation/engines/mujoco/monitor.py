@@ -245,9 +245,8 @@ class ResidualMonitor:
             mujoco.mj_fwdActuation(bars.model, d)
             d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
-        on = {bar: force.tolist() for bar, force in bars.joint_forces().items()}
-        x, y = loop_force.tolist()
-        pins = put_back(on, x, y)
+        on = {bar: complex(*force) for bar, force in bars.joint_forces().items()}
+        pins = put_back(on, complex(*loop_force))
         return {name: np.array(force) for name, force in pins.items()}
 
     def _close(
