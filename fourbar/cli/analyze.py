@@ -473,12 +473,7 @@ def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
             pressure,
             "needs a cylinder; the scene's [drive] has no from and to",
         )
-    if given.is_bare(pressure):
-        raise InputError(
-            "--pressure",
-            pressure,
-            f'the unit is missing; did you mean "{pressure} bar"?',
-        )
+    given.require_unit("--pressure", pressure, pressure, "bar")
     return given.read_number("--pressure", pressure, "Pa", POSITIVE)
 
 

@@ -262,15 +262,19 @@ def read_positions(scene: Scene, text: str) -> Command:
         is_column |= not scene.drive.may_be_commanded
     if is_column:
         return locate(scene, name, value)
-    if is_bare(value):  # it may have been meant in any unit
-        likely = "mm" if unit == "m" else "deg"
-        hint = f'the unit is missing; did you mean "{value} {likely}"?'
-        raise InputError("--at", text, hint)
+    require_unit("--at", text, value, "mm" if unit == "m" else "deg")
     stated = read_number("--at", value, unit)
     if unit == "rad" and name != motion.commanded:
         rounding = half_unit_of_text(value, unit)
         stated = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
     return find_positions(scene, name, stated)
+
+
+def require_unit(key: str, text: str, value: str, likely: str) -> None:
+    """Raise InputError for a number alone, which may have been meant in any unit."""
+    if is_bare(value):
+        hint = f'the unit is missing; did you mean "{value} {likely}"?'
+        raise InputError(key, text, hint)
 
 
 _ANGLE_OF_SCENE = re.compile(r"(.+):\s*(theta_[234])\s*(?:([+-])\s*(.+))?")
@@ -295,7 +299,9 @@ def take_motion(scene: Scene, text: str) -> Scene:
         allowed = "needs a scene whose motion commands an angle"
         raise InputError("--positions", text, allowed)
     file, name, sign, added = match.groups()
-    offset = 0.0 if added is None else read_number("--positions", added, "rad")
+    added = added or "0 deg"
+    require_unit("--positions", text, added, "deg")
+    offset = read_number("--positions", added, "rad")
     first = load(file)
     moved = solve(first, find_last_stage(first))
     angle = getattr(moved, name) + (-offset if sign == "-" else offset)
