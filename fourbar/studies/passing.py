@@ -65,6 +65,12 @@ def find_positions(scene: Scene, name: str, value: float) -> Command:
     if not places:
         # of the range that the scene's own motion is in
         places_of_range = default_places(scene, float(command(scene).angle[0]))
+        for end in (0, -1) if commanded in COMMANDED_ANGLES else ():
+            place = float(places_of_range[end])
+            for _, beyond, outwards in _find_nearest_limit(
+                scene.linkage, scene.motion.bar, place
+            ):
+                places_of_range[end] -= outwards * (beyond + INSIDE_LIMIT)
         whole = solve(scene, "position", at=command_at(scene, places_of_range))
         values = getattr(whole, name)
         low = _write_position(name, float(np.nanmin(values)), _GRID_DIGITS)
@@ -90,7 +96,7 @@ def say_range(scene: Scene) -> str:
     if motion.stroke is not None:
         return f"this cylinder can have {write_stroke_ranges(scene)}"
     ranges = [
-        f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg"
+        f"{math.degrees(low):.9g} to {math.degrees(high):.9g} deg"
         for low, high in find_intervals(scene.linkage, motion.bar)
     ]
     return f"theta_{motion.bar} goes from {' and from '.join(ranges)}"

@@ -510,7 +510,7 @@ must be less than the number itself, 2 in
 lengths = { ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }
 tolerances."lengths.input" = "3 in"
 ---
-positions requested; theta_2 goes from -133.433 to 133.433 deg
+positions requested; theta_2 goes from -133.432537 to 133.432537 deg
 # by cosines: (49 + 4 - 72.25)/28 is that of 133.4 deg
 lengths = { ground = "7 in", input = "2 in", coupler = "4 in", output = "4.5 in" }
 motion = { theta_2 = "180 deg", omega_2 = "60 rpm" }

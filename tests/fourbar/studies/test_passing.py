@@ -127,7 +127,10 @@ def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
         find_positions(scene, "theta_4", opposite)
     ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
     least, most = map(float, ends)
-    assert least <= theta_4.min() and theta_4.max() <= most
+    ends = limit_positions(linkage)[:2]
+    extent = sorted(-np.degrees(limit.theta_4) % 360.0 for limit in ends)
+    assert least < theta_4.min() and theta_4.max() < most
+    assert (least % 360.0, most % 360.0) == approx(extent, rel=2e-3)
 
 
 ROCKER_WITH_RAM = """\
