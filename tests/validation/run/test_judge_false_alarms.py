@@ -169,7 +169,7 @@ def draw_table(rng, ends):
     """Steps of 1 ms to 1 s throw the cubic far beyond the angles between them."""
     steps = 10.0 ** rng.uniform(-3.0, 0.0, 6)
     angles = rng.uniform(-1.0, 1.0, 7) * 10.0 ** rng.uniform(-3.0, 0.5)
-    angles[-1] = angles[0]
+    angles[-1] = angles[0] + 2.0 * np.pi * rng.integers(-1, 2)
     time = (0.0, *np.cumsum(steps).tolist())
     return Law(time=time, theta_2=tuple(angles.tolist()), ends=ends)
 

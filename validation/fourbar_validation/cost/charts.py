@@ -4,7 +4,7 @@ The settings are those that decide.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,7 +30,6 @@ from fourbar_validation.cost.work_precision import (
     FORMULAS_CURVE,
     MUJOCO_INVERSE,
     PINOCCHIO,
-    STEPPED_MOTION,
     CostPoint,
 )
 from fourbar_validation.report.svg import (
@@ -51,16 +50,10 @@ Style = Mapping[str, Any]
 """Options of matplotlib's `plot`."""
 
 
-class Look(NamedTuple):
-    """Curve of the study, and how it is drawn.
-
-    Colour, marker and dashes tell it apart in grey too.
-    """
-
-    curve: str
-    style: Style
-
-
+Looks = Mapping[str, tuple[str, Style]]
+"""Curve of the study by its label, and how it is drawn. Colour, marker and dashes tell
+it apart in grey too.
+"""
 _STYLES = (
     (_BLUE, "o", "solid"),
     (_ORANGE, "s", _DASHED),
@@ -70,15 +63,13 @@ _STYLES = (
 )
 
 
-def _dress(curves: Mapping[str, str]) -> dict[str, Look]:
+def _dress(curves: Mapping[str, str]) -> Looks:
     """Give curves, by their labels, colour, marker and dashes."""
     every = {"mec": PAPER, "mew": 0.5, "ms": 5.0, "lw": 1.7}
     looks = {}
-    for (label, curve), (colour, marker, dashes) in zip(
-        curves.items(), _STYLES, strict=False
-    ):
+    for label, (colour, marker, dashes) in zip(curves, _STYLES, strict=False):
         own = {"color": colour, "ls": dashes, "marker": marker}
-        looks[label] = Look(curve, own | every)
+        looks[label] = (curves[label], own | every)
     return looks
 
 
@@ -187,43 +178,25 @@ def set_axes(axes: Any) -> None:
         )
 
 
-class _WorkPrecision:
-    """Picture of the error of one quantity over the cost."""
-
-    def __init__(self, curves: Curves, quantity: str, title: str) -> None:
-        self.quantity = quantity
-        self.figure = make_figure(6.0, write_statement(curves, quantity), title)
-        self.axes = self.figure.add_axes((0.135, 0.085, 0.84, 0.675))
-
-    def draw(self, points: Sequence[CostPoint], **style: Any) -> list[complex]:
-        """Draw points, and return their places: ms of a simulated second, and error.
-
-        What lies below the picture is put at its edge.
-        """
-        x = [1e3 * point.seconds_per_second for point in points]
-        y = [max(point.error(self.quantity), _LOWEST) for point in points]
-        self.axes.plot(x, y, **style)
-        return [*map(complex, x, y)]
-
-    def mark(self, point: CostPoint, text: str, **style: Any) -> None:
-        """Mark a point, and write next to it where the name covers nothing."""
-        (at,) = self.draw([point], **{"ls": "none"} | style)
-        add_label(self.axes, text, at, 1.0, INK, TEXT)
-
-
-def draw_work_precision(
-    curves: Curves,
-    quantity: str,
-    title: str,
-) -> Any:
+def draw_work_precision(curves: Curves, quantity: str, title: str) -> Any:
     """Draw the error of torque or of the worst pin force over the cost.
 
-    Cost is the time of a simulated second.
+    Cost is the time of a simulated second. What lies below the picture is put at its
+    edge.
     """
-    picture = _WorkPrecision(curves, quantity, title)
-    axes = picture.axes
+    figure = make_figure(6.0, write_statement(curves, quantity), title)
+    axes = figure.add_axes((0.135, 0.085, 0.84, 0.675))
+
+    def draw(points: Sequence[CostPoint], name: str = "", **style: Any) -> None:
+        """Draw points; a name is written next to the last where it covers nothing."""
+        x = [1e3 * point.seconds_per_second for point in points]
+        y = [max(point.error(quantity), _LOWEST) for point in points]
+        axes.plot(x, y, **style)
+        if name:
+            add_label(axes, name, complex(x[-1], y[-1]), 1.0, INK, TEXT)
+
     front = find_pareto(list_stepped(curves), quantity)
-    picture.draw(
+    draw(
         front,
         lw=8.0,
         solid_capstyle="round",
@@ -232,32 +205,30 @@ def draw_work_precision(
         color=BAND,
         label="cheapest of everything stepped",
     )
-    for name, look in METHOD_LOOKS.items():
-        row = curves.get(look.curve, ())
+    for label, (curve, style) in METHOD_LOOKS.items():
+        row = curves.get(curve, ())
         row = [point for point in row if point.error(quantity) < LARGEST_DRAWN_ERROR]
         if row:
-            picture.draw(row, label=name, **look.style)
+            draw(row, label=label, **style)
     default = find_default(curves)
     if default is not None and default.error(quantity) < LARGEST_DRAWN_ERROR:
         star = {"marker": "*", "ms": 16, "mec": INK, "mew": 0.8}
-        picture.mark(default, "Euler, 2 ms", color=_ORANGE, zorder=5, **star)
+        draw([default], "Euler, 2 ms", ls="none", color=_ORANGE, zorder=5, **star)
     digits, priced = _find_price(curves, quantity)
     if priced is not None:
         text = f"{digits.lower()}, {1e3 * priced.seconds_per_second:.2g} ms"
-        picture.mark(priced, text, zorder=6, **_RING)
+        draw([priced], text, zorder=6, **_RING)
     for point in chain.from_iterable(curves.values()):
         if (
-            point.kind != STEPPED_MOTION
+            point.kind in _MARKS
             and _LOWEST <= point.error(quantity) < LARGEST_DRAWN_ERROR
         ):
             marker, colour = _MARKS[point.kind]
-            drawn = {"marker": marker, "ms": 9, "mec": PAPER, "mew": 0.6}
+            look = {"ls": "none", "marker": marker, "ms": 9, "mec": PAPER, "mew": 0.6}
             text = SHORT.get(point.setting, point.setting)
-            picture.mark(point, text, color=colour, zorder=4, **drawn)
-    axes.set_ylabel(
-        f"error of the {QUANTITY_WORDS[quantity]}, of its scale",
-        labelpad=1.0,
-    )
+            draw([point], text, color=colour, zorder=4, **look)
+    what = f"error of the {QUANTITY_WORDS[quantity]}, of its scale"
+    axes.set_ylabel(what, labelpad=1.0)
     set_axes(axes)
     axes.set_ylim(_LOWEST / 4.0, 3.0)
     low, high = axes.get_xlim()
@@ -267,8 +238,8 @@ def draw_work_precision(
         ratio = front[0].seconds_per_revolution / front[0].seconds_per_second
         text += f"; of a revolution: times {ratio:.3g}"
     axes.set_xlabel(text)
-    settle_labels(picture.figure)
-    return picture.figure
+    settle_labels(figure)
+    return figure
 
 
 _MARKS = {EXACT_MOTION: ("h", _GREEN), FORMULAS_CURVE: ("*", INK)}
@@ -313,9 +284,7 @@ def _find_price(curves: Curves, quantity: str) -> tuple[str, CostPoint | None]:
     return "", None
 
 
-def _take_timestep(point: CostPoint) -> float:
-    """Return the timestep as a part of a revolution."""
-    return 1.0 / point.setting_value
+_TIMESTEP = "timestep, part of a revolution"
 
 
 class SettingPicture(NamedTuple):
@@ -324,32 +293,32 @@ class SettingPicture(NamedTuple):
     needs: str
     """Curve without which there is no picture."""
     statement: str
-    looks: Mapping[str, Look]
-    abscissa: Callable[[CostPoint], float]
+    looks: Looks
     xlabel: str
 
+    def find_place(self, point: CostPoint) -> float:
+        """Return the abscissa of a point: its setting, or the timestep by its steps."""
+        x = point.setting_value
+        return max(1.0 / x if self.xlabel == _TIMESTEP else x, ZERO_TOLERANCE_PLACE)
 
-_TIMESTEP = "timestep, part of a revolution"
+
 SETTING_PICTURES = {
     "timestep": SettingPicture(
         "RK4, pads, tc = 10 steps",
         "A timestep buys digits until the closure's\ntime constant (tc) stops it",
         TIMESTEPS,
-        _take_timestep,
         _TIMESTEP,
     ),
     "integrator": SettingPicture(
         "RK4, tc held",
         "RK4 gains four digits where the others\ngain one",
         INTEGRATOR_LOOKS,
-        _take_timestep,
         _TIMESTEP,
     ),
     "softness": SettingPicture(
         "softness d",
         "The error goes as 1 - d; under loads a slow\nlinkage sags, which is far worse",
         SOFTNESS_LOOKS,
-        lambda point: point.setting_value,
         "1 - d (d: impedance of solimp; MuJoCo's own 0.9)",
     ),
     "solver": SettingPicture(
@@ -357,7 +326,6 @@ SETTING_PICTURES = {
         f"Beside a flywheel of {write_one_digit(BEST.flywheel)} Newton's solver needs\n"
         "a tolerance of 0",
         SOLVERS,
-        lambda point: point.setting_value or ZERO_TOLERANCE_PLACE,
         "tolerance of the solver",
     ),
 }
@@ -367,12 +335,11 @@ SETTING_PICTURES = {
 def _draw_setting(curves: Curves, title: str, picture: SettingPicture) -> Any:
     figure = make_figure(4.4, picture.statement, title)
     axes = figure.add_axes((0.135, 0.12, 0.84, 0.565))
-    for label, look in picture.looks.items():
-        row = sorted(curves.get(look.curve, ()), key=picture.abscissa)
+    for label, (curve, style) in picture.looks.items():
+        row = sorted(curves.get(curve, ()), key=picture.find_place)
         row = [point for point in row if point.at_steps.worst < LARGEST_DRAWN_ERROR]
-        x = [*map(picture.abscissa, row)]
         y = [point.at_steps.worst for point in row]
-        axes.plot(x, y, label=label, **look.style)
+        axes.plot([*map(picture.find_place, row)], y, label=label, **style)
     axes.set_ylabel("worst error of torque and pin forces")
     axes.set_xlabel(picture.xlabel)
     set_axes(axes)

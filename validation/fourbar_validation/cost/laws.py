@@ -4,7 +4,7 @@ A law is an exponent with its uncertainty; floors and jumps are found too.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -104,21 +104,15 @@ class ErrorLaw:
 
 
 def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
-    """Write each law in one line, quantity by quantity."""
+    """Write each law in one line, quantities of the same text together."""
     shown = []
     for name, group in groupby(all_laws, key=lambda law: law.name):
-        laws = list(group)
-        texts = _group_quantities((law.quantity, str(law)) for law in laws)
-        shown.append(f"{name}, expected {laws[0].expected:g}: {'; '.join(texts)}")
+        texts: dict[str, list[str]] = {}
+        for law in group:
+            texts.setdefault(str(law), []).append(law.quantity)
+        told = "; ".join(f"{', '.join(names)}: {text}" for text, names in texts.items())
+        shown.append(f"{name}, expected {law.expected:g}: {told}")
     return shown
-
-
-def _group_quantities(pairs: Iterable[tuple[str, str]]) -> list[str]:
-    """Group quantities with the same text."""
-    grouped: dict[str, list[str]] = {}
-    for quantity, text in pairs:
-        grouped.setdefault(text, []).append(quantity)
-    return [f"{', '.join(names)}: {text}" for text, names in grouped.items()]
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
@@ -151,28 +145,18 @@ def _list_errors(points: Sequence[CostPoint], quantity: str) -> list[float]:
     return [getattr(point.at_steps, quantity) for point in points]
 
 
-def _list_jumps(errors: Sequence[float]) -> list[int]:
-    """List the places in a ladder where its errors jump up."""
-    jumps = []
+def _describe_jumps(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]:
+    """Describe the places in a ladder where its errors jump up."""
+    errors = _list_errors(ladder, quantity)
     for i in range(1, len(errors)):
-        before = errors[i - 1]
+        before, error = errors[i - 1 : i + 1]
         # two sources that cancel make a dip, and its far side is no jump; a motion that
         # is lost again is one
         allowed = before
-        if errors[i] < LARGEST_LAWFUL_ERROR:
+        if error < LARGEST_LAWFUL_ERROR:
             allowed = max(errors[max(i - 2, 0) : i])
-        rises = not errors[i] <= _LAWLESS_RISE * allowed
-        if before < LARGEST_LAWFUL_ERROR and rises:
-            jumps.append(i)
-    return jumps
-
-
-def _describe_jumps(ladder: Sequence[CostPoint], quantity: str) -> list[str]:
-    errors = _list_errors(ladder, quantity)
-    return [
-        f"jumps from {errors[i - 1]:.1e} to {errors[i]:.1e} at {ladder[i].setting}"
-        for i in _list_jumps(errors)
-    ]
+        if before < LARGEST_LAWFUL_ERROR and not error <= _LAWLESS_RISE * allowed:
+            yield f"jumps from {before:.1e} to {error:.1e} at {ladder[i].setting}"
 
 
 def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:

@@ -51,6 +51,7 @@ WHOLE_ENGINE = ("all", "watch")
 """
 KEY = ["scene", "engine", "setting", "quantity"]
 WITHOUT_SETTING = ["scene", "engine", "quantity"]
+_BOTH_VERDICTS = ["verdict_old", "verdict_new"]
 MOST_ONE_BY_ONE = 50
 """Scenes and engines listed by name that were not run or not compared. The others are
 counted.
@@ -92,15 +93,6 @@ _WITH_A_CAUSE = (
     Kind.VERDICT_BETTER,
     Kind.NEW_FAILURE,
     Kind.STILL_FAILS,
-)
-_OF_ONE_RUN = (
-    Kind.ENGINE_GONE,
-    Kind.SCENE_GONE,
-    Kind.GONE,
-    Kind.NOT_RUN,
-    Kind.GONE_FAILURE,
-    Kind.NEW,
-    Kind.NEW_FAILURE,
 )
 
 
@@ -167,7 +159,7 @@ class Differences:
     @property
     def shared(self) -> int:
         """Return how many rows stand in both runs, whatever question they answer."""
-        return len(self.table) - len(self.of(*_OF_ONE_RUN))
+        return int((self.table[_BOTH_VERDICTS] != "").all(axis=1).sum())
 
     @property
     def nothing(self) -> bool:
@@ -181,7 +173,7 @@ class Differences:
         Not counted are engines and scenes that the new one does not have. The old one
         is then of another suite.
         """
-        missing = self.of(Kind.NOT_RUN, Kind.ENGINE_GONE, Kind.SCENE_GONE)
+        missing = self.of(Kind.NOT_RUN, *WHOLE)
         return 2 * self.shared < len(self.table) - len(missing)
 
     @property
@@ -206,7 +198,7 @@ class Differences:
     def grown(self) -> list[str]:
         """Name the rows whose allowed error grew so far that it is printed."""
         table = self.table
-        both = table[["verdict_old", "verdict_new"]].isin(COMPARED_VERDICTS).all(axis=1)
+        both = table[_BOTH_VERDICTS].isin(COMPARED_VERDICTS).all(axis=1)
         more = table.allowed_new > NOTABLE * table.allowed_old
         rows = table[both & (table.why == "") & (table.allowed_old > 0.0) & more]
         return [
@@ -241,9 +233,8 @@ class Differences:
     def sentences(self) -> list[str]:
         """Say who disagrees, and in how many scenes; the most frequent first."""
         lines = self.table
-        verdicts = lines[["verdict_old", "verdict_new"]]
         exact = (lines.setting == EXACT_SETTING) & (lines.engine != FORMULAS)
-        exact &= verdicts.isin(COMPARED_VERDICTS).any(axis=1)
+        exact &= lines[_BOTH_VERDICTS].isin(COMPARED_VERDICTS).any(axis=1)
         of_scene = lines[exact].groupby("scene").engine.agg(set)
         worse = lines[lines.kind.isin(_DISAGREEING)].groupby("scene").engine.agg(set)
         counts = Counter(
@@ -367,9 +358,7 @@ def _classify_rows(
     moved = table.scene + " / " + table.engine + ": " + table.setting
     moved = (moved + " -> " + table.setting_new).where(table.setting_new != "", "")
     ways = ("changed", "has other positions")
-    whys = {
-        one.scene: f"scene {one.scene} {ways[one.positions_alone]}" for one in changed
-    }
+    whys = {one.scene: f"scene {one.scene} {ways[one.moved]}" for one in changed}
     both = zip(table.scene, moved, strict=True)
     table["why"] = [whys.get(scene, move) for scene, move in both]
     conditions = table[["condition_old", "condition_new"]]
@@ -378,12 +367,9 @@ def _classify_rows(
     pairs = table.set_index(["scene", "engine"]).index
     refused = (table.quantity == "all") & (table.verdict_new == REFUSES) & ~in_old
     refused = pairs.isin(pairs[refused]) & pairs.isin(pairs[in_old])
-    ranks = dict(zip(("", *VERDICTS), range(-1, len(VERDICTS)), strict=True))
-    rank_old, rank_new = (
-        table[verdict].map(ranks).astype(int)
-        for verdict in ("verdict_old", "verdict_new")
-    )
-    worse = rank_new - rank_old
+    rank = ["", *VERDICTS].index
+    old_rank, new_rank = (table[name].map(rank).astype(int) for name in _BOTH_VERDICTS)
+    worse = new_rank - old_rank
     alike = ~table.verdict_new.isin(COMPARED_VERDICTS) | (old == new)
     alike |= (old.isna() & new.isna()) | ((new - old).abs() <= table.round_off)
     larger = (new > _NOTICEABLE * old) | new.isna()

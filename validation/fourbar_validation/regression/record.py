@@ -172,28 +172,6 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
-def _require_undamaged(
-    tables: Mapping[str, Mapping[str, Any]],
-    folder: Path,
-    read: str,
-    key: str,
-) -> None:
-    """Raise an InputError that names the first table that its record does not describe.
-
-    Such a table is missing or unnamed, or has another SHA-256.
-    """
-    present = {name for name in RECORD_FILES if (folder / name).is_file()}
-    for name in sorted({*tables, *present, read}):
-        path = folder / name
-        stated = tables.get(name, {"rows": "no", "sha256": "none"})
-        if name not in present or _hash_file(path) != stated["sha256"]:
-            why = (
-                f"is missing, damaged or of another run: {ABOUT_FILE} states"
-                f" {stated['rows']} rows and the SHA-256 {stated['sha256']}"
-            )
-            raise InputError(key, str(path), why)
-
-
 NOTHING_KNOWN = About({}, "unknown machine", {})
 
 
@@ -206,10 +184,16 @@ class Recorded:
 
     about: About
     table: Path
-    verified: bool = False
-    """True if a record says that the tables are those that it was written with."""
     key: str = "RESULTS"
     """Name in an error message: the argument or option that named the record."""
+
+    @property
+    def verified(self) -> bool:
+        """Return whether a record says that its tables are those it was written with.
+
+        A table alone has none.
+        """
+        return self.about is not NOTHING_KNOWN
 
     def describe(self) -> str:
         """Say in words which run it is: where it lies, of which date and commit."""
@@ -299,9 +283,10 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
         why = "must be of a run that was finished: run it again, and it is resumed"
         raise InputError(key, str(table), why)
     record = table.with_name(ABOUT_FILE)
-    run = Recorded(NOTHING_KNOWN, table, key=key)
+    about = NOTHING_KNOWN
     if record.is_file():
-        run = Recorded(_read_about(record, table, key), table, True, key)
+        about = _read_about(record, table, key)
+    run = Recorded(about, table, key)
     if next(run.rows(), None) is None:
         why = "must hold at least one comparison: it has none"
         raise InputError(key, str(table), why)
@@ -309,7 +294,11 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
 
 
 def _read_about(record: Path, table: Path, key: str) -> About:
-    """Read what the record of a table says; InputError if either is damaged."""
+    """Read what the record of a table says.
+
+    Raises InputError if it is damaged, and names the first table that it does not
+    describe: one that is missing or unnamed, or has another SHA-256.
+    """
     text = record.read_bytes()
     with name_damage(key, record, "is not a record written by `run`"):
         kept = json.loads(text)
@@ -318,7 +307,16 @@ def _read_about(record: Path, table: Path, key: str) -> About:
             raise InputError(key, str(record), why)
         tables = kept.pop("tables")
         about = About(**_escape_texts(kept))
-    _require_undamaged(tables, table.parent, table.name, key)
+    folder = table.parent
+    present = {name for name in RECORD_FILES if (folder / name).is_file()}
+    for name in sorted({*tables, *present, table.name}):
+        stated = tables.get(name, {"rows": "no", "sha256": "none"})
+        if name not in present or _hash_file(folder / name) != stated["sha256"]:
+            why = (
+                f"is missing, damaged or of another run: {ABOUT_FILE} states"
+                f" {stated['rows']} rows and the SHA-256 {stated['sha256']}"
+            )
+            raise InputError(key, str(folder / name), why)
     return about
 
 
@@ -347,13 +345,14 @@ def accept(run: Recorded, target: Path) -> None:
     """
     target.mkdir(parents=True, exist_ok=True)
     table = _find_kept_table(run)
-    _copy(table, target / table.name)  # first: by it `is_half_accepted` knows the run
-    times = run.table.with_name(TIMINGS_FILE)
-    for name in RECORD_FILES:
-        if name == times.name and times.is_file():
-            _copy(times, target / name)
-        elif name != table.name:
-            (target / name).unlink(missing_ok=True)  # a file of the previous state
+    # first: by it `is_half_accepted` knows the run
+    kept = (table, run.table.with_name(TIMINGS_FILE))
+    for source in kept:
+        if source.is_file():
+            with draft_file(target / source.name) as draft:
+                shutil.copyfile(source, draft)
+    for name in {*RECORD_FILES} - {path.name for path in kept if path.is_file()}:
+        (target / name).unlink(missing_ok=True)  # a file of the previous state
     write_about(run.about, target)
 
 
@@ -378,13 +377,17 @@ def is_half_accepted(run: Recorded, target: Path) -> bool:
     return False
 
 
-def _copy(source: Path, target: Path) -> None:
-    """Copy a file however long, all of it or nothing."""
-    draft = target.with_name(f".{target.name}.part")
-    with name_file(target):
+@contextmanager
+def draft_file(path: Path) -> Iterator[Path]:
+    """Yield where a file, however long, is drafted.
+
+    The file is in place once it is complete, and is removed if it is empty.
+    """
+    draft = path.with_name(f".{path.name}.part")
+    with name_file(path):
         try:
-            shutil.copyfile(source, draft)
-            os.replace(draft, target)
-        except BaseException:
+            yield draft
+            if draft.stat().st_size:
+                os.replace(draft, path)
+        finally:
             draft.unlink(missing_ok=True)
-            raise

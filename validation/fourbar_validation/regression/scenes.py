@@ -78,7 +78,7 @@ class SceneChange:
     """(key, old, new)."""
 
     @property
-    def positions_alone(self) -> bool:
+    def moved(self) -> bool:
         """Return whether the question is the same, at other positions."""
         return all(key.startswith(POSITION_KEYS) for key, _, _ in self.entries)
 

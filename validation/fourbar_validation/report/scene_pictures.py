@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.quantities import ANGLES, FORCE_NAMES, LINE, OK, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
@@ -75,16 +74,17 @@ def draw_scene_figure(record: Record) -> str | None:
     scene = record.scene
     if scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
-    linkage = _draw_best_position(record.name, scene, solution)
+    drawn = _draw_best_position(record.name, scene, solution)
     if np.count_nonzero(solution.status_code == OK) < 2:
-        return linkage
+        return drawn
     shown = ANGLES
     if scene.motion.free is not None:
         shown = _MOTION_AND_FORCE
     elif solution.F32 is not None:
         shown = (name_driving(scene), _choose_force(record, solution))
-    curves = [_Curve(name, record, scene, solution) for name in shown]
-    return linkage + "".join(curve.draw() for curve in curves)
+    return drawn + "".join(
+        _Curve(name, record, scene, solution).draw() for name in shown
+    )
 
 
 def draw_thumbnail(record: Record) -> str | None:
@@ -107,8 +107,7 @@ def draw_thumbnail(record: Record) -> str | None:
     quantity = name_driving(scene)
     # no torque acts on a released motion
     if scene.motion.free is None and getattr(solution, quantity) is not None:
-        curve = _Curve(quantity, record, scene, solution)
-        curve.draw_values(right, curve.list_answers(), 3.0)
+        _Curve(quantity, record, scene, solution).draw_values(right, 3.0)
         right.set_title(right.get_ylabel(), size=7.0, color=SOFT, loc="left")
     for axes in (left, right):
         axes.set_axis_off()
@@ -162,7 +161,9 @@ def _choose_force(record: Record, solution: Solution) -> str:
 class _Curve:
     """The picture of one quantity of a scene: its values, and their errors beneath.
 
-    Errors of the simulation and of the exact engines have axes of their own.
+    Errors of the simulation and of the exact engines have axes of their own. Of a force
+    the component is drawn that is larger: one of the wrong sign lies on the curve of
+    magnitudes.
     """
 
     quantity: str
@@ -170,26 +171,21 @@ class _Curve:
     scene: Scene
     solution: Solution
 
-    @property
-    def good(self) -> NDArray[np.bool_]:
-        """Positions at which the formulas have values."""
-        return np.equal(self.solution.status_code, OK)
-
-    def list_answers(self, *, simulated: bool | None = None) -> list[Answer]:
-        """List the answers that have the quantity, of all engines or of one kind."""
-        return [
+    def __post_init__(self) -> None:
+        self.good = self.solution.status_code == OK
+        self.answers = [
             answer
             for answer in self.record.answers
-            if answer.refusal is None
-            and self.quantity in answer.quantities
-            and simulated in (None, choose_style(answer.engine).simulated)
+            if answer.refusal is None and self.quantity in answer.quantities
         ]
 
     def draw(self) -> str:
         """Draw it as an SVG."""
         from matplotlib.figure import Figure
 
-        groups = [self.list_answers(simulated=simulated) for simulated in (True, False)]
+        groups: list[list[Answer]] = [[], []]
+        for answer in self.answers:
+            groups[not choose_style(answer.engine).simulated].append(answer)
         groups = [group for group in groups if group]
         figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
         heights = [1.9, *[1.0] * len(groups)]
@@ -197,7 +193,7 @@ class _Curve:
             len(heights), sharex=True, height_ratios=heights, squeeze=False
         )
         first, *others = axes = panels[:, 0]
-        self.draw_values(first, self.list_answers(), 5.5)
+        self.draw_values(first, 5.5)
         unit = "error / scale" if self.quantity in FORCE_NAMES else "error (rad)"
         for below, group in zip(others, groups, strict=True):
             self.draw_errors(below, group)
@@ -221,7 +217,7 @@ class _Curve:
             return time
         return np.degrees(angle)
 
-    def draw_values(self, axes: "Axes", answers: list[Answer], size: float) -> None:
+    def draw_values(self, axes: "Axes", size: float) -> None:
         """Draw the formulas as a band, and each engine's marks, of a size in points.
 
         The marks stand at positions of their own. Where the formulas have no value, as
@@ -229,17 +225,25 @@ class _Curve:
         a pole the curve leaves the picture, which ends beyond 96 % of the positions.
         """
         quantity = self.quantity
-        axis = self.choose_component(answers)
-        values = _take_plain(quantity, getattr(self.solution, quantity), axis)
-        ours = np.where(self.good, values, np.nan)
+        values = getattr(self.solution, quantity)
+        axis = None
+        if values.ndim == 2:
+            axis = int(np.nanmax(np.abs(values[self.good]), axis=0).argmax())
+
+        def take(values: Array) -> Array:
+            if quantity in ANGLES:
+                return np.degrees(values)
+            return values if axis is None else values[:, axis]
+
+        ours = np.where(self.good, take(values), np.nan)
         base = self.choose_base(None)
         axes.plot(base, ours, color=BAND, lw=0.9 * size, solid_capstyle="butt")
-        for turn, answer in enumerate(answers):
-            theirs = _take_plain(quantity, answer.quantities[quantity], axis)
+        for turn, answer in enumerate(self.answers):
+            theirs = take(answer.quantities[quantity])
             if len(theirs) == len(ours):  # a simulation makes positions of its own
                 theirs = np.where(self.good, theirs, np.nan)
-            phase = (turn + 0.5) / (len(answers) * MARKS_OF_A_CURVE)
-            parts = np.arange(MARKS_OF_A_CURVE) / MARKS_OF_A_CURVE + phase
+            phase = (turn + 0.5) / len(self.answers)
+            parts = (np.arange(MARKS_OF_A_CURVE) + phase) / MARKS_OF_A_CURVE
             places = np.unique((parts * len(theirs)).astype(int))
             x = self.choose_base(answer.at)[places]
             axes.plot(x, theirs[places], **_mark(answer, size))
@@ -250,7 +254,14 @@ class _Curve:
             axes.set_ylim(low - 0.5 * span, high + 0.5 * span)
             top = float(base[np.nanargmax(np.abs(ours))]), high + 0.5 * span
             add_label(axes, "leaves towards a pole", complex(*top), -1j, INK, 8.0)
-        axes.set_ylabel(_label(quantity, self.solution, axis))
+        name = quantity.replace("theta_", "θ").translate(_SUBSCRIPT)
+        label = f"{quantity} {'xy'[axis or 0]} (N)"
+        if quantity in ANGLES:
+            label = f"{name} (°)"
+        elif axis is None:
+            torque = f"T{self.solution.drive_bar} (N m)".translate(_SUBSCRIPT)
+            label = "F (N)" if quantity == LINE.value else torque
+        axes.set_ylabel(label)
 
     def draw_errors(self, axes: "Axes", answers: list[Answer]) -> None:
         """Draw the largest error of each segment on a logarithmic axis.
@@ -261,32 +272,32 @@ class _Curve:
 
         quantity = self.quantity
         solution = self.solution
+        engines = [answer.engine for answer in answers]
         rows = [row for row in self.record.rows if row.quantity == quantity]
-        first = answers[0].engine
         condition = find_condition(quantity, self.scene.linkage, solution)
         allowed = EQUIVALENCE.allowed(condition)
-        if choose_style(first).simulated:
-            held_to = [row.allowed for row in rows if row.engine == first]
+        if choose_style(engines[0]).simulated:
+            held_to = [row.allowed for row in rows if row.engine == engines[0]]
             allowed = np.full(len(solution), [*held_to, SIMULATED.factor][0])
         shown = np.where(self.good, allowed, np.nan)
         limits = [("allowed", ALLOWED, shown)]
-        common = float(np.nanmax(shown))
         for row in rows:  # of an engine that is allowed more than the others
-            is_drawn = row.engine in {answer.engine for answer in answers}
-            if is_drawn and row.compared and row.allowed > 2.0 * common:
+            more = row.compared and row.allowed > 2.0 * np.nanmax(shown)
+            if more and row.engine in engines:
                 colour = choose_style(row.engine).colour
                 own = np.full(len(solution), row.allowed)
                 limits.append((f"allowed to {row.engine}", colour, own))
         base = self.choose_base(None)
-        middle = int(np.flatnonzero(self.good)[np.count_nonzero(self.good) // 2])
+        good = np.flatnonzero(self.good)
+        middle = good[len(good) // 2]
         for text, colour, limit in limits:
             axes.plot(base, limit, color=colour, lw=1.1, ls=(0, (5, 2)))
             place = complex(base[middle], limit[middle])
             add_label(axes, text, place, -1j, colour, 8.5)
         for turn, answer in enumerate(answers):
-            formulas = (
-                solution if answer.at is None else solve(self.scene, at=answer.at)
-            )
+            formulas = solution
+            if answer.at is not None:
+                formulas = solve(self.scene, at=answer.at)
             mine = getattr(formulas, quantity)
             size = scale_of(quantity, self.scene, formulas, mine).size
             error = find_error(quantity, mine, answer.quantities[quantity], size)
@@ -308,24 +319,6 @@ class _Curve:
             minor_locator=NullLocator(),
             major_formatter=FuncFormatter(lambda value, _: f"{value:.0e}"),
         )
-
-    def choose_component(self, answers: list[Answer]) -> int | None:
-        """Return the component of a force that is wrong; None if none is.
-
-        A force whose sign or direction is wrong lies on the curve of magnitudes.
-        """
-        failed = [row for row in self.record.rows if row.failed]
-        wrong = {row.engine for row in failed if row.quantity == self.quantity}
-        ours = getattr(self.solution, self.quantity)
-        differences = []
-        for answer in answers:
-            theirs = answer.quantities[self.quantity]
-            if answer.engine in wrong and theirs.shape == ours.shape:
-                apart = np.nanmax(np.abs(theirs - ours), axis=0, initial=0.0)
-                differences.append(apart)
-        if ours.ndim == 1 or not differences:
-            return None
-        return int(np.argmax(np.max(differences, axis=0)))
 
 
 def find_worst_of_segments(error: Array, phase: float) -> list[int]:
@@ -352,30 +345,3 @@ def _mark(answer: Answer, size: float) -> dict[str, Any]:
         "mfc": PAPER,
         "mew": 1.2,
     }
-
-
-def _take_plain(quantity: str, values: Array, axis: int | None) -> Array:
-    """Take a scalar as it is (angles in degrees).
-
-    `axis`: component to take of a vector; left out: its magnitude.
-    """
-    if quantity in ANGLES:
-        return np.degrees(values)
-    if values.ndim == 2 and axis is not None:
-        return values[:, axis]
-    if values.ndim == 2:
-        return magnitude(values)
-    return values
-
-
-def _label(quantity: str, solution: Solution, axis: int | None) -> str:
-    if quantity == LINE.value:
-        return "F (N)"
-    if quantity == "torque":
-        return f"T{solution.drive_bar} (N m)".translate(_SUBSCRIPT)
-    name = quantity.replace("theta_", "θ").translate(_SUBSCRIPT)
-    if quantity in ANGLES:
-        return f"{name} (°)"
-    if axis is not None:
-        return f"{quantity} {'xy'[axis]} (N)"
-    return f"|{quantity}| (N)"

@@ -14,19 +14,11 @@ from typing import Any, NamedTuple
 from fourbar_validation.compare.tolerance import EPS
 
 PAGE_STYLES = Path(__file__).parent / "templates" / "page.css"
-LIGHT_COLOURS: dict[str, str] = dict(
-    re.findall(
-        r"(--[\w-]+): light-dark\((#\w+),", PAGE_STYLES.read_text(encoding="utf-8")
-    )
+_COLOURS: list[tuple[str, str, str]] = re.findall(
+    r"(--[\w-]+): light-dark\((#\w+), (#\w+)\)", PAGE_STYLES.read_text(encoding="utf-8")
 )
-"""Colours of a light page by the names of their custom properties."""
-_DARK: dict[str, str] = dict(
-    re.findall(
-        r"(--[\w-]+): light-dark\(#\w+, (#\w+)\)",
-        PAGE_STYLES.read_text(encoding="utf-8"),
-    )
-)
-"""Colours of a dark page."""
+"""Custom property, and its colour in a light and in a dark page."""
+LIGHT_COLOURS = {name: light for name, light, _ in _COLOURS}
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
     LIGHT_COLOURS[f"--{name}"]
     for name in ("ink", "soft", "grid", "under", "allowed", "paper")
@@ -110,35 +102,12 @@ def set_frame(axes: Any) -> None:
     axes.spines[["left", "bottom"]].set_color(GRID)
 
 
-def write_svg(figure: Any, salt: str) -> str:
-    """Draw the figure, to stand in a page.
+def write_svg(figure: Any, salt: str, **paper: Any) -> str:
+    """Draw the figure, small, to stand in a page.
 
-    `salt`: keeps the ids of two figures in one page apart.
+    `salt`: keeps the ids of two figures in one page apart. `paper`: what lies beneath
+    it, as matplotlib's `savefig` takes it; left out: the page.
     """
-    return _shrink_svg(_draw_svg(figure, salt))
-
-
-def write_alone(figure: Any, salt: str) -> str:
-    """Return the figure as the SVG of a file of its own.
-
-    The paper is light or dark as the reader's pages are.
-    """
-    svg = _shrink_svg(_draw_svg(figure, salt, transparent=False))
-    light, dark = (
-        "".join(f"{name}:{value};" for name, value in colours.items())
-        for colours in (LIGHT_COLOURS, _DARK)
-    )
-    rules = f"svg{{{light}}}@media(prefers-color-scheme:dark){{svg{{{dark}}}}}"
-    return svg.replace("<style>", f"<style>{rules}", 1)
-
-
-def _draw_svg(
-    figure: Any,
-    salt: str,
-    *,
-    transparent: bool = True,
-) -> str:
-    """Draw the figure as matplotlib does, an SVG that stands by itself."""
     import matplotlib
 
     text = io.StringIO()
@@ -148,16 +117,26 @@ def _draw_svg(
         "font.size": 8.5,
         "font.family": "sans-serif",
     }
+    paper = paper or {"transparent": True, "facecolor": "none"}
     with matplotlib.rc_context(settings):
-        figure.savefig(
-            text,
-            format="svg",
-            transparent=transparent,
-            facecolor="none" if transparent else figure.get_facecolor(),
-            metadata={"Date": None, "Creator": None},
-        )
+        metadata = {"Date": None, "Creator": None}
+        figure.savefig(text, format="svg", metadata=metadata, **paper)
     svg = text.getvalue()
-    return svg[svg.index("<svg") :]
+    return _shrink_svg(svg[svg.index("<svg") :])
+
+
+def write_alone(figure: Any, salt: str) -> str:
+    """Return the figure as the SVG of a file of its own.
+
+    The paper is light or dark as the reader's pages are.
+    """
+    svg = write_svg(figure, salt, facecolor=figure.get_facecolor())
+    light, dark = (
+        "".join(f"{colours[0]}:{colours[form]};" for colours in _COLOURS)
+        for form in (1, 2)
+    )
+    rules = f"svg{{{light}}}@media(prefers-color-scheme:dark){{svg{{{dark}}}}}"
+    return svg.replace("<style>", f"<style>{rules}", 1)
 
 
 def _shrink_svg(svg: str) -> str:

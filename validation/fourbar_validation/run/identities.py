@@ -48,7 +48,6 @@ from fourbar_validation.compare.tolerance import (
     find_gap,
     find_lever,
     find_worst,
-    join_components,
     magnitude,
     mark_touching,
 )
@@ -135,70 +134,47 @@ def _make_equation_row(
     return question.row(quantity, error, allowed, reason, judged, condition)
 
 
-class _Balance:
-    """Forces, and moments about O2, that must vanish in sum.
-
-    The sums of their sizes are kept too.
-    """
-
-    def __init__(self) -> None:
-        self.force: Any = 0.0
-        self.moment: Any = 0.0
-        self.forces: Any = 0.0
-        self.moments: Any = 0.0
-
-    def push(self, force: Array, point: Array, sense: float = 1.0) -> None:
-        """Add a force at a point."""
-        turning = point[..., 0] * force[..., 1] - point[..., 1] * force[..., 0]
-        self.force = self.force + sense * force
-        self.forces = self.forces + magnitude(force)
-        self.moment = self.moment + sense * turning
-        self.carry(force, point)
-
-    def carry(self, force: Array, point: Array) -> None:
-        """Add the size alone of the moment of a force inside, which cancels."""
-        arm = np.hypot(point[..., 0], point[..., 1])
-        self.moments = self.moments + arm * magnitude(force)
-
-    def couple(self, couple: Array, sense: float = 1.0) -> None:
-        """Add a couple."""
-        self.moment = self.moment + sense * couple
-        self.moments = self.moments + np.abs(couple)
-
-
 def _check_sums(question: Question) -> Iterator[Row]:
-    """Check that F12 + F14 + loads = sum of m a_G, the moments about O2, the power."""
+    """Check that F12 + F14 + loads = sum of m a_G, the moments about O2, the power.
+
+    What acts is complex: force, its point, and a couple.
+    """
     scene = question.scene
     linkage = scene.linkage
     solution = question.solution
     actions, of_drive, O4 = _sum_actions(question)
     drive = name_driving(scene)
-    balance = _Balance()
-    if solution.torque is not None:
-        balance.couple(solution.torque)
-    balance.push(solution.F12, np.zeros(2))
-    balance.push(solution.F14, O4)
-    balance.carry(solution.F32, solution.A)
-    balance.carry(solution.F43, solution.B)
+
+    def read(name: str) -> Any:
+        vectors = solution[name]
+        return vectors[:, 0] + 1j * vectors[:, 1]
+
+    torque = 0.0 if solution.torque is None else solution.torque
+    exerted: list[tuple[Any, Any, Any]] = [
+        (read("F12"), 0.0, torque),
+        (read("F14"), O4, 0.0),
+    ]
+    # the moments of forces inside cancel
+    inside: Any = np.abs(read("A") * read("F32")) + np.abs(read("B") * read("F43"))
     acting = actions.wrenches(Wrenches())
     driving = of_drive.wrenches(Wrenches())
-    first_pins = (("O2", np.zeros(2)), ("", solution.A), ("O4", O4))
+    first_pins = (("O2", 0.0), ("", read("A")), ("O4", O4))
     for number, (ground_pin, pin) in zip(MOVING_BARS, first_pins, strict=True):
         force_on, couple = acting.on(number)
         # the ground's pull on bars 2 and 4 goes through their pins; between moving bars
         # it cancels
         resultant = force_on + actions.through.get(ground_pin, 0.0)
-        load = np.broadcast_to(resultant, len(solution))
-        balance.push(join_components(load.real, load.imag), pin)
-        balance.couple(couple)
+        exerted.append((resultant, pin, couple))
         # a force that drives and the loads nearly cancel in the couple of their bar,
         # and the force has the rounding of its own moment
-        _, couple_of_drive = driving.on(number)
-        balance.moments = balance.moments + np.abs(couple_of_drive)
-        accelerated = linkage.bar(number).mass * getattr(solution, f"a_G{number}")
-        balance.push(accelerated, getattr(solution, f"G{number}"), -1.0)
-        turned = actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}")
-        balance.couple(turned, -1.0)
+        inside += np.abs(driving.on(number)[1])
+        inertia = linkage.bar(number).mass * read(f"a_G{number}")
+        turned = actions.bodies[number - 2].I * solution[f"alpha_{number}"]
+        exerted.append((-inertia, read(f"G{number}"), -turned))
+    force: Any = sum(force for force, _, _ in exerted)
+    moment = sum((np.conj(point) * force).imag + M for force, point, M in exerted)
+    forces = sum(np.abs(force) for force, _, _ in exerted)
+    moments = sum(np.abs(point * force) + np.abs(M) for force, point, M in exerted)
     # the forces of the bars that are not driven are solved apart, and the torque is
     # that of virtual work
     placed = state_from_pins(scene)
@@ -213,8 +189,8 @@ def _check_sums(question: Question) -> Iterator[Row]:
     lever = find_lever(linkage) * solution.drive_condition
     condition = find_condition(drive, linkage, solution)
     with np.errstate(divide="ignore", invalid="ignore"):
-        force_size = (balance.forces + forces_acting) / lever
-        moment_size = (balance.moments + couples_acting) / condition
+        force_size = (forces + forces_acting) / lever
+        moment_size = (moments + inside + couples_acting) / condition
     # the sense of dry friction at a pin at rest is decided by rounding: not the same
     # here as in the answer
     judged = (solution.status_code == OK) & ~question.reversing(IDENTITY.factor)
@@ -222,19 +198,15 @@ def _check_sums(question: Question) -> Iterator[Row]:
     works = getattr(solution, drive) * speed
     equations = {
         "power": ("of the drive", solution.power - works, np.abs(works)),
-        "force_sum": ("F12 + F14 + loads = sum of m a_G", balance.force, force_size),
-        "moment_sum": (
-            "moments about O2, with the torque",
-            balance.moment,
-            moment_size,
-        ),
+        "force_sum": ("F12 + F14 + loads = sum of m a_G", force, force_size),
+        "moment_sum": ("moments about O2, with the torque", moment, moment_size),
     }
     for name, (equation, rest, size) in equations.items():
-        error = divide(magnitude(rest), size)
+        error = divide(np.abs(rest), size)
         yield _make_equation_row(question, name, equation, error, judged)
 
 
-def _sum_actions(question: Question) -> tuple[Actions, Actions, Array]:
+def _sum_actions(question: Question) -> tuple[Actions, Actions, complex]:
     """Sum what acts at the speeds that were answered.
 
     Another evaluation of them is not used. What a drive that exerts a force does is
@@ -259,8 +231,7 @@ def _sum_actions(question: Question) -> tuple[Actions, Actions, Array]:
         if solution.drive is not None:
             solution.drive.act(actions, solution.drive_force)
             solution.drive.act(of_drive, solution.drive_force)
-    O4 = complex(np.ravel(state.foot(4))[0])
-    return actions, of_drive, np.array([O4.real, O4.imag])
+    return actions, of_drive, complex(np.ravel(state.foot(4))[0])
 
 
 def check_status(question: Question) -> Iterator[Row]:

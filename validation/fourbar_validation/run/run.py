@@ -3,14 +3,13 @@
 The results are streamed to disk, and the pictures drawn.
 """
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.writing import name_file, write_text
+from fourbar.writing import write_text
 from fourbar_validation.compare.results_file import ResultsWriter, read_columns
 from fourbar_validation.compare.rows import (
     FAILS,
@@ -34,6 +33,7 @@ from fourbar_validation.regression.record import (
     PARQUET_FILE,
     Recorded,
     describe_run,
+    draft_file,
     open_run,
     write_about,
 )
@@ -179,8 +179,10 @@ def _collect_tasks(
     """
     with (
         ResultsWriter(out) as columns,
-        _draft_file(out / OUTPUT) as output,
-        _draft_file(out / "timings.csv") as times,
+        draft_file(out / OUTPUT) as printed,
+        printed.open("w", encoding="utf-8", newline="") as output,
+        draft_file(out / "timings.csv") as timed,
+        timed.open("w", encoding="utf-8", newline="") as times,
     ):
         times.write(write_csv_rows(TIMING_COLUMNS, []))
         for number, scenes in enumerate(plan.tasks):
@@ -216,23 +218,6 @@ def _redraw(
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
     sound = [engine for engine in engines if engine.name not in broken]
     return make_jobs(suite, [scene], sound, draw=True)[0]
-
-
-@contextmanager
-def _draft_file(path: Path) -> Iterator[TextIO]:
-    """Draft a text file line by line.
-
-    The file is in place once it is complete, and removed if it is empty.
-    """
-    draft = path.with_name(f".{path.name}.part")
-    with name_file(path):
-        try:
-            with draft.open("w", encoding="utf-8", newline="") as file:
-                yield file
-            if draft.stat().st_size:
-                os.replace(draft, path)
-        finally:
-            draft.unlink(missing_ok=True)
 
 
 def _list_timings(record: Record) -> Iterator[list[str]]:
