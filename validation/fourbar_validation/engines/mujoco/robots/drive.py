@@ -11,6 +11,7 @@ from fourbar.effects.place import Place
 from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.robots.ancestry import list_wraps
 from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 
@@ -24,63 +25,30 @@ class _Wrench(NamedTuple):
     point: Array
 
 
-class FileCylinder:
-    """Actuator of a file along a tendon that exerts what it is told to, N."""
+class Cylinder(NamedTuple):
+    """Actuator of a file along a tendon between two sites."""
 
-    couple_bar = None
-
-    def __init__(self, model: mujoco.MjModel, scene: Scene, actuator: int) -> None:
-        self.model = model
-        self.drive = scene.drive
-        self.actuator = actuator
-
-    def take_over(self, model: mujoco.MjModel) -> None:
-        """Make the actuator of a model exert its control, without any limit."""
-        i = self.actuator
-        model.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
-        model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_NONE
-        model.actuator_dyntype[i] = mujoco.mjtDyn.mjDYN_NONE
-        model.actuator_gainprm[i] = 0.0
-        model.actuator_gainprm[i, 0] = 1.0 / model.actuator_gear[i, 0]
-        model.actuator_ctrllimited[i] = model.actuator_forcelimited[i] = False
-        self.model = model
-
-    def exert(self, data: mujoco.MjData, size: float) -> None:
-        """Apply a force, N, in the state that is placed."""
-        data.ctrl[self.actuator] = size
-
-    def find_pull(self, data: mujoco.MjData) -> Array:
-        """Return the generalized forces per N, (nv,), in the state that is placed."""
-        forces = []
-        for size in (0.0, 1.0):
-            data.ctrl[self.actuator] = size
-            mujoco.mj_fwdActuation(self.model, data)
-            forces.append(data.qfrc_actuator.copy())
-        data.ctrl[self.actuator] = 0.0
-        return np.asarray(forces[1] - forces[0])
-
-    def find_speed(self, data: mujoco.MjData) -> float:
-        """Return the speed of the tendon, m/s."""
-        gear = self.model.actuator_gear[self.actuator, 0]
-        return float(data.actuator_velocity[self.actuator] / gear)
+    actuator: int
+    sites: list[int]
 
 
-def find_cylinder(model: mujoco.MjModel, scene: Scene) -> FileCylinder | None:
-    """Return the file's own cylinder if it has one and the scene is driven by one."""
-    if not isinstance(scene.drive, LinearDrive):
-        return None
+def find_cylinder(model: mujoco.MjModel) -> Cylinder | None:
+    """Return the cylinder of a file if it has exactly one."""
     on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
     controlled = model.actuator_gainprm.any(axis=1)
-    cylinders = np.flatnonzero(on_tendons & controlled)
+    cylinders = np.flatnonzero(on_tendons & controlled).tolist()
     if len(cylinders) != 1:
         return None
-    return FileCylinder(model, scene, int(cylinders[0]))
+    wraps = [*list_wraps(model, model.actuator_trnid[cylinders[0], 0])]
+    sites = [index for kind, index, _ in wraps if kind == mujoco.mjtWrap.mjWRAP_SITE]
+    return Cylinder(cylinders[0], sites) if len(sites) == len(wraps) == 2 else None
 
 
 class LoopDrive:
     """Wrenches of a scene's drive on the bars of a loop, per N m or N that it exerts.
 
-    The ground bears the opposite of each.
+    The ground bears the opposite of each. The file's own cylinder acts where the file
+    has it, in the place of that of the scene.
     """
 
     def __init__(self, model: mujoco.MjModel, loop: RobotLoop, scene: Scene) -> None:
@@ -89,6 +57,9 @@ class LoopDrive:
         self.drive = scene.settled_drive()
         self.couple_bar = None if scene.drive is not None else scene.drive_bar
         """Bar on which a couple acts, if that is the drive."""
+        self.cylinder = None
+        if isinstance(scene.drive, LinearDrive):
+            self.cylinder = find_cylinder(model)
 
     def _list_wrenches(self, data: mujoco.MjData) -> list[_Wrench]:
         frame = LoopFrame(self.loop, data)
@@ -112,16 +83,25 @@ class LoopDrive:
             if self.drive.frame == "bar":
                 direction *= unit
             force = np.array([direction.real, direction.imag]) @ frame.axes
-            pushed = [(self.drive.place.bar, force, place), (1, -force, place)]
+            bar = self.drive.place.bar
+            return [
+                _Wrench(bodies[bar][0], force, none, place),
+                _Wrench(bodies[1][0], -force, none, place),
+            ]
+        if self.cylinder is not None:
+            start, end = data.site_xpos[self.cylinder.sites]
+            pushed = self.model.site_bodyid[self.cylinder.sites].tolist()
+            line = end - start
         else:
             assert isinstance(self.drive, LinearDrive)
             ends = (self.drive.start, self.drive.end)
             (start, _), (end, _) = map(locate, ends)
+            pushed = [bodies[one.bar][0] for one in ends]
             line = frame.in_plane(end - start) @ frame.axes
-            force = line / np.linalg.norm(line)
-            pushed = [(ends[0].bar, -force, start), (ends[1].bar, force, end)]
+        force = line / np.linalg.norm(line)
         return [
-            _Wrench(bodies[bar][0], force, none, point) for bar, force, point in pushed
+            _Wrench(pushed[0], -force, none, start),
+            _Wrench(pushed[1], force, none, end),
         ]
 
     def exert(self, data: mujoco.MjData, size: float) -> None:

@@ -56,7 +56,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     record_states,
     varies,
 )
-from fourbar_validation.engines.mujoco.robots.drive import FileCylinder, LoopDrive
+from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
@@ -155,7 +155,7 @@ class LoopInside:
         self,
         model: mujoco.MjModel,
         loop: RobotLoop,
-        drive: LoopDrive | FileCylinder | None = None,
+        drive: LoopDrive | None = None,
         *,
         bar: int = 2,
         branch: int = OPEN,
@@ -237,10 +237,10 @@ class LoopInside:
         else:
             model.opt.disableflags |= LIMITS_OFF | find_bits("contact")
             off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
+        if self.acting is not None and self.acting.cylinder is not None:
+            off = [*off, self.acting.cylinder.actuator]
         model.actuator_gainprm[off] = 0.0
         model.actuator_biasprm[off] = 0.0
-        if isinstance(self.acting, FileCylinder):
-            self.acting.take_over(model)
         # while joints are held, what ties them to the moving bars would only be torn
         model.eq_active0[list(self.loop.other_equalities)] = 0
 
@@ -578,7 +578,6 @@ class LoopInside:
         data.efc_force[: data.nefc] = multipliers
         if self.acting is not None:
             self.acting.exert(data, size)
-            mujoco.mj_fwdActuation(model, data)  # a cylinder of the file pulls then
         mujoco.mj_rnePostConstraint(model, data)
         forces = self._read_forces(data)
         if self.acting is not None:

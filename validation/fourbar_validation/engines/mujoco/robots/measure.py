@@ -39,9 +39,7 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
 )
 from fourbar_validation.engines.mujoco.robots.drive import (
-    FileCylinder,
     LoopDrive,
-    find_cylinder,
 )
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -121,11 +119,10 @@ def put_loop_inside(
     """
     model = found.robot.model if model is None else model
     scene = found.scene
-    own = find_cylinder(model, scene)
     inside = LoopInside(
         model,
         found.loop,
-        own or LoopDrive(model, found.loop, scene),
+        LoopDrive(model, found.loop, scene),
         bar=command(scene).bar,
         branch=scene.motion.branch,
         as_it_is=found.as_it_is,
@@ -243,8 +240,8 @@ def _describe_findings(
             f"its drive on pin {pin}, {describe_actuator(model, number)}, is taken off:"
             " the torque is solved for"
         )
-    if isinstance(inside.acting, FileCylinder):
-        name = model.actuator(inside.acting.actuator).name
+    if inside.acting is not None and inside.acting.cylinder is not None:
+        name = model.actuator(inside.acting.cylinder.actuator).name
         yield f"its actuator {name!r} gives the cylinder's force that is solved for"
     if inside.as_it_is and inside.contacts:
         contacts = write_count(inside.contacts, "contact")
