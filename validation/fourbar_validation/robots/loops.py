@@ -3,7 +3,6 @@
 A scene is made from one of them.
 """
 
-import math
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -11,14 +10,11 @@ from typing import Any
 import click
 
 from fourbar.files import dump
-from fourbar.mjcf.model import write_six_digits
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     LoopScene,
-    RobotClosure,
     RobotReport,
-    write_length,
 )
 from fourbar_validation.report.sentences import print_sentence
 from fourbar_validation.robots.files import read_robot
@@ -34,40 +30,14 @@ from fourbar_validation.robots.options import (
 
 _COLUMNS_OF_A_COMMENT = 78
 """Columns of a comment in a scene: a file's reader takes no line of a hundred dots."""
-PRINTED_AS_ZERO = 1e-12
-"""m or deg; less is printed as 0."""
 SCENE = "fourbar_validation.engines.mujoco.robots.loop_scene:read_loop_scene"
 _LIST = "fourbar_validation.engines.mujoco.robots.closures:list_closures"
-
-
-def _write_closure(closure: RobotClosure) -> str:
-    """Write what is known of a closure."""
-    parts = [f"{closure.name}: {closure.kind}"]
-    if closure.loop is None:
-        parts[0] += f", no four-bar: {closure.reason}"
-    if closure.ground:
-        parts.append(f"ground {closure.ground}")
-    if closure.hinges:
-        parts.append(f"hinges {', '.join(closure.hinges)}")
-    if closure.other_joints:
-        parts.append(f"other joints {', '.join(closure.other_joints)}")
-    if closure.loop is not None:
-        parts.append(closure.loop.describe_lengths())
-    if closure.misaligned is not None:
-        angle = math.degrees(closure.misaligned)
-        parts.append(f"axes {angle if angle > PRINTED_AS_ZERO else 0.0:.2g} deg apart")
-    if closure.gap is not None:
-        gap = closure.gap if closure.gap > PRINTED_AS_ZERO else 0.0
-        parts.append(f"gap {write_length(gap) if gap else 0} mm")
-    parts.append(f"solref {write_six_digits(*closure.solref)}")
-    parts.append(f"solimp {write_six_digits(*closure.solimp)}")
-    return "; ".join(parts)
 
 
 def _show_report(report: RobotReport) -> None:
     """Print a line for each closure, and what was done to the file and its pose."""
     for closure in report.closures:
-        print_sentence(_write_closure(closure))
+        print_sentence(closure.text)
     if not report.closures:
         print_sentence(
             "No loop is closed in the file: a <connect> between two sites closes one, "

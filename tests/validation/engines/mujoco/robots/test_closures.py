@@ -332,9 +332,8 @@ def test_two_connects_along_one_axis_are_one_pin():
 def test_an_equality_of_joints_or_of_a_fixed_tendon_is_a_mimic(tendon, mimic, words):
     text = Planar().text().replace("</equality>", f"{mimic}</equality>{tendon}")
     one, other = report_of(text).closures
-    assert (other.name, other.kind) == (
-        ("T", "tendon") if tendon else ("O4-O2", "joint")
-    )
+    named = "T: tendon, no four-bar" if tendon else "O4-O2: joint, no four-bar"
+    assert other.text.startswith(named)
     assert other.loop is None
     assert words in other.reason
     assert one.loop.other_equalities == (1,)
@@ -421,13 +420,12 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one():
         loop_of(planar.text(), drive="wheel")
 
 
-def test_a_hinge_that_another_loop_moves_is_the_driven_one():
+def test_without_a_motor_the_first_hinge_of_the_ground_is_driven():
     model = mujoco.MjModel.from_xml_string(EXCAVATOR)
     loop = loop_of(EXCAVATOR)
-    assert model.joint(loop.joint).name == "rocker"
-    assert "piston_pin acts on it: rocker is taken as driven" in loop.chosen[0]
-    assert model.joint("rocker").id > model.joint("bucket").id
-    assert loop_of(EXCAVATOR, drive="bucket").joint == model.joint("bucket").id
+    assert model.joint(loop.joint).name == "bucket"
+    assert "no motor acts on it: bucket is taken as driven" in loop.chosen[0]
+    assert loop_of(EXCAVATOR, drive="rocker").joint == model.joint("rocker").id
 
 
 def test_a_loop_is_chosen_by_its_name():
@@ -567,8 +565,7 @@ def test_two_fingers_on_one_base_stay_apart():
 
 def test_a_slide_is_no_hinge():
     *_, piston = report_of(EXCAVATOR).closures
-    assert "stroke" not in piston.hinges
-    assert piston.other_joints == ("stroke (slide)",)
+    assert "hinges cylinder, rocker; other joints stroke (slide)" in piston.text
 
 
 @pytest.mark.parametrize("cut, by", [("B", "anchor"), ("B", "weld")])

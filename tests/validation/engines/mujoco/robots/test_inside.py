@@ -53,6 +53,10 @@ LOOPS = {
     "lifted": (file_of(LIFTED), "rod-arm"),
 }
 """A file and the loop that is asked of it; None: the first."""
+OPTIONS = {
+    "adaptive": PoseOptions(held=("spring_link",)),
+    "excavator": PoseOptions(drive="rocker"),
+}
 ASKED_TWICE = 1e-6
 """Relative; the solver of the file stops at a tolerance of 1e-8 of its own."""
 RIGID = 1e-8
@@ -62,7 +66,7 @@ RIGID = 1e-8
 @cache
 def open_loop(name):
     file, closing = LOOPS[name]
-    options = PoseOptions(held=("spring_link",) if name == "adaptive" else ())
+    options = OPTIONS.get(name, PoseOptions())
     compiled = compile_robot(file)
     posed = pose_robot(compiled.model, options)
     loop = next(

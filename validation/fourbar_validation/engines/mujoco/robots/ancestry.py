@@ -44,30 +44,17 @@ def find_roots(model: mujoco.MjModel, held: set[int]) -> list[int]:
     return roots
 
 
-def find_common(
-    model: mujoco.MjModel,
-    first: int,
-    second: int,
-) -> int:
-    """Return the nearest body that carries both of two bodies, or is one of them."""
-    above = set(climb(model, second))
-    return next(body for body in climb(model, first) if body in above)
+def list_joints_between(model: mujoco.MjModel, first: int, second: int) -> list[int]:
+    """List the joints from one body up to the common ancestor, and down to another.
 
-
-def list_joints_between(
-    model: mujoco.MjModel,
-    first: int,
-    second: int,
-) -> list[int]:
-    """List the joints on the ways from two bodies to their common ancestor."""
-    common = find_common(model, first, second)
-    joints: list[int] = []
-    for end in (first, second):
-        for body in climb(model, end):
-            if body == common:
-                break
-            joints += list_joints(model, body)
-    return joints
+    MuJoCo counts bodies and joints from the world outwards.
+    """
+    above = [
+        {joint for body in climb(model, end) for joint in list_joints(model, body)}
+        for end in (first, second)
+    ]
+    up, down = above[0] - above[1], above[1] - above[0]
+    return [*sorted(up, reverse=True), *sorted(down)]
 
 
 def list_closing(model: mujoco.MjModel) -> list[int]:
@@ -221,18 +208,16 @@ def list_dofs(model: mujoco.MjModel, joint: int) -> list[int]:
     return dofs
 
 
-def list_motors(model: mujoco.MjModel) -> list[tuple[int, int]]:
-    """List (joint, actuator) of what takes a control and acts on joints."""
+def list_motors(model: mujoco.MjModel) -> list[int]:
+    """List the joints that what takes a control acts on, a joint for each motor."""
     motors = []
-    for number in range(model.nu):
+    for number in filter(lambda one: takes_control(model, one), range(model.nu)):
         kind = model.actuator_trntype[number]
         target = int(model.actuator_trnid[number, 0])
-        if not takes_control(model, number):
-            continue
         if kind in _ON_JOINTS:
-            motors.append((target, number))
+            motors.append(target)
         elif kind == mujoco.mjtTrn.mjTRN_TENDON:
-            motors += [(joint, number) for joint in list_tendon_joints(model, target)]
+            motors += list_tendon_joints(model, target)
     return motors
 
 

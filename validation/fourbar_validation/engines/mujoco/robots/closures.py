@@ -15,10 +15,10 @@ import numpy as np
 
 from fourbar.errors import InputError, write_count
 from fourbar.linkage import ENDS, PINS
+from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
-    find_common,
     find_ends,
     find_parent,
     find_roots,
@@ -26,7 +26,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_actuators,
     list_closing,
     list_followers,
-    list_joints,
+    list_joints_between,
     list_motors,
     list_tied_joints,
     name_body,
@@ -77,6 +77,8 @@ NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
 _SERVE_SPATIAL = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
 _SERVE_PLANAR = "MuJoCo or Drake serve it, PMKS+ for a sketch"
 """Tools for mechanisms that are no planar four-bar."""
+PRINTED_AS_ZERO = 1e-12
+"""m or deg; less is printed as 0."""
 _MOST_HOLDS = 5
 """Further choices of joints to hold that are printed."""
 _SWITCHED_OFF = 'it is switched off in the file (active="false", or a <flag>)'
@@ -211,14 +213,17 @@ class _Chain:
             or model.eq_data[number, 10] == 0.0  # a weld's torquescale
         )
         self.ends = find_tied_bodies(model, number)
-        common = find_common(model, *self.ends)
+        first, second = (climb(model, end) for end in self.ends)
+        common = max({*first} & {*second})  # the one that is farthest from the world
         self.ground = finder.root[common]
         self.ground_name = name_body(model, common)
-        ways = [finder.list_way(end, common) for end in self.ends]
-        (self.joints, self.bars), (joints, bars) = ways
-        self.joints += reversed(joints)
-        self.bars += bars[-2::-1]
-        """One more than joints; None: the joint hangs on another of the same body."""
+        joints = list_joints_between(model, *self.ends)
+        self.joints = [joint for joint in joints if joint not in finder.held]
+        self.bars = [finder.root[self.ends[0]]]
+        """One more than joints."""
+        for joint in self.joints:
+            turned, bearer = finder.join(joint)
+            self.bars.append(bearer if self.bars[-1] == turned else turned)
         types = {joint: int(model.jnt_type[joint]) for joint in self.joints}
         self.hinges = [one for one, kind in types.items() if kind == HINGE_JOINT]
         self.others = {one: types[one] for one in types if one not in self.hinges}
@@ -268,23 +273,10 @@ class _Finder:
         self.before.qpos[:] = posed.stated
         mujoco.mj_kinematics(model, self.before)
 
-    def list_way(self, end: int, common: int) -> tuple[list[int], list[int | None]]:
-        """List the moving joints from an end up to an ancestor, and the bars they join.
-
-        There is one bar more; None stands where a joint bears another on one body.
-        """
-        joints: list[int] = []
-        bars: list[int | None] = [self.root[end]]
-        for body in climb(self.model, end):
-            if body == common:
-                break
-            on_body = list_joints(self.model, body)
-            moving = [joint for joint in on_body if joint not in self.held]
-            joints += reversed(moving)
-            if moving:
-                bars += [None] * (len(moving) - 1)
-                bars.append(self.root[find_parent(self.model, body)])
-        return joints, bars
+    def join(self, joint: int) -> tuple[int, int]:
+        """Return the bar that a joint turns, and the one that bears it."""
+        body = int(self.model.jnt_bodyid[joint])
+        return self.root[body], self.root[find_parent(self.model, body)]
 
     def _list_away(self, chain: _Chain) -> list[int]:
         """List the joints of a chain but the hinges on whose axis its closure lies."""
@@ -301,43 +293,51 @@ class _Finder:
         """Describe one equality."""
         model = self.model
         kind = EQUALITY_KINDS.get(model.eq_type[number], "flex")
-        closure = RobotClosure(
-            self.names[number],
-            kind,
-            None,
-            self._describe_mimic(number, kind),
-            solref=tuple(model.eq_solref[number].tolist()),
-            solimp=tuple(model.eq_solimp[number].tolist()),
-        )
-        if number not in self.chains:
-            return closure
-        chain = self.chains[number]
         loop = None
-        reason = next(self._list_reasons(chain), "")
-        if not reason:
-            try:
-                loop = self._make_loop(chain)
-                other = self._make_loop(chain, from_other_end=True)
-                loop = replace(loop, from_other_end=other)
-            except _NoFourBarError as error:
-                reason = str(error)
-        first, second = find_ends(model, self.before, number)
-        apart = first - second
-        normal = self.normals.get(number, np.zeros(3))
-        gap = float(np.linalg.norm(apart - (apart @ normal) * normal))
-        return replace(
-            closure,
-            loop=loop,
-            reason=reason,
-            ground=chain.ground_name,
-            hinges=tuple(name_joint(model, joint) for joint in chain.hinges),
-            other_joints=tuple(
+        reason = self._describe_mimic(number, kind)
+        facts: list[str] = []
+        if number in self.chains:
+            chain = self.chains[number]
+            reason = next(self._list_reasons(chain), "")
+            if not reason:
+                try:
+                    loop = self._make_loop(chain)
+                    other = self._make_loop(chain, from_other_end=True)
+                    loop = replace(loop, from_other_end=other)
+                except _NoFourBarError as error:
+                    reason = str(error)
+            facts += self._list_facts(chain, loop)
+        facts.append(f"solref {write_six_digits(*model.eq_solref[number].tolist())}")
+        facts.append(f"solimp {write_six_digits(*model.eq_solimp[number].tolist())}")
+        name = self.names[number]
+        what = kind if loop is not None else f"{kind}, no four-bar: {reason}"
+        return RobotClosure(name, loop, reason, "; ".join([f"{name}: {what}", *facts]))
+
+    def _list_facts(self, chain: _Chain, loop: RobotLoop | None) -> Iterator[str]:
+        """Say what a chain is made of, and how far it is from closed and planar."""
+        model = self.model
+        yield f"ground {chain.ground_name}"
+        if chain.hinges:
+            hinges = (name_joint(model, joint) for joint in chain.hinges)
+            yield f"hinges {', '.join(hinges)}"
+        if chain.others:
+            others = (
                 f"{name_joint(model, joint)} ({JOINT_WORDS[kind]})"
                 for joint, kind in chain.others.items()
-            ),
-            misaligned=self._measure_axes(chain)[0],
-            gap=gap if chain.is_pin else None,
-        )
+            )
+            yield f"other joints {', '.join(others)}"
+        if loop is not None:
+            yield loop.describe_lengths()
+        angle, _ = self._measure_axes(chain)
+        if angle is not None:
+            apart = math.degrees(angle)
+            yield f"axes {apart if apart > PRINTED_AS_ZERO else 0.0:.2g} deg apart"
+        if chain.is_pin:
+            first, second = find_ends(model, self.before, chain.number)
+            normal = self.normals.get(chain.number, np.zeros(3))
+            across = (first - second) @ normal
+            gap = float(np.linalg.norm(first - second - across * normal))
+            yield f"gap {write_length(gap) if gap > PRINTED_AS_ZERO else 0} mm"
 
     def _describe_mimic(self, number: int, kind: str) -> str:
         """Write which joint follows which, by which polynomial."""
@@ -378,13 +378,14 @@ class _Finder:
             yield "both ends are on one rigid body"
         if self._is_idle(chain):
             yield self._explain_idle(chain)
+        model = self.model
         angle, names = self._measure_axes(chain)
         is_skew = angle is not None and angle > PARALLEL
         is_four = chain.pins == len(PINS)
         if [*chain.others.values()] == [BALL] and is_four and not is_skew:
             yield self._explain_ball(chain)
         for joint, kind in chain.others.items():
-            yield f"{name_joint(self.model, joint)} {self._explain_joint(chain, kind)}"
+            yield f"{name_joint(model, joint)} {self._explain_joint(chain, kind)}"
         if angle is not None and is_skew:
             spatial = f"the loop is spatial ({_SERVE_SPATIAL})"
             places = self.data.xanchor[chain.hinges].round(6)
@@ -397,7 +398,7 @@ class _Finder:
             yield f"the axes of {names} are {degrees:.3g} deg apart: {spatial}"
         if not is_four:
             yield self._explain_count(chain)
-        if None in chain.bars:
+        if len({*model.jnt_bodyid[chain.joints]}) < len(chain.joints):
             yield "two of its hinges are on one body: a bar has no body"
 
     def _explain_idle(self, chain: _Chain) -> str:
@@ -538,7 +539,7 @@ class _Finder:
         joint best.
         """
         count = max(chain.pins - len(PINS), 0)
-        driven = {joint for joint, _ in self._list_motors(chain)}
+        driven = {*self._list_motors(chain)}
         several = len(driven) > 1
         hinges = [one for one in chain.hinges if (one in driven) == several]
         stiffness = self.model.jnt_stiffness
@@ -594,13 +595,11 @@ class _Finder:
         for joint in hinges:
             across = np.cross(*self.data.xaxis[[joint, min(hinges)]])
             if float(np.linalg.norm(across)) <= math.sin(PARALLEL):
-                parent = self.root[find_parent(model, model.jnt_bodyid[joint])]
-                pair = frozenset((self._find_root(joint), parent))
-                pins[pair] = self.data.xanchor[joint]
+                pins[frozenset(self.join(joint))] = self.data.xanchor[joint]
         for one in loops:
             first, last = (self.root[end] for end in one.ends)
             pins[frozenset((first, last))], _ = find_ends(model, self.data, one.number)
-        moved = {self._find_root(joint) for one in coupled for joint in one.joints}
+        moved = {self.join(joint)[0] for one in coupled for joint in one.joints}
         bars = {bar for pair in pins for bar in pair}
         for inner in permutations(bars - {first, last}, 2):
             cycle = [first, *inner, last]
@@ -625,13 +624,12 @@ class _Finder:
 
     def _find_bar(self, body: int, bars: Container[int]) -> int:
         """Return the bar that carries a body, however far down, or the world."""
-        while body and self.root[body] not in bars:
-            body = find_parent(self.model, body)
-        return self.root[body]
+        above = (self.root[one] for one in climb(self.model, body))
+        return next((root for root in above if root in bars), 0)
 
-    def _list_motors(self, chain: _Chain) -> list[tuple[int, int]]:
-        """List (joint, actuator) of what takes a control and acts on a chain."""
-        return [motor for motor in list_motors(self.model) if motor[0] in chain.joints]
+    def _list_motors(self, chain: _Chain) -> list[int]:
+        """List the joints of a chain on which what takes a control acts."""
+        return [joint for joint in list_motors(self.model) if joint in chain.joints]
 
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.
@@ -642,7 +640,7 @@ class _Finder:
         data = self.data
         joints: list[int | None] = [*chain.joints]
         groups: list[tuple[int, ...]]
-        groups = [(bar,) for bar in chain.bars if bar is not None]
+        groups = [(bar,) for bar in chain.bars]
         if chain.is_pin:
             joints.append(None)
         else:  # its halves are one bar
@@ -662,11 +660,11 @@ class _Finder:
         cut = next((pin for pin in PINS if pin not in hinges), None)
         bodies = dict(zip(ENDS, groups, strict=True))
         sides = {
-            pin: 1.0 if self._find_root(joint) in bodies[PINS[pin][1]] else -1.0
+            pin: 1.0 if self.join(joint)[0] in bodies[PINS[pin][1]] else -1.0
             for pin, joint in hinges.items()
         }
         normal = find_mean_axis(data, hinges.values())
-        turns_ground = self._find_root(driven) in bodies[1]
+        turns_ground = self.join(driven)[0] in bodies[1]
         if (data.xaxis[driven] @ normal > 0.0) == turns_ground:
             normal = -normal
         places = {
@@ -736,10 +734,6 @@ class _Finder:
             remarks=tuple(remarks),
         )
 
-    def _find_root(self, joint: int) -> int:
-        """Return the bar that a joint turns."""
-        return self.root[int(self.model.jnt_bodyid[joint])]
-
     def _choose_along(self, normal: Array, line: Array) -> Array:
         """Return the unit vector x of a plane in world axes, (3,).
 
@@ -770,38 +764,23 @@ class _Finder:
             stated = find_joint(model, self.options.drive, "--drive")
             if stated in at_ground:
                 return stated, []
-        driven = [joint for joint, _ in self._list_motors(chain)]
+        driven = self._list_motors(chain)
         if not driven:  # one that takes no control drives by a speed that it keeps
             driven = [joint for joint in at_ground if list_actuators(model, joint)]
         names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
         chosen = next((joint for joint in driven if joint in at_ground), None)
         reason = f"motors act on {names}"
         if chosen is None:
-            pushed = self._find_pushed(at_ground, chain)
-            # of the hinges without a sign the first of the file
-            chosen = next(iter(pushed), min(at_ground))
-            acts = [f"{by} acts on it" for by in pushed.values()]
-            reason = next(iter(acts), "no motor acts on it")
+            chosen = min(
+                at_ground
+            )  # of the hinges without a sign the first of the file
+            reason = "no motor acts on it"
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"
         elif len({*driven}) == 1:
             return chosen, []
         taken = f"{name_joint(model, chosen)} is taken as driven"
         return chosen, [f"{reason}: {taken} (--drive states another)"]
-
-    def _find_pushed(self, at_ground: list[int], chain: _Chain) -> dict[int, str]:
-        """Return the one hinge of the ground whose bar another closure moves.
-
-        The value is the closure's name; nothing if there is not exactly one such hinge.
-        """
-        hinge_of = {self._find_root(joint): joint for joint in at_ground}
-        pushed = {
-            hinge_of[self.root[body]]: other.name
-            for other in self._list_others(chain)
-            for body in other.ends
-            if self.root[body] in hinge_of and not self._is_idle(other)
-        }
-        return pushed if len(pushed) == 1 else {}
 
     def _sort_equalities(
         self, loop: RobotLoop

@@ -21,7 +21,6 @@ from fourbar.formulas.mobility import (
 from fourbar.linkage import Lengths
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
-    find_common,
     find_tied_bodies,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import CompiledRobot
@@ -61,19 +60,16 @@ def _list_roundings(
     """List by how much the rounding of each stated place and turn moves a pin, m."""
     model = compiled.model
     first, second = find_tied_bodies(model, loop.equality)
-    common = find_common(model, first, second)
     if model.eq_objtype[loop.equality] == mujoco.mjtObj.mjOBJ_SITE:
         sites = (model.eq_obj1id[loop.equality], model.eq_obj2id[loop.equality])
         places = [model.site_pos[site] for site in sites]
     else:
         places = [model.eq_data[loop.equality, 0:3]]
     places += [model.jnt_pos[joint] for joint in loop.hinges.values()]
-    for end in (first, second):
-        path = climb(model, end)
-        for body in path[: path.index(common)]:
-            places.append(model.body_pos[body])
-            turned = find_rounding(compiled.quaternions.get(body, ()))
-            yield _TURN_OF_A_QUATERNION * longest * turned
+    for body in {*climb(model, first)} ^ {*climb(model, second)}:
+        places.append(model.body_pos[body])
+        turned = find_rounding(compiled.quaternions.get(body, ()))
+        yield _TURN_OF_A_QUATERNION * longest * turned
     yield from map(find_rounding, places)
 
 

@@ -182,22 +182,11 @@ class RobotClosure:
     """One equality of a robot: the four-bar that it closes, or why it closes none."""
 
     name: str
-    kind: str
-    """Kind as MJCF calls it: connect, weld, joint, ..."""
     loop: RobotLoop | None
     reason: str
     """Why it is no planar four-bar; empty where it is one."""
-    ground: str = ""
-    hinges: tuple[str, ...] = ()
-    """Hinges of the loop by name, from the first body of the equality to the second."""
-    other_joints: tuple[str, ...] = ()
-    """Other joints of the loop, each with its kind."""
-    misaligned: float | None = None
-    """Largest angle between two of its hinges' axes, rad; None: fewer than two."""
-    gap: float | None = None
-    """Distance of the two ends in the pose as stated, m; None where it has no ends."""
-    solref: tuple[float, ...] = ()
-    solimp: tuple[float, ...] = ()
+    text: str
+    """Kind, ground, joints, lengths, gap and softness, or the reason."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,7 +91,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         notes.append(f"outside their ranges before closing: {names}")
     closed = stated
     if closing.size(stated) > CLOSED_IN_THE_FILE or {*outside} - fixed:
-        motors = {joint for joint, _ in list_motors(model)} - {*outside}
+        motors = {*list_motors(model)} - {*outside}
         closed = closing.close(stated, fixed | motors)
         # where a motor or a range stops it short of closing
         for start in (stated, *closing.list_starts(stated, fixed)):
