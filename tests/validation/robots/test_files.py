@@ -225,7 +225,10 @@ def test_a_plugin_is_left_out_and_said(tmp_path, inertial):
     assert bool(inertial) == (not robot.unknown_masses)
     if inertial:
         assert robot.model.body("arm").mass == 2.0
-    assert "meshes that are missing are left out: ring of a plugin" in robot.notes
+    assert (
+        "meshes that are missing are left out: 1, the first of them ring of a plugin"
+        in robot.notes
+    )
 
 
 @pytest.mark.parametrize(

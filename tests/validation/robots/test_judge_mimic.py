@@ -116,13 +116,17 @@ def test_a_motion_through_a_change_point_is_refused(tmp_path):
         measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
 
-def test_the_range_of_the_file_is_the_motion_of_a_scene_over_a_whole_turn(tmp_path):
+def test_the_range_of_the_file_is_the_motion_of_a_scene_over_a_whole_turn(
+    tmp_path, capsys
+):
     motion = PARALLELOGRAM.motion.replace(angle=np.linspace(0.0, math.tau, 73))
     turn = replace(PARALLELOGRAM, motion=motion)
     path = write_upright(tmp_path, pad="")
     limited = path.read_text().replace('name="drive"', 'name="drive" range="-40 20"')
     path.write_text(limited)
     report = measure_mimic(path, "rocker_j", turn)
+    show_mimic(report)
+    assert not re.search(r"e-\d", capsys.readouterr().out)  # round-off is 0
     # the crank stands at 90 deg
     assert np.degrees(report.swing) == approx((50.0, 110.0))
     assert report.file.angle <= ROUND_OFF

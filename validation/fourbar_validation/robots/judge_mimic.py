@@ -26,6 +26,8 @@ from fourbar_validation.robots.guard import examine_guarded
 READ = "fourbar_validation.engines.mujoco.robots.mimic:read_joint_equality"
 POLYNOMIAL_DEGREES = (1, 2, 3, 4)
 """Degrees of the polynomials of MuJoCo's polycoef; URDF's mimic has degree 1."""
+_DECIMALS = 11
+"""Decimals beyond which angles in degrees, ratios and coefficients are round-off."""
 POSITIONS_FITTED = 1001
 """Positions over the motion of the scene. A largest error between two of them is missed
 by some 1e-6 of it.
@@ -376,8 +378,8 @@ def show_mimic(report: _MimicReport) -> None:
     fits = zip(POLYNOMIAL_DEGREES, report.squares, report.fitted, strict=True)
     for degree, *errors in fits:
         for fit, error in zip(_FITS, errors, strict=True):
-            ratio = f"{error.ratio:.4g}"
-            click.echo(ROW.format(str(degree), fit, _deg(error.angle), ratio))
+            sizes = (_deg(error.angle), _write(error.ratio, 4))
+            click.echo(ROW.format(str(degree), fit, *sizes))
             polycoef = _write_coefficients(error.coefficients)
             click.echo(f"{'':8}{label} {polycoef}")
 
@@ -452,13 +454,19 @@ def _write_errors(report: _MimicReport) -> str:
         f"largest error of the angle: {through_zero}"
         f"{_deg(report.shifted)} deg with the constant of least squares, "
         f"{_deg(report.centred)} deg with the best one; "
-        f"of the ratio {_write_ratio(equality)}: {report.file.ratio:.4g}{missing}"
+        f"of the ratio {_write_ratio(equality)}: "
+        f"{_write(report.file.ratio, 4)}{missing}"
     )
 
 
 def _deg(angle: float) -> str:
-    return f"{math.degrees(angle):.5g}"
+    return _write(math.degrees(angle), 5)
 
 
 def _write_coefficients(coefficients: tuple[float, ...]) -> str:
-    return " ".join(f"{number:.7g}" for number in coefficients)
+    return " ".join(_write(number, 7) for number in coefficients)
+
+
+def _write(number: float, digits: int) -> str:
+    """Write a number, and 0 where it is round-off."""
+    return f"{round(number, _DECIMALS) + 0.0:.{digits}g}"

@@ -41,7 +41,8 @@ def _show_report(report: RobotReport) -> None:
     if not report.closures:
         print_sentence(
             "No loop is closed in the file: a <connect> between two sites closes one, "
-            "in an SDF a further joint or <drake:ball_constraint>."
+            "in an SDF a further joint or <drake:ball_constraint>, in a URDF a "
+            "<loop_joint>."
         )
     for closure in report.closures:
         loop = closure.loop

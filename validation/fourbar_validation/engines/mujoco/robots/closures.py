@@ -350,8 +350,8 @@ class _Finder:
             follower = name_joint(model, joint)
             polynomial = " ".join(f"{c + 0.0:.6g}" for c in numbers)
             advice = (
-                "write the loop that it stands for, by fourbar new SCENE --pins; then"
-                f" check-mjcf SCENE FILE --mimic {follower} says what it loses"
+                "if it stands for a four-bar, write that by fourbar new SCENE --pins;"
+                f" then check-mjcf SCENE FILE --mimic {follower} says what it loses"
             )
             if (model.jnt_type[[joint, leader]] == SLIDE).any():
                 advice = "a slide is in it: no four-bar stands behind it"

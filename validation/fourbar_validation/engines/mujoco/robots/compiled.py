@@ -126,8 +126,10 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
     )
     notes = list(file.notes)
     if left_out:
-        files = ", ".join(sorted(left_out))
-        notes.append(f"meshes that are missing are left out: {files}")
+        notes.append(
+            f"meshes that are missing are left out: {len(left_out)}, the first of them "
+            f"{min(left_out)}"
+        )
     if masses:
         names = ", ".join(model.body(number).name for number in masses)
         notes.append(
