@@ -21,7 +21,7 @@ from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import Law, Rise
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import find_miscalculated
-from fourbar_validation.check.check import judge_table
+from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.csv_columns import MADE_OF, list_names_of_points
 from fourbar_validation.check.judge_table import Allowance, Judge
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
@@ -85,7 +85,7 @@ def write(numbers, names=ALL, digits=None):
 
 def list_differing(scene, table):
     """Name the quantities that differ, without a search for what explains them."""
-    findings = [one for one in Judge(scene, table).findings() if one.judged]
+    findings = [one for one in Judge(scene, table).findings if one.judged]
     assert findings
     return {one.quantity for one in findings if not one.agrees}
 
@@ -107,7 +107,7 @@ def judged(read):
     """Judges numbers that are written as a table."""
 
     def judge(scene, *numbers, tolerance=None):
-        return judge_table(
+        return Judgement(
             scene,
             read(write(*numbers)),
             tolerance,
@@ -164,7 +164,7 @@ def test_zeros_that_are_left_off_are_digits_if_they_are_right(
     """The torque is 1.10071 and 3.16939 N m."""
     places = right(THESIS)["theta_2"].tolist()
     table = f"theta_2,torque\n{places[0]},{first}\n{places[1]},{second}\n"
-    judgement = judge_table(THESIS, read(table))
+    judgement = Judgement(THESIS, read(table))
     assert judgement.status == HOLDS and judgement.digits == digits
 
 
@@ -178,7 +178,7 @@ def test_blank_cells_are_counted_and_the_rest_of_their_row_is_judged(read):
         f"{two},{2 * second},{numbers['F12'][1, 0]:.17g},,b\n"
         f"{two},,,,c\n"
     )
-    judgement = judge_table(THESIS, table)
+    judgement = Judgement(THESIS, table)
     assert [(f.line, f.quantity, f.agrees) for f in judgement.findings] == [
         (2, "torque", True), (3, "torque", False), (3, "F12_x", True)
     ]  # fmt: skip
@@ -205,7 +205,7 @@ def test_what_the_digits_of_the_angle_explain_is_no_mistake(factor, read):
         f"{angle:.1f},{value:.6g}"
         for angle, value in zip(np.degrees(angles), torque, strict=True)
     ]
-    judgement = judge_table(OURS, read("\n".join(["theta_2 [deg],torque", *rows, ""])))
+    judgement = Judgement(OURS, read("\n".join(["theta_2 [deg],torque", *rows, ""])))
     assert judgement.status == FAILED
     by_digits = "what differs is within half a digit of theta_2"
     assert (by_digits in judgement.describe_unexplained()) == (factor == 1.0)
@@ -663,7 +663,7 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     assert explanation.quantities == ("torque", "F12")
     angles = {"theta_2": numbers["theta_2"], "theta_4 [deg]": numbers["theta_4"]}
     table = read(tabulate(angles, f"{{:.{digits}f}}".format))
-    first = judge_table(OURS, table).explanations[0].text
+    first = Judgement(OURS, table).explanations[0].text
     assert first.startswith("units: numbers in rad where deg was announced")
 
 
@@ -740,7 +740,7 @@ def test_the_table_of_another_scene_is_explained(words, read):
     at = solve(scene)[name]
     text = tabulate({name: at, "F12_x": numbers.F12[:, 0], "F14_y": numbers.F14[:, 1]})
     motion = {"commanded": scene.motion.commanded, "law": scene.motion.law}
-    judgement = judge_table(scene, read(text, **motion))
+    judgement = Judgement(scene, read(text, **motion))
     first, *more = (one.text for one in judgement.explanations)
     assert first == words and not any("of two bars" in text for text in more)
 
@@ -775,7 +775,7 @@ def test_one_component_is_judged_by_itself(letter, read):
 
     def judge(values):
         columns = {"theta_2": numbers["theta_2"], name: values}
-        return judge_table(OURS, read(tabulate(columns)))
+        return Judgement(OURS, read(tabulate(columns)))
 
     same = judge(column)
     assert not same.differing and len(same.findings) == len(column)
@@ -830,7 +830,7 @@ def test_nonsense_and_a_single_number_are_explained_by_nothing(judged, read):
 
     Without gravity it is 0.292 N m, which two digits tell from nothing.
     """
-    few = judge_table(OURS, read("theta_2 [deg],torque\n60,0.29\n"))
+    few = Judgement(OURS, read("theta_2 [deg],torque\n60,0.29\n"))
     assert few.differing and not few.explanations
     numbers = right(OURS)
     wild = numbers | {name: noise(3, numbers[name]) for name in FORCES}
@@ -911,7 +911,7 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(read):
     both = (right(THESIS)[f"theta_{bar}"][0] for bar in (2, 3))
     right_row = ",".join(repr(float(angle)) for angle in both)
     table = read(f"theta_2,theta_3\n{right_row}\n{math.radians(45.0)!r},1\n")
-    judgement = judge_table(THESIS, table)
+    judgement = Judgement(THESIS, table)
     assert judgement.not_assembled == [3] and judgement.status == FAILED
     assert [finding.line for finding in judgement.findings] == [2]
 
@@ -953,7 +953,7 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     points = list_names_of_points(scene)
     table = read_table(path, points=points).from_pin(scene.origin)
     assert "not a known column" not in table.left_out.values()
-    assert judge_table(scene, table).status == HOLDS
+    assert Judgement(scene, table).status == HOLDS
     if any(scene.origin):
         unmoved = read_table(path, points=points)
         assert list_differing(scene, unmoved) >= {"A", "B"}
@@ -1047,7 +1047,7 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(re
     scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0))
     solution = fourbar.solve(scene)
     assert {*solution.branch.tolist()} == {1, -1}
-    judgement = judge_table(scene, read(solution.to_csv()))
+    judgement = Judgement(scene, read(solution.to_csv()))
     assert judgement.status == HOLDS and judgement.compared > 100
 
 
@@ -1069,7 +1069,7 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(re
 
     def judge(scene, *names):
         text = write(log, (*rates, *names)).replace("nan", "")
-        return judge_table(scene, read(text))
+        return Judgement(scene, read(text))
 
     assert judge(OURS, *ALL).status == FAILED  # at the scene's one speed
     judgement = judge(still, *ALL)
@@ -1101,7 +1101,7 @@ def test_the_speed_and_acceleration_of_a_row_are_rounded_too(
     rates = {"omega_2": omega.round(decimals), "alpha_2": alpha.round(decimals)}
     columns = {"theta_2": log["theta_2"], **rates, "torque": log["torque"]}
     still = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
-    judgement = judge_table(still, read(tabulate(columns)))
+    judgement = Judgement(still, read(tabulate(columns)))
     if not said:
         assert judgement.status == HOLDS
         return
@@ -1159,7 +1159,7 @@ def with_comma(theta, torque):
     ],
 )
 def test_an_ordinary_table_is_read(form, torques):
-    judgement = judge_table(OURS, torques(*form))
+    judgement = Judgement(OURS, torques(*form))
     assert judgement.status == HOLDS
     agreeing = sum(one.agrees for one in judgement.findings if one.quantity == "torque")
     assert agreeing == 12
@@ -1168,7 +1168,7 @@ def test_an_ordinary_table_is_read(form, torques):
 
 def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
     table = torques("theta_2,torque")
-    assert judge_table(OURS, table).status == HOLDS
+    assert Judgement(OURS, table).status == HOLDS
     (note,) = table.notes
     words = "theta_2 has no unit and goes to 330: it is read as degrees"
     assert note.startswith(words)

@@ -15,7 +15,7 @@ import fourbar
 from fourbar import Motion, Sweep
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
-from fourbar_validation.check.check import judge_table
+from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands, find_steady
 from fourbar_validation.check.theirs import read_table
@@ -71,7 +71,7 @@ def judged(read):
     """Judges a table whose rows are found by an angle."""
 
     def judge(scene, *columns):
-        return judge_table(scene, read(tabulate(*columns), scene.motion.commanded))
+        return Judgement(scene, read(tabulate(*columns), scene.motion.commanded))
 
     return judge
 
@@ -120,7 +120,7 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
     right = fourbar.solve(scene)
     columns = right.theta_4, -0.5 * right.omega_2, -0.5 * right.omega_3
     table = read(write("theta_4,alpha_2,alpha_3", *columns), "theta_4")
-    (first, *_) = judge_table(scene, table).explanations
+    (first, *_) = Judgement(scene, table).explanations
     assert first.complete and "(dJ/dt) v is missing" in first.text
 
 
@@ -153,7 +153,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(read):
             f"{angle},{x!r}" for angle, x in zip(angles, torque.tolist(), strict=True)
         ]
         table = read("\n".join(["theta_2 [deg],torque", *rows]))
-        findings = Judge(scene, table).findings()
+        findings = Judge(scene, table).findings
         assert sum(not one.agrees for one in findings) == differ
 
 
@@ -289,7 +289,7 @@ def follow_rise(time):
 def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
     time = np.arange(0.0123, 0.79, 0.0517)
     columns = time.round(4), follow_rise(time)[0], follow_rise(time - lag)[3]
-    judgement = judge_table(SERVO, read(write("time,theta_2,torque", *columns)))
+    judgement = Judgement(SERVO, read(write("time,theta_2,torque", *columns)))
     (only,) = judgement.explanations
     assert only.complete and f"time {abs(lag):g} s {side} its own" in only.text
 
@@ -316,14 +316,14 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read
     read = partial(read, law=RISE)
     if refused:
         with raises(InputError, match=refused) as caught:
-            judge_table(SERVO, read(text))
+            Judgement(SERVO, read(text))
         assert "Servo" not in str(caught.value)
         return
-    judgement = judge_table(SERVO, read(text))
+    judgement = Judgement(SERVO, read(text))
     assert judgement.status == HOLDS and judgement.compared >= len(time)
     assert not judgement.table.left_out or "omega_2" in names
     wrong = text.replace(f"{torque[3]:.15g}", f"{1.3 * torque[3]:.15g}")
-    findings = Judge(SERVO, read(wrong)).findings()
+    findings = Judge(SERVO, read(wrong)).findings
     assert [one.line for one in findings if not one.agrees] == [5]
 
 
@@ -333,7 +333,7 @@ def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     scene = crank_rocker(motion=Motion(theta.tolist(), speed))
     time = (theta - math.radians(start)) / speed
     text = write("time,torque", time, fourbar.solve(scene).torque)
-    judgement = judge_table(scene, read(text, law=find_steady(scene)))
+    judgement = Judgement(scene, read(text, law=find_steady(scene)))
     assert judgement.agreeing == 4 and judgement.digits >= "12"
 
 
@@ -343,7 +343,7 @@ def test_times_that_nobody_rounded_leave_all_digits(times, read):
     rows = zip(times, np.degrees(theta), torque, strict=True)
     lines = [f"{time:g},{angle:.4f},{number:.8f}" for time, angle, number in rows]
     table = read("\n".join(["time,theta_2 [deg],torque", *lines]))
-    judgement = judge_table(SERVO, table)
+    judgement = Judgement(SERVO, table)
     assert judgement.status == HOLDS and judgement.digits[0] >= "7"
 
 
@@ -358,12 +358,12 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
     theta = first + np.arccos(cosine) - CYLINDER.ends[1][1].angle
     theta[1] += 1e-6
     table = read(write("stroke,theta_2", stroke, theta), "stroke")
-    judgement = judge_table(scene, table)
+    judgement = Judgement(scene, table)
     assert [finding.line for finding in judgement.differing] == [3]
     assert judgement.compared == 3 and judgement.table.found_by == "theta_2"
     own = fourbar.solve(scene, "position")
     text = tabulate("theta_2", own.theta_2, own.stroke).replace("torque", "stroke")
-    assert judge_table(scene, read(text)).status == HOLDS
+    assert Judgement(scene, read(text)).status == HOLDS
     with raises(InputError, match="needs a column stroke"):
         judged(scene, "theta_2", theta, theta)
 

@@ -3,12 +3,13 @@
 import json
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 
 import click
+import numpy as np
 
 from fourbar.errors import (
     FAILED,
@@ -20,7 +21,6 @@ from fourbar.errors import (
 )
 from fourbar.files import load
 from fourbar.quantities import STAGE_OF, UNITS
-from fourbar.scene import Scene
 from fourbar.writing import null_nan, require_file, write_text
 from fourbar_validation.check.csv_columns import list_names_of_points
 from fourbar_validation.check.judge_table import (
@@ -30,74 +30,71 @@ from fourbar_validation.check.judge_table import (
 )
 from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.row_commands import find_steady
-from fourbar_validation.check.theirs import TheirTable, Unit, read_table
+from fourbar_validation.check.theirs import read_table
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.report.junit import JunitCase, write_document
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """All findings, and the known mistakes that would explain them."""
+class Judgement(Judge):
+    """All findings, and the known mistakes that would explain them.
 
-    judge: Judge
+    What is allowed is K eps/condition, plus half a unit of the last printed digit, and
+    of the angle's. A tolerance decides if it is given, and what explains the rest is
+    held to it too.
+    """
 
     @cached_property
     def explanations(self) -> list[Explanation]:
-        """Return the known mistakes that explain what differs."""
+        """Return the known mistakes that explain what differs.
+
+        They are those of the quantities of a solution, or else of its motion.
+        """
         labels = {finding.quantity for finding in self.differing}
-        return _explain(self.judge, labels)
+        known = {k: one for k, one in self.columns.items() if one.quantity in UNITS}
+        motion = [k for k in known if STAGE_OF.get(known[k].quantity) != "force"]
+        for keys in dict.fromkeys((tuple(known), tuple(motion))):
+            columns = {key: self.table.columns[key] for key in keys}
+            table = replace(self.table, columns=columns)
+            part = Judge(self.scene, table, self.tolerance, self.rows)
+            wrong = [key for key in sorted(keys) if known[key].label in labels]
+            found = explain(part, [part.columns[key] for key in wrong]) if wrong else []
+            if found:
+                is_all = len(keys) == len(known)
+                return [one._replace(complete=one.complete and is_all) for one in found]
+        return []
 
-    @cached_property
-    def table(self) -> TheirTable:
-        """Return the table as it was read, with what is to be said of it."""
-        table = self.judge.table
-        return replace(table, notes=(*table.notes, *self.judge.describe_held()))
-
-    @cached_property
-    def findings(self) -> list[Discrepancy]:
-        """Return every number that the table states where the formulas have one."""
-        return self.judge.findings()
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of the table, and of what friction holds."""
+        return (*self.table.notes, *self.describe_held())
 
     @cached_property
     def differing(self) -> list[Discrepancy]:
-        """Return the findings that do not agree, though digits are left to judge by."""
+        """The findings that do not agree, though digits are left to judge by."""
         return [one for one in self.findings if one.judged and not one.agrees]
-
-    @cached_property
-    def not_assembled(self) -> list[int]:
-        """Return the lines at which the linkage does not assemble, or is singular.
-
-        There is no right answer there.
-        """
-        return self.judge.without_answer()
 
     @property
     def blank(self) -> int:
-        """Return how many cells of the judged columns have no number."""
-        columns = self.judge.columns.values()
+        """How many cells of the judged columns have no number."""
+        columns = self.columns.values()
         return sum(int((~column.stated).sum()) for column in columns)
 
     @property
     def agreeing(self) -> int:
-        """Return how many numbers agree."""
+        """How many numbers agree."""
         return sum(finding.agrees for finding in self.findings)
 
     @property
     def exact(self) -> int:
-        """Return how many numbers agree to round-off and their printed digits."""
+        """How many numbers agree to round-off and their printed digits."""
         return sum(finding.exact for finding in self.findings)
-
-    @cached_property
-    def not_judged(self) -> int:
-        """Return how many numbers have no digit left to judge by."""
-        return sum(not finding.judged for finding in self.findings)
 
     @property
     def compared(self) -> int:
-        """Return how many numbers were judged."""
-        return len(self.findings) - self.not_judged
+        """How many numbers have a digit left to judge by."""
+        return sum(finding.judged for finding in self.findings)
 
     @property
     def agreed_power(self) -> int | None:
@@ -106,36 +103,30 @@ class Judgement:
         The power is None if a tolerance was stated, or if one of them is off by more
         than any table that is right in the digits it has.
         """
-        if self.judge.tolerance is not None or not self.differing or self.not_assembled:
+        sizes = np.array([math.hypot(*finding.ours) for finding in self.differing])
+        if self.tolerance is not None or self.not_assembled or not sizes.all():
             return None
-        sizes = [math.hypot(*finding.ours) for finding in self.differing]
-        if not all(sizes):
-            return None
-        worst = max(
-            finding.difference / size
-            for finding, size in zip(self.differing, sizes, strict=True)
-        )
-        return math.ceil(math.log10(worst)) if worst <= FEWEST_DIGITS else None
+        apart = [finding.difference for finding in self.differing]
+        worst = np.max(apart / sizes, initial=0.0)
+        return math.ceil(math.log10(worst)) if 0.0 < worst <= FEWEST_DIGITS else None
 
     def describe_unexplained(self) -> str:
         """Say that no mistake explains what differs, or that the angle's digits do."""
-        stated, rates = self.judge.stated, self.judge.rows.rates
-        judge = Judge(
-            self.judge.scene, replace(stated, is_rounded=True), self.judge.tolerance
-        )
-        if not Judgement(judge).differing:
-            rounded = [stated.found_by, *filter(stated.columns.__contains__, rates)]
-            within = f"what differs is within half a digit of {', '.join(rounded)}"
+        rounded = replace(self.stated, is_rounded=True)
+        if not Judgement(self.scene, rounded, self.tolerance).differing:
+            rates = filter(rounded.columns.__contains__, self.rows.rates)
+            names = ", ".join([rounded.found_by, *rates])
+            within = f"what differs is within half a digit of {names}"
             return f"{within}: print more digits there"
         what = "the rest" if self.explanations else "it"
         found = f"no single known mistake explains {what}"
-        if self.judge.tolerance is None:
+        if self.tolerance is None:
             found += "; of numbers right in fewer digits --rtol may find one"
         return found
 
     @cached_property
     def not_compared(self) -> list[str]:
-        """Name the lines and quantities of which no number has a digit to compare."""
+        """Names of the lines and quantities of which no number has a digit."""
         compared = dict[str, bool]()
         for finding in self.findings:
             for name in (f"line {finding.line}", finding.quantity):
@@ -152,21 +143,17 @@ class Judgement:
 
     def sentence(self) -> str:
         """Write how many numbers agree, exactly and within the stated tolerance."""
-        tolerance = self.judge.tolerance
         if not self.compared:
             agreed = "Nothing was compared"
-        elif tolerance is None:
-            agreed = f"{self.agreeing} of {self.compared} numbers agree"
         else:
-            within = f"rtol {tolerance.rtol:g}, atol {tolerance.atol:g}"
-            agreed = (
-                f"{self.agreeing} of {self.compared} numbers agree within {within};"
-                f" {self.exact} to round-off"
-            )
-        if self.digits and tolerance is None:
-            agreed += f", compared to {self.digits}"
-        if self.not_judged:
-            agreed += f"; no digit left to judge {self.not_judged} more by"
+            agreed = f"{self.agreeing} of {self.compared} numbers agree"
+        if self.tolerance is None:
+            agreed += f", compared to {self.digits}" if self.digits else ""
+        elif self.compared:
+            rtol, atol = self.tolerance
+            agreed += f" within rtol {rtol:g}, atol {atol:g}; {self.exact} to round-off"
+        if not_judged := len(self.findings) - self.compared:
+            agreed += f"; no digit left to judge {not_judged} more by"
         if self.blank:
             cells = len(self.findings) + self.blank
             agreed += f"; {self.blank} of {cells} cells are blank"
@@ -174,12 +161,12 @@ class Judgement:
 
     @property
     def digits(self) -> str:
-        """Say to how many digits each quantity was compared.
+        """To how many digits each quantity was compared.
 
         Of the numbers of a quantity the one with the fewest digits counts.
         """
         fewest: dict[int, list[str]] = {}
-        for column in self.judge.columns.values():
+        for column in self.columns.values():
             if math.isfinite(most := column.precision):
                 digits = math.floor(-math.log10(max(most, EPS)))
                 fewest.setdefault(digits, []).append(column.label)
@@ -193,48 +180,8 @@ class Judgement:
 
     def is_explained(self) -> bool:
         """Return whether the explanations account for every quantity that differs."""
-        explained = {
-            quantity
-            for explanation in self.explanations
-            for quantity in explanation.quantities
-        }
-        return explained >= {finding.quantity for finding in self.differing}
-
-
-def judge_table(
-    scene: Scene,
-    table: TheirTable,
-    tolerance: Allowance | None = None,
-) -> Judgement:
-    """Judge every number of a table, and find the mistakes that explain what differs.
-
-    The allowed error is K eps/condition, plus half a unit of the last printed digit,
-    and of the angle's. A tolerance decides if it is given, and what explains the rest
-    is held to it too.
-    """
-    return Judgement(Judge(scene, table, tolerance))
-
-
-def _explain(judge: Judge, labels: Collection[str]) -> list[Explanation]:
-    """Explain what differs of the quantities of a solution, or else of its motion."""
-    columns = {
-        key: column for key, column in judge.columns.items() if column.quantity in UNITS
-    }
-    motion = [key for key in columns if STAGE_OF.get(columns[key].quantity) != "force"]
-    for keys in dict.fromkeys((tuple(columns), tuple(motion))):
-        table = {key: judge.table.columns[key] for key in keys}
-        part = Judge(
-            judge.scene,
-            replace(judge.table, columns=table),
-            judge.tolerance,
-            judge.rows,
-        )
-        wrong = [key for key in sorted(keys) if columns[key].label in labels]
-        found = explain(part, [part.columns[key] for key in wrong]) if wrong else []
-        if found:
-            is_all = len(keys) == len(columns)
-            return [one._replace(complete=one.complete and is_all) for one in found]
-    return []
+        explained = (each.quantities for each in self.explanations)
+        return {each.quantity for each in self.differing} <= set().union(*explained)
 
 
 def write_judgement_json(judgement: Judgement) -> str:
@@ -250,9 +197,9 @@ def write_judgement_json(judgement: Judgement) -> str:
         "compared": judgement.compared,
         "agree": judgement.agreeing,
         "agree_to_round_off": judgement.exact,
-        "not_judged": judgement.not_judged,
+        "not_judged": len(judgement.findings) - judgement.compared,
         "blank": judgement.blank,
-        "tolerance": judgement.judge.tolerance,
+        "tolerance": judgement.tolerance,
         "found_by": table.found_by,
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
@@ -265,22 +212,20 @@ def write_judgement_json(judgement: Judgement) -> str:
 
 def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]:
     case = partial(JunitCase, name, name)
-    for quantity in dict.fromkeys(each.quantity for each in judgement.findings):
-        judged = [
-            each
-            for each in judgement.findings
-            if each.quantity == quantity and each.judged
-        ]
-        differing = [finding for finding in judged if not finding.agrees]
-        if differing:
-            worst = max(differing, key=lambda finding: finding.error)
+    judged = [each for each in judgement.findings if each.judged]
+    counts = Counter(each.quantity for each in judged)
+    worst = {each.quantity: each for each in _sort_differing(judgement)[::-1]}
+    differing = Counter(each.quantity for each in judgement.differing)
+    for quantity, count in counts.items():
+        if quantity in worst:
+            each = worst[quantity]
             text = (
-                f"{len(differing)} of {len(judged)} differ; line {worst.line}: theirs"
-                f" {worst.theirs}, ours {worst.ours} in SI, error {worst.error:.2e},"
-                f" allowed {worst.allowed:.2e}"
+                f"{differing[quantity]} of {count} differ; line {each.line}: theirs"
+                f" {each.theirs}, ours {each.ours} in SI, error {each.error:.2e},"
+                f" allowed {each.allowed:.2e}"
             )
             yield case(quantity, "failure", "differs", text)
-        elif judged:
+        else:
             yield case(quantity, "passed")
     for name_of_part in judgement.not_compared:
         text = "no number has a digit to compare"
@@ -291,6 +236,11 @@ def _list_cases_of_table(judgement: Judgement, name: str) -> Iterator[JunitCase]
     if not judgement.compared:
         text = judgement.sentence()
         yield case("anything is compared", "failure", "nothing compared", text)
+
+
+def _sort_differing(judgement: Judgement) -> list[Discrepancy]:
+    """Sort what differs, the largest error first."""
+    return sorted(judgement.differing, key=lambda each: -each.error)
 
 
 MOST_SHOWN_OF_EACH = 3
@@ -378,7 +328,7 @@ def check_command(
     else:
         tolerance = Allowance(rtol or 0.0, atol or 0.0)
     table = table.from_pin(stated.origin)
-    judgement = judge_table(stated, table, tolerance)
+    judgement = Judgement(stated, table, tolerance)
     if json is not None:
         write_text(json, write_judgement_json(judgement))
     if junit is not None:
@@ -391,56 +341,18 @@ def check_command(
 def show_judgement(judgement: Judgement, name: str) -> None:
     """Print what differs, what explains it, and the count."""
     table = judgement.table
-    for note in table.notes:
+    for note in judgement.notes:
         print_sentence(note)
     for why in dict.fromkeys(table.left_out.values()):
-        headings = ", ".join(
-            heading for heading, reason in table.left_out.items() if reason == why
-        )
-        print_sentence(abbreviate(f"left out ({why}): {headings}", LONGEST_MESSAGE))
+        headings = [one for one, reason in table.left_out.items() if reason == why]
+        text = f"left out ({why}): {', '.join(headings)}"
+        print_sentence(abbreviate(text, LONGEST_MESSAGE))
     differing = judgement.differing
     if differing:
-        from rich.console import Console
-        from rich.markup import escape
-
-        title = (
-            f"{escape(escape_controls(name))}: what differs,"
-            f" the {MOST_SHOWN_OF_EACH} worst of each quantity"
-        )
-        units = {one.label: one.unit for one in judgement.judge.columns.values()}
-        head = (
-            "line",
-            f"{table.found_by}\ndeg",
-            "quantity",
-            "theirs",
-            "ours",
-            "error",
-            "allowed",
-        )
-        rows = [
-            (
-                str(each.line),
-                f"{math.degrees(each.place):.7g}",
-                *_write_in_their_unit(each, units),
-                f"{each.error:.1e}",
-                f"{each.allowed:.1e}",
-            )
-            for each in _choose_worst(differing)
-        ]
-        Console(soft_wrap=True).print(
-            make_words_table(
-                head,
-                rows,
-                title=title,
-                show_edge=False,
-                padding=(0, 1, 0, 0),
-            )
-        )
+        _show_differing(judgement, name)
         counted = Counter(finding.quantity for finding in differing)
-        print_sentence(
-            "in all: "
-            + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items())
-        )
+        counts = (f"{count} of {quantity}" for quantity, count in counted.items())
+        print_sentence(f"in all: {', '.join(counts)}")
     for line in judgement.not_assembled:
         print_sentence(
             f"line {line}: the linkage has no motion there (it does not assemble, or is"
@@ -466,25 +378,40 @@ def show_judgement(judgement: Judgement, name: str) -> None:
     print_sentence(judgement.sentence())
 
 
-def _choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
-    """Choose the largest differences of each quantity, the worst quantity first."""
-    by_quantity: dict[str, list[Discrepancy]] = {}
-    for finding in sorted(differing, key=lambda f: -f.error):
-        by_quantity.setdefault(finding.quantity, []).append(finding)
-    return [
-        finding
-        for findings in by_quantity.values()
-        for finding in findings[:MOST_SHOWN_OF_EACH]
-    ]
+def _show_differing(judgement: Judgement, name: str) -> None:
+    """Print the largest differences of each quantity, the worst quantity first.
 
+    Numbers are in the unit of their column.
+    """
+    from rich.console import Console
+    from rich.markup import escape
 
-def _write_in_their_unit(
-    finding: Discrepancy, units: dict[str, Unit]
-) -> tuple[str, ...]:
-    """Write the quantity with the unit of their column, and both numbers in it."""
-    unit = units[finding.quantity]
-    written = (
-        ", ".join(f"{x / unit.factor:.9g}" for x in numbers)
-        for numbers in (finding.theirs, finding.ours)
+    units = {one.label: one.unit for one in judgement.columns.values()}
+    rows: dict[str, list[tuple[str, ...]]] = {}
+    for each in _sort_differing(judgement):
+        unit = units[each.quantity]
+        theirs, ours = (
+            ", ".join(f"{x / unit.factor:.9g}" for x in numbers)
+            for numbers in (each.theirs, each.ours)
+        )
+        row = (
+            str(each.line),
+            f"{math.degrees(each.place):.7g}",
+            f"{each.quantity} [{escape_controls(unit.text)}]",
+            theirs,
+            ours,
+            f"{each.error:.1e}",
+            f"{each.allowed:.1e}",
+        )
+        rows.setdefault(each.quantity, []).append(row)
+    angle = f"{judgement.table.found_by}\ndeg"
+    head = ("line", angle, "quantity", "theirs", "ours", "error", "allowed")
+    title = (
+        f"{escape(escape_controls(name))}: what differs,"
+        f" the {MOST_SHOWN_OF_EACH} worst of each quantity"
     )
-    return f"{finding.quantity} [{escape_controls(unit.text)}]", *written
+    shown = [row for several in rows.values() for row in several[:MOST_SHOWN_OF_EACH]]
+    table = make_words_table(
+        head, shown, title=title, show_edge=False, padding=(0, 1, 0, 0)
+    )
+    Console(soft_wrap=True).print(table)

@@ -396,15 +396,17 @@ class Judge:
         """
         return [solve(self.scene, self.stage, at=at) for at in self.rows.near]
 
+    @cached_property
     def findings(self) -> list[Discrepancy]:
-        """List every number that the table states where the formulas have one."""
+        """Every number that the table states where the formulas have one."""
         columns = self.columns.values()
         return [finding for column in columns for finding in column.findings()]
 
-    def without_answer(self) -> list[int]:
-        """List lines with a number where the linkage does not assemble.
+    @cached_property
+    def not_assembled(self) -> list[int]:
+        """Lines with a number where the linkage does not assemble, or is singular.
 
-        No number is right there, nor at a singular position.
+        There is no right number there.
         """
         missing = [each.stated & ~each.answered for each in self.columns.values()]
         return [self.table.lines[i] for i in np.flatnonzero(np.any(missing, axis=0))]
