@@ -4,13 +4,10 @@ from base64 import b64encode
 from html import escape
 
 from fourbar.errors import FourBarError
+from fourbar.files import dump
 from fourbar.formulas.mobility import classify
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene
-from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.driving import describe_drive
 from fourbar.show.plot import draw_figure
-from fourbar.show.shown_units import write_ends
 from fourbar.show.tables import list_columns
 from fourbar.solution import Solution
 from fourbar.writing import describe_extent, make_html
@@ -20,7 +17,7 @@ POSITIONS_AT_EITHER_END = 5
 
 
 def show_scene(scene: Scene) -> str:
-    """Draw the linkage above what the scene states.
+    """Draw the linkage above its type and the text of the scene, in SI and radians.
 
     The drawing is that of `scene.plot("linkage")`.
     """
@@ -33,36 +30,12 @@ def show_scene(scene: Scene) -> str:
         )
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
-    title = scene.title or "Four-bar linkage"
-    return picture + make_html(title, (), _list_facts(scene))
-
-
-def _list_facts(scene: Scene) -> list[tuple[str, str]]:
-    motion = scene.motion
-    facts = [("type", classify(scene.linkage).name)]
-    bars = zip(BAR_NAMES.items(), scene.linkage.lengths, strict=True)
-    for (number, name), length in bars:
-        text = _write_in_si(length, "m")
-        if number in MOVING_BARS and (mass := scene.linkage.bar(number).mass):
-            text = f"{text}, {_write_in_si(mass, 'kg')}"
-        facts.append((name, text))
-    speed = "positions only"
-    if motion.speed is not None:
-        omega = write_ends(motion.speed, lambda x: _write_in_si(x, "rad/s"))
-        alpha = write_ends(motion.acceleration, lambda x: _write_in_si(x, "rad/s^2"))
-        speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
-    acting = [f"load on bar {load.bar}" for load in scene.loads]
-    acting += [effect.key for effect in scene.effects]
-    return [
-        *facts,
-        ("motion", f"{speed}; {BRANCH_NAMES[motion.branch]} branch"),
-        ("drive", "released" if motion.free is not None else describe_drive(scene)),
-        ("acting", ", ".join(acting) or "nothing"),
-    ]
-
-
-def _write_in_si(number: float, unit: str) -> str:
-    return f"{number + 0.0:.6g} {unit}"
+    try:
+        text = dump(scene)
+    except FourBarError as error:
+        text = str(error)
+    name = classify(scene.linkage).name
+    return f"{picture}<b>{escape(name)}</b><pre>{escape(text)}</pre>"
 
 
 def show_solution(solution: Solution) -> str:

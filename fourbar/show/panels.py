@@ -70,19 +70,12 @@ Evaluated there, a curve that jumps at the end has the value of this side.
 """
 _FLAT = 1e-13
 """Part of the largest value by which values of one polynomial differ by rounding."""
-_SEARCH_PARTS, _SEARCH_ROUNDS = 64, 4
-"""Parts in which a panel is cut where an extreme value is searched, and how often. The
-place is then within 2e-6 of a panel, and the value within the square of that.
-"""
 _X, _WEIGHTS = leggauss(NODES)
 _TO_SERIES = np.linalg.inv(legvander(_X, NODES - 1))
 """Matrix from the values at the nodes to the terms of the Legendre series."""
 _CHECKED = np.array([-1.0, 1.0]) * (1.0 - 2.0 * _BESIDE_END)
 _TO_CHECKED = legvander(_CHECKED, NODES - 1) @ _TO_SERIES
 """Matrix from the values at the nodes to the polynomial where it is checked."""
-_GRID = np.linspace(-1.0, 1.0, 33)
-_TO_GRID = legvander(_GRID, NODES - 1)
-"""Matrix from the terms of a series to values at which changes of sign are seen."""
 _EVALUATED = np.concatenate((_CHECKED[:1], _X, _CHECKED[1:]))
 
 ComputeCurves = Callable[[Array], dict[str, Array]]
@@ -131,8 +124,6 @@ class PanelCurve:
     @cached_property
     def series(self) -> Array:
         """Return the terms of the Legendre series of each panel, (p, N, k)."""
-        if self.values.shape[1] == 1:
-            return self.values
         return np.asarray(np.einsum("ij,pjk->pik", _TO_SERIES, self.values))
 
 
@@ -140,7 +131,7 @@ class PanelCurve:
 class Panels:
     """Curves over a motion, on panels that follow each other.
 
-    Single positions, with nothing between them, are panels of one node.
+    Single positions, with nothing between them, are panels of no width.
     """
 
     start: Array
@@ -161,11 +152,13 @@ class Panels:
         curves: Mapping[str, Array],
         share: Array,
     ) -> "Panels":
-        """Take positions for panels of one node each, with curves (n,) or (n, k)."""
+        """Take positions for panels of no width, with curves (n,) or (n, k)."""
         n = len(places)
         single = {}
         for name, values in curves.items():
-            single[name] = PanelCurve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
+            numbers = values.reshape(n, 1, -1)
+            nodes = np.broadcast_to(numbers, (n, NODES, numbers.shape[-1]))
+            single[name] = PanelCurve(nodes, np.full(n, np.inf), [])
         return cls(places, places, share, single, located=False)
 
     def with_points(self, places: Array, curves: Mapping[str, Array]) -> "Panels":
@@ -173,19 +166,19 @@ class Panels:
 
         At the end of a panel a curve that jumps there may have a value of its own.
         """
+        points = Panels.of_positions(places, curves, np.zeros(len(places)))
         start = np.append(places, self.start)
         rises = self.stop[0] > self.start[0]
         order = np.argsort(start if rises else -start, kind="stable")
         added = {}
         for name, curve in self.curves.items():
-            points = curves[name].reshape(len(places), 1, -1)
-            points = np.repeat(points, curve.values.shape[1], axis=1)
-            values = np.concatenate([points, curve.values])[order]
-            error = np.append(np.full(len(places), np.inf), curve.error)[order]
+            point = points.curves[name]
+            values = np.concatenate([point.values, curve.values])[order]
+            error = np.append(point.error, curve.error)[order]
             poles = np.flatnonzero(np.isin(order - len(places), curve.poles))
             added[name] = PanelCurve(values, error, poles.tolist())
         stop = np.append(places, self.stop)[order]
-        share = np.append(0.0 * places, self.share)[order]
+        share = np.append(points.share, self.share)[order]
         return Panels(start[order], stop, share, added)
 
     @property
@@ -211,8 +204,7 @@ class Panels:
 
     def _average(self, of_nodes: Array) -> float:
         """Return the mean over the motion of values at the nodes, where there are."""
-        weights = 0.5 * _WEIGHTS if self.located else np.ones(1)
-        means = of_nodes @ weights
+        means = of_nodes @ (0.5 * _WEIGHTS)
         known = np.isfinite(means)
         return float(means[known] @ self.share[known] / self.share[known].sum())
 
@@ -248,25 +240,20 @@ class Panels:
     def find_zeros(self, name: str) -> Array:
         """Find the places at which a curve changes its sign, in order."""
         series = self.curves[name].series[..., 0]
-        values = (series @ _TO_GRID.T).ravel()
-        is_zero = np.repeat(self._are_zero(name), len(_GRID))
-        least = TIED * np.nanmax(np.abs(values), initial=0.0)
-        rows = np.flatnonzero(np.abs(values) > least)
-        changes = np.flatnonzero(values[rows[1:]] * values[rows[:-1]] < 0.0)
+        is_zero = self._are_zero(name)
+        least = TIED * np.nanmax(np.abs(self.curves[name].values), initial=0.0)
         zeros = []
-        for before, after in zip(rows[changes], rows[changes + 1], strict=True):
-            if np.isnan(values[before:after]).any() or is_zero[before:after].any():
+        before = 0.0
+        for panel, terms in enumerate(series):
+            if is_zero[panel] or not np.isfinite(terms).all():
+                before = 0.0
                 continue
-            panel, point = divmod(before + 1, len(_GRID))
-            if after == before + 1 and point > 0:
-                roots = _find_panel_zeros(series[panel])
-                root = roots[np.searchsorted(roots, _GRID[point - 1])]
-                zeros.append(self._place(panel, root))
-                continue
-            vanishing = np.arange(before + 1, after + 1)
-            edges = vanishing[vanishing % len(_GRID) == 0]
-            panel, point = divmod(edges[0] if len(edges) else before + 1, len(_GRID))
-            zeros.append(self._place(panel, _GRID[point]))
+            parts = np.array([-1.0, *_find_panel_zeros(terms)])
+            between = 0.5 * (parts + np.append(parts[1:], 1.0))
+            for x, value in zip(parts, legval(between, terms), strict=True):
+                if before * value < 0.0 and abs(value) > least:
+                    zeros.append(self._place(panel, x))
+                before = value if abs(value) > least else before
         return np.array(zeros)
 
     def find_rests(self, name: str) -> Array:
@@ -307,11 +294,11 @@ class Panels:
         terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1).sum(axis=1)
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
-        x = (_X if self.located else np.zeros(1))[node]
+        x = _X[node]
         values = sizes[rows, node]
         may_exceed = smooth & (best + 2.0 * terms >= best.max())
-        places, extremes = _search_extremes(curve.series[may_exceed], rank)
-        x[may_exceed], values[may_exceed] = places, extremes
+        for row in np.flatnonzero(may_exceed):
+            x[row], values[row] = _find_extreme(curve.series[row], rank)
         ranks = np.where(np.isfinite(values), rank(values), -np.inf)
         first = int(np.argmax(ranks >= ranks.max() - TIED * scale))
         for after in range(first + 1, len(ranks)):
@@ -333,24 +320,20 @@ def _measure(values: Array) -> Array:
     return np.asarray(np.hypot.reduce(values, axis=-1))
 
 
-def _search_extremes(
-    series: Array, rank: Callable[[Array], Array]
-) -> tuple[Array, Array]:
-    """Find the first place at which each polynomial ranks highest, and its value."""
-    rows = np.arange(len(series))
-    terms = np.moveaxis(series, 1, 0)[:, :, None]
-    low = np.full(len(series), -1.0 + _INSIDE)
-    high = np.full(len(series), 1.0 - _INSIDE)
-    for _ in range(_SEARCH_ROUNDS):
-        x = np.linspace(low, high, _SEARCH_PARTS + 1, axis=1)
-        evaluated: Any = legval(x[..., None], terms, tensor=False)
-        values = _measure(evaluated)
-        ranks = rank(values)
-        slack = _FLAT * np.abs(values).max(axis=1)
-        best = np.argmax(ranks >= (ranks.max(axis=1) - slack)[:, None], axis=1)
-        low = x[rows, np.maximum(best - 1, 0)]
-        high = x[rows, np.minimum(best + 1, _SEARCH_PARTS)]
-    return x[rows, best], values[rows, best]
+def _find_extreme(series: Array, rank: Callable[[Array], Array]) -> tuple[float, float]:
+    """Find the first place at which a polynomial, (N, k), ranks highest, and its value.
+
+    The square of its size has no slope there, unless the place is an end of the panel.
+    """
+    scaled = series / (np.abs(series).max() or 1.0)
+    square: Any = sum(Legendre(terms) ** 2 for terms in scaled.T)
+    stops = [-1.0, *_find_panel_zeros(square.deriv().coef), 1.0]
+    x = np.clip(stops, _INSIDE - 1.0, 1.0 - _INSIDE)
+    values = _measure(np.moveaxis(legval(x, series), 0, -1))
+    ranks = rank(values)
+    slack = _FLAT * np.abs(values).max()
+    best = int(np.argmax(ranks >= ranks.max() - slack))
+    return float(x[best]), float(values[best])
 
 
 def _find_panel_zeros(series: Array) -> Array:
@@ -377,8 +360,6 @@ class _Fit(NamedTuple):
     """Least value of a scalar, (p,); inf where all are missing, and of a vector."""
     size: Array
     """Largest size, (p,); 0 where all are missing."""
-    unsettled: NDArray[np.bool_]
-    """True for a panel that would have been halved again, (p,)."""
 
 
 def fit_panels(
@@ -398,7 +379,6 @@ def fit_panels(
     """
     start = edges[:-1]
     stop = edges[1:]
-    length = edges[-1] - edges[0]
     fits = _fit_panels(compute, start, stop)
     usual = {}
     for name, fit in fits.items():
@@ -406,55 +386,45 @@ def fit_panels(
         medians = np.median(np.nan_to_num(np.abs(_measure(fit.values))), axis=1)
         scale = medians.max() or 1.0
         usual[name] = float(scale * np.sqrt(np.square(medians / scale).mean()))
-    kept: dict[str, list[_Fit]] = {name: [] for name in fits}
-    ends = []
+    opens: dict[str, NDArray[np.bool_]] = {}
+    is_new = np.full(len(start), True)
     for halvings in range(most_halvings + 1):
-        share = (stop - start) / length
-        opens = {}
+        share = (stop - start) / (edges[-1] - edges[0])
         for name, fit in fits.items():
-            # a node that a halving leaves out may have been next to a pole
-            known = [*kept[name], fit]
-            most = max(part.most.max(initial=-np.inf) for part in known)
-            least = min(part.least.min(initial=np.inf) for part in known)
-            is_open = _find_open(fit, share, usual[name], (most, least), wanted[name])
+            is_open = _find_open(fit, share, usual[name], wanted[name])
             noise = _NOISE * 2.0**halvings * fit.size
-            opens[name] = is_open & ~(fit.error <= noise)
-        is_open = np.any([*opens.values()], axis=0)
-        most_open = 0 if halvings == most_halvings else _MOST_OPEN
-        is_last = not 0 < is_open.sum() <= most_open
-        keep = ~is_open | is_last
-        ends.append((start[keep], stop[keep]))
-        for name, fit in fits.items():
-            part = fit._replace(unsettled=opens[name] & is_last)
-            kept[name].append(_Fit(*(column[keep] for column in part)))
-        if is_last:
+            opens[name] = is_new & is_open & ~(fit.error <= noise)
+        halved = np.any([*opens.values()], axis=0)
+        if halvings == most_halvings or not 0 < halved.sum() <= _MOST_OPEN:
             break
-        middle = 0.5 * (start[is_open] + stop[is_open])
-        start = np.concatenate((start[is_open], middle))
-        stop = np.concatenate((middle, stop[is_open]))
-        fits = _fit_panels(compute, start, stop)
-    start, stop = map(np.concatenate, zip(*ends, strict=True))
-    order = np.argsort(start if stop[0] > start[0] else -start)
+        middle = 0.5 * (start[halved] + stop[halved])
+        starts = np.concatenate((start[halved], middle))
+        stops = np.concatenate((middle, stop[halved]))
+        start = np.concatenate((start[~halved], starts))
+        stop = np.concatenate((stop[~halved], stops))
+        for name, halves in _fit_panels(compute, starts, stops).items():
+            pairs = zip(fits[name], halves, strict=True)
+            fits[name] = _Fit(*(np.concatenate((c[~halved], h)) for c, h in pairs))
+        is_new = np.arange(len(start)) >= len(start) - len(starts)
+    order = np.argsort(start if edges[-1] > edges[0] else -start)
     curves = {}
-    for name, parts in kept.items():
-        whole = _Fit(*(np.concatenate(c)[order] for c in zip(*parts, strict=True)))
-        curves[name] = PanelCurve(whole.values, whole.error, [])
-        curves[name].poles = _find_panels_at_poles(curves[name], whole.unsettled)
+    for name, fit in fits.items():
+        curves[name] = PanelCurve(fit.values[order], fit.error[order], [])
+        curves[name].poles = _find_panels_at_poles(curves[name], opens[name][order])
     start = start[order]
     stop = stop[order]
-    share = (stop - start) / (stop - start).sum()
-    return Panels(start, stop, share, curves)
+    return Panels(start, stop, (stop - start) / (stop - start).sum(), curves)
 
 
 def _find_open(
     fit: _Fit,
     share: Array,
     usual: float,
-    extremes: tuple[float, float],
     wanted: Wanted,
 ) -> NDArray[np.bool_]:
     """Mark the panels that are halved: for an extreme value, or for the integrals."""
-    most, least = extremes
+    most = float(fit.most.max())
+    least = float(fit.least.min())
     scale = max(abs(most), abs(least)) if np.isfinite(least) else abs(most)
     highest = fit.most + fit.error
     with np.errstate(invalid="ignore"):
@@ -521,5 +491,5 @@ def _fit_panels(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, 
         most = np.where(missing, -np.inf, sizes).max(axis=1)
         least = np.where(missing | (not single), np.inf, sizes).min(axis=1)
         size = np.where(missing, 0.0, np.abs(sizes)).max(axis=1)
-        fits[name] = _Fit(values, error, most, least, size, missing[:, 0])
+        fits[name] = _Fit(values, error, most, least, size)
     return fits

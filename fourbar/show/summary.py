@@ -181,21 +181,14 @@ class Facts:
         """Smallest transmission angle; it is 0 where its sine changes its sign."""
         panels = self.motion.positions
         solution = self.solution
-        if panels.located:
-            first = Peak(abs(float(solution.sin_mu[0])), float(solution.at.places[0]))
-            if first.value <= ZERO_TRANSMISSION_ANGLE:
-                return first._replace(value=0.0)
-            zeros = panels.find_zeros("sin_mu")
-            if len(zeros):
-                return Peak(0.0, float(zeros[0]))
-            sines = panels.curves["sin_mu"]
-            # between two stretches it may change its sign without a zero
-            sizes = PanelCurve(np.abs(sines.values), sines.error, [])
-            least = replace(panels, curves={"": sizes}).find_peak("", -1)
-        else:
-            absolute = np.abs(panels.curves["sin_mu"].sizes[:, 0])
-            row = int(np.argmax(absolute <= np.nanmin(absolute) + TIED))
-            least = Peak(float(absolute[row]), float(panels.start[row]))
+        if abs(solution.sin_mu[0]) <= ZERO_TRANSMISSION_ANGLE:
+            return Peak(0.0, float(solution.at.places[0]))
+        if panels.located and len(zeros := panels.find_zeros("sin_mu")):
+            return Peak(0.0, float(zeros[0]))
+        sines = panels.curves["sin_mu"]
+        # between two stretches it may change its sign without a zero
+        sizes = PanelCurve(np.abs(sines.values), sines.error, [])
+        least = replace(panels, curves={"": sizes}).find_peak("", -1)
         mu = math.asin(min(1.0, abs(least.value)))
         return Peak(0.0 if mu <= ZERO_TRANSMISSION_ANGLE else mu, least.place)
 
