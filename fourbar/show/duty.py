@@ -3,7 +3,7 @@
 Bearings and a motor are chosen by them; the JSON of `analyze` has them.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,7 +108,7 @@ def shaking_force(solution: Solution) -> Array:
     a_G: the force F21 + F41 = -(F12 + F14), and that of a linear drive or of springs
     with an end on the ground besides.
     """
-    return _balance_momentum(solution)[0].copy()
+    return _sum_on_frame(solution)[0]
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -117,20 +117,7 @@ def shaking_moment(solution: Solution) -> Array:
     By the angular momentum of the bars about O2: -T - O4 x F14, and the moments of
     linear drives, springs and couples that act between bars and ground.
     """
-    return _balance_momentum(solution)[1].copy()
-
-
-def _balance_momentum(solution: Solution) -> tuple[Array, Array]:
-    """Return the force on the frame and its moment about O2, which the solution keeps.
-
-    Force and moment are those of the momentum of the bars.
-    """
-    expect("solution", solution, Solution)
-    kept = vars(solution)
-    if "_on_frame" not in kept:
-        kept["_on_frame"] = _sum_on_frame(solution)
-    on_frame: tuple[Array, Array] = kept["_on_frame"]
-    return on_frame
+    return _sum_on_frame(solution)[1]
 
 
 def _sum_on_frame(solution: Solution) -> tuple[Array, Array]:
@@ -211,50 +198,36 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         return None
     motion = _describe_loads(solution)
     panels = motion.panels
-    name = drive.keys.value
     kind = "torque" if solution.drive is None else "force"
-
-    def find_largest(curve: str) -> float | None:
+    numbers: dict[str, Any] = dict.fromkeys(DUTY_UNITS)
+    for name, curve in ((kind, drive.keys.value), ("power", "power")):
         peak = motion.find_peak(curve)
-        return peak and abs(peak.value)
-
-    effort: dict[str, Any] = {"peak_torque": None, "rms_torque": None}
-    largest = find_largest(name)
+        numbers[f"peak_{name}"] = peak and abs(peak.value)
+        numbers[f"rms_{name}"] = motion.find_rms(curve)
+    largest = numbers[f"peak_{kind}"]
     if motion.start is not None and largest is not None:
-        largest = max(largest, abs(motion.start.value))
-    effort[f"peak_{kind}"] = largest
-    effort[f"rms_{kind}"] = motion.find_rms(name)
-    duty = MotorDuty(
-        **effort,
-        peak_speed=find_largest("speed"),
-        peak_power=find_largest("power"),
-        rms_power=motion.find_rms("power"),
-        energy_in=None,
-        energy_out=None,
-        closed=bool(is_once_round(solution)) and not motion.stretches,
-    )
+        numbers[f"peak_{kind}"] = max(largest, abs(motion.start.value))
+    fastest = motion.find_peak("speed")
+    numbers["peak_speed"] = fastest and abs(fastest.value)
+    closed = bool(is_once_round(solution)) and not motion.stretches
     # over a stretch without forces the energies would be those of a part, unsaid
     whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
     second = motion.places_of_second
-    if not second or not whole or not panels.has_value("power"):
-        return duty
-    work = np.diff(panels.accumulate("power")) / second
-    duty = duty._replace(
-        energy_in=float(work[work > 0.0].sum()),
-        energy_out=float(-work[work < 0.0].sum()),
-    )
-    if not duty.closed:
-        return duty
-    given = panels.integrate("power")
-    surplus = panels.accumulate("power", given / panels.length)
-    duty = duty._replace(energy_swing=float(np.ptp(surplus)) / second)
-    if solution.drive_bar != solution.at.bar:  # or the drive exerts a force
-        return duty
-    # the commanded angle: the integral of the speed would be off by its rule
-    angle = solution.at.angle
-    sense = np.sign(np.mean(np.asarray(solution.at.speed)))
-    turned = sense * abs(angle[-1] - angle[0])
-    return duty._replace(mean_torque=float(given / second / turned))
+    if second and whole and panels.has_value("power"):
+        work = np.diff(panels.accumulate("power")) / second
+        numbers["energy_in"] = float(work[work > 0.0].sum())
+        numbers["energy_out"] = float(-work[work < 0.0].sum())
+        if closed:
+            given = panels.integrate("power")
+            surplus = panels.accumulate("power", given / panels.length)
+            numbers["energy_swing"] = float(np.ptp(surplus)) / second
+            if solution.drive_bar == solution.at.bar:  # else it has another angle
+                # the integral of the speed would be off by its rule
+                angle = solution.at.angle
+                sense = np.sign(np.mean(np.asarray(solution.at.speed)))
+                turned = sense * abs(angle[-1] - angle[0])
+                numbers["mean_torque"] = float(given / second / turned)
+    return MotorDuty(closed=closed, **numbers)
 
 
 def _describe_loads(solution: Solution) -> MotionCurves:
@@ -289,22 +262,27 @@ def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
     if duty is None:
         return None
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
-
-    def convert(numbers: Iterable[Any], of: dict[str, str]) -> dict[str, Any]:
-        """Name numbers as their units are, and convert them."""
-        return {
-            name: None if number is None else number * find_unit_in(unit, units)[1]
-            for number, (name, unit) in zip(numbers, of.items(), strict=True)
-        }
-
     of_pin = {"peak": "N", "rms": "N", "theta_2": "rad"}
     return {
         "closed": duty.closed,
-        **convert((getattr(duty, name) for name in si), si),
+        **convert((getattr(duty, name) for name in si), si, units),
         "pins": {
-            pin: convert(bearing_load(solution, pin), of_pin) for pin in PIN_FORCE
+            pin: convert(bearing_load(solution, pin), of_pin, units)
+            for pin in PIN_FORCE
         },
         "units": {name: find_unit_in(unit, units)[0] for name, unit in si.items()},
+    }
+
+
+def convert(
+    numbers: Iterable[Any], si: Mapping[str, str], units: Conversion
+) -> dict[str, Any]:
+    """Name numbers, or several of a kind, as their SI units are, and convert them."""
+    return {
+        name: None
+        if number is None
+        else np.multiply(number, find_unit_in(unit, units)[1]).tolist()
+        for number, (name, unit) in zip(numbers, si.items(), strict=False)
     }
 
 

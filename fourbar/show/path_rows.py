@@ -6,6 +6,7 @@ import numpy as np
 
 from fourbar.errors import clean_line
 from fourbar.show.driving import name_places
+from fourbar.show.duty import convert
 from fourbar.show.shown_units import choose_unit, drop_rounding
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.studies.paths import measure_paths
@@ -41,16 +42,9 @@ def write_paths(solution: Solution, units: Conversion) -> list[str]:
 
 def collect_paths(solution: Solution, units: Conversion) -> dict[str, Any]:
     """Collect the paths as the JSON has them, by the name of the point."""
-    _, unit = name_places(solution)
-    length, angle, place = (find_unit_in(of, units)[1] for of in ("m", "rad", unit))
+    _, place = name_places(solution)
+    lengths = dict.fromkeys(("x", "y", "straightness", "stroke"), "m")
+    si = {**lengths, "direction": "rad", "ends": place}
     return {
-        name: {
-            "x": [length * x for x in path.x],
-            "y": [length * y for y in path.y],
-            "straightness": length * path.straightness,
-            "stroke": length * path.stroke,
-            "direction": angle * path.direction,
-            "ends": [place * end for end in path.ends],
-        }
-        for name, path in measure_paths(solution).items()
+        name: convert(path, si, units) for name, path in measure_paths(solution).items()
     }
