@@ -20,7 +20,7 @@ from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
 from fourbar.solution import Conversion, Solution, where_assembled
 from fourbar.solving import solve
-from fourbar.studies.course import MotionCourse, Stretch, bisect, pair_ends
+from fourbar.studies.course import MotionCourse, Stretch, bisect, list_stretches
 from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33
@@ -162,7 +162,7 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
                 scene, command_between, solution, spring, end, beyond
             )
             where = " and ".join(
-                _write_stretch(solution, one, units) for one in stretches
+                write_stretch(solution, one, units) for one in stretches
             )
             length = write_short(end, "m", units)
             said = sentence.format(length=length, where=where)
@@ -220,11 +220,9 @@ def _list_wound(
     for spring in springs if WOUND in solution.status_code else []:
         alone = replace(scene, loads=(), effects=(Torsion((spring,)),))
         wound = solve(alone, at=solution.at).status_code[known] == WOUND
-        edges = np.flatnonzero(np.diff(wound))
-        ends = np.where(wound[edges], places[edges], places[edges + 1])
         where = " and ".join(
-            _write_stretch(solution, stretch, units)
-            for stretch in pair_ends(bool(wound[0]), ends, bool(wound[-1]))
+            write_stretch(solution, stretch, units)
+            for stretch in list_stretches(wound, places)
         )
         if where:
             notes.append(
@@ -283,24 +281,26 @@ def _list_stretches(
     A step in which nothing lies between the two positions ends at the one that is
     beyond: steps of a list, and those where the loop does not close.
     """
-    rows = np.flatnonzero(beyond[1:] != beyond[:-1])
     at = solution.at
-    places = np.where(beyond[rows], at.places[rows], at.places[rows + 1])
-    assembled = solution.assembled[rows] & solution.assembled[rows + 1]
-    if assembled.any() and not isinstance(scene.motion.angle, np.ndarray):
-        low, high = (at.places[rows[assembled] + after] for after in (0, 1))
 
-        def is_longer(there: Array) -> NDArray[np.bool_]:
-            distance = measure_end_distance(scene, spring, command_between(there))
-            return np.greater(distance, end)
+    def is_longer(there: Array) -> NDArray[np.bool_]:
+        distance = measure_end_distance(scene, spring, command_between(there))
+        return np.greater(distance, end)
 
+    def locate(rows: NDArray[np.intp], ends: Array) -> Array:
+        passes = solution.assembled[rows] & solution.assembled[rows + 1]
+        if isinstance(scene.motion.angle, np.ndarray) or not passes.any():
+            return ends
+        low, high = (at.places[rows[passes] + after] for after in (0, 1))
         before = is_longer(low)
         low, high = bisect(lambda there: is_longer(there) == before, low, high)
-        places[assembled] = 0.5 * (low + high)
-    return pair_ends(bool(beyond[0]), places, bool(beyond[-1]))
+        ends[passes] = 0.5 * (low + high)
+        return ends
+
+    return list_stretches(beyond, at.places, locate)
 
 
-def _write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
+def write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
     """Write a stretch as "from theta_2 = 61.2 deg on", of falling places "down"."""
     start, stop = stretch
     if start is None and stop is None:

@@ -38,6 +38,7 @@ from fourbar.show.acting import (
     list_law_notes,
     list_spring_notes,
     list_torsion_notes,
+    write_stretch,
 )
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.columns import explain_static
@@ -454,11 +455,7 @@ class SceneBlock(Facts):
     def _write_stretches(self) -> Iterator[str]:
         """Write where the assembly ends."""
         parts = [
-            " ".join(
-                f"{word} {self._place(end, named=self.unit != 'm')}"
-                for word, end in zip(("from", "up to"), stretch, strict=True)
-                if end is not None
-            )
+            write_stretch(self.solution, stretch, self.units)
             for stretch in self.motion.stretches
         ]
         if parts:

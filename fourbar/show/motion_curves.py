@@ -19,11 +19,19 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import find_held, is_once_round, read_drive_demand
-from fourbar.show.panels import SHALLOW, Panels, Peak, Wanted, fit_panels, split_runs
+from fourbar.show.panels import (
+    DEEP,
+    SHALLOW,
+    Panels,
+    Peak,
+    Wanted,
+    fit_panels,
+    split_runs,
+)
 from fourbar.show.shown_units import SHOWN_AS_ZERO, drop_rounding
 from fourbar.solution import Solution, where_assembled
 from fourbar.solving import solve, split
-from fourbar.studies.course import Stretch, pair_ends
+from fourbar.studies.course import Stretch, list_stretches
 from fourbar.studies.internal_forces import Bending, largest_bending
 
 _PANELS_OF_A_TURN, _MOST_FIRST_PANELS = 48, 960
@@ -47,10 +55,12 @@ its sign.
 _POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
 _NO_BENDING = 1e-13
 """Bending moment that is round-off, over the pin forces times the longest bar."""
-_AS_WIDE = 1e-6
-"""Difference below which ranges of angles are equally wide, rad. An end in its last
+_HALF_A_TURN = 1e-6
+"""Turns within which two ranges of angles are half a turn apart. An end in its last
 digits leaves some 1e-8.
 """
+_Curves = dict[str, tuple[Array, Wanted]]
+"""Curves by name, with what is asked of each."""
 _Named = list[tuple[float, str]]
 """Places with the name of what happens there."""
 
@@ -194,24 +204,16 @@ class MotionCurves:
 
     @cached_property
     def stretches(self) -> list[Stretch]:
-        """Places from and up to which the linkage assembles, in rising order.
+        """Places from and up to which the linkage assembles, in the motion's order.
 
         None at the ends of the motion; empty if it always assembles.
         """
         positions = self.positions
         if not positions.located:
             return []
-        places = positions.list_nodes()
+        places = positions.list_nodes().ravel()
         assembles = np.isfinite(positions.curves["sin_mu"].values[..., 0]).ravel()
-        places = places.ravel()
-        if places[0] > places[-1]:
-            places = places[::-1]
-            assembles = assembles[::-1]
-        rows = np.flatnonzero(assembles[1:] != assembles[:-1])
-        if not rows.size:
-            return []
-        ends = np.where(assembles[rows], places[rows], places[rows + 1])
-        return pair_ends(bool(assembles[0]), ends, bool(assembles[-1]))
+        return [] if assembles.all() else list_stretches(assembles, places)
 
 
 def describe_motion(solution: Solution) -> MotionCurves:
@@ -233,12 +235,12 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         share = np.ones(len(solution))
         if is_once_round(solution):
             share[-1] = 0.0  # the first position again
-        curves = _list_curves(scene, solution)
+        curves = _take_values(_list_curves(solution))
         panels = Panels.of_positions(solution.at.places, curves, share)
         extremes = solution
         if solution.with_extremes is not None:
             extremes = solve(scene, "position", at=solution.with_extremes)
-        curves = _list_position_curves(extremes)
+        curves = _take_values(_list_position_curves(extremes))
         share = np.ones(len(extremes))
         positions = Panels.of_positions(extremes.at.places, curves, share)
         _mark_poles(scene, solution, panels)
@@ -249,24 +251,25 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     breaks = np.unique([*corners, *(place for place, _ in zeros)])
     exact = np.unique(np.concatenate([exact, breaks]))
     edges = _join_edges(exact, even)
-    stage = "acceleration" if solution.F12 is None else "force"
 
-    def compute_positions(places: Array) -> dict[str, Array]:
-        there = solve(scene, "position", at=command_at(scene, places))
-        return _list_position_curves(there)
+    def fit(
+        list_curves: Callable[[Solution], _Curves], stage: str, most_halvings: int
+    ) -> Panels:
+        def compute(places: Array) -> dict[str, Array]:
+            there = solve(scene, stage, at=command_at(scene, places))
+            return _take_values(list_curves(there))
 
-    def compute(places: Array) -> dict[str, Array]:
-        return _list_curves(scene, solve(scene, stage, at=command_at(scene, places)))
+        wanted = {name: asked for name, (_, asked) in list_curves(solution).items()}
+        panels = fit_panels(compute, edges, wanted, most_halvings)
+        return panels.with_points(exact, compute(exact))
 
-    wanted = _list_wanted(scene, solution)
-    positions = fit_panels(compute_positions, edges, wanted)
-    positions = positions.with_points(exact, compute_positions(exact))
+    positions = fit(_list_position_curves, "position", DEEP)
     for bar in MOVING_BARS:
         _join_turns(positions, solution, bar)
     panels = positions
     if solution.omega_4 is not None:
-        panels = fit_panels(compute, edges, wanted, SHALLOW)
-        panels = panels.with_points(exact, compute(exact))
+        stage = "acceleration" if solution.F12 is None else "force"
+        panels = fit(_list_curves, stage, SHALLOW)
     reversals, rests = (
         [(place, name) for place, name in found if name in PINS]
         for found in (zeros, rests)
@@ -285,11 +288,11 @@ def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
         return
     at = solution.at.part(rows).as_doubles()
     beside = [
-        _list_curves(scene, solve(scene, at=at._replace(angle=at.angle + away)))
+        _list_curves(solve(scene, at=at._replace(angle=at.angle + away)))
         for away in _BESIDE_A_POLE * np.array([-1.0, 1.0, -0.25, 0.25])
     ]
     for name, curve in panels.curves.items():
-        values = np.abs([curves[name].reshape(len(rows), -1) for curves in beside])
+        values = np.abs([curves[name][0].reshape(len(rows), -1) for curves in beside])
         sizes = values.max(axis=-1)
         curve.poles = rows[(sizes[2:] > 2.0 * sizes[:2]).any(axis=0)].tolist()
 
@@ -383,70 +386,58 @@ def _locate_breaks(
     return sorted(breaks, reverse=backwards), sorted(rests, reverse=backwards)
 
 
-def _list_wanted(scene: Scene, solution: Solution) -> dict[str, Wanted]:
-    """List what is asked of each curve, with the size of its rounding."""
-    longest = max(scene.linkage.lengths)
-    roundings = dict.fromkeys(_POSITION_CURVES, SHOWN_AS_ZERO)
-    roundings["stroke"] = SHOWN_AS_ZERO * longest
-    wanted = {name: Wanted(size, ranged=True) for name, size in roundings.items()}
-    wanted |= dict.fromkeys(RATES, Wanted())
-    if solution.F12 is None:
-        return wanted
-    drive = read_drive_demand(solution)
-    rounding = find_drive_rounding(solution)
-    speed = float(np.nanmax(np.abs(getattr(solution, drive.speed_key)), initial=0.0))
-    loads = compute_pin_loads(solution)
-    largest = max(float(np.nanmax(load, initial=0.0)) for load in loads.values())
-    bending = Wanted(SHOWN_AS_ZERO * largest * longest)
-    wanted |= {f"bending_{bar}": bending for bar in MOVING_BARS}
-    wanted["speed"] = Wanted(SHOWN_AS_ZERO * speed)
-    wanted |= dict.fromkeys(
-        PIN_FORCES, Wanted(SHOWN_AS_ZERO * largest, integrated=True)
-    )
-    wanted["power"] = Wanted(rounding * speed, integrated=True)
-    wanted[drive.keys.value] = Wanted(rounding, integrated=True)
-    return wanted
+def _take_values(curves: _Curves) -> dict[str, Array]:
+    return {name: values for name, (values, _) in curves.items()}
 
 
-def _list_position_curves(solution: Solution) -> dict[str, Array]:
+def _list_position_curves(solution: Solution) -> _Curves:
     """List the curves of the positions alone, by name.
 
     A commanded angle has a value where the linkage does not assemble, too.
     """
-    curves = {name: getattr(solution, name) for name in _POSITION_CURVES}
+    asked = Wanted(SHOWN_AS_ZERO, ranged=True)
+    curves = {name: (getattr(solution, name), asked) for name in _POSITION_CURVES}
     if solution.stroke is not None:
-        curves["stroke"] = where_assembled(solution, solution.stroke)
+        stroke = where_assembled(solution, solution.stroke)
+        asked = Wanted(SHOWN_AS_ZERO * max(solution.lengths), ranged=True)
+        curves["stroke"] = stroke, asked
     return curves
 
 
-def _list_curves(scene: Scene, solution: Solution) -> dict[str, Array]:
+def _list_curves(solution: Solution) -> _Curves:
     """List the curves of loads, or where nothing acts of rates, by name.
 
     Commanded rates end, as all others do, where the linkage ceases to assemble.
     """
-    curves = {}
+    scene = solution.scene
+    curves: _Curves = {}
     if solution.omega_4 is not None and not (acts(scene) and solution.F12 is not None):
-        for letter in ("omega", "alpha"):
-            for bar in MOVING_BARS:
-                rate = getattr(solution, f"{letter}_{bar}")
-                curves[f"{letter}_{bar}"] = where_assembled(solution, rate)
+        for name in RATES:
+            curves[name] = where_assembled(solution, getattr(solution, name)), Wanted()
     if solution.F12 is None:
         return curves
     loads = compute_pin_loads(solution)
     largest = np.max([*loads.values()], axis=0)
+    rounding = SHOWN_AS_ZERO * float(np.nanmax(largest, initial=0.0))
     for name, load in loads.items():
         kept = drop_rounding(load, largest) != 0.0
-        curves[name] = np.where(kept[:, None], getattr(solution, name), 0.0)
+        force = np.where(kept[:, None], getattr(solution, name), 0.0)
+        curves[name] = force, Wanted(rounding, integrated=True)
     for bar, bending in compute_bending(solution).items():
-        curves[f"bending_{bar}"] = np.abs(bending.moment)
+        asked = Wanted(rounding * max(solution.lengths))
+        curves[f"bending_{bar}"] = np.abs(bending.moment), asked
     drive = read_drive_demand(solution)
     if scene.motion.free is not None:
         return curves
     # what a balanced linkage leaves of a load is rounding, and has no peak
     idle = drive.sizes <= SHOWN_AS_ZERO * largest * _find_longest_arm(solution)
-    curves["speed"] = where_assembled(solution, getattr(solution, drive.speed_key))
-    for name in (drive.keys.value, "power"):
-        curves[name] = np.where(idle, 0.0, getattr(solution, name))
+    speed = where_assembled(solution, getattr(solution, drive.speed_key))
+    fastest = float(np.nanmax(np.abs(speed), initial=0.0))
+    curves["speed"] = speed, Wanted(SHOWN_AS_ZERO * fastest)
+    rounding = find_drive_rounding(solution)
+    for name, size in ((drive.keys.value, rounding), ("power", rounding * fastest)):
+        values = np.where(idle, 0.0, getattr(solution, name))
+        curves[name] = values, Wanted(size, integrated=True)
     return curves
 
 
@@ -555,25 +546,12 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     low = np.inf
     high = -np.inf
     for stretch in stretches:
-        start = angles[stretch].min()
-        stop = angles[stretch].max()
-        turned = TURN * _find_turns(start, stop, low, high) if low < high else 0.0
-        angles[stretch] += turned
-        low = min(low, start + turned)
-        high = max(high, stop + turned)
+        if low < high:
+            middle = 0.5 * (angles[stretch].min() + angles[stretch].max())
+            away = (0.5 * (low + high) - middle) / TURN
+            # half a turn away is no turn, whatever the rounding
+            turns = np.ceil(np.abs(away) - 0.5 - _HALF_A_TURN)
+            angles[stretch] += TURN * np.copysign(turns, away)
+        low = min(low, angles[stretch].min())
+        high = max(high, angles[stretch].max())
     curve.values = angles.reshape(curve.values.shape)
-
-
-def _find_turns(start: float, stop: float, low: float, high: float) -> int:
-    """Return the whole turns by which an interval of angles is moved.
-
-    With them it covers least together with another.
-    """
-    distance = 0.5 * (low + high) - 0.5 * (start + stop)
-    nearest = round(distance / TURN)
-
-    def measure(turns: int) -> tuple[int, int]:
-        width = max(high, stop + TURN * turns) - min(low, start + TURN * turns)
-        return round(width / _AS_WIDE), abs(turns)
-
-    return min((nearest - 1, nearest, nearest + 1), key=measure)

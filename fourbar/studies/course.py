@@ -27,14 +27,22 @@ Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
 
 
-def pair_ends(begins: bool, places: Array, ends: bool) -> list[Stretch]:
-    """Pair the places at which a condition begins and ceases to hold.
+def list_stretches(
+    holds: NDArray[np.bool_],
+    places: Array,
+    locate: Callable[[NDArray[np.intp], Array], Array] = lambda rows, ends: ends,
+) -> list[Stretch]:
+    """List from where and up to where a condition holds.
 
     Parameters
     ----------
-    begins, ends : True if it holds at the first and at the last position.
+    holds : (n,), at the places.
+    locate : function of the rows after which the condition changes, and of the place
+        beside each at which it holds; it returns better places.
     """
-    all_ends = [*[None] * begins, *places.tolist(), *[None] * ends]
+    rows = np.flatnonzero(holds[1:] != holds[:-1])
+    ends = locate(rows, np.where(holds[rows], places[rows], places[rows + 1])).tolist()
+    all_ends = [*[None] * int(holds[0]), *ends, *[None] * int(holds[-1])]
     return list(zip(all_ends[::2], all_ends[1::2], strict=True))
 
 
