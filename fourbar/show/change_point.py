@@ -1,6 +1,7 @@
 """Pin forces on a change point: the limits to which they tend along the assembly."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -31,10 +32,6 @@ ZERO_LIMIT = 1e-9
 """Part of the forces below which a limit is zero."""
 
 
-class _NoSideError(Exception):
-    """A change point of which a side cannot be asked; says why."""
-
-
 def find_limits(solution: Solution) -> tuple[Solution, str]:
     """Return the solution of one position, and what is said of its pin forces.
 
@@ -46,18 +43,20 @@ def find_limits(solution: Solution) -> tuple[Solution, str]:
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return solution, ""
     rising, order = np.unique(MULTIPLES, return_inverse=True)
-    try:
-        places = _list_places(solution, rising)
-    except _NoSideError as error:
-        return solution, f"on the change point pin forces have no value: {error}"
+    places = _list_places(solution, rising)
+    if places is None:
+        return solution, (
+            "on the change point pin forces have no value: the motion begins, ends or"
+            " stands still there, and has one side alone"
+        )
     beside = solve(solution.scene, "force", at=places)
     limits = _extrapolate_forces(beside, order)
-    forces: Any = {name: limit[None] for name, limit in limits.items()}
     bounded = [np.isfinite(limit).all() for limit in limits.values()]
     said = "on the change point no pin force has a limit"
     if any(bounded):
         said = "on the change point: the limits from both sides"
         said += "" if all(bounded) else "; - has none"
+    forces: Any = {name: limit[None] for name, limit in limits.items()}
     return replace(solution, **forces), said
 
 
@@ -90,8 +89,8 @@ def has_growing_forces(solution: Solution) -> bool:
     return False
 
 
-def _list_places(solution: Solution, multiples: Array) -> Command:
-    """List the positions at multiples of the step, which rise.
+def _list_places(solution: Solution, multiples: Array) -> Command | None:
+    """List the positions at multiples of the step, which rise; None without a side.
 
     Along a motion over time the bar has the speed and acceleration of each instant.
     """
@@ -102,28 +101,21 @@ def _list_places(solution: Solution, multiples: Array) -> Command:
         # a stroke changes by as much as turns its bar by the step; an angle has turn 1
         here = float(at.places[0])
         _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
-        try:
+        with suppress(InputError):  # a cylinder at an end of its range
             return command_at(scene, here + ANGLE_STEP / abs(turn) * multiples)
-        except InputError as error:
-            raise _NoSideError("the cylinder is at an end of its range") from error
-
-    moving = "the law" if law else "the release"
+        return None
     speed = abs(float(np.ravel(np.asarray(at.speed, dtype=float))[0]))
     if speed == 0.0:
-        raise _NoSideError(f"{moving} stands still there")
-    assert at.time is not None
-    times = float(np.ravel(at.time)[0]) + ANGLE_STEP / speed * multiples
-    begin = 0.0
-    end = math.inf
+        return None
+    times = at.places[0] + ANGLE_STEP / speed * multiples
+    begin, *_, end = law.time if law else (0.0, math.inf)
+    if times[0] < begin or times[-1] > end:
+        return None
     if law:
-        begin, *_, end = law.time
-    if begin <= times[0] and times[-1] <= end:
-        if law:
-            return command_at(scene, times)
-        released = release_at(scene, np.array([0.0, *times])).command
-        if len(released.angle) > len(times):
-            return released.part(slice(1, None))
-    raise _NoSideError(f"{moving} begins or ends there, and has one side alone")
+        return command_at(scene, times)
+    released = release_at(scene, np.array([0.0, *times])).command
+    # one that comes to rest before has fewer instants
+    return released.part(slice(1, None)) if len(released.angle) > len(times) else None
 
 
 def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:
@@ -134,26 +126,14 @@ def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, A
     beside : positions on both sides of it.
     rows : those at the `MULTIPLES` of the step.
     """
-    forces = {
-        name: np.reshape(getattr(beside, name)[rows], (2, 2, 3, 2))
-        for name in PIN_FORCES
-    }
-    size = max(np.abs(values[:, 1, -1]).max() for values in forces.values())
-    return {name: _extrapolate_force(values, size) for name, values in forces.items()}
-
-
-def _extrapolate_force(values: Array, size: float) -> Array:
-    """Extrapolate a force to the change point, (2,); NaN where it has no limit.
-
-    Parameters
-    ----------
-    values : by side, parabola, multiple of the step and component.
-    size : of the forces beside the change point, N.
-    """
-    first, second, third = np.moveaxis(values, 2, 0)
+    forces = np.array([getattr(beside, name)[rows] for name in PIN_FORCES])
+    # by force, side, parabola, multiple of the step and component
+    values = forces.reshape(len(PIN_FORCES), 2, 2, 3, 2)
+    size = np.abs(values[:, :, 1, -1]).max()
+    first, second, third = np.moveaxis(values, 3, 0)
     extrapolations = 3.0 * first - 3.0 * second + third
-    distance = np.ptp(extrapolations, axis=(0, 1)).max()
-    if not distance <= SAME_LIMIT * size:
-        return np.full(2, np.nan)
-    limit = extrapolations[:, 0].mean(axis=0)
-    return np.where(np.abs(limit) <= ZERO_LIMIT * size, 0.0, limit)
+    distance = np.ptp(extrapolations, axis=(1, 2)).max(axis=-1)
+    limits = extrapolations[:, :, 0].mean(axis=1)
+    limits[np.abs(limits) <= ZERO_LIMIT * size] = 0.0
+    limits[~(distance <= SAME_LIMIT * size)] = np.nan
+    return dict(zip(PIN_FORCES, limits, strict=True))

@@ -4,7 +4,7 @@ Output is text, or one JSON object in SI units and radians.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from fourbar.formulas.mobility import (
     circuits,
     classify,
     limit_positions,
-    reach_of,
     swing,
     time_ratio,
     turns_fully,
@@ -36,7 +35,7 @@ from fourbar.quantities import (
 from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
-from fourbar.show.driving import name_places, read_drive_demand
+from fourbar.show.driving import read_drive_demand
 from fourbar.show.lines import BLOCK_WIDTH, wrap_line
 from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.shown_units import COMMON, choose_unit, write_cell
@@ -46,7 +45,7 @@ from fourbar.show.tables import (
     write_cells,
     write_table,
 )
-from fourbar.solution import DEGREES, Conversion, find_unit_in, find_unit_of_quantity
+from fourbar.solution import Conversion, find_unit_in, find_unit_of_quantity
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.derivatives import Sensitivity
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
@@ -83,7 +82,7 @@ def write_type(
     yield f"s + l = {write(outer)} {relation} p + q = {write(inner)}"
     yield f"bars that turn fully: {turning or 'none'}"
     if mobility.barker is not None:  # a structure does not move
-        yield from _write_mobility(linkage, write, everything)
+        yield from _write_mobility(linkage, everything)
 
 
 def write_type_json(linkage: FourBar) -> str:
@@ -114,11 +113,7 @@ def write_type_json(linkage: FourBar) -> str:
     )
 
 
-def _write_mobility(
-    linkage: FourBar,
-    write: Callable[[float], str],
-    everything: bool,
-) -> Iterator[str]:
+def _write_mobility(linkage: FourBar, everything: bool) -> Iterator[str]:
     """Write what swings and turns, and between which limits.
 
     Angles are in deg, with the digits that a drawing needs.
@@ -144,9 +139,6 @@ def _write_mobility(
         what = f"  {BAR_NAMES[bar]}: {others} {how}"
         angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
         yield f"{what:<34}{angles}  {BRANCH_NAMES.get(limit.branch, 'both')}"
-    for bar in MOVING_BARS:
-        if turns_fully(linkage, bar):
-            yield from _explain_turning(linkage, bar, write)
     if points := change_points(linkage):
         yield f"change points: theta_2 = {' and '.join(map(_write_angle, points))}"
     transmission = transmission_extremes(linkage)
@@ -164,37 +156,6 @@ def _write_mobility(
         yield f"time ratio of the output strokes at constant omega_2: {ratio:.4f}"
 
 
-def _explain_turning(
-    linkage: FourBar,
-    bar: int,
-    write: Callable[[float], str],
-) -> Iterator[str]:
-    """Say why a bar has no limits.
-
-    The two others would have to be collinear, stretched or folded.
-    """
-    reach = reach_of(linkage, bar)
-    d = linkage.ground
-    length = linkage.lengths[bar - 1]
-    (one, x), (two, y) = (
-        (BAR_NAMES[k], linkage.lengths[k - 1]) for k in MOVING_BARS if k != bar
-    )
-    name = BAR_NAMES[bar]
-    touches = reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0
-    when = "are in line at change points alone" if touches else "are never in line"
-    yield f"{name}: no limits, {one} and {two} {when}:"
-    relation = "=" if reach.beyond_stretched == 0.0 else "<"
-    yield (
-        f"    ground + {name} = {write(d + length)} {relation} {one} + {two} ="
-        f" {write(x + y)}"
-    )
-    relation = "=" if reach.beyond_folded == 0.0 else ">"
-    yield (
-        f"    |ground - {name}| = {write(abs(d - length))} {relation} |{one} - {two}| ="
-        f" {write(abs(x - y))}"
-    )
-
-
 def _write_angle(angle: float) -> str:
     return f"{_write_degrees(angle)} deg"
 
@@ -203,9 +164,8 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     """Write the numbers that matter most, as lines and a table.
 
     Shown are torque, with friction at rest what it holds, pin forces and points; if the
-    scene states no speed, angles replace torque and forces. The lines above the table
-    say what each quantity depends on most. The rank of a number follows from its
-    largest share of a largest value.
+    scene states no speed, angles replace torque and forces. The rank of a number
+    follows from its largest share of a largest value.
 
     `width`: that of a terminal.
     """
@@ -217,8 +177,6 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
         f"largest change over the positions {derivatives.describe_steps()};"
         " pin forces by their magnitude"
     ]
-    symbol, si = name_places(solution)
-    unit, factor = find_unit_in(si, DEGREES)
     shares: dict[str, float] = {}
     largest = ["largest value"]
     changes = []
@@ -227,19 +185,10 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
         sizes = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
         size = float(np.nanmax(sizes)) if np.isfinite(sizes).any() else math.nan
         largest.append(write_cell(size, ".4g"))
-        most = dict[bool, str]()
         ranked = derivatives.influences(name)
         for row in ranked:
-            place = factor * solution.at.places[row.row]
-            most.setdefault(
-                derivatives.keys[row.key].unit == "rad",
-                f"{row.key} (at {symbol} = {place:.6g} {unit})",
-            )
             share = abs(row.change) / size if size > 0.0 else 0.0
             shares[row.key] = max(shares.get(row.key, 0.0), share)
-        if most:
-            named = ", of the angles on ".join(most[key] for key in sorted(most))
-            lines.append(f"{name} depends most on {named}")
         no_change = 0.0 if np.isfinite(derivatives.by[name]).any() else math.nan
         of_name = dict.fromkeys(derivatives.keys, no_change)
         changes.append(of_name | {row.key: row.change for row in ranked})

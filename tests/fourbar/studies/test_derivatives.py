@@ -97,7 +97,7 @@ def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
     assert max(map(len, text.split("\n"))) <= BLOCK_WIDTH and "torque_low" in text
 
 
-def test_the_command_names_the_place_and_rounding_is_no_influence():
+def test_the_largest_share_comes_first_and_rounding_is_no_influence():
     """The coupler of a parallelogram does not turn: its load may act at any place."""
     motion = Motion(theta_4=np.array([0.5, 0.9]), omega_4=1.0)
     load = Load(3, (5.0, -1.0), from_pin=(0.1, 0.2))
@@ -105,8 +105,6 @@ def test_the_command_names_the_place_and_rounding_is_no_influence():
     moving = {row.key for row in slopes.influences("torque")}
     assert "loads.0.force.0" in moving and "loads.0.from_pin.0" not in moving
     text = write_sensitivity(slopes, None)
-    most = re.search(r"torque depends most on (\S+) \(at theta_4 = ", text)
-    assert most and most[1] == slopes.influences("torque")[0].key
     rows = text[text.index("largest value") :].splitlines()
     cells = np.array([row.split()[-5:] for row in rows if row]).astype(float)
     shares = np.max(np.abs(cells[1:]) / cells[0], axis=1)
@@ -163,7 +161,6 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys):
     model = MODELS / "crank_rocker.toml"
     assert status(["analyze", str(model), "--sensitivity"]) == 0
     text = capsys.readouterr().out
-    assert "torque depends most on lengths.ground (at theta_2 = " in text
     # the torque of inertia grows with the square of the speed, that of weight and loads
     # does not
     (row,) = re.findall("bars.input.mass.*", text)
