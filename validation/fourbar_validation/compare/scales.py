@@ -16,7 +16,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import COUPLE, LINE, OK, RATES, UNITS, Array
@@ -138,10 +137,6 @@ _OF_EACH_BAR = ("rad/s", "rad/s^2")
 """Units of quantities whose sums of terms differ from bar to bar."""
 
 
-def _return_one(_: str, sizes: TermSizes) -> Array:
-    return np.ones(len(sizes.solution))
-
-
 def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
     scene = sizes.scene
     arms = sum(map(_compute_arm, scene.linkage.moving)) + sum(
@@ -231,8 +226,6 @@ def _sum_powers(_: str, sizes: TermSizes) -> Array:
 _A_FORCE, _A_VELOCITY = "F12", "v_B"
 """Quantities of their units to which every bar contributes."""
 TERMS_OF_UNIT: dict[str, Callable[[str, TermSizes], Array]] = {
-    "rad": _return_one,
-    "1": _return_one,
     "m": _sum_length_terms,
     "rad/s": _sum_speeds,
     "m/s": _sum_velocities,
@@ -299,7 +292,8 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     speeds |= {bar: known[name] for bar, name in _SPEEDS.items() if name in known}
     moves = len(speeds) > len(MOVING_BARS)
     if moves and at.speed is not None:
-        known |= _find_velocities(scene.linkage, theta, speeds)
+        turning = {bar: 1j * speeds[bar] for bar in MOVING_BARS}
+        known |= _swing_points(scene.linkage, theta, turning, "v")
     known["sin_mu"] = np.sin(theta[4] - theta[3])
     one, second = (theta[bar] for bar in theta if bar != at.bar)
     known["condition"] = np.abs(np.sin(second - one))
@@ -335,49 +329,32 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     )
 
 
-def _find_velocities(
+def _swing_points(
     linkage: FourBar,
     theta: dict[int, Array],
-    omega: dict[int, Array],
-) -> dict[str, Array]:
-    """Return the velocities of A, B and the mass centres, (n, 2), m/s.
+    turning: dict[int, Any],
+    letter: str,
+) -> dict[str, Any]:
+    """Return velocities ("v") or accelerations ("a") of A, B and the mass centres.
 
-    All follow from the answer's own angles and speeds.
+    They are (n, 2), and follow from the answer's own angles and rates. `turning`: what
+    an arm of each bar is multiplied by, 1j omega or 1j alpha - omega^2.
     """
 
-    def swung(bar: int, distance: float, angle: float) -> Array:
-        speed = distance * omega[bar]
-        direction = theta[bar] + angle
-        return join_components(-speed * np.sin(direction), speed * np.cos(direction))
+    def swing(bar: int, distance: float, angle: float) -> Any:
+        return turning[bar] * distance * np.exp(1j * (theta[bar] + angle))
 
-    velocities = {
-        "v_A": swung(2, linkage.input.length, 0.0),
-        "v_B": swung(4, linkage.output.length, 0.0),
+    points = {
+        "A": swing(2, linkage.input.length, 0.0),
+        "B": swing(4, linkage.output.length, 0.0),
     }
     for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
-        centre = swung(number, *find_centre(bar))
-        moved = centre + velocities["v_A"] if number == 3 else centre
-        velocities[f"v_G{number}"] = moved
-    return velocities
-
-
-def _find_accelerations(linkage: FourBar, answered: Solution) -> dict[str, Any]:
-    """Find the accelerations of the mass centres, m/s^2, from an answer's own rates."""
-
-    def swing(bar: int, distance: float, angle: float) -> NDArray[np.complex128]:
-        omega = getattr(answered, f"omega_{bar}")
-        arm = distance * np.exp(1j * (getattr(answered, f"theta_{bar}") + angle))
-        swung = (1j * getattr(answered, f"alpha_{bar}") - omega * omega) * arm
-        return np.asarray(swung)
-
-    of_A = swing(2, linkage.input.length, 0.0)
-    accelerations: dict[str, Any] = {}
-    for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
         centre = swing(number, *find_centre(bar))
-        if number == 3:
-            centre = centre + of_A
-        accelerations[f"a_G{number}"] = join_components(centre.real, centre.imag)
-    return accelerations
+        points[f"G{number}"] = centre + points["A"] if number == 3 else centre
+    return {
+        f"{letter}_{name}": join_components(point.real, point.imag)
+        for name, point in points.items()
+    }
 
 
 def size_answer(scene: Scene, answered: Solution) -> TermSizes | None:
@@ -386,6 +363,12 @@ def size_answer(scene: Scene, answered: Solution) -> TermSizes | None:
         if any(getattr(answered, name) is None for name in RATES):
             return None
         if any(getattr(answered, f"a_G{bar}") is None for bar in MOVING_BARS):
-            accelerations = _find_accelerations(scene.linkage, answered)
-            answered = replace(answered, **accelerations)
+            theta, omega, alpha = (
+                {bar: getattr(answered, f"{rate}_{bar}") for bar in MOVING_BARS}
+                for rate in ("theta", "omega", "alpha")
+            )
+            turning = {bar: 1j * alpha[bar] - omega[bar] ** 2 for bar in MOVING_BARS}
+            moved = _swing_points(scene.linkage, theta, turning, "a")
+            centres = {name: moved[name] for name in moved if "G" in name}
+            answered = replace(answered, **centres)
     return TermSizes(scene, answered)
