@@ -133,6 +133,7 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
             expected.scale(name, solution[name]).cancellation,
             rtol=1e-12,
         )
+    np.testing.assert_allclose(sizes.solution.a_G3, solution.a_G3, rtol=1e-12)
     assert size_answer(scene, replace(bare, alpha_4=None)) is None
 
 
