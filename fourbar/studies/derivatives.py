@@ -351,7 +351,10 @@ def sensitivity(scene: Scene) -> Sensitivity:
             ~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)])
         )
         seeded = scene
-        for number, (key, entry) in enumerate(keys.items()):
+        # a place moves before the pins of its bar do
+        for number, (key, entry) in sorted(
+            enumerate(keys.items()), key=lambda one: ".from_pin." not in one[1][0]
+        ):
             if key.startswith("motion."):
                 continue
             # what is left out carries the slope of its length too

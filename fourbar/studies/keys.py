@@ -352,8 +352,11 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
 def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
     entries = list_entries(scene)
-    # a place moves in the drawing before the pins of its bar do
-    places_first = sorted(numbers, key=lambda key: not entries[key].is_drawn_place)
+    # a place moves before the pins of its bar do
+    places_first = sorted(
+        numbers,
+        key=lambda key: not (".from_pin." in key or entries[key].is_drawn_place),
+    )
     changed = scene
     for key in places_first:
         changed = replace_number(changed, entries[key], numbers[key])
@@ -405,6 +408,28 @@ def _follow_pins(scene: Scene, drawn: DrawnPins) -> Scene:
         followed = replace_place(followed, place, length)
         if bar == 1:
             turned = angle(vector(dot(v, moved_v), sine(v, moved_v)))
-            turned = followed.linkage.ground_angle + turned
-            followed = replace_place(followed, ["linkage", "ground_angle"], turned)
+            theta = followed.linkage.ground_angle + turned
+            followed = replace_place(followed, ["linkage", "ground_angle"], theta)
+            followed = _keep_drawn(followed, drawn, turned)
     return followed
+
+
+def _keep_drawn(scene: Scene, drawn: DrawnPins, turned: Any) -> Scene:
+    """Return the scene whose places on the ground stay in the drawing.
+
+    `drawn`, `turned`: the pins before their move, and by how much it turned the ground.
+    """
+    assert scene.drawing is not None
+    x, y = drawn.place("O2")
+    to_x, to_y = scene.drawing.place("O2")
+    back = vector(x - to_x, y - to_y) * polar(1.0, -angle(drawn.vector(1)))
+
+    def keep(place: Place) -> Place:
+        if place.bar != 1 or place.from_pin is None:
+            return place
+        z = place.vector() + back
+        return place._replace(
+            from_pin=(z.real, -turned), from_centre=(z.imag, 0.5 * np.pi - turned)
+        )
+
+    return scene.with_places(keep)

@@ -200,12 +200,29 @@ class SceneFile:
                 table[last] = [_change_entry(entry, change) for entry in old]
             else:
                 table[last] = _change_entry(old, change)
+        if drawn:
+            self._keep_on_ground(document, document["pins"])
         try:
             return loads(tomlkit.dumps(document))
         except InputError as refused:
             if refused.key != "lengths":
                 raise
             raise NotAskedError("a changed linkage can never assemble") from refused
+
+    def _keep_on_ground(self, document, pins):
+        """Let the places on the ground stay in the drawing while its pins move."""
+        if isinstance(document, list):
+            document = dict(enumerate(document))
+        if not isinstance(document, dict):
+            return
+        for part in document.values():
+            self._keep_on_ground(part, pins)
+        if document.get("bar") == 1 and "from_pin" in document:
+            O2, O4 = (complex(*map(_read, pins[pin])) for pin in ENDS[1])
+            place = cmath.rect(*map(_read, document["from_pin"]))
+            place *= self._bars[1] / abs(self._bars[1])
+            place = (place + self._feet[1] - O2) * abs(O4 - O2) / (O4 - O2)
+            document["from_pin"] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
 
 
 def _read(quantity):

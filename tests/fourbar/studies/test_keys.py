@@ -5,11 +5,12 @@ The oracle of coordinates moves the drawing and states the file anew.
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from pytest import raises
 
-from fourbar import InputError, Tolerance, save, tolerances, uniform, vary
+from fourbar import InputError, Tolerance, save, solve, tolerances, uniform, vary
 from fourbar.cli import status
 from fourbar.files import dump, loads
 from tests.support.rows import read_rows
@@ -213,3 +214,25 @@ def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(
     assert max(map(len, shown)) <= 80
     (row,) = (line.split() for line in shown if line.startswith("patch_y  "))
     assert row[3] == "0"
+
+
+RAM = """
+[drive]
+from = { bar = 1, drawn = ["600 mm", "-100 mm"] }
+to = { bar = 2, drawn = ["500 mm", "260 mm"] }
+[effects]
+springs = [{ from = { bar = 1, drawn = ["900 mm", "0 mm"] }, \
+to = { bar = 3, drawn = ["690 mm", "300 mm"] }, stiffness = "4 N/mm", length = "0 m" }]
+"""
+
+
+def test_what_is_drawn_on_the_ground_stays_while_its_pins_move():
+    """The file with the moved pin has the same cylinder and spring."""
+    heights = np.array([0.4, 0.47])
+    text = WISHBONE.replace('theta_2 = "drawn"', 'theta_2 = "-5 deg"')
+    varied = vary(loads(text + RAM), {"pins.O4.1": heights})
+    forces = [
+        solve(loads(f"{text}{RAM}".replace('"445 mm"', f'"{height} m"'))).drive_force
+        for height in heights
+    ]
+    assert_allclose(solve(varied).drive_force, forces, rtol=1e-12)
