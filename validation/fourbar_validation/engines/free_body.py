@@ -8,8 +8,9 @@ the drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass ce
 Vectors of the plane are complex numbers, x + i y.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from fourbar.quantities import COUPLE, LINE, Array, ComplexArray
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.line import DriveLine, place_line
-from fourbar_validation.compare.pins import find_centre, find_mass, state_from_pins
+from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.engines.description import (
     FORCE_AT,
     SHARED_BY_EXACT_ENGINES,
@@ -39,7 +40,6 @@ from fourbar_validation.engines.free_body_effects import (
     find_wound,
     has_wrench,
     list_sliding_pins,
-    make_vector,
     sum_acting,
 )
 from fourbar_validation.engines.linear import solve_refined
@@ -50,10 +50,6 @@ DRIVE_COLUMN = 12
 """The torque, or the force along a line."""
 EQUATION_ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
-POSITIONS_SOLVED_AT_ONCE = 4096
-"""Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
-are 22 MB.
-"""
 _FRICTION_STAGES = 16
 """Stages in which friction grows to its full coefficient. Each is the start of the
 next.
@@ -93,16 +89,15 @@ class FreeBody:
         asked = command
         if command.moves_stroke:
             command = find_angle(command, scene.motion, *measure_cylinder(scene))
-        bar = command.bar
         closed = close(scene.linkage, command.angle, command.branch, command.bar)
-        theta = list(closed.theta)
-        theta.insert(bar - 2, command.angle)
+        theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
+        motion = _move_bodies(scene.linkage, command, theta)
         answer = Answer(
             NAME,
             "exact",
             at=asked,
             assembled=closed.assembled,
-            quantities=_compute_places(scene.linkage, *theta),
+            quantities=_list_places(motion, theta),
             evidence={
                 "closure_gap": float(
                     np.max(closed.gap, initial=0.0, where=closed.assembled)
@@ -116,72 +111,65 @@ class FreeBody:
             ),
         )
         if command.speed is not None:
-            commanded = (theta[0], *list_speeds(command), *theta[1:])
-            blocks = [
-                slice(start, start + POSITIONS_SOLVED_AT_ONCE)
-                for start in range(0, len(command.angle), POSITIONS_SOLVED_AT_ONCE)
-            ]
-            parts = [
-                _answer_positions(scene, bar, *(array[block] for array in commanded))
-                for block in blocks
-            ]
-            answer.evidence["residual"] = max(
-                (residual for _, residual in parts),
-                default=0.0,
-            )
-            for name in parts[0][0] if parts else ():
-                answer.quantities[name] = np.concatenate(
-                    [part[name] for part, _ in parts]
-                )
+            forces, answer.evidence["residual"] = _list_forces(scene, motion)
+            answer.quantities |= _list_rates(motion) | forces
+            if any(effect.dry for effect in scene.effects):
+                begins = []
+                for side in (1.0, -1.0):
+                    either = command._replace(speed=side, acceleration=0.0)
+                    begins.append(_move_bodies(scene.linkage, either, theta))
+                answer.quantities |= _find_range_at_rest(scene, motion, begins)
         return answer
 
 
-def _compute_places(
-    linkage: FourBar,
-    theta_2: Array,
-    theta_3: Array,
-    theta_4: Array,
-) -> dict[str, Array]:
-    """Compute the angles of bars 3 and 4, their sine, and the points.
+def _move_bodies(linkage: FourBar, command: Command, theta: Array) -> BodyMotion:
+    """Set the bars at angles (3, n) in motion as commanded; a speed left out is 0."""
+    theta_2, theta_3, theta_4 = theta
+    omega, alpha = list_speeds(command)
+    return speeds_and_accelerations(
+        linkage, theta_2, omega, alpha, theta_3, theta_4, command.bar
+    )
+
+
+def _list_places(motion: BodyMotion, theta: Array) -> dict[str, Array]:
+    """List the angles, the sine of those of bars 3 and 4, and the points.
 
     The points are pins A, B and the mass centres.
     """
-    unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
-    O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
-    first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
-    quantities = {
-        "theta_2": theta_2,
-        "theta_3": theta_3,
-        "theta_4": theta_4,
-        "sin_mu": np.sin(theta_4 - theta_3),
-    }
-    quantities |= {
-        "A": stack_components(first_pin[3]),
-        "B": stack_components(O4 + linkage.output.length * unit[4]),
+    _, theta_3, theta_4 = theta
+    places = {
+        "A": motion.first_pin[3],
+        "B": motion.first_pin[4] + motion.linkage.output.length * motion.unit[4],
     }
     for bar in MOVING_BARS:
-        quantities[f"G{bar}"] = stack_components(
-            first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar]
-        )
+        places[f"G{bar}"] = motion.first_pin[bar] + motion.to_centre(bar)
+    quantities = dict(zip(("theta_2", "theta_3", "theta_4"), theta, strict=True))
+    quantities["sin_mu"] = np.sin(theta_4 - theta_3)
+    return quantities | {
+        name: stack_components(place) for name, place in places.items()
+    }
+
+
+def _list_rates(motion: BodyMotion) -> dict[str, Array]:
+    """List speeds and accelerations of bars, and accelerations of the points."""
+    a_A = motion.swing(2, motion.first_pin[3])
+    a_B = motion.swing(4, motion.linkage.output.length * motion.unit[4])
+    quantities = {"a_A": stack_components(a_A), "a_B": stack_components(a_B)}
+    for bar in MOVING_BARS:
+        a_G = motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0)
+        quantities |= {
+            f"omega_{bar}": motion.omega[bar],
+            f"alpha_{bar}": motion.alpha[bar],
+            f"a_G{bar}": stack_components(a_G),
+        }
     return quantities
 
 
-def _answer_positions(
-    scene: Scene,
-    commanded: int,
-    theta_2: Array,
-    speed: Array,
-    acceleration: Array,
-    theta_3: Array,
-    theta_4: Array,
-) -> tuple[dict[str, Array], float]:
-    """Answer motion, pin forces and torque at some positions.
+def _list_forces(scene: Scene, motion: BodyMotion) -> tuple[dict[str, Array], float]:
+    """List pin forces, the drive's size and its condition.
 
-    The residual of their thirteen equations is returned too.
+    The residual of the thirteen equations is returned too.
     """
-    motion = speeds_and_accelerations(
-        scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded
-    )
     unknowns, residual, from_jamming = balance(scene, motion)
     drive = COUPLE if scene.drive is None else LINE
     if (gone := find_wound(scene, motion)) is not None:
@@ -190,57 +178,33 @@ def _answer_positions(
         name: unknowns[:, FORCE_COLUMNS[name] : FORCE_COLUMNS[name] + 2]
         for name in FORCE_AT.values()
     }
-    for bar in MOVING_BARS:
-        forces |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
-    a_A = motion.swing(2, motion.first_pin[3])
-    if (
-        line := _place_line_of_drive(scene, motion)
-    ) is None:  # the sine between the bars that are not driven
-        condition = np.abs(
-            cross_products(
-                *(
-                    motion.unit[number]
-                    for number in MOVING_BARS
-                    if number != scene.drive_bar
-                )
-            )
-        )
+    if (line := _place_line_of_drive(scene, motion)) is None:
+        # the sine between the bars that are not driven
+        others = [bar for bar in MOVING_BARS if bar != scene.drive_bar]
+        condition = np.abs(cross_products(*(motion.unit[bar] for bar in others)))
     else:
         condition = line.condition
     forces["drive_condition"] = condition * from_jamming
-    forces |= {
-        "a_A": stack_components(a_A),
-        "a_B": stack_components(
-            motion.swing(4, scene.linkage.output.length * motion.unit[4])
-        ),
-    }
-    for bar in MOVING_BARS:
-        forces[f"a_G{bar}"] = stack_components(
-            motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0)
-        )
-    if any(effect.dry for effect in scene.effects):
-        ends = []
-        for side in (1.0, -1.0):
-            begins = speeds_and_accelerations(
-                scene.linkage,
-                theta_2,
-                np.full_like(theta_2, side),
-                0.0 * theta_2,
-                theta_3,
-                theta_4,
-                commanded,
-            )
-            ends.append(
-                balance(scene, motion._replace(beginning=begins.omega))[0][
-                    :, DRIVE_COLUMN
-                ]
-            )
-        forces |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
+    forces[drive.value] = unknowns[:, DRIVE_COLUMN]
     if scene.loads or scene.effects:
-        forces[f"{drive.value}_inertia"] = balance(
-            replace(scene, loads=(), effects=()), motion
-        )[0][:, DRIVE_COLUMN]
-    return forces | {drive.value: unknowns[:, DRIVE_COLUMN]}, residual
+        alone, _, _ = balance(replace(scene, loads=(), effects=()), motion)
+        forces[f"{drive.value}_inertia"] = alone[:, DRIVE_COLUMN]
+    return forces, residual
+
+
+def _find_range_at_rest(
+    scene: Scene, motion: BodyMotion, begins: Iterable[BodyMotion]
+) -> dict[str, Array]:
+    """Find the least and the greatest that the drive takes where the linkage rests.
+
+    `begins`: motions that may begin there.
+    """
+    drive = COUPLE if scene.drive is None else LINE
+    ends = []
+    for begun in begins:
+        unknowns, _, _ = balance(scene, motion._replace(beginning=begun.omega))
+        ends.append(unknowns[:, DRIVE_COLUMN])
+    return {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
 
 
 def _place_line_of_drive(scene: Scene, motion: BodyMotion) -> DriveLine | None:
@@ -317,10 +281,8 @@ def balance(
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
     if len(arms):
-        couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
-        from_jamming = _compute_distance_from_jamming(
-            loads[..., 0], loads[..., 1:], arms, couples
-        )
+        couples, matrix = continue_couples(loads[..., 0], loads[..., 1:], arms)
+        from_jamming = _compute_distance_from_jamming(matrix)
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
     return total, residual, from_jamming
 
@@ -371,9 +333,7 @@ def count_solutions(scene: Scene, command: Command) -> Array:
     signs = with_signs(scene.linkage, command).branch
     closed = close(scene.linkage, command.angle, signs, command.bar)
     theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
-    motion = speeds_and_accelerations(
-        scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar
-    )
+    motion = _move_bodies(scene.linkage, command, theta)
     _, loads, arms, _ = solve_unit_couples(scene, motion)
     return np.array(
         [
@@ -440,11 +400,11 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
     drive on the bars that it pushes.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
-    for bar, (row, first, second) in EQUATION_ROWS.items():
-        for force in (first, second):
-            matrix[:, row, FORCE_COLUMNS[force]] = matrix[
-                :, row + 1, FORCE_COLUMNS[force] + 1
-            ] = 1.0
+    sums = [*EQUATION_ROWS.values(), (9, "F32", "F23"), (11, "F43", "F34")]
+    for row, *forces in sums:
+        for axis, force in product((0, 1), forces):
+            matrix[:, row + axis, FORCE_COLUMNS[force] + axis] = 1.0
+    for bar, (row, _, second) in EQUATION_ROWS.items():
         u = motion.unit[bar]
         matrix[:, row + 2, FORCE_COLUMNS[second]] = -u.imag
         matrix[:, row + 2, FORCE_COLUMNS[second] + 1] = u.real
@@ -455,11 +415,6 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
         for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
             unit.push(point.bar, sense * line.unit, arm)
         matrix[:, :, DRIVE_COLUMN] = -_make_right_sides(motion.linkage, unit)
-    for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
-        for axis in (0, 1):
-            matrix[:, row + axis, FORCE_COLUMNS[force] + axis] = matrix[
-                :, row + axis, FORCE_COLUMNS[reaction] + axis
-            ] = 1.0
     return matrix
 
 
@@ -487,10 +442,12 @@ def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
 
 
-def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> Array:
+@np.errstate(invalid="ignore")
+def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> tuple[Array, Array]:
     """Solve x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p).
 
-    The continuation starts from no friction; NaN where it jams.
+    The continuation starts from no friction; NaN where it jams. The Jacobian of the
+    equations is returned too, (n, p, p).
 
     Parameters
     ----------
@@ -499,41 +456,23 @@ def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> Array:
         p), 1/m.
     k : mu r of each pin, m.
     """
-    x = np.full(F.shape, np.nan)
-    remaining = np.flatnonzero(
-        np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2))
-    )
-    x[remaining] = 0.0
+    x = np.zeros(F.shape)
     for stage in range(1, _FRICTION_STAGES + 1):
-        x[remaining], settled, det = solve_couples(
-            F[remaining], C[remaining], k * (stage / _FRICTION_STAGES), x[remaining]
-        )
+        x, settled, matrix = solve_couples(F, C, k * (stage / _FRICTION_STAGES), x)
         # without friction the determinant is 1; a change of its sign means that the
         # branch has turned back
-        grown = settled & (det > 0.0) & (x[remaining] >= 0.0).all(axis=1)
-        x[remaining[~grown]] = np.nan
-        remaining = remaining[grown]
-    return x
+        grown = settled & (np.linalg.det(matrix) > 0.0) & (x >= 0.0).all(axis=1)
+        x = np.where(grown[:, None], x, np.nan)
+    return x, np.where(grown[:, None, None], matrix, np.nan)
 
 
-def _compute_distance_from_jamming(
-    F: ComplexArray,
-    C: ComplexArray,
-    k: Array,
-    x: Array,
-) -> Array:
-    """Compute the least singular value of the Jacobian, at most 1, (n,).
-
-    The equations are those of `continue_couples`.
-    """
-    with np.errstate(invalid="ignore"):
-        _, matrix = _compute_friction_jacobian(F, C, k, x)
-    far = np.full(len(x), np.nan)
+def _compute_distance_from_jamming(matrix: Array) -> Array:
+    """Compute the least singular value of Jacobians, at most 1, (n,)."""
+    far = np.full(len(matrix), np.nan)
     finite = np.isfinite(matrix).all(axis=(1, 2))
-    far[finite] = np.minimum(
-        np.linalg.svd(matrix[finite], compute_uv=False)[:, -1], 1.0
-    )
-    return far
+    far[finite] = np.linalg.svd(matrix[finite], compute_uv=False)[:, -1]
+    least: Array = np.minimum(far, 1.0)
+    return least
 
 
 def _compute_friction_jacobian(
@@ -561,30 +500,19 @@ def solve_couples(
 ) -> tuple[Array, NDArray[np.bool_], Array]:
     """Solve by Newton's method from couples `x`.
 
-    Return also where it converged, and the Jacobian's determinant.
+    Return also where it converged, and the Jacobian, (n, p, p).
     """
-    n, pins = x.shape
-    x = x.copy()
-    k = np.broadcast_to(k, x.shape)
-    settled = np.zeros(n, dtype=bool)
-    matrix = np.zeros((n, pins, pins))
-    left = np.arange(n)
     for _ in range(_FRICTION_STEPS):
-        couples = x[left]
-        size, matrix[left] = _compute_friction_jacobian(
-            F[left], C[left], k[left], couples
-        )
-        gap = k[left] * size - couples
-        reach = (np.abs(C[left]) * couples[:, None, :]).sum(axis=-1)
-        terms = k[left] * (np.abs(F[left]) + reach)
-        settled[left] = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
-        step = solve_system(matrix[left], gap[..., None])[0][..., 0]
-        moving = ~settled[left] & np.isfinite(step).all(axis=1)
-        left = left[moving]
-        if not len(left):
+        size, matrix = _compute_friction_jacobian(F, C, k, x)
+        gap = k * size - x
+        terms = k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
+        settled = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
+        step = solve_system(matrix, gap[..., None])[0][..., 0]
+        moving = ~settled & np.isfinite(step).all(axis=1)
+        if not moving.any():
             break
-        x[left] += step[moving]
-    return x, settled, np.linalg.det(matrix)
+        x = np.where(moving[:, None], x + step, x)
+    return x, settled, matrix
 
 
 def stack_components(vectors: ComplexArray) -> Array:
