@@ -5,7 +5,7 @@ and ratios are drawn.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +14,6 @@ import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
-from fourbar.scene import find_signs
 from fourbar.show.derived import derive
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import compute_energies
@@ -37,7 +36,7 @@ from fourbar.show.plot.style import (
     set_degree_ticks,
     write_labelled_quantity,
 )
-from fourbar.show.plot.view import View, collect_point_vectors, list_limits
+from fourbar.show.plot.view import View, collect_point_vectors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,10 +58,8 @@ class Curve(NamedTuple):
     name: str
     """Name in a note, and in the legend if its look has no other."""
     values: Array
-    """Values at the positions of the sweep or at places of its own, (n,), SI."""
+    """Values at the positions of the sweep, (n,), SI."""
     look: dict[str, Any]
-    over: Any = None
-    """Places of its own on the axis."""
 
 
 class Chart(NamedTuple):
@@ -92,10 +89,9 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     units = {**view.units, **_DEGREES}
     factor, unit = choose_scale(limit or largest_magnitude(*sizes), chart.unit, units)
     poles = view.axis.factor * np.array(chart.poles)
-    for name, values, look, over in chart.curves:
-        # no line crosses a pole
-        rows = np.searchsorted(positions, poles if over is None else [])
-        places = np.insert(positions if over is None else over, rows, np.nan)
+    rows = np.searchsorted(positions, poles)
+    places = np.insert(positions, rows, np.nan)  # no line crosses a pole
+    for name, values, look in chart.curves:
         finite = np.where(np.isfinite(values), factor * values, np.nan)
         shown = np.insert(finite, rows, np.nan)
         axes.plot(places, shown, **{"label": name} | look)
@@ -337,10 +333,7 @@ Source: R. L. Norton, Design of Machinery; H. Alt introduced the angle (1932).
 
 
 def list_transmission(view: View) -> Chart:
-    """List the acute angle between coupler and output.
-
-    Limit and dead-centre positions are marked.
-    """
+    """List the acute angle between coupler and output, and the least one wanted."""
     mu = derive(view.sweep, "transmission")
     least = np.full(len(mu), math.radians(_RECOMMENDED))
     thin = {"color": MUTED, "lw": 0.9, "ls": (0, (4, 2))}
@@ -348,39 +341,7 @@ def list_transmission(view: View) -> Chart:
         Curve("transmission angle", mu, {"color": INK}),
         Curve(f"{_RECOMMENDED:g}° recommended", least, thin),
     ]
-    if view.time is None:
-        curves += _list_limits(view)
     return Chart("Transmission angle", r"$\mu$", "rad", curves, "end")
-
-
-def _list_limits(view: View) -> Iterator[Curve]:
-    """List limits of the commanded bar and dead centres, by their places and angles."""
-    at = view.sweep.at
-    order = np.argsort(at.angle)
-    low, high = at.angle[order[[0, -1]]]
-    middle = 0.5 * (low + high)
-    one, follower = (bar for bar in MOVING_BARS if bar != at.bar)
-    signs = find_signs(view.scene.linkage, at.angle, at.branch, at.bar)
-    for name, bar, limits in list_limits(view.scene):
-        # a sweep that ends at a limit ends short of it
-        beside = 1.5 * (high - low) / len(order) if bar == at.bar else 0.0
-        places = []
-        heights = []
-        for limit in limits:
-            theta = dict(zip(MOVING_BARS, limit[:3], strict=True))
-            place = middle + math.remainder(theta[at.bar] - middle, math.tau)
-            nearest = np.argmin(np.abs(at.angle - place))
-            sine = math.sin(theta[follower] - theta[one])
-            is_passed = bar == at.bar or signs[nearest] * sine > 0.0
-            if is_passed and low - beside <= place <= high + beside:
-                places.append(place)
-                heights.append(abs(math.remainder(theta[4] - theta[3], math.pi)))
-        if places:
-            mark = "s" if bar == at.bar else "D"
-            over = np.interp(places, at.angle[order], view.axis.values[order])
-            look = {"marker": mark, "ls": "none", "ms": 6.0, "mew": 1.1, "zorder": 5}
-            look |= RING_MARK | {"clip_on": False}
-            yield Curve(name, np.array(heights), look, over)
 
 
 CHARTS: dict[str, Callable[[View], Chart]] = {

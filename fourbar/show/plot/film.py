@@ -2,11 +2,11 @@
 
 import math
 import shutil
+import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from subprocess import CalledProcessError
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from PIL.Image import Image
 
 FRAMES_PER_SECOND = 25
 FILM_DPI = 100
@@ -32,6 +33,8 @@ SWEEP_SECONDS = 6.0
 """Duration of a film of a sweep if no other is stated, s."""
 WINDOW_POSITIONS = 12
 """Positions whose symbols the window is made to hold."""
+_STAYS = 255
+"""Colour, after those of the palette, of a pixel that a frame leaves as it was."""
 SHORTEST_FILM = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 
@@ -72,6 +75,7 @@ def write_film(
         allowed = f"must be more than 0 and at most {longest:g}"
         raise InputError("seconds", seconds, allowed)
     with apply_style():
+        program = _find_ffmpeg() if kind == "mp4" else ""
         shown = make_view(scene)
         shown.units = units
         if seconds is None:
@@ -81,32 +85,60 @@ def write_film(
                 seconds = min(max(duration, SHORTEST_FILM), longest)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         with tempfile.TemporaryDirectory() as folder:
-            draft = Path(folder) / f"film.{kind}"
-            _write_frames(draft, shown, order, moving)
-            write_bytes(path, draft.read_bytes())
+            _write_gif(Path(folder, "film.gif"), _draw_frames(shown, order, moving))
+            if program:
+                _encode_mp4(folder, program)
+            write_bytes(path, Path(folder, f"film.{kind}").read_bytes())
     return len(order)
 
 
-def _write_frames(path: Path, shown: View, order: list[int], moving: bool) -> None:
-    import matplotlib as mpl
-    from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+def _draw_frames(shown: View, order: list[int], moving: bool) -> "Iterator[Image]":
+    """Draw what moves, frame by frame, over a picture of what stands still."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
 
-    writer: AbstractMovieWriter = PillowWriter(FRAMES_PER_SECOND)
-    if path.suffix == ".mp4":
-        mpl.rcParams["animation.ffmpeg_path"] = _find_ffmpeg()
-        writer = FFMpegWriter(FRAMES_PER_SECOND, codec="h264")
     figure, move = _make_stage(shown, moving)
+    (axes,) = figure.axes
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    with show_running(f"{len(order)} frames are drawn") as progress:
+        for number, index in enumerate(order, 1):
+            canvas.restore_region(still)
+            for artist in move(index):
+                axes.draw_artist(artist)
+            if progress is not None:
+                progress(number / len(order))
+            yield Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+
+def _write_gif(path: Path, frames: "Iterator[Image]") -> None:
+    """Write frames as they come, in one palette; a pixel that stays is transparent."""
+    from PIL import Image
+    from PIL.GifImagePlugin import getdata, getheader
+
+    shown = next(frames).quantize(_STAYS, Image.Quantize.MAXCOVERAGE)
+    header, _ = getheader(shown, info={"loop": 0})
+    look: Any = {"duration": 1000 // FRAMES_PER_SECOND, "transparency": _STAYS}
+    before = np.asarray(shown)
+    with open(path, "wb") as file:
+        file.writelines([*header, *getdata(shown, **look)])
+        for frame in frames:
+            pixels = np.asarray(frame.quantize(palette=shown, dither=Image.Dither.NONE))
+            changes = Image.fromarray(np.where(pixels == before, _STAYS, pixels))
+            file.writelines(getdata(changes, **look))
+            before = pixels
+        file.write(b";")
+
+
+def _encode_mp4(folder: str, program: str) -> None:
+    """Encode the GIF of a folder anew; yuv420p is what browsers and slides play."""
+    command = [program, "-i", "film.gif", "-c:v", "h264", "-pix_fmt", "yuv420p"]
     try:
-        with (
-            show_running(f"{len(order)} frames are drawn") as progress,
-            writer.saving(figure, str(path), FILM_DPI),
-        ):
-            for number, index in enumerate(order, 1):
-                move(index)
-                writer.grab_frame()
-                if progress is not None:
-                    progress(number / len(order))
-    except CalledProcessError:
+        subprocess.run(
+            [*command, "film.mp4"], cwd=folder, capture_output=True, check=True
+        )
+    except subprocess.CalledProcessError:
         raise DependencyError(
             "this ffmpeg cannot encode H.264 (libx264); .gif and .html need none"
         ) from None
@@ -136,58 +168,51 @@ def choose_frames(shown: View, count: int) -> list[int]:
     return order + order[-2:0:-1] if there_and_back else order
 
 
-def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], None]]":
-    """Make the figure, and the function that moves it to a position of the sweep."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Any]]":
+    """Make the figure, and the function that moves it to a position of the sweep.
+
+    The function returns what is to be drawn, from below.
+    """
     from matplotlib.figure import Figure
-    from matplotlib.legend import Legend
     from matplotlib.patheffects import withStroke
 
     sweep = shown.sweep
+    axis = shown.axis
     figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_frame(axes, shown)
     still = {*axes.lines, *axes.patches}
+    title = axes.set_title("θ")
+    moved = list[Any]()
 
-    def move(index: int) -> None:
+    def clear() -> None:
+        while moved:
+            moved.pop().remove()
+        title.set_text("")
+
+    def move(index: int) -> list[Any]:
         """Draw the mechanism at a position, in place of what stood there."""
-        for artist in {*axes.lines, *axes.patches, *axes.texts} - still:
-            artist.remove()
+        clear()
         with_arrows = moving and shown.moves
         draw_mechanism(axes, shown, sweep, index, moving=with_arrows)
         for text in axes.texts:  # names keep clear of bars of their colour
             text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
-        axis = shown.axis
-        words = f"{axis.symbol} = "
-        unit = axis.unit
-        place = axis.factor * sweep.at.places[index]
-        if shown.time is not None:
-            words = f"t = {shown.time[index]:.2f} s, θ₂ = "
-            unit = "°"
-            place = math.degrees(sweep.theta_2[index])
-        words += write_cell(place, ".1f").replace("-", "−") + unit
-        axes.set_title(f"{words}, {shown.branch_name} branch", pad=pad)
+        drawn = (*axes.lines, *axes.patches, *axes.texts)
+        moved.extend(artist for artist in drawn if artist not in still)
+        place = write_cell(axis.factor * sweep.at.places[index], ".2f")
+        words = f"{axis.symbol} = {place}{axis.unit}".replace("-", "−")
+        title.set_text(f"{words}, {shown.branch_name} branch")
+        return sorted([*moved, title], key=lambda artist: artist.get_zorder())
 
-    pad = 0.0
     closes = np.flatnonzero(sweep.assembled)
     # the window holds what acts at every position
     for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
         move(int(index))
     label_plane(axes, shown, "θ")
-    pad = place_legend(axes, 3)
+    place_legend(axes, 3)
     figure.draw_without_rendering()
     axes.set_autoscale_on(False)  # nothing jumps from frame to frame
     figure.set_layout_engine(None)
-    # what stands still is drawn once: a picture lies under the frames
-    for artist in {*axes.lines, *axes.patches, *axes.texts} - still:
-        artist.remove()
-    axes.set_title("")
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # type: ignore[no-untyped-call]
-    pixels = np.array(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-    figure.figimage(pixels, zorder=-1.0)
-    for artist in (figure.patch, *figure.texts, *axes.findobj(Legend), *still):
-        artist.set_visible(False)
-    axes.set_axis_off()
+    clear()
     return figure, move

@@ -39,9 +39,9 @@ POINT_DISTANCE = 3.0
 """Distance of the dots along a line."""
 _MARGIN = 2.5
 """Space around a label: half the width of a bar and a little more."""
-_MARK_WEIGHT, _TEXT_WEIGHT, _LEADER_WEIGHT = 12.0, 30.0, 10.0
-"""Weights of a mark, and of each dot of a text and of a leader. A dot of a line has the
-line's width.
+_MARK_WEIGHT, _TEXT_WEIGHT, _HATCH_WEIGHT = 12.0, 30.0, 1.0
+"""Weights of a mark, and of each dot of a text and around a hatching. A dot of a line
+has the line's width.
 """
 
 
@@ -115,14 +115,16 @@ class _Room:
                 self.keep_off(join_points(path.vertices), _MARK_WEIGHT)
                 continue
             for line in path.cleaned(remove_nans=True).to_polygons(closed_only=False):
-                self.keep_off(self.sample(line), artist.get_linewidth())
+                self.keep_off(
+                    self.sample(line), artist.get_linewidth() or _HATCH_WEIGHT
+                )
         labels = []
         for text in self.axes.texts:
             if text.get_gid() == _IS_LABEL:
                 labels.append(text)
             else:
                 self.add_box(text.get_window_extent(self.renderer))
-        for label in labels:
+        for label in sorted(labels, key=lambda text: -len(text.get_text())):
             self.place(label)
 
     def keep_off(self, dots: Points, weight: float) -> None:
@@ -175,10 +177,11 @@ class _Room:
             leader = Path(np.array([split_complex(point), end]))
             cost = float(covers @ self.weights) + 30.0 * (not is_whole)
             cost += 0.04 * reach + 0.05 * k
+            cost += 200.0 * sum(led.intersects_bbox(box) for led in self.leaders)
             if reach > _LED:
                 crossed = sum(map(leader.intersects_bbox, self.boxes))
                 crossed += sum(map(leader.intersects_path, self.leaders))
-                cost += _COST_OF_A_LEADER + 40.0 * crossed
+                cost += _COST_OF_A_LEADER + 200.0 * crossed
             if cost < least:
                 least = cost
                 best = offset, box, leader, reach
@@ -188,7 +191,6 @@ class _Room:
         self.add_box(box)
         if reach > _LED:
             self.leaders.append(leader)
-            self.keep_off(self.sample(leader.vertices), _LEADER_WEIGHT)
             ends = self.axes.transData.inverted().transform(leader.vertices)
             # the limits stay, by which the labels were placed
             look = {"color": label.get_color(), "lw": 0.5, "zorder": 8.5}

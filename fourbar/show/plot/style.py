@@ -302,22 +302,19 @@ def set_degree_ticks(axis: Any, span: float) -> None:
             return
 
 
-def place_legend(axes: "Axes", columns: int = 4) -> float:
+def place_legend(axes: "Axes", columns: int = 4) -> None:
     """Place the legend, if a curve has a value, between title and panel.
 
     No curve is covered there; a drawing to scale has a narrower legend.
-
-    Return the distance of the title over it, typographic points.
     """
     if not axes.get_legend_handles_labels()[1]:
-        return 0.0
+        return
     to_scale = axes.get_aspect() == 1.0
     above, pad, line = (1.005, 6.0, 12.0) if to_scale else (1.02, 7.0, 11.0)
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, above), ncols=columns)
     legend.set_in_layout(False)  # it would make its panel narrower
     pad += line * math.ceil(len(legend.get_texts()) / columns)
     axes.set_title(axes.get_title(loc="left"), pad=pad)
-    return pad
 
 
 def fit_legends(figure: "Figure") -> None:

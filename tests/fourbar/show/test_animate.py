@@ -228,8 +228,16 @@ def test_a_gif_moves_the_linkage(scene, frames, tmp_path, monkeypatch):
         assert film.n_frames == frames
         for index in range(frames):
             film.seek(index)
-            pictures.append(np.asarray(film.convert("L")))
+            pictures.append(np.asarray(film.convert("L"), int))
     assert all(np.any(p != q) for p, q in pairwise(pictures))
+    with style.apply_style():  # nothing of an earlier frame stays
+        shown = view.make_view(scene)
+        (last,) = films._draw_frames(
+            shown, films.choose_frames(shown, frames)[-1:], False
+        )
+    assert (
+        np.mean(np.abs(pictures[-1] - np.asarray(last.convert("L"), int)) > 64) < 1e-3
+    )
 
 
 @pytest.mark.slow
@@ -267,5 +275,5 @@ def test_a_frame_has_the_linkage_at_its_position_and_nothing_of_another():
             assert len(bars) == 3
             assert_allclose(bars[1].get_xydata(), [A, B])
             angle = degrees(shown.sweep.theta_2[index])
-            assert f"θ₂ = {angle:.1f}°" in axes.get_title("left")
+            assert f"θ₂ = {angle:.2f}°" in axes.get_title("left")
     assert held[0] == held[1]
