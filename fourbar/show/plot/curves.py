@@ -259,7 +259,13 @@ def list_demand(view: View) -> Chart:
     """List the torque or force of the drive."""
     drive = read_drive_demand(view.sweep)
     what = "Torque" if view.scene.drive is None else "Force"
-    return _list_drive(view, drive.keys.value, drive.symbol[0], drive.unit, what)
+    chart = _list_drive(view, drive.keys.value, drive.symbol[0], drive.unit, what)
+    for end, label in zip(drive.keys[2:], ("begins to move", "_"), strict=True):
+        held = getattr(view.sweep, end)
+        if held is not None and np.any(apart := held != drive.values):
+            look = {"color": MUTED, "ls": "--", "label": label}
+            chart.curves.append(Curve(end, np.where(apart, held, np.nan), look))
+    return chart
 
 
 def list_stroke(view: View) -> Chart:

@@ -447,6 +447,16 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     assert any(f"Dashed upright line: θ₂\u00a0=\u00a0{place}" in word for word in words)
 
 
+def test_what_dry_friction_holds_is_drawn_about_the_torque():
+    """0.5 N m at O2, to either side."""
+    held = (Gravity(), Friction.at(O2=0.5))
+    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.4, 5), 0.0), effects=held)
+    (panel,) = composed(scene, "torque").axes
+    _, torque, low, high, *_ = (line.get_ydata() for line in panel.lines)
+    half = 0.5 * torque[0] / solved(scene).torque[0]
+    assert_allclose([low, high], [torque - half, torque + half])
+
+
 @pytest.mark.slow
 def test_the_position_drawn_is_clear_of_poles_of_its_own_branch():
     """The one of the open branch is a pole of the crossed one."""
