@@ -440,11 +440,10 @@ class SceneBlock(Facts):
         if self.held and self.peak is not None:
             name = "at rest" if self.is_held_at_rest else "range"
             yield _row(name, self._write_held(self.drive.unit))
-        if self.start is not None and self.peak is not None:
-            start = self._value(self.start.value, self.drive.unit)
-            if len(self.solution) > 1:
-                start += f" at {self._place(self.start.place)}"
-            yield _row("to start", f"{start}, against dry friction")
+        if (start := self.motion.start) is not None:
+            value = self._value(start.value, self.drive.unit)
+            row = f"{value} at {self._place(start.place)}, against dry friction"
+            yield _row("to start", row)
         yield from self._write_stroke()
         yield from self._write_power()
         if self.pressure is not None and self.stroke_range is not None:
@@ -653,16 +652,15 @@ class SceneBlock(Facts):
             yield _row("bore", "none is enough, as the force grows without bound")
             return
         panels = self.motion.panels
-        from_rest = self.held or self.start
-        solution = self.motion.solve_between() if from_rest else self.solution
+        solution = self.motion.solve_between()
         parts = []
         for sense, end, does in (
             (1, LINE.high, " to push"),
             (-1, LINE.low, ", and the rod's area besides, to pull"),
         ):
             force = sense * panels.find_peak(LINE.value, sense).value
-            if from_rest:
-                force = max(force, np.nanmax(sense * getattr(solution, end)))
+            if (ends := getattr(solution, end)) is not None:
+                force = max(force, np.nanmax(sense * ends))
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
                 parts.append(
@@ -694,7 +692,7 @@ class SceneBlock(Facts):
         The list is empty where dry friction does not hold the linkage, or adds nothing.
         """
         moves = np.any(self.solution.at.speed)
-        if moves or not (self.held or self.start):
+        if self.drive is None or moves or not (self.held or self.motion.start):
             return []
         from_rest = self.motion.from_rest
         has_value = self.motion.panels.has_value

@@ -59,11 +59,10 @@ def find_held(solution: Solution) -> tuple[Array, Array]:
     At rest with an acceleration it is held by none: the sense is that of its start,
     elsewhere 0, (n,).
     """
-    keys = read_drive_demand(solution).keys
-    low, high = (getattr(solution, end) for end in (keys.low, keys.high))
+    low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
     if low is None:
         return np.zeros(0), np.zeros(0)
-    held = np.isfinite(low) & np.isfinite(high) & (low < high)
+    held = np.isfinite(high - low) & (low < high)
     at_rest = held & (solution.at.speed == 0.0)
     senses = at_rest * np.sign(solution.at.acceleration)
     return held & (senses == 0.0), senses

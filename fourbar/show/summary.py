@@ -243,11 +243,6 @@ class Facts:
             ranges.append(HeldRange(least, most, ends, varies))
         return ranges
 
-    @property
-    def start(self) -> Peak | None:
-        """Largest torque or force that starts a motion from rest; None: none does."""
-        return self.drive and self.motion.start
-
     @cached_property
     def is_held_at_rest(self) -> bool:
         """Return True if nothing moves where dry friction holds a pin."""
