@@ -217,11 +217,12 @@ def choose_range(
     linkage: FourBar,
     bar: int = 2,
     holding: float | None = None,
+    margin: float = ANGLE_FROM_LIMITS,
 ) -> tuple[float, float]:
     """Choose the range of a commanded bar's angle for a scene that names none, rad.
 
     0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the
-    one that holds an angle, shrunk by ANGLE_FROM_LIMITS at each end.
+    one that holds an angle, shrunk by a margin at each end.
     """
     if turns_fully(linkage, bar):
         return 0.0, TURN
@@ -232,7 +233,7 @@ def choose_range(
             start = low
             stop = high
             break
-    margin = min(ANGLE_FROM_LIMITS, (stop - start) / _NARROW)
+    margin = min(margin, (stop - start) / _NARROW)
     return start + margin, stop - margin
 
 

@@ -571,22 +571,24 @@ def _reverse(point: "Place") -> Any:
     return select(point.distance >= 0.0, forwards, np.pi + forwards + PI_LOW)
 
 
-def default_places(scene: Scene, holding: float | None = None) -> Array:
+def default_places(
+    scene: Scene,
+    holding: float | None = None,
+    margin: float = ANGLE_FROM_LIMITS,
+) -> Array:
     """List the angles or strokes that are swept if a scene names none, (n,).
 
-    The angles are those of the range that holds one. With a single change point they
-    go through two turns, after which the assembly repeats.
+    The angles are those of the range that holds one, less a margin at its limits. With
+    a single change point they go through two turns, after which the assembly repeats.
     """
     steps = DEFAULT_STEPS
     if scene.motion.stroke is not None:
         triangle = _triangle_of(scene)
-        first, last = triangle.find_strokes(
-            ANGLE_FROM_LIMITS, np.pi - ANGLE_FROM_LIMITS
-        )
+        first, last = triangle.find_strokes(margin, np.pi - margin)
     else:
         linkage = scene.linkage
         bar = scene.motion.bar
-        first, last = choose_range(linkage, bar, holding)
+        first, last = choose_range(linkage, bar, holding, margin)
         if turns_fully(linkage, bar):
             turns = int(count_turns(linkage.lengths, bar))
             last = first + turns * (last - first)

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.formulas.path import count_turns
 from fourbar.linkage import BAR_NAMES
@@ -53,19 +54,19 @@ def read_drive_demand(solution: Solution) -> Driving:
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
-def find_held(solution: Solution) -> tuple[Array, Array]:
-    """Mark where dry friction holds a pin at rest, and find where a motion starts.
+def find_held(solution: Solution) -> tuple[NDArray[np.intp], Array]:
+    """Find the rows in which dry friction holds a pin, and where a motion starts.
 
-    At rest with an acceleration it is held by none: the sense is that of its start,
+    At rest with an acceleration nothing is held: the sense is that of the start,
     elsewhere 0, (n,).
     """
     low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
     if low is None:
-        return np.zeros(0), np.zeros(0)
+        return np.zeros(0, dtype=np.intp), np.zeros(0)
     held = np.isfinite(high - low) & (low < high)
     at_rest = held & (solution.at.speed == 0.0)
     senses = at_rest * np.sign(solution.at.acceleration)
-    return held & (senses == 0.0), senses
+    return np.flatnonzero(held & (senses == 0.0)), senses
 
 
 def name_places(solution: Solution) -> tuple[str, str]:

@@ -222,12 +222,12 @@ class Facts:
         A turn that begins at such a position ends at the same, which is listed once.
         """
         solution = self.solution
-        rows = np.flatnonzero(find_held(solution)[0])
+        rows = find_held(solution)[0]
         if self.drive is None or not len(rows):
             return []
         if not np.any(solution.at.speed):  # held between the positions too
             solution = self.motion.solve_between()
-            rows = np.flatnonzero(find_held(solution)[0])
+            rows = find_held(solution)[0]
         low = getattr(solution, self.drive.keys.low)
         high = getattr(solution, self.drive.keys.high)
         places = solution.at.places

@@ -64,13 +64,8 @@ def find_positions(scene: Scene, name: str, value: float) -> Command:
             places.append(place)
     if not places:
         # of the range that the scene's own motion is in
-        places_of_range = default_places(scene, float(command(scene).angle[0]))
-        for end in (0, -1) if commanded in COMMANDED_ANGLES else ():
-            place = float(places_of_range[end])
-            for _, beyond, outwards in _find_nearest_limit(
-                scene.linkage, scene.motion.bar, place
-            ):
-                places_of_range[end] -= outwards * (beyond + INSIDE_LIMIT)
+        first = float(command(scene).angle[0])
+        places_of_range = default_places(scene, first, INSIDE_LIMIT)
         whole = solve(scene, "position", at=command_at(scene, places_of_range))
         values = getattr(whole, name)
         low = _write_position(name, float(np.nanmin(values)), _GRID_DIGITS)
