@@ -68,11 +68,10 @@ class _MimicReport:
     """Angle counted from the zeros of the file. Errors that depend on an unknown zero
     are NaN.
     """
-    zero: float
-    """Angle of the follower's bar at the leader's zero, rad; NaN if it is not known."""
-    other: tuple[float, float]
-    """Largest error counted from another angle there, and that angle, rad, where the
-    loop and the file have different ones; else NaN.
+    zeros: tuple[tuple[float, float], ...]
+    """Largest error counted from an angle of the follower's bar at the leader's zero,
+    and that angle, rad. The loop and the file may have different ones: the better comes
+    first. None is known of a file without a picture whose loop is open there.
     """
     shifted: float
     """Largest error of the angle with the constant of least squares, rad. It replaces
@@ -84,11 +83,6 @@ class _MimicReport:
     """Polynomials of POLYNOMIAL_DEGREES by least squares over the scene's positions."""
     fitted: tuple[_MimicError, ...]
     """Polynomials of POLYNOMIAL_DEGREES whose largest error of the angle is least."""
-
-    @property
-    def has_zeros(self) -> bool:
-        """True if it is known where both joints are at the zero of the file."""
-        return math.isfinite(self.zero)
 
 
 def measure_mimic(
@@ -127,38 +121,38 @@ def measure_mimic(
         )
     equality = _state_angles(equality, theta)
     positions = _place_leader(scene, equality)
-    low = float(positions[0])
-    high = float(positions[-1])
+    low, high = positions[[0, -1]].tolist()
     branch = int(command(scene).branch[0])
     theta_2 = np.union1d(np.linspace(low, high, POSITIONS_FITTED), positions)
     angle, ratio = _follow(scene, theta_2, branch, equality)
-    # both joints in their own senses
-    side = equality.side * equality.sense
     x = theta_2
-    zeros: list[float] = []
-    if equality.theta_2 is not None:
+    zeros = [equality.follower_zero]
+    if not math.isnan(equality.theta_2):
         middle = 0.5 * (low + high)
         rest = middle + math.remainder(equality.theta_2 - middle, math.tau)
         x = equality.side * (theta_2 - rest)
         if theta.keys() <= {"theta_2"}:
             with suppress(InputError):  # the loop is open there
-                in_loop, _ = _follow(scene, np.array([rest]), branch, equality)
-                zeros += in_loop.tolist()
-        drawn = equality.follower_zero
-        if drawn is not None and not any(is_same_angle(one, drawn) for one in zeros):
-            zeros.append(drawn)
+                (in_loop,), _ = _follow(scene, np.array([rest]), branch, equality)
+                if is_same_angle(in_loop, zeros[0]):
+                    zeros.clear()
+                zeros.append(float(in_loop))
+    # both joints in their own senses
+    side = equality.side * equality.sense
     turned = side * angle
     own = _measure_polynomial(equality.coefficients, x, turned, equality.sense * ratio)
     left = np.polynomial.polynomial.polyval(x, equality.coefficients) - turned
-    if equality.theta_2 is None and any(equality.coefficients[2:]):
+    if math.isnan(equality.theta_2) and any(equality.coefficients[2:]):
         own = replace(own, ratio=math.nan)
         left = np.full_like(left, math.nan)
     errors = sorted(
-        (float(np.abs(_drop_turns(left + side * zero)).max()), zero) for zero in zeros
+        (float(np.abs(_drop_turns(left + side * zero)).max()), zero)
+        for zero in zeros
+        if not math.isnan(zero)
     )
-    (error, zero), other, *_ = [*errors, *[(math.nan, math.nan)] * 2]
     y = angle
     if errors:
+        _, zero = errors[0]
         missed = left + side * zero
         y = turned - side * zero + (missed - _drop_turns(missed))
         ratio = equality.sense * ratio
@@ -175,9 +169,8 @@ def measure_mimic(
     return _MimicReport(
         equality,
         (low, high),
-        replace(own, angle=error),
-        zero,
-        other,
+        replace(own, angle=errors[0][0] if errors else math.nan),
+        tuple(errors),
         shifted=float(np.abs(left - left[at_positions].mean()).max()),
         centred=float(np.ptp(left)) / 2.0,
         squares=tuple(squares),
@@ -229,7 +222,7 @@ def _state_angles(
     of_follower = (f"theta_{bar}" for bar in sorted(equality.bars) if bar > 2)
     allowed = ["theta_2", *of_follower]
     theta = {1: 0.0}
-    if equality.theta_2 is not None:
+    if not math.isnan(equality.theta_2):
         theta[2] = equality.theta_2
     for name, angle in angles.items():
         if name not in allowed:
@@ -276,7 +269,7 @@ def _follow(
                 "a change point, where the output may go on in two ways: state a motion"
                 " that does not go through it"
             )
-            if equality.limits is not None and equality.theta_2 is None:
+            if equality.limits is not None and math.isnan(equality.theta_2):
                 ends = " to ".join(map(_deg, equality.limits))
                 reason += (
                     "; or state by --pose theta_2=ANGLE the angle of bar 2 in the rest"
@@ -357,18 +350,20 @@ def show_mimic(report: _MimicReport) -> None:
         f" {equality.leader} by polycoef"
         f" {_write_coefficients(equality.coefficients)}; {_write_theta_2(report)}"
     )
-    if equality.other_side is not None:
-        print_sentence(_write_side(equality))
+    if not equality.is_side_told:
+        print_sentence(
+            "nothing tells from which side the scene is drawn: the tip of the axis of"
+            f" {equality.leader} is assumed, and --pose theta_2=ANGLE states another"
+        )
     print_sentence(_write_errors(report))
-    other_error, zero = report.other
-    if math.isfinite(other_error):
+    for largest, zero in report.zeros[1:]:
         print_sentence(
             f"{angle} at the zero of the file is another in the loop than in the"
             f" picture of the file: through {_deg(math.remainder(zero, math.tau))} deg"
-            f" the largest error is {_deg(other_error)} deg"
+            f" the largest error is {_deg(largest)} deg"
         )
     label = "polycoef"
-    if not report.has_zeros:
+    if not report.zeros:
         label = "a0 to a4"
         print_sentence(
             f"the polynomials below need no zero: {angle} = a0 + a1 theta_2 + a2"
@@ -399,7 +394,7 @@ def _write_theta_2(report: _MimicReport) -> str:
     """Write theta_2 as what the file makes it: the leader and an angle."""
     equality = report.equality
     low, high = (f"{math.degrees(angle):.6g}" for angle in report.swing)
-    if equality.theta_2 is None:
+    if math.isnan(equality.theta_2):
         return (
             f"theta_2 runs from {low} to {high} deg; the file does not tell it at the"
             f" zero of {equality.leader}, and --pose theta_2=ANGLE states it"
@@ -413,20 +408,6 @@ def _write_theta_2(report: _MimicReport) -> str:
     )
 
 
-def _write_side(equality: JointEquality) -> str:
-    """Say from which side the scene is taken to be drawn, and what states another."""
-    other = equality.other_side
-    assert other is not None and equality.theta_2 is not None
-    said = (
-        "nothing tells from which side the scene is drawn: the tip of the axis of"
-        f" {equality.leader} is assumed"
-    )
-    if is_same_angle(other, equality.theta_2):
-        return said
-    angle = f"{math.degrees(math.remainder(other, math.tau)):.9g}"
-    return f'{said}; --pose "theta_2={angle} deg" states the other side'
-
-
 def _write_errors(report: _MimicReport) -> str:
     """Write the errors of the polynomial of the file that the known zeros tell."""
     equality = report.equality
@@ -435,15 +416,15 @@ def _write_errors(report: _MimicReport) -> str:
     angle = _write_angle("theta", equality)
     through_zero = ""
     missing = ""
-    if report.has_zeros:
-        drawn = equality.follower_zero
-        in_file = drawn is not None and is_same_angle(report.zero, drawn)
+    if report.zeros:
+        _, zero = report.zeros[0]
+        in_file = is_same_angle(zero, equality.follower_zero)
         through_zero = (
             f"{_deg(report.file.angle)} deg through the zero of the file, where {angle}"
             f"{'' if in_file else ' of the loop'} is"
-            f" {_deg(math.remainder(report.zero, math.tau))} deg; "
+            f" {_deg(math.remainder(zero, math.tau))} deg; "
         )
-    elif equality.theta_2 is not None:
+    elif not math.isnan(equality.theta_2):
         bars = sorted(bar for bar in equality.bars if bar > 2)
         stated = ",".join(f"theta_{bar}=ANGLE" for bar in bars)
         missing = (

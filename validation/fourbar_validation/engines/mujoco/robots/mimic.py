@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -51,20 +51,18 @@ class JointEquality:
     """x0, rad: the leader in the rest pose of the file."""
     sense: float
     """+1 if both joints turn about the same direction, -1 if about opposite ones."""
-    theta_2: float | None
-    """theta_2 of the scene in the rest pose, rad; None where the file does not tell
+    theta_2: float
+    """theta_2 of the scene in the rest pose, rad; NaN where the file does not tell
     where the input or the ground ends.
     """
-    follower_zero: float | None
-    """Angle of the follower's bar against its bearer in the rest pose, rad; None where
+    follower_zero: float
+    """Angle of the follower's bar against its bearer in the rest pose, rad; NaN where
     the file does not tell it.
     """
     side: float
     """+1 if theta_2 grows with the leader, -1 if it falls."""
-    other_side: float | None
-    """theta_2 in the rest pose of a scene drawn from the other side, rad, if nothing
-    tells the side; None if it is known, or theta_2 is not.
-    """
+    is_side_told: bool
+    """False where +1 is assumed."""
     bars: tuple[int, int]
     """Bar that the follower turns, and the one that it turns against: 1 to 4."""
     limits: tuple[float, float] | None
@@ -73,7 +71,7 @@ class JointEquality:
     @property
     def swing(self) -> tuple[float, float] | None:
         """Range of theta_2 by the leader's limits, rad; None if it is not known."""
-        if self.limits is None or self.theta_2 is None:
+        if self.limits is None or math.isnan(self.theta_2):
             return None
         ends = [self.side * (end - self.leader_zero) for end in self.limits]
         return self.theta_2 + min(ends), self.theta_2 + max(ends)
@@ -135,57 +133,50 @@ class _RestPose:
         """x along the ground and y in the plane, (2, 3), once the ground is found."""
 
     def describe(self, stated: float | None) -> JointEquality:
-        """Describe the equality, with the angles of the rest pose and the side.
-
-        The ground or the input may not be found: neither is known then.
-        """
+        """Describe the equality, with the angles of the rest pose and the side."""
         model = self.model
         linkage = self.scene.linkage
         follower, leader, coefficients = self.tie
-        along = float(self.data.xaxis[follower] @ self.data.xaxis[leader])
+        sense = math.copysign(1.0, self.data.xaxis[follower] @ self.data.xaxis[leader])
+        bars = self._find_bars(follower)
+        # angles of the bars from the ground's line, seen from the tip of the axis
+        angles = [0.0, math.nan, math.nan, math.nan]
+        turn = 0.0
+        rocker = self._find_rocker()
+        if rocker is not None:
+            angles[1] = self._find_angle(leader, linkage.input)
+            if not math.isnan(angles[1]):  # else the side of the scene is not known
+                angles[3] = self._find_angle(rocker, linkage.output)
+            if bars == (3, 2):
+                angles[2] = self._find_angle(follower, linkage.coupler)
+            if rocker == follower:
+                # the equality turns the output while the leader is at its zero
+                turn = sense * coefficients[0]
         low, high = model.jnt_range[leader].tolist()
+        ground = linkage.ground_angle
         equality = JointEquality(
             name_joint(model, follower),
             name_joint(model, leader),
             coefficients,
             float(model.qpos0[model.jnt_qposadr[leader]]),
-            math.copysign(1.0, along),
-            stated,
-            None,
+            sense,
+            math.nan if stated is None else stated,
+            math.nan,
             1.0,
-            stated,
-            self._find_bars(follower),
+            True,
+            bars,
             (low, high) if model.jnt_limited[leader] else None,
         )
-        rocker = self._find_rocker()
-        input_angle = None
-        if rocker is not None:
-            input_angle = self._find_angle(leader, linkage.input)
-        if rocker is None or input_angle is None:
-            return equality
-        output_angle = self._find_angle(rocker, linkage.output)
-        angles = None
-        if output_angle is not None:
-            # where the equality turns the output while the leader is at its zero
-            turn = coefficients[0] * along if rocker == follower else 0.0
-            angles = (0.0, input_angle, math.nan, output_angle + turn)
-        ground = linkage.ground_angle
-        rests = {side: ground + side * input_angle for side in (1.0, -1.0)}
-        told = self._find_side(rests, angles, equality)
+        told = self._find_side((*angles[:3], angles[3] + turn), equality)
         side = told or 1.0
-        follower_zero = None
-        if equality.bars == (4, 1) and rocker == follower and output_angle is not None:
-            follower_zero = ground + side * output_angle
-        elif equality.bars == (3, 2):
-            coupler = self._find_angle(follower, linkage.coupler)
-            if coupler is not None:
-                follower_zero = side * (coupler - input_angle)
+        turned, bearer = (angles[bar - 1] for bar in bars)
+        zero = side * (turned - bearer) + (ground if bars[1] == 1 else 0.0)
         return replace(
             equality,
-            theta_2=rests[side] if stated is None else stated,
-            follower_zero=follower_zero,
+            theta_2=ground + side * angles[1] if stated is None else stated,
+            follower_zero=zero if 3 in bars or rocker == follower else math.nan,
             side=side,
-            other_side=None if told else rests[-side],
+            is_side_told=told is not None or math.isnan(angles[1]),
         )
 
     def _find_bars(self, follower: int) -> tuple[int, int]:
@@ -226,46 +217,42 @@ class _RestPose:
         return None
 
     def _find_side(
-        self,
-        rests: Mapping[float, float],
-        angles: Sequence[float] | None,
-        equality: JointEquality,
+        self, angles: tuple[float, ...], equality: JointEquality
     ) -> float | None:
         """Return +1 if a scene sees the leader's axis from its tip, -1 from behind.
 
         The stated or the drawn theta_2 decides. Where it does not, the scene's output
         does, and last the side from which the leader's range meets the scene's. The
-        result is None if none of them tells.
-
-        Parameters
-        ----------
-        rests : theta_2 in the rest pose by sides, rad.
-        angles : theta_1 to theta_4 in the file, seen from the tip, rad, if it tells
-            them.
+        result is None if none of them tells. `angles`: theta_1 to theta_4 in the file,
+        seen from the tip, rad, NaN if it does not tell them.
         """
         scene = self.scene
         shown = equality.theta_2
-        if shown is None and scene.drawing is not None:
+        if math.isnan(shown) and scene.drawing is not None:
             shown = scene.drawing.angle(2)
         positions = command(scene).theta_2
-        evidence: list[list[float]] = [[], [], []]
-        for side, rest in rests.items():
-            if shown is not None and is_same_angle(rest, shown):
-                evidence[0].append(side)
-            turned = [-side * angle for angle in angles or ()]
-            if turned and is_seen_from_behind(scene, turned):
-                evidence[1].append(side)
-            swing = replace(equality, side=side, theta_2=rest).swing
-            if swing is not None and _meet(swing, (positions.min(), positions.max())):
-                evidence[2].append(side)
-        return next((sides[0] for sides in evidence if len(sides) == 1), None)
+        moved = (float(positions.min()), float(positions.max()))
 
-    def _find_angle(self, joint: int, bar: Bar) -> float | None:
+        def list_evidence(side: float) -> tuple[bool, ...]:
+            rest = scene.linkage.ground_angle + side * angles[1]
+            swing = replace(equality, side=side, theta_2=rest).swing
+            return (
+                is_same_angle(rest, shown),
+                is_seen_from_behind(scene, [-side * angle for angle in angles]),
+                swing is not None and _meet(swing, moved),
+            )
+
+        tip, behind = map(list_evidence, (1.0, -1.0))
+        if tip == behind:
+            return None
+        return 1.0 if tip > behind else -1.0
+
+    def _find_angle(self, joint: int, bar: Bar) -> float:
         """Return the angle of a bar from its hinge to its other pin, rad.
 
         The pin is what lies at the length of the bar: a hinge, else a site, else the
         end of a capsule or cylinder. Else a mass centre as far from the hinge as that
-        of the scene tells the line, if the scene has it on the line. None if there is
+        of the scene tells the line, if the scene has it on the line. NaN if there is
         nothing, or if it lies in several directions.
         """
         body = self.model.jnt_bodyid[joint]
@@ -283,11 +270,12 @@ class _RestPose:
             if angles:
                 first = angles[0]
                 spread = [abs(math.remainder(one - first, math.tau)) for one in angles]
-                return first if max(spread) <= _SAME_LENGTH else None
+                return first if max(spread) <= _SAME_LENGTH else math.nan
         distance, turn = bar.centre or (0.5 * bar.length, 0.0)
         arm = locate(self.data.xipos[body])
         is_centre = math.isclose(abs(arm), distance, rel_tol=_SAME_CENTRE)
-        return cmath.phase(arm) if is_centre and turn == 0.0 and distance else None
+        is_told = is_centre and turn == 0.0 and distance
+        return cmath.phase(arm) if is_told else math.nan
 
     def _list_places(self, body: int) -> Iterator[Iterable[Array]]:
         """Yield the hinges of the bodies on a body, its sites, the ends of its rods."""
