@@ -555,7 +555,8 @@ class LoopInside:
         data.qpos[:] = state.qpos
         data.qvel[:] = state.qvel
         mujoco.mj_forward(model, data)
-        rows = data.efc_J.reshape(-1, model.nv)[: data.nefc]
+        every = data.efc_J.reshape(-1, model.nv)[: data.nefc]
+        rows, rubbing = np.split(every, [data.ne])
         accelerations = self.step * wanted
         due = _measure_drift(data, rows @ state.qvel) - rows @ accelerations
         turns = _solve_least_squares(rows @ self.basis, due)
@@ -563,7 +564,9 @@ class LoopInside:
         needed = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, needed, accelerations)
         needed += data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
-        needed += self._rub(state)
+        # dry friction in full
+        limits = data.efc_frictionloss[data.ne : data.nefc]
+        needed += rubbing.T @ (limits * np.sign(rubbing @ state.qvel))
         needed -= self.turn * self.flywheel * wanted
         pull = self.turn if self.acting is None else self.acting.find_pull(data)
         # M a + c - J^T f = pull s on the hinges of the loop; the closures bear what
@@ -575,7 +578,7 @@ class LoopInside:
         left = needed[self.moving] - columns @ multipliers
         size = float(left @ level / np.linalg.norm(pull[self.moving]))
         data.qacc[:] = accelerations
-        data.efc_force[: data.nefc] = multipliers
+        data.efc_force[: data.ne] = multipliers
         if self.acting is not None:
             self.acting.exert(data, size)
         mujoco.mj_rnePostConstraint(model, data)
@@ -583,20 +586,6 @@ class LoopInside:
         if self.acting is not None:
             self.acting.exert(data, 0.0)
         return (size, *forces), accelerations
-
-    def _rub(self, state: _RobotState) -> Array:
-        """Return the joint forces against dry friction in full, (nv,)."""
-        model = self.model
-        data = self.data
-        mujoco.mj_resetData(model, data)
-        data.qpos[:] = state.qpos
-        mujoco.mj_fwdPosition(model, data)
-        speeds = np.zeros(data.nefc)
-        mujoco.mj_mulJacVec(model, data, speeds, state.qvel)
-        full = data.efc_frictionloss[: data.nefc] * np.sign(speeds)
-        forces = np.zeros(model.nv)
-        mujoco.mj_mulJacTVec(model, data, forces, full)
-        return forces
 
     def _balance(self, accelerations: Array) -> Array:
         """Return the joint forces that leave the hinges that follow alone, (nv,).
@@ -830,15 +819,15 @@ def _solve_least_squares(matrix: Array, right: Array) -> Array:
 
 
 def _measure_drift(data: mujoco.MjData, speeds: Array) -> Array:
-    """Return -(dJ/dt) v of the constraints, from the reference that MuJoCo gives them.
+    """Return -(dJ/dt) v of the equalities, from the reference that MuJoCo gives them.
 
     The reference is -(dJ/dt) v - B (J v) - K I r. `speeds`: J v.
     """
-    parameters = data.efc_KBIP[: data.nefc]
+    parameters = data.efc_KBIP[: data.ne]
     damper = parameters[:, 1]
     spring = parameters[:, 0] * parameters[:, 2]
-    drift = data.efc_aref[: data.nefc] + damper * speeds
-    return np.asarray(drift + spring * data.efc_pos[: data.nefc])
+    drift = data.efc_aref[: data.ne] + damper * speeds
+    return np.asarray(drift + spring * data.efc_pos[: data.ne])
 
 
 def _has_warned(data: mujoco.MjData) -> bool:

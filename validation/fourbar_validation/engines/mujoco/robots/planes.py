@@ -63,7 +63,7 @@ def evaluate_closures(
     data: mujoco.MjData,
     normals: Mapping[int, Array],
 ) -> tuple[Array, Array]:
-    """Return residual (m,) and Jacobian (m, nv) of all rows in a state that is placed.
+    """Return residual (m,) and Jacobian (m, nv) of all equalities in a placed state.
 
     What no planar motion changes is left out: of the first three rows of a connect or
     a weld, a shift, the part along the normal, and of three more of a weld, a turn,
@@ -73,11 +73,11 @@ def evaluate_closures(
     ----------
     normals : of the plane of each equality that has one, by its number.
     """
-    shape = (data.nefc, model.nv)
-    residual = data.efc_pos[: data.nefc].copy()
+    shape = (data.ne, model.nv)
+    residual = data.efc_pos[: data.ne].copy()
     jacobian = data.efc_J[: math.prod(shape)].reshape(shape).copy()
     for number, normal in normals.items():
-        rows = np.flatnonzero(data.efc_id[: data.nefc] == number)
+        rows = np.flatnonzero(data.efc_id[: data.ne] == number)
         if not len(rows):  # it is switched off
             continue
         along = np.outer(normal, normal)
@@ -99,13 +99,13 @@ def copy_for_closures(
     model: mujoco.MjModel,
     closures: Iterable[int],
 ) -> mujoco.MjModel:
-    """Copy a model so that a loop's closures are its only constraints.
+    """Copy a model so that closures are its only constraints beside dry friction.
 
     The derivative is dense.
     """
     alone = copy(model)
     alone.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    alone.opt.disableflags |= find_bits("contact", "limit", "frictionloss", "island")
+    alone.opt.disableflags |= find_bits("contact", "limit", "island")
     alone.eq_active0[:] = 0
     alone.eq_active0[[*closures]] = 1
     return alone
@@ -123,6 +123,7 @@ def find_offset(
     robot is let go at rest in a pose, along the normal and in the plane, N.
     """
     alone = copy_for_closures(model, closures)
+    alone.opt.disableflags |= find_bits("frictionloss")
     data = mujoco.MjData(alone)
     data.qpos[:] = qpos
     mujoco.mj_forward(alone, data)
