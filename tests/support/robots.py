@@ -9,13 +9,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.examine import (
-    examine_file,
-    examine_mended,
-)
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
+from fourbar_validation.engines.mujoco.robots.measure import (
+    examine_file,
+    examine_mended,
+    measure_loops,
+)
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import judge_file, list_answers
 

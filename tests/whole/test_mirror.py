@@ -69,8 +69,8 @@ validation/check/test_check.py | calculated csv_columns fitted
 validation/check/test_check.py | judge_table mistakes theirs variants wrong_scenes
 validation/robots/test_check_mjcf.py | differences guard judge_loop
 validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
-validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: examine seen
-validation/engines/mujoco/robots/test_closures.py | ancestry frame loop_facts
+validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: seen
+validation/engines/mujoco/robots/test_closures.py | ancestry loop_facts
 validation/engines/mujoco/robots/test_measure.py | planes
 validation/robots/test_files.py | validation/engines/mujoco/robots: compiled
 validation/robots/test_loops.py | options

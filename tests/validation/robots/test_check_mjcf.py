@@ -31,7 +31,6 @@ from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry
 from fourbar_validation.engines.mujoco.describe import describe_model
-from fourbar_validation.engines.mujoco.robots import examine as examining
 from fourbar_validation.engines.mujoco.robots import measure as measuring
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
@@ -475,7 +474,7 @@ def test_each_entry_is_mended_in_a_model_of_its_own(monkeypatch):
     torques = [one[0].quantities["torque"] for one in (stiff, soft, alone)]
     assert np.array_equal(*torques[1:])
     assert not np.array_equal(*torques[:2])
-    monkeypatch.setattr(examining, "PRICING", 0.0)
+    monkeypatch.setattr(measuring, "PRICING", 0.0)
     assert mend(STILL, file, MINE, settings) == [None, None]
 
 

@@ -27,7 +27,7 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED
 from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.mujoco import couple as couples
 from fourbar_validation.engines.mujoco.robots import inside
-from fourbar_validation.engines.mujoco.robots.examine import (
+from fourbar_validation.engines.mujoco.robots.measure import (
     examine_file,
     predict_softness,
 )

@@ -39,6 +39,10 @@ NOT_THERE = (
 )
 _TURNING = ("revolute", "continuous", "spherical", None)
 """Types of a pin that closes a loop of a URDF; Drake's states none."""
+_STAND_IN = {"vertex": "0 0 0 .001 0 0 0 .001 0 0 0 .001", "scale": "1 1 1"}
+"""Tetrahedron of a millimetre in the place of a mesh that is missing, of which a body
+that moves gets a mass of 0.2 mg.
+"""
 _REACHING_OUT = ("attach", "model")
 """Elements that load other models, in which a loop may be."""
 _FOR_THE_EYE = ("texture", "skin", "layer", "sensor")
@@ -371,7 +375,8 @@ class _RobotReading:
             mesh.set("file", plain)
             path = self._find(name, (self.path.parent / folder, self.path.parent))
             if path is None:
-                self.missing[plain] = file
+                self.missing[mesh.attrib["name"]] = file
+                mesh.attrib = {"name": mesh.attrib["name"], **_STAND_IN}
                 continue
             total += path.stat().st_size
             if total > LARGEST_ASSETS:

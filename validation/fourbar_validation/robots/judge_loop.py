@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.mobility import change_points
-from fourbar.quantities import COUPLE, FORCE_NAMES, OK, PIN_FORCES, UNKNOWNS, Array
+from fourbar.quantities import COUPLE, OK, UNKNOWNS, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.solution import Solution
@@ -61,9 +61,9 @@ JUDGED_QUANTITIES = tuple(
 """Quantities that a file is held to. A soft loop lets the bars accelerate by themselves
 for an instant; what that does to the torque and the pin forces is judged there.
 """
-_EXAMINE = "fourbar_validation.engines.mujoco.robots.examine:examine_file"
-_MENDED = "fourbar_validation.engines.mujoco.robots.examine:examine_mended"
-_SOFTNESS = "fourbar_validation.engines.mujoco.robots.examine:predict_softness"
+_EXAMINE = "fourbar_validation.engines.mujoco.robots.measure:examine_file"
+_MENDED = "fourbar_validation.engines.mujoco.robots.measure:examine_mended"
+_SOFTNESS = "fourbar_validation.engines.mujoco.robots.measure:predict_softness"
 _NOTHING = 1e-9
 """Cost below which a difference is one of the digits of a scene, which has twelve."""
 _BY_STIFFEST = (
@@ -120,27 +120,7 @@ class LoopJudgement:
         return list(dict.fromkeys(error.method for error in self.errors))
 
     def sentences(self) -> Iterator[str]:
-        """Yield a sentence for each method: the errors of torque and worst force."""
-        for method in self.methods():
-            errors = {
-                error.row.quantity: error.row.error
-                for error in self.errors
-                if error.method == method and error.row.quantity in FORCE_NAMES
-            }
-            if not errors or any(math.isnan(error) for error in errors.values()):
-                continue
-            pins = [name for name in errors if name in PIN_FORCES]
-            parts = [
-                f"{name} is off by {write_error(error)}"
-                for name, error in errors.items()
-                if name not in pins
-            ]
-            if pins:
-                worst = max(pins, key=errors.__getitem__)
-                parts.append(
-                    f"the worst pin force, {worst}, by {write_error(errors[worst])}"
-                )
-            yield f"{method}: {', '.join(parts)}, of its largest value."
+        """Say why the file is right, or what is to be mended first."""
         soft = [error.row for error in self.errors if error.row.verdict == DEGRADED]
         if soft and not self.counts[FAILS]:
             softest = max(soft, key=lambda row: row.error)

@@ -14,7 +14,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.mujoco.robots.examine import examine_file
+from fourbar_validation.engines.mujoco.robots.measure import examine_file
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.loop_errors import find_left_out, list_errors_by_method
 from tests.support.robots import AS_DRAWN, Planar, file_of, measure, read_scene

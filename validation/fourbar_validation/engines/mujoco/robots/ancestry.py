@@ -9,6 +9,10 @@ import numpy as np
 
 from fourbar.quantities import Array
 
+EQUALITY_KINDS = {
+    int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
+    for name in ("connect", "weld", "joint", "tendon")
+}
 _CLOSING = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 _ON_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 

@@ -18,6 +18,7 @@ from fourbar.linkage import ENDS, PINS
 from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    EQUALITY_KINDS,
     climb,
     find_ends,
     find_parent,
@@ -34,7 +35,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_part,
 )
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
     RobotClosure,
@@ -59,6 +59,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     find_joint,
     pose_robot,
 )
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 
 _PIN_BETWEEN = {frozenset(bars): pin for pin, bars in PINS.items()}
 """Pins by the two bars that each joins."""
@@ -66,10 +67,6 @@ COINCIDENT_PINS = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
 LEVEL_PLANE = 1e-6
 """Part of gravity below which a plane is level."""
-EQUALITY_KINDS = {
-    int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
-    for name in ("connect", "weld", "joint", "tendon")
-}
 _TIED = {"connect": "body", "weld": "body"}
 """What an equality ties, where its kind does not say it."""
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}

@@ -21,10 +21,6 @@ _MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
 _LARGEST_NUMBER = 1e100
 """m, kg or kg m^2 whose square is a double."""
-_STAND_IN = 0.01
-"""m, radius of the sphere that stands where a mesh is missing and a mass unknown."""
-MASS_OF_THE_SPHERE = 1e-3
-"""kg, mass of that sphere: MuJoCo moves no body without one."""
 _FROM_GEOMS, _AS_STATED = 1, 0
 """Values of the compiler's `inertiafromgeom`: all bodies, and none; 2 is in between."""
 
@@ -89,7 +85,7 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
                 place = [float(part) for part in end.attrib["xyz"].split()]
                 spec.body(end.attrib["link"]).add_site(name=site, pos=place)
                 setattr(closure, f"name{number}", site)
-        left_out, unknown = _take_out_meshes(spec, file)
+        unknown = _name_unknown(spec, file)
         quaternions = {
             number: tuple(body.quat.tolist())
             for number, body in enumerate(spec.bodies)
@@ -125,7 +121,7 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
         if model.body(number).name in unknown and model.body_weldid[number]
     )
     notes = list(file.notes)
-    if left_out:
+    if left_out := {*file.missing.values()}:
         notes.append(
             f"meshes that are missing are left out: {len(left_out)}, the first of them "
             f"{min(left_out)}"
@@ -162,33 +158,15 @@ def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
     return parts
 
 
-def _take_out_meshes(spec: mujoco.MjSpec, file: RobotFile) -> tuple[set[str], set[str]]:
-    """Take out the missing meshes and their geoms.
-
-    Return files left out, and bodies whose mass they were.
-    """
-    gone = {mesh.name: mesh for mesh in spec.meshes if mesh.file in file.missing}
-    left_out: set[str] = set()
-    unknown: set[str] = set()
+def _name_unknown(spec: mujoco.MjSpec, file: RobotFile) -> set[str]:
+    """Return the names of the bodies whose mass missing meshes would give."""
+    unknown = set()
     for number, body in enumerate(spec.bodies):
-        geoms = [geom for geom in body.geoms if geom.meshname in gone]
+        geoms = [geom for geom in body.geoms if geom.meshname in file.missing]
         if geoms and _needs_geoms(spec, body, geoms):
             body.name = body.name or f"body_{number}"
             unknown.add(body.name)
-        for geom in geoms:
-            left_out.add(file.missing[gone[geom.meshname].file])
-            spec.delete(geom)
-        if body.name in unknown and body.joints:
-            size = [_STAND_IN, 0.0, 0.0]
-            kind = mujoco.mjtGeom.mjGEOM_SPHERE
-            body.add_geom(type=kind, size=size, mass=MASS_OF_THE_SPHERE)
-    if left_out:  # they may name the geoms, and move nothing
-        for element in [*spec.sensors, *spec.pairs]:
-            spec.delete(element)
-    for mesh in gone.values():
-        left_out.add(file.missing[mesh.file])
-        spec.delete(mesh)
-    return left_out, unknown
+    return unknown
 
 
 def _needs_geoms(

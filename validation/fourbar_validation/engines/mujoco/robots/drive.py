@@ -12,8 +12,8 @@ from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import list_wraps
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 
 
 class _Wrench(NamedTuple):

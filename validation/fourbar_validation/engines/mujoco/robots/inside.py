@@ -61,7 +61,6 @@ from fourbar_validation.engines.mujoco.robots.forces import (
     BearerForces,
     read_equality_force,
 )
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     DRIVEN_PINS,
     FOLLOWING,
@@ -72,6 +71,7 @@ from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
     evaluate_closures,
 )
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.runner import Stepper
 
 CLOSED = 1e-15

@@ -43,7 +43,7 @@ class RobotFile:
     assets: Mapping[str, bytes] = field(default_factory=dict)
     """Contents of each mesh file, by its name in the text."""
     missing: Mapping[str, str] = field(default_factory=dict)
-    """Mesh files that are not there: name in the text, and name in the file."""
+    """Mesh files that are not there, by the names of their meshes."""
     notes: tuple[str, ...] = ()
 
 

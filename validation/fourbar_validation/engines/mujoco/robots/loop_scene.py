@@ -220,7 +220,7 @@ def is_seen_from_behind(scene: Scene, angles: Sequence[float]) -> bool:
     return missed_behind < missed - _SAME_OUTPUT
 
 
-class SceneOfLoop:
+class SceneOfLoop(SeenLoop):
     """A scene that is made from one loop."""
 
     def __init__(
@@ -229,15 +229,12 @@ class SceneOfLoop:
         posed: PosedRobot,
         loop: RobotLoop,
     ) -> None:
+        super().__init__(posed.model, loop)
         self.compiled = compiled
-        self.model = posed.model
-        self.data = posed.data
-        self.loop = loop
-        self.seen = SeenLoop(posed.model, loop)
         self.remarks: list[str] = []
         self.shift = 0.0
         """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""
-        self.carried = {bar: self.seen.list_parts(bar) for bar in MOVING_BARS}
+        self.carried = {bar: self.list_parts(bar) for bar in MOVING_BARS}
         self.bodies = {body for bodies in self.carried.values() for body in bodies}
         parts = list_unknown_parts(compiled, self.bodies)
         if parts:
@@ -270,20 +267,20 @@ class SceneOfLoop:
         Say too which axes of the world x and y of the scene are.
         """
         loop = self.loop
-        at_zero = loop.angles[0] + self.seen.angle_at("O2", 0.0) + self.shift
+        at_zero = loop.angles[0] + self.angle_at("O2", 0.0) + self.shift
         constant = round(math.degrees(at_zero), _DECIMALS_OF_A_DEGREE)
         sign = "-" if loop.senses["O2"] < 0.0 else ""
         angle = f"theta_2 = {sign}{self._name_hinge('O2')}"
         if constant:
             angle += f" {'+' if constant > 0.0 else '-'} {abs(constant):.12g} deg"
-        x, y = (_write_axis(axis) for axis in self.seen.axes)
+        x, y = (_write_axis(axis) for axis in self.axes)
         fixed = not self.model.body_weldid[loop.bodies[1][0]]
         when = "" if fixed else " in this pose"
         return f"Angles: {angle}. Axes: x is {x} of the world, y is {y}{when}."
 
     def describe(self, speed: float, title: str, source: str) -> Scene:
         """Describe the scene."""
-        lumps = {bar: self.seen.lump(bar) for bar in MOVING_BARS}
+        lumps = {bar: self.lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
         lengths = self.meet_lengths()
         bars = {}
@@ -328,7 +325,7 @@ class SceneOfLoop:
     @property
     def _pull(self) -> complex:
         """Gravity in the plane, m/s^2."""
-        return complex(*self.seen.in_plane(self.gravity))
+        return complex(*self.in_plane(self.gravity))
 
     def _list_armature(self) -> dict[str, float]:
         """Return the armature of each hinge that has any, by its pin, kg m^2."""
@@ -385,7 +382,7 @@ class SceneOfLoop:
             stiffness = float(model.jnt_stiffness[joint])
             if not stiffness:
                 continue
-            rest = self.seen.rest_angle(pin, spring=True)
+            rest = self.rest_angle(pin, spring=True)
             turns = math.tau * round((at_start[pin] - rest) / math.tau)
             angle = _round_angle(math.remainder(rest, math.tau))
             yield pin, round_off(stiffness), angle, round_off(stiffness * turns)
@@ -403,7 +400,7 @@ class SceneOfLoop:
             force = -float(lifted.sum()) * self._pull
             if not force:
                 continue
-            place = self.seen.polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
+            place = self.polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
             size = round_off(abs(force))
             angle = _round_angle(cmath.phase(force))
             from_pin = (round_off(place[0]), _round_angle(place[1]))
@@ -419,7 +416,7 @@ class SceneOfLoop:
         """
         theta_2 = self.loop.angles[1]
         low, high = _find_assembling(linkage, theta_2)
-        if stops := self.seen.stops("O2"):
+        if stops := self.stops("O2"):
             low = max(low, stops[0] + self.loop.angles[0])
             high = min(high, stops[1] + self.loop.angles[0])
         near = min(max(theta_2, low), high)
@@ -431,12 +428,10 @@ class SceneOfLoop:
         in_pose = int(np.searchsorted(angles, theta_2))
         betas = self._follow(linkage, angles, in_pose)
         free = (angles >= low) & (angles <= high)
-        inside = {}
         for pin, beta in betas.items():
-            least, most = self.seen.stops(pin) or (-math.inf, math.inf)
-            above = beta >= least - OUTSIDE_A_RANGE
-            inside[pin] = above & (beta <= most + OUTSIDE_A_RANGE)
-            free &= inside[pin]
+            least, most = self.stops(pin) or (-math.inf, math.inf)
+            free &= beta >= least - OUTSIDE_A_RANGE
+            free &= beta <= most + OUTSIDE_A_RANGE
         if not free.any():
             raise InputError(
                 "MJCF",
@@ -447,17 +442,6 @@ class SceneOfLoop:
         low, high = angles[[first, last]].tolist()
         start = max(low, min(near, high - math.tau))
         stop = min(high, start + math.tau)
-        beside = slice(max(first - 1, 0), last + 2)
-        stopping = [
-            self._name_hinge(pin)
-            for pin, within in inside.items()
-            if pin != "O2" and high - low < math.tau and not within[beside].all()
-        ]
-        if stopping:
-            self.remarks.append(
-                f"the range of {', '.join(sorted(stopping))} ends the motion before"
-                f" that of {self._name_hinge('O2')}"
-            )
         at_start = {
             pin: float(np.interp(start, angles, beta)) for pin, beta in betas.items()
         }
@@ -521,7 +505,7 @@ class SceneOfLoop:
         """Name what acts on the loop and is not in the scene."""
         model = self.model
         loop = self.loop
-        across = float(self.gravity @ self.seen.normal)
+        across = float(self.gravity @ self.normal)
         if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
             weights = (
                 f"{BAR_NAMES[bar]} {abs(lump.mass * across):.4g} N"
@@ -561,7 +545,7 @@ class SceneOfLoop:
         """
         model = self.model
         none = np.zeros((model.ntendon, 0))
-        for number in filter(self.seen.touches_tendon, range(model.ntendon)):
+        for number in filter(self.touches_tendon, range(model.ntendon)):
             acts = []
             for name in ("stiffness", "damping", "frictionloss", "armature"):
                 size = getattr(model, f"tendon_{name}")[number]
@@ -583,7 +567,7 @@ class SceneOfLoop:
             if (
                 on_joint
                 or (on_site and model.site_bodyid[target] in self.bodies)
-                or (pulls and self.seen.touches_tendon(target))
+                or (pulls and self.touches_tendon(target))
             ):
                 self._leave_out(describe_actuator(model, number))
 

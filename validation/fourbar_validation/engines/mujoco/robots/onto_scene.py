@@ -32,7 +32,6 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     CompiledRobot,
     compile_robot,
 )
-from fourbar_validation.engines.mujoco.robots.frame import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
@@ -54,7 +53,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     move_to,
     pose_robot,
 )
-from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, SeenLoop, list_bars
 
 _NOTHING_CLOSES = {
     "MJCF": (
