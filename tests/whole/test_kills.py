@@ -29,7 +29,7 @@ from fourbar_validation.engines.environments import choose_engines
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import hash_modules
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.run import jobs
+from fourbar_validation.run import plan as plan_module
 from fourbar_validation.run.plan import COLLECTING, Plan
 from fourbar_validation.run.run import run
 from fourbar_validation.run.store import Store
@@ -360,8 +360,8 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging():
     """One of fifty thousand needs minutes in the simulators."""
-    one = jobs.find_time_limit(Random(1, 0, TYPES), ())
-    assert jobs.find_time_limit(Files((), 50_000), ()) > 5.0 * one
+    one = plan_module.find_time_limit(Random(1, 0, TYPES), ())
+    assert plan_module.find_time_limit(Files((), 50_000), ()) > 5.0 * one
 
 
 class Blunders:
@@ -389,13 +389,13 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     """
     judge_here(monkeypatch)
     drawn = []
-    judge = jobs.judge_job
+    judge = plan_module.judge_job
 
     def noting(job):
         drawn.extend([job.name] * job.draw)
         return judge(job)
 
-    monkeypatch.setattr(jobs, "judge_job", noting)
+    monkeypatch.setattr(plan_module, "judge_job", noting)
     for module in ("report.run_summary", "run.plan"):
         monkeypatch.setattr(f"fourbar_validation.{module}.PICTURED", 3)
     monkeypatch.setattr("fourbar_validation.run.run.write_html", lambda *_, **__: "")

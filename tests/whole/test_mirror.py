@@ -24,7 +24,6 @@ fourbar/cli/test_cli.py | fourbar/show: tables
 whole/test_exits.py | validation: cli
 whole/test_exits.py | validation/report: sentences terminal
 whole/test_exits.py | lab: cli fuzz_files
-whole/test_kills.py | validation/run: jobs
 whole/test_narrow_terminal.py | fourbar/show: folded
 whole/test_results_format.py | validation/compare: results_file
 # one table or one evaluation, whose rows are no use alone
@@ -50,7 +49,7 @@ fourbar/show/plot/test_plot.py | tolerance_figures view
 # a comparison is tested by engines with given answers
 validation/run/test_judge.py | validation/compare: answer effect_sizes
 validation/run/test_judge.py | command identities judge_engines law question
-validation/run/test_parts.py | plan progress request
+validation/run/test_parts.py | plan request
 # adapters: judged against printed figures, each other, and faults put in front of
 # them
 validation/engines/test_engines.py | balls description limits loaded loop pinocchio tree
@@ -84,7 +83,7 @@ lab/test_bench.py | contenders starts thirteen thirteen_bodies
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
 lab/test_faults.py | fault_scenes injection
-validation/cost/test_cost.py | charts formulas series work_precision
+validation/cost/test_cost.py | charts series work_precision
 validation/cost/test_cost.py | validation/advise: clocks
 validation/advise/test_advise.py | judged_setup matters
 lab/test_benchmark.py | lab/simulators: slider_engines slider_mujoco slider_pinocchio

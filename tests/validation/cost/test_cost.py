@@ -30,7 +30,7 @@ from fourbar_validation.advise.worst_errors import (
     WorstErrors,
     compute_errors,
 )
-from fourbar_validation.cost import charts, conclusion, formulas, laws, work_precision
+from fourbar_validation.cost import charts, conclusion, laws, work_precision
 from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco.trial import TrialSetup
@@ -141,15 +141,15 @@ def test_formulas_are_right_to_round_off(scene, tmp_path):
 
 def test_what_is_no_number_or_not_compared_has_no_small_error():
     scene = turning(positions=8)
-    commanded = formulas.choose_few(command(scene))
+    commanded = work_precision.choose_few(command(scene))
     solution = fourbar.solve(scene, at=commanded)
     ours = {name: np.array(solution[name]) for name in ERROR_NAMES}
-    balls = formulas.evaluate_balls(scene, commanded)
+    balls = work_precision.evaluate_balls(scene, commanded)
     ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
     ours["F32"][5] *= 1.0 + 1e-9
     for ball in balls:
         del ball["F14_x"]
-    worst_errors = formulas.compare_with_balls(scene, commanded, ours, balls)
+    worst_errors = work_precision.compare_with_balls(scene, commanded, ours, balls)
     assert worst_errors.torque == worst_errors.F12 == worst_errors.F14 == math.inf
     assert worst_errors.F43 < 1e-13 and 1e-12 < worst_errors.F32 < 2e-9
     still = replace(scene, motion=scene.motion.replace(speed=0.0), drive_bar=4)

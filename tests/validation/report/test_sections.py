@@ -110,8 +110,8 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path):
 628 | 628
 0 | 0
 0.125 | 0.125
-3.1e-09 | 3.10e-09
-1.5e7 | 1.50e+07
+3.1e-09 | 3.1e-09
+1.5e7 | 1.5e+07
 """),
 )
 def test_what_is_counted_is_written_for_people(value, text):

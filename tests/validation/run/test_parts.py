@@ -62,7 +62,7 @@ def test_a_run_over_all_parts_in_one_folder_writes_the_report(run):
         assert not (out / "results.csv").exists()
     assert len(list((out / "parts").iterdir())) == 4
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fourbar_validation.run.jobs.judge_job", judge_nothing)
+        patch.setattr("fourbar_validation.run.plan.judge_job", judge_nothing)
         run("out")
     assert not (out / "request.json").exists() and not (out / "parts").exists()
     whole = Path(run("whole"))

@@ -49,9 +49,9 @@ def find_spread_by_energy(scene, solution, instant, engine):
     together errs by no more than what its energy does. It loses that where the bars
     come into line and the constraint forces are large.
     """
-    start, step, _ = free.FORWARD[engine]
+    start, _ = free.FORWARD[engine]
     times = np.linspace(0.0, 1.0, len(solution))
-    energy = start(step).release(scene, times).energy
+    energy = start(free.LONGEST_TIMESTEP).release(scene, times).energy
     lost = float(np.abs(energy - energy[0]).max())
     kinetic = 0.0
     for number in (2, 3, 4):

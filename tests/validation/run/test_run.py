@@ -13,9 +13,9 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE, Guest
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import describe_run, open_run
+from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.run.jobs import Job, _judge_by_engine
-from fourbar_validation.run.plan import Plan
+from fourbar_validation.run.plan import Job, Plan, _judge_by_engine
 from fourbar_validation.run.run import run
 from tests.support.here import judge_here
 from tests.support.runs import changed, save_run
@@ -42,7 +42,7 @@ def run_against(tmp_path, monkeypatch):
     def run_records(before, *records, engine=OF_MINE, **suite):
         by_name = {record.name: record for record in records}
         monkeypatch.setattr(
-            "fourbar_validation.run.jobs.judge_job", lambda job: by_name[job.name]
+            "fourbar_validation.run.plan.judge_job", lambda job: by_name[job.name]
         )
         same_suite = replace(MINE, settings=MINE.settings | {"scenes of": "few"})
         saved = open_run(save_run(tmp_path / "before", before, about=same_suite))
@@ -110,7 +110,7 @@ def test_an_engine_that_was_asked_for_and_compared_nothing_is_no_success(
     plan = Plan(
         Few(("a",)), (OF_MINE, kind("other", FreeBody, EQUIVALENCE)), chosen=chosen
     )
-    summary = plan.summarise()
+    summary = Summary(plan.engines, plan.missing, bool(plan.chosen))
     refusal = Row.unmeasured("a", "other", "exact", "all", REFUSES, "no licence")
     summary.add(Record("a", rows=[ROW, refusal], left_out=["mine: in part"]))
     words = "NOT CHECKED: other: nothing compared (1 scene): no licence. All 1 comp"

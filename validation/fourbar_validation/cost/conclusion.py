@@ -95,15 +95,10 @@ def _write_cheapest_settings(curves: Curves) -> Iterator[str]:
         (ERROR_OF_FOUR_DIGITS, "force", "of every pin force"),
         (SIX_DIGITS, "force", "of every pin force"),
     ):
-        point = find_cheapest(curves, quantity, error)
-        if point is None:
-            yield (
-                f"{ERROR_IN_WORDS[error]} {what}:"
-                " no setting that was tried reaches them."
-            )
-        else:
-            time = _write_time(point)
-            yield f"{ERROR_IN_WORDS[error]} {what}: {time} by {point.name}."
+        told = "no setting that was tried reaches them"
+        if point := find_cheapest(curves, quantity, error):
+            told = f"{_write_time(point)} by {point.name}"
+        yield f"{ERROR_IN_WORDS[error]} {what}: {told}."
 
 
 def _write_defaults(curves: Curves) -> Iterator[str]:

@@ -93,18 +93,15 @@ def cost(
             print_sentence(sentence)
         if verbose:
             Console().print(make_words_table(COST_HEADINGS, list_front(curves)))
-            for line in (
-                *write_laws(laws),
-                *(f"left out: {line}" for line in study.left_out),
-            ):
+            for line in write_laws(laws):
                 print_sentence(line)
+            for line in study.left_out:
+                print_sentence(f"left out: {line}")
         click.echo(f"Pictures, laws and every point: {out / name / 'cost.md'}")
         fitted += decided
     if not fitted:
         print_sentence("Nothing was compared: no law has points enough for a fit.")
-    if fitted and all(law.holds for law in fitted):
-        return HOLDS
-    return FAILED
+    return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
 
 
 def write_cost(
@@ -141,7 +138,7 @@ def write_cost(
 def write_subtitle(scene: Scene, title: str) -> str:
     """Describe what was run, in one line under the statement of a picture."""
     acting = [type(effect).__name__.lower() for effect in scene.effects]
-    acting += ["loads"] if scene.loads else []
+    acting += ["loads"] * bool(scene.loads)
     parts = [title]
     if scene.motion.omega_2 is not None:
         parts.append(f"{scene.motion.omega_2:g} rad/s")

@@ -79,41 +79,38 @@ WITHOUT_PADS = replace(BEST, pad=None, time_constant_steps=10.0)
 
 
 def _vary(
-    field: str, label: str, values: Iterable[float], settings: Settings
+    field: str,
+    label: str,
+    values: Iterable[float],
+    settings: Settings,
+    held: float | None = None,
 ) -> tuple[Spot, ...]:
-    """Vary one field of the settings."""
-    spots = []
-    for x in values:
-        changed: dict[str, Any] = {field: x}
-        spots.append(Spot(label.format(x), replace(settings, **changed), x=x))
-    return tuple(spots)
-
-
-def _vary_impedance() -> tuple[Spot, ...]:
-    return tuple(
-        Spot(f"d = {d:g}", replace(WITHOUT_PADS, impedance=d), x=1.0 - d)
-        for d in _IMPEDANCES
-    )
-
-
-def _vary_steps(held: float | None = None, **changes: Any) -> tuple[Spot, ...]:
-    """Vary the timestep of settings that are the best ones but for some changes.
+    """Vary one field of the settings; of an impedance what it lacks to 1 counts.
 
     `held`: a part of a revolution at which the closure's time constant is held in
     seconds, so that the timestep alone changes; None: it is so many steps as in the
     settings.
     """
+    spots = []
+    for x in values:
+        changed: dict[str, Any] = {field: x}
+        if held is not None:
+            changed["time_constant_steps"] = held * x
+        place = 1.0 - x if field == "impedance" else x
+        spots.append(Spot(label.format(x), replace(settings, **changed), x=place))
+    return tuple(spots)
+
+
+def _vary_impedance() -> tuple[Spot, ...]:
+    return _vary("impedance", "d = {:g}", _IMPEDANCES, WITHOUT_PADS)
+
+
+def _vary_steps(held: float | None = None, **changes: Any) -> tuple[Spot, ...]:
+    """Vary the timestep of settings that are the best ones but for some changes."""
     settings = replace(BEST, **changes)
     steps = STEPS_PER_TURN if settings.integrator == "RK4" else _MORE_STEPS
-    spots = _vary("steps_per_revolution", "{:g} steps a revolution", steps, settings)
-    if held is None:
-        return spots
-    return tuple(
-        replace(
-            spot, settings=replace(spot.settings, time_constant_steps=held * spot.x)
-        )
-        for spot in spots
-    )
+    label = "{:g} steps a revolution"
+    return _vary("steps_per_revolution", label, steps, settings, held)
 
 
 def design_curves(scene: Scene) -> Iterator[SettingCurve]:

@@ -9,10 +9,15 @@ import click
 from fourbar.errors import HOLDS, InputError, list_allowed
 from fourbar.writing import write_text
 from fourbar_validation.compare.results_file import CSV_ROWS
-from fourbar_validation.compare.rows import FAILS, Counts
+from fourbar_validation.compare.rows import Counts
 from fourbar_validation.engines.programs import bound_memory
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import Differences, Kind, compare_runs
+from fourbar_validation.regression.changes import (
+    WITHOUT_SETTING,
+    Differences,
+    Kind,
+    compare_runs,
+)
 from fourbar_validation.regression.history import (
     HISTORY,
     append,
@@ -124,16 +129,16 @@ def report_differences(
 def _add_since(differences: Differences, before: Recorded, *, draw: bool) -> None:
     """Say since which accepted run the rows fail that are written; draw the first."""
     failing = differences.failing[: render.MOST_ROWS_ON_THE_PAGE]
-    keys = [tuple(key) for key in failing[["scene", "engine", "quantity"]].to_numpy()]
+    keys = [*failing[WITHOUT_SETTING].itertuples(index=False, name=None)]
     history = read_history(before)
     since = find_since(history, before, keys)
     differences.table.loc[failing.index, "since"] = [since[key] for key in keys]
     if draw and len(failing):
-        first = next(failing.itertuples())
-        name = f"{first.scene} / {first.engine} / {first.quantity}"
-        caption = f"{name}: error in the accepted runs and in this one. It"
-        differences.picture = draw_row(history, first)
-        differences.caption = f"{caption} {since[keys[0]]}."
+        differences.picture = draw_row(history, next(failing.itertuples()))
+        differences.caption = (
+            f"{' / '.join(keys[0])}: error in the accepted runs and in this one. It"
+            f" {since[keys[0]]}."
+        )
 
 
 def _read_choice(
@@ -184,18 +189,17 @@ def _require_as_strict(run: Recorded, target: Path) -> None:
     weakened = [*map(str, differences.weakened)]
     left_out = differences.name_whole(Kind.ENGINE_GONE, Kind.SCENE_GONE)
     left_out += differences.name_whole(Kind.NOT_RUN)
-    for what, why in (
-        (weakened, "is held to weaker rules than"),
-        (left_out, "leaves out what was judged in"),
-    ):
-        if what:
-            more = f", and {len(what) - 1} more" * (len(what) > 1)
-            raise InputError(
-                "RESULTS",
-                str(run.table.parent),
-                f"{why} {accepted.describe()} ({what[0]}{more}): say --allow-weaker if"
-                " that is meant",
-            )
+    why = (
+        "is held to weaker rules than" if weakened else "leaves out what was judged in"
+    )
+    if what := weakened or left_out:
+        more = f", and {len(what) - 1} more" * (len(what) > 1)
+        raise InputError(
+            "RESULTS",
+            str(run.table.parent),
+            f"{why} {accepted.describe()} ({what[0]}{more}): say --allow-weaker if that"
+            " is meant",
+        )
 
 
 @click.command(name="accept")
@@ -240,9 +244,7 @@ def accept_command(
     run = open_run(results)
     counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:
-        failing = f"{counts[FAILS]} comparisons fail"
-        why = failing if counts[FAILS] else "nothing was compared"
-        why = f"must hold, or say --even-failing: {why}"
+        why = f"must hold, or say --even-failing: {counts.sentence()}"
         raise InputError("RESULTS", str(results), why)
     if not run.verified:  # the record does not say whether it lost some of its rows
         why = f"needs a {ABOUT_FILE} with its rows and SHA-256; `run` writes one"

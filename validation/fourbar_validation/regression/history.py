@@ -8,8 +8,8 @@ versions in columns of their own (`version_mujoco`).
 import hashlib
 import io
 import json
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,8 +43,9 @@ def append(file: Path, run: Recorded) -> None:
     lines = _tabulate_run(run)
     if file.exists():
         with name_damage("--to", file, _NO_HISTORY):
-            data = io.BytesIO(file.read_bytes())
-            old = pandas.read_parquet(data, page_checksum_verification=True)
+            old = pandas.read_parquet(
+                io.BytesIO(file.read_bytes()), page_checksum_verification=True
+            )
             if (old["run"] == lines["run"][0]).any():
                 return
             lines = pandas.concat([old, lines], ignore_index=True)
@@ -72,9 +73,8 @@ def _tabulate_run(run: Recorded) -> "DataFrame":
         scene: _hash(json.dumps(entries, sort_keys=True))
         for scene, entries in about.scenes.items()
     }
-    ratios = lines.pop("times_formulas")
-    lines["scene_hash"] = [hashes.get(scene, "") for scene in lines.scene]
-    lines["times_formulas"] = ratios
+    place = lines.columns.get_loc("times_formulas")
+    lines.insert(place, "scene_hash", [hashes.get(one, "") for one in lines.scene])
     of_run = pandas.DataFrame(stated, index=lines.index)
     return pandas.concat([of_run, lines], axis=1)
 
@@ -118,12 +118,12 @@ def find_since(
     An engine without an answer (quantity "all") has no such row where it answered.
     """
     of_engines = dict(list(history.groupby(["scene", "engine"])))
-    return {
-        (scene, engine, quantity): _write_since(
-            of_engines.get((scene, engine), history[:0]), quantity, before
-        )
-        for scene, engine, quantity in failing
-    }
+    since = {}
+    for key in failing:
+        *of, quantity = key
+        lines = of_engines.get(tuple(of), history[:0])
+        since[key] = _write_since(lines, quantity, before)
+    return since
 
 
 def _write_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
@@ -136,31 +136,28 @@ def _write_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
         lines = lines[fails | (lines.quantity == quantity)]
         fails = fails[lines.index]
     runs = fails.groupby([lines.date, lines.commit], sort=False).any()
+    here = before.describe()
     if runs.empty:
-        return f"is not in {before.describe()}"
-    names = _name_runs(runs.index)
+        return f"is not in {here}"
+    names = [*starmap(_name_run, runs.index)]
     verb = "answered" if quantity == "all" else "held"
     if runs.index[-1] != (before.about.date, before.about.commit):
         end = "failed" if runs.iloc[-1] else verb
-        return f"is not in {before.describe()}; it {end} in {names[-1]}"
+        return f"is not in {here}; it {end} in {names[-1]}"
     if not runs.iloc[-1]:
-        return f"{verb} in {before.describe()}"
+        return f"{verb} in {here}"
     if runs.all():
         many = f", and in every accepted run since {names[0]}"
-        return f"failed too in {before.describe()}" + many * (len(runs) > 1)
-    last = len(runs) - 1 - int(np.argmin(runs.to_numpy()[::-1]))
+        return f"failed too in {here}" + many * (len(runs) > 1)
+    last = np.flatnonzero(~runs)[-1]
     return f"has not {verb} since {names[last + 1]}; it {verb} in {names[last]}"
 
 
-def _name_runs(runs: Iterable[tuple[str, str]]) -> list[str]:
-    """Name runs by date and commit, those of one day and commit by their time too."""
-    days = Counter((date[:10], commit) for date, commit in runs)
-    names = []
-    for date, commit in runs:
-        alone = days[date[:10], commit] == 1
-        when = date[:10] if alone else date[:19].replace("T", " ")
-        names.append(f"the run of {when}" + f" at commit {commit}" * bool(commit))
-    return names
+def _name_run(date: str, commit: str) -> str:
+    """Name a run by its time and commit."""
+    return f"the run of {date[:19].replace('T', ' ')}" + f" at commit {commit}" * bool(
+        commit
+    )
 
 
 def draw_row(history: "DataFrame", row: Any) -> str:
@@ -183,7 +180,7 @@ def draw_row(history: "DataFrame", row: Any) -> str:
 def _draw_panels(
     name: str,
     runs: Sequence[tuple[str, str]],
-    panels: Mapping[str, Mapping[str, Any]],
+    panels: Mapping[str, Any],
     allowed: Any,
 ) -> str:
     """Draw numbers of engines over runs, on panels by their labels.
@@ -269,9 +266,6 @@ def _draw_history(table: "DataFrame") -> str:
         observed=True,
     )
     finite = of_runs.where(np.isfinite(of_runs) & (of_runs > 0.0))
-    panels = {
-        label: {str(engine): finite[column][engine] for engine in finite[column]}
-        for column, label in (("used", "error / allowed"), ("time", "time / formulas"))
-    }
+    panels = {"error / allowed": finite["used"], "time / formulas": finite["time"]}
     runs = [(str(date), str(commit)) for date, _, commit in of_runs.index]
     return _draw_panels("history", runs, panels, 1.0)

@@ -91,21 +91,14 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
 
 def _is_weaker(what: str, old: Mapping[str, str], new: Mapping[str, str]) -> bool:
     """Return whether an entry that differs makes its rule weaker."""
-    factors = [_read_float(entries.get(FACTOR_CHANGED)) for entries in (old, new)]
+    before, after = (float(rule.get(FACTOR_CHANGED, "inf")) for rule in (old, new))
     match what:
         case "factor":
-            return factors[1] > _LOOSER * factors[0]
+            return after > _LOOSER * before
         case "class" | "reason":  # without a factor both are infinite
-            return not factors[1] * _LOOSER < factors[0]
+            return not after * _LOOSER < before
         case "over the condition" | "prediction" | "through time":
             return new[what] == "yes"
         case "answers":
             return not {*old[what].split(", ")} <= {*new[what].split(", ")}
     return True
-
-
-def _read_float(text: str | None) -> float:
-    try:
-        return float(text or "")
-    except ValueError:
-        return float("inf")

@@ -13,7 +13,7 @@ from fourbar.files import dump
 from fourbar.scene import Scene
 from fourbar_validation.scenes.suites import Suite
 
-SceneEntries = Mapping[str, str]
+SceneEntries = dict[str, str]
 
 _MOST_DESCRIBED = 2000
 """Scenes that a record describes, one or two kB each. Random linkages follow from their
@@ -47,26 +47,24 @@ def describe_changes(scene: Scene) -> dict[str, str]:
         entries = tomllib.loads(dump(scene))
     except FourBarError:  # a scene that no file can state
         return {"scene": repr(scene)}
-    return dict(
-        _flatten_entries(
-            "",
-            {key: value for key, value in entries.items() if key not in _NO_QUESTION},
-        )
-    )
+    for name in _NO_QUESTION:
+        entries.pop(name, None)
+    return dict(_flatten_entries("", entries))
 
 
-def _flatten_entries(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
+def _flatten_entries(key: str, value: Any) -> Iterable[tuple[str, str]]:
+    parts: Iterable[tuple[Any, Any]] = ()
     if isinstance(value, dict):
-        for key, entry in value.items():
-            yield from _flatten_entries(f"{prefix}.{key}" if prefix else key, entry)
-    elif isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
-        for number, entry in enumerate(value, 1):
-            yield from _flatten_entries(f"{prefix}.{number}", entry)
-    else:
-        yield (
-            prefix,
-            ", ".join(map(str, value)) if isinstance(value, list) else str(value),
-        )
+        parts = value.items()
+    elif isinstance(value, list):
+        if any(isinstance(entry, dict) for entry in value):
+            parts = enumerate(value, 1)
+        else:
+            value = ", ".join(map(str, value))
+    for name, entry in parts:
+        yield from _flatten_entries(f"{key}.{name}".lstrip("."), entry)
+    if not parts:
+        yield key, str(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,27 +72,24 @@ class SceneChange:
     """Entries that a scene states now and stated before."""
 
     scene: str
-    entries: tuple[tuple[str, str, str], ...]
+    entries: tuple[tuple[str, ...], ...]
     """(key, old, new)."""
 
     @property
     def moved(self) -> bool:
         """Return whether the question is the same, at other positions."""
-        return all(key.startswith(POSITION_KEYS) for key, _, _ in self.entries)
+        return all(key.startswith(POSITION_KEYS) for key, *_ in self.entries)
 
     def __str__(self) -> str:
-        parts = "; ".join(
-            f"{key} {_write_unit_once(old, new)}" for key, old, new in self.entries
-        )
-        return f"scene {self.scene}: {parts}"
+        parts = (f"{key} {_write_unit_once(*two)}" for key, *two in self.entries)
+        return f"scene {self.scene}: {'; '.join(parts)}"
 
 
 def _write_unit_once(old: str, new: str) -> str:
     """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
     number, _, unit = old.partition(" ")
-    _, _, new_unit = new.partition(" ")
-    if unit and unit == new_unit and "," not in old:
-        return f"{number} -> {new}"
+    if unit and "," not in old and new.endswith(f" {unit}"):
+        old = number
     return f"{old} -> {new}"
 
 
@@ -108,13 +103,10 @@ def find_renamed(
     """
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
-        stated = repr(sorted(new[name].items()))
-        names.setdefault(stated, []).append(name)
+        names.setdefault(repr(sorted(new[name].items())), []).append(name)
     renamed = {}
     for name in sorted(old.keys() - new.keys()):
-        stated = repr(sorted(old[name].items()))
-        same = names.get(stated)
-        if same:
+        if same := names.get(repr(sorted(old[name].items()))):
             renamed[name] = same.pop()
     return renamed
 
@@ -126,13 +118,12 @@ def list_scene_changes(
     """List the scenes of both runs that ask something else now."""
     changes = []
     for name in sorted(old.keys() & new.keys()):
-        before = old[name]
-        after = new[name]
-        entries = tuple(
-            (key, before.get(key, "not stated"), after.get(key, "not stated"))
-            for key in dict.fromkeys((*before, *after))
-            if before.get(key) != after.get(key)
+        runs = (old[name], new[name])
+        stated = (
+            (key, *(run.get(key, "not stated") for run in runs))
+            for key in runs[0] | runs[1]
         )
+        entries = tuple(one for one in stated if one[1] != one[2])
         if entries:
             changes.append(SceneChange(name, entries))
     return changes

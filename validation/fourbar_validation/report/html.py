@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNKNOWNS
+from fourbar.quantities import LINE, UNKNOWNS
 from fourbar_validation.compare.rows import (
     FAILS,
     FORMULAS,
@@ -36,10 +36,6 @@ they are opened.
 """
 QUANTITY_ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
-
-
-_DRAWN = (COUPLE.value, LINE.value, *PIN_FORCES)
-"""Quantities of which the pictures of a scene show some."""
 
 
 class _Cell(NamedTuple):
@@ -108,16 +104,6 @@ class _SceneView:
     """engine: its comparison that used most."""
 
     @property
-    def drawn(self) -> list[str]:
-        """Return the independent engines whose answers the pictures show."""
-        shown = {
-            name
-            for (quantity, name), cell in self.by_place.items()
-            if quantity in _DRAWN and cell.row.compared and name != FORMULAS
-        }
-        return [engine for engine in self.engines if engine in shown]
-
-    @property
     def counts(self) -> Counts:
         """Return its comparisons by verdict."""
         return Counts(cell.row for cell in self.cells)
@@ -143,10 +129,8 @@ def write_html(
     ]
     cells = [cell for view in views for cell in view.cells]
     rows = [cell.row for cell in cells]
-    failing = sorted(
-        (cell for cell in cells if cell.row.failed),
-        key=lambda cell: (-cell.row.used, cell.line),
-    )
+    failing = [cell for cell in cells if cell.row.failed]
+    failing.sort(key=lambda cell: (-cell.row.used, cell.line))
     return render(
         "fourbar_validation.report",
         "report.html.j2",
@@ -180,8 +164,7 @@ def _take_answers(scene: Record | None) -> str:
     """Take the pictures of torque and pin force out of a scene's figure."""
     if scene is None or not scene.figure:
         return ""
-    linkage, end, answers = scene.figure.partition("</svg>")
-    return answers or linkage + end
+    return scene.figure.partition("</svg>")[2] or scene.figure
 
 
 def write_summary_page(summary: Summary) -> str:
@@ -214,11 +197,9 @@ def _make_scene_view(
         for cell in ranked
         if cell.row.quantity != "undecided" or cell.row.failed
     }
-    names = {cell.row.quantity for cell in cells}
-    quantities = [name for name in QUANTITY_ORDER if name in names]
-    quantities += sorted(names.difference(QUANTITY_ORDER))
-    engines = _list_engines(rows)
-    return _SceneView(scene, cells, engines, quantities, by_place, worst)
+    names = sorted({cell.row.quantity for cell in cells})
+    names.sort(key=[*QUANTITY_ORDER, *names].index)
+    return _SceneView(scene, cells, _list_engines(rows), names, by_place, worst)
 
 
 def _list_engines(rows: Any) -> list[str]:

@@ -1,7 +1,8 @@
 """JUnit XML, for the test page of a continuous-integration system."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 from fourbar_validation.compare.rows import Row
@@ -67,26 +68,28 @@ def write_document(title: str, cases: Iterable[JunitCase]) -> str:
     """Write the cases as JUnit XML, suite by suite."""
     import xml.etree.ElementTree as ET
 
-    report = ET.Element("testsuites", name=title)
-    suites: dict[str, ET.Element] = {}
-    counts: Counter[tuple[str, str]] = Counter()
+    suites: dict[str, list[JunitCase]] = {}
     for case in cases:
-        if case.suite not in suites:
-            suites[case.suite] = ET.SubElement(report, "testsuite", name=case.suite)
-        element = ET.SubElement(
-            suites[case.suite],
-            "testcase",
-            name=case.name,
-            classname=case.classname,
-            time="0.0",
-        )
-        if case.outcome != "passed":
-            ET.SubElement(element, case.outcome, message=case.message, type=case.kind)
-        for name in (case.suite, ""):
-            counts.update(((name, "tests"), (name, case.outcome)))
-    for name, element in {**suites, "": report}.items():
-        element.set("tests", str(counts[name, "tests"]))
-        element.set("failures", str(counts[name, "failure"]))
-        element.set("skipped", str(counts[name, "skipped"]))
-        element.set("errors", "0")
+        suites.setdefault(case.suite, []).append(case)
+    every = [*chain.from_iterable(suites.values())]
+    report = ET.Element("testsuites", {"name": title} | _count(every))
+    for name, of_suite in suites.items():
+        suite = ET.SubElement(report, "testsuite", {"name": name} | _count(of_suite))
+        for case in of_suite:
+            named = {"name": case.name, "classname": case.classname, "time": "0.0"}
+            element = ET.SubElement(suite, "testcase", named)
+            if case.outcome != "passed":
+                told = {"message": case.message, "type": case.kind}
+                ET.SubElement(element, case.outcome, told)
     return ET.tostring(report, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _count(cases: Sequence[JunitCase]) -> dict[str, str]:
+    """Count cases by their outcome."""
+    outcomes = Counter(case.outcome for case in cases)
+    return {
+        "tests": str(len(cases)),
+        "failures": str(outcomes["failure"]),
+        "skipped": str(outcomes["skipped"]),
+        "errors": "0",
+    }

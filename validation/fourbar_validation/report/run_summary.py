@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from heapq import nlargest
 from operator import attrgetter, itemgetter
+from typing import Any
 
 from fourbar.errors import HOLDS, write_count
 from fourbar.quantities import PIN_FORCES
@@ -143,7 +144,7 @@ class Summary:
         """Largest error*condition/eps of each exact engine: the K that would have
         sufficed.
         """
-        self.independence: dict[str, tuple[str, str]] = {}
+        self.independence: dict[str, Sequence[str]] = {}
         """engine: (shared with the formulas, found alone)."""
         self.with_forces = self.checked_twice = 0
         self.released = False
@@ -289,7 +290,7 @@ class Summary:
 
     @property
     def engines(self) -> list[EngineLine]:
-        """Return every engine by its name, then the formulas.
+        """Return every engine as people look for them, then the formulas.
 
         An engine that had nothing to compare is among them if that has a reason.
         """
@@ -301,17 +302,18 @@ class Summary:
             line.version = "" if line.engine.endswith(f" {version}") else version
             name = ENGINE_NAMES.get(line.engine, f"{line.engine} {{}}")
             line.name = name.format(line.version).replace(" ,", ",").strip()
-        return sorted(
-            self._lines.values(),
-            key=lambda line: (line.engine == FORMULAS, line.engine),
-        )
+        order = [*ENGINE_NAMES]
+
+        def place(line: EngineLine) -> tuple[Any, ...]:
+            name = line.engine
+            return name == FORMULAS, [*order, name].index(name), name
+
+        return sorted(self._lines.values(), key=place)
 
     @property
     def independent(self) -> list[EngineLine]:
-        """Return the engines in the order in which people look for them."""
-        order = [*ENGINE_NAMES]
-        lines = [line for line in self.engines if line.engine != FORMULAS]
-        return sorted(lines, key=lambda line: [*order, line.engine].index(line.engine))
+        """Return them without the formulas."""
+        return [line for line in self.engines if line.engine != FORMULAS]
 
     @property
     def silent(self) -> dict[str, str]:

@@ -21,7 +21,6 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
-    SIMULATED,
     find_condition,
     find_error,
     magnitude,
@@ -161,8 +160,7 @@ def _choose_force(record: Record, solution: Solution) -> str:
 class _Curve:
     """The picture of one quantity of a scene: its values, and their errors beneath.
 
-    Errors of the simulation and of the exact engines have axes of their own. Of a force
-    the component is drawn that is larger: one of the wrong sign lies on the curve of
+    Of a force the larger component is drawn: one of the wrong sign lies on the curve of
     magnitudes.
     """
 
@@ -183,23 +181,14 @@ class _Curve:
         """Draw it as an SVG."""
         from matplotlib.figure import Figure
 
-        groups: list[list[Answer]] = [[], []]
-        for answer in self.answers:
-            groups[not choose_style(answer.engine).simulated].append(answer)
-        groups = [group for group in groups if group]
-        figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
-        heights = [1.9, *[1.0] * len(groups)]
-        panels = figure.subplots(
-            len(heights), sharex=True, height_ratios=heights, squeeze=False
-        )
-        first, *others = axes = panels[:, 0]
-        self.draw_values(first, 5.5)
+        figure = Figure(figsize=(4.3, 4.0), layout="constrained")
+        axes = figure.subplots(2, sharex=True)
+        self.draw_values(axes[0], 5.5)
+        self.draw_errors(axes[1])
         unit = "error / scale" if self.quantity in FORCE_NAMES else "error (rad)"
-        for below, group in zip(others, groups, strict=True):
-            self.draw_errors(below, group)
-            below.set_ylabel(unit, fontsize=8.5)
+        axes[1].set_ylabel(unit, fontsize=8.5)
         angle = f"θ{self.solution.at.bar} (°)".translate(_SUBSCRIPT)
-        axes[-1].set_xlabel("time (s)" if self.solution.time is not None else angle)
+        axes[1].set_xlabel("time (s)" if self.solution.time is not None else angle)
         figure.align_ylabels(axes)
         for panel in axes:
             set_frame(panel)
@@ -263,7 +252,7 @@ class _Curve:
             label = "F (N)" if quantity == LINE.value else torque
         axes.set_ylabel(label)
 
-    def draw_errors(self, axes: "Axes", answers: list[Answer]) -> None:
+    def draw_errors(self, axes: "Axes") -> None:
         """Draw the largest error of each segment on a logarithmic axis.
 
         The worst one is ringed; what is allowed is drawn too.
@@ -272,18 +261,13 @@ class _Curve:
 
         quantity = self.quantity
         solution = self.solution
-        engines = [answer.engine for answer in answers]
-        rows = [row for row in self.record.rows if row.quantity == quantity]
+        engines = {answer.engine for answer in self.answers}
         condition = find_condition(quantity, self.scene.linkage, solution)
-        allowed = EQUIVALENCE.allowed(condition)
-        if choose_style(engines[0]).simulated:
-            held_to = [row.allowed for row in rows if row.engine == engines[0]]
-            allowed = np.full(len(solution), [*held_to, SIMULATED.factor][0])
-        shown = np.where(self.good, allowed, np.nan)
+        shown = np.where(self.good, EQUIVALENCE.allowed(condition), np.nan)
         limits = [("allowed", ALLOWED, shown)]
-        for row in rows:  # of an engine that is allowed more than the others
+        for row in self.record.rows:  # of an engine that is allowed more than others
             more = row.compared and row.allowed > 2.0 * np.nanmax(shown)
-            if more and row.engine in engines:
+            if more and row.quantity == quantity and row.engine in engines:
                 colour = choose_style(row.engine).colour
                 own = np.full(len(solution), row.allowed)
                 limits.append((f"allowed to {row.engine}", colour, own))
@@ -294,7 +278,7 @@ class _Curve:
             axes.plot(base, limit, color=colour, lw=1.1, ls=(0, (5, 2)))
             place = complex(base[middle], limit[middle])
             add_label(axes, text, place, -1j, colour, 8.5)
-        for turn, answer in enumerate(answers):
+        for turn, answer in enumerate(self.answers):
             formulas = solution
             if answer.at is not None:
                 formulas = solve(self.scene, at=answer.at)
@@ -302,7 +286,7 @@ class _Curve:
             size = scale_of(quantity, self.scene, formulas, mine).size
             error = find_error(quantity, mine, answer.quantities[quantity], size)
             error = np.where(formulas.status_code == OK, error, np.nan)
-            places = find_worst_of_segments(error, turn / len(answers))
+            places = find_worst_of_segments(error, turn / len(self.answers))
             if not places:
                 continue
             x = self.choose_base(answer.at)[places]

@@ -3,6 +3,7 @@
 The record of a whole run, record.json, is made in `regression/record.py`.
 """
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from operator import attrgetter
 from typing import Any
@@ -41,7 +42,7 @@ class Record:
     rows: list[Row] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    independence: dict[str, tuple[str, str]] = field(default_factory=dict)
+    independence: dict[str, Sequence[str]] = field(default_factory=dict)
     """engine: (shared with the formulas, found alone)."""
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
     output: dict[str, str] = field(default_factory=dict)
@@ -64,10 +65,11 @@ class Record:
     def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
         answers = self.answers
-        shared = {one.engine: (one.shared, one.own) for one in answers if one.own}
         return replace(
             self,
-            independence=shared,
+            independence={
+                one.engine: [one.shared, one.own] for one in answers if one.own
+            },
             evidence={one.engine: one.evidence for one in answers if one.evidence},
             figure=figure,
             thumbnail=thumbnail,
@@ -90,13 +92,9 @@ class Record:
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":
         """Return the record from the data that `kept_all` returned."""
-        independence = {name: tuple(two) for name, two in kept["independence"].items()}
-        restored = {
-            "rows": [Row(*row) for row in kept["rows"]],
-            "timings": [Timing(**timing) for timing in kept["timings"]],
-            "independence": independence,
-        }
-        return cls(**kept | restored)
+        rows = [Row(*row) for row in kept["rows"]]
+        timings = [Timing(**timing) for timing in kept["timings"]]
+        return cls(**kept | {"rows": rows, "timings": timings})
 
     def joined(self, further: "Record") -> "Record":
         """Add the answers of another set of engines.

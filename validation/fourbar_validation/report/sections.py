@@ -47,26 +47,20 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     elif results.is_file() and (out / HARD_FOLDER / "report.html").is_file():
         section = collect_hard_cases(read_columns(results))
         links = [(f"{HARD_FOLDER}/report.html",) * 2]
-        sections.append(
-            replace(
-                section,
-                text=f"From the run in {HARD_FOLDER}/: {_MUST}",
-                links=links,
-            )
-        )
+        text = f"From the run in {HARD_FOLDER}/: {_MUST}"
+        sections.append(replace(section, text=text, links=links))
     folders = sorted(path.parent for path in (out / _COST).glob("*/cost.csv"))
     return [*sections, *(_read_study(folder) for folder in folders[:MOST_STUDIES])]
 
 
 def collect_hard_cases(rows: Iterable[Row]) -> Section:
     """Collect the section on a run of the hard suite."""
-    counts = {family.name: Counts() for family in HARD_FAMILIES}
-    scenes: dict[str, set[str]] = {family.name: set() for family in HARD_FAMILIES}
+    counts: dict[str, Counts] = {}
+    scenes: dict[str, set[str]] = {}
     for row in rows:
-        family = find_family(row.scene)
-        if family is not None:
-            counts[family].add([row])
-            scenes[family].add(row.scene)
+        name = find_family(row.scene) or ""
+        counts.setdefault(name, Counts()).add([row])
+        scenes.setdefault(name, set()).add(row.scene)
     table = [
         (
             family.name,
@@ -76,7 +70,7 @@ def collect_hard_cases(rows: Iterable[Row]) -> Section:
             family.statement,
         )
         for family in HARD_FAMILIES
-        if scenes[family.name]
+        if family.name in scenes
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
     text = _MUST.capitalize()
@@ -123,13 +117,8 @@ def _read_study(folder: Path) -> Section:
         picture = folder / name
         if picture.is_file() and picture.stat().st_size <= LARGEST_INLINE_PICTURE:
             data = base64.b64encode(picture.read_bytes()).decode("ascii")
-            figures.append(
-                SectionFigure(
-                    alt,
-                    f"{alt}.",
-                    image=f"data:image/svg+xml;base64,{data}",
-                )
-            )
+            image = f"data:image/svg+xml;base64,{data}"
+            figures.append(SectionFigure(alt, f"{alt}.", image=image))
     text = (
         f"What each digit of {folder.name} costs, from the study in"
         f" {_COST}/{folder.name}/. Times are those of torque and pin forces at the"

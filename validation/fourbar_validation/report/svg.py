@@ -35,7 +35,6 @@ class Style(NamedTuple):
     marker: str
     symbol: str
     """The mark as a character, for legends in text."""
-    simulated: bool = False
 
     @property
     def colour(self) -> str:
@@ -56,7 +55,7 @@ class Style(NamedTuple):
 _STYLES = {
     "pinocchio-inverse": Style("--e1", "o", "○"),
     "mujoco-inverse": Style("--e2", "s", "□"),
-    "mujoco-simulated": Style("--e3", "^", "△", simulated=True),
+    "mujoco-simulated": Style("--e3", "^", "△"),
     "free-body": Style("--e4", "D", "◇"),
     "ball-arithmetic": Style("--e5", "v", "▽"),
     "exudyn-constraints": Style("--e6", "<", "◁"),

@@ -9,11 +9,6 @@ from pathlib import Path
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.report.svg import choose_style
 
-WITHOUT_A_POWER = (1e-2, 1e6)
-"""Numbers between these are written without a power of ten. The larger ones are if they
-are whole.
-"""
-
 _SCRIPT = Path(__file__).with_name("templates") / "report.js"
 
 
@@ -25,13 +20,11 @@ def render(package: str, name: str, /, **what: object) -> str:
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    page = name.endswith(
-        ".html.j2"
-    )  # in Markdown `escape_cell` escapes what would break out
+    # in Markdown `escape_cell` escapes what would break out
+    page = name.endswith(".html.j2")
+    folders = map(PackageLoader, (package, "fourbar_validation.report"))
     environment = Environment(
-        loader=ChoiceLoader(
-            [PackageLoader(package), PackageLoader("fourbar_validation.report")]
-        ),
+        loader=ChoiceLoader([*folders]),
         undefined=StrictUndefined,
         autoescape=page,
         trim_blocks=True,
@@ -41,23 +34,21 @@ def render(package: str, name: str, /, **what: object) -> str:
     environment.filters |= {
         "number": write_error,
         "plain": count_or_size,
-        "degrees": lambda radians: (
-            "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}"
-        ),
+        "degrees": lambda angle: f"{math.degrees(angle):.3f}".replace("nan", "-"),
         "cell": escape_cell,
-        "packed": (
-            lambda text: base64.b64encode(
-                gzip.compress(text.encode("utf-8"), mtime=0)
-            ).decode()
-        ),
+        "packed": lambda text: _encode(gzip.compress(text.encode(), mtime=0)),
         "colour": lambda engine: f"var({choose_style(engine).variable})",
         "symbol": lambda engine: choose_style(engine).symbol,
     }
     # the only script that the page's security policy lets run
     script = _SCRIPT.read_text(encoding="utf-8")
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    digest = _encode(hashlib.sha256(script.encode()).digest())
     environment.globals |= {"script": script, "script_hash": f"sha256-{digest}"}
     return environment.get_template(name).render(**what)
+
+
+def _encode(data: bytes) -> str:
+    return base64.b64encode(data).decode()
 
 
 def escape_cell(text: object) -> str:
@@ -73,20 +64,9 @@ def write_error(value: float) -> str:
 
     A dash stands for no number.
     """
-    if math.isnan(value):
-        return "-"
-    return f"{value:.2e}"
+    return f"{value:.2e}".replace("nan", "-")
 
 
 def count_or_size(value: float) -> str:
-    """Write three significant digits: 628, 0.125, 3.10e-09.
-
-    A dash stands for no number.
-    """
-    if math.isnan(value):
-        return "-"
-    if value == 0.0 or (float(value).is_integer() and abs(value) < WITHOUT_A_POWER[1]):
-        return f"{value:.0f}"
-    if WITHOUT_A_POWER[0] <= abs(value) < 1000.0:
-        return f"{value:.3g}"
-    return f"{value:.2e}"
+    """Write three significant digits, as few as there are; a dash stands for NaN."""
+    return f"{value:.3g}".replace("nan", "-")

@@ -38,13 +38,11 @@ def print_table(
     colour = "green" if summary.good else "red"
     console.print(f"[bold {colour}]{escape(clean_line(summary.headline))}[/]")
     console.print(_make_overview(summary))
-    causes = summary.causes
-    for cause in causes[:MOST_CAUSES_PRINTED]:
+    for cause in summary.causes[:MOST_CAUSES_PRINTED]:
         console.print(f"[bold red]wrong:[/] {escape(clean_line(str(cause)))}")
-    if len(causes) > MOST_CAUSES_PRINTED:
-        console.print(
-            f"and {len(causes) - MOST_CAUSES_PRINTED} more causes; the report has them"
-        )
+    more = len(summary.causes) - MOST_CAUSES_PRINTED
+    if more > 0:
+        console.print(f"and {more} more causes; the report has them")
     for note in summary.notes[:_MOST_NOTES]:
         console.print(escape(clean_line(note)))
     for engine, reason in summary.missing:
@@ -88,11 +86,8 @@ def _make_overview(summary: Summary) -> "Table":
 
 
 def _make_worst_table(summary: Summary) -> "Table":
-    title = "worst row of each scene and engine"
-    if len(summary.worst) < summary.judged:
-        title = (
-            f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
-        )
+    many = f"{len(summary.worst)} of {summary.judged}"
+    title = f"worst rows of {many} scenes and engines"
     rows = []
     for row in summary.worst:
         place = f"{math.degrees(row.theta_2):.1f}".replace("nan", "-")

@@ -16,27 +16,16 @@ class AlikeTexts:
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._first: dict[str, str] = {}
-        self._differing: set[str] = set()
-
-    def __bool__(self) -> bool:
-        return bool(self._counts)
 
     def add(self, text: str) -> None:
         """Take in a text."""
         words = NUMBERS_IN_A_REASON.sub("#", text)
         self._counts[words] += 1
-        if self._first.setdefault(words, text) != text:
-            self._differing.add(words)
+        self._first.setdefault(words, text)
 
     def list_all(self) -> list[tuple[str, int]]:
-        """List the first of each kind of texts with its numbers, and their count.
+        """List the first of each kind of texts, and their count, the commonest first.
 
-        The text says if the others have other numbers; the commonest comes first.
+        What differs in the others is their numbers.
         """
-        listed = []
-        for words, count in self._counts.most_common():
-            text = self._first[words]
-            if words in self._differing:
-                text += f" (and {count - 1} more like it, with other numbers)"
-            listed.append((text, count))
-        return listed
+        return [(self._first[words], n) for words, n in self._counts.most_common()]

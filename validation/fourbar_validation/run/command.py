@@ -12,8 +12,7 @@ from fourbar_validation.regression.accept import add_output_options, report_diff
 from fourbar_validation.regression.record import PARQUET_FILE
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.parts import judge_part
-from fourbar_validation.run.plan import WORKERS
-from fourbar_validation.run.progress import show_progress
+from fourbar_validation.run.plan import WORKERS, show_progress
 from fourbar_validation.run.request import ALL_TYPES, Request, make_plan
 from fourbar_validation.run.run import run
 

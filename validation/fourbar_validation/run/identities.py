@@ -156,18 +156,17 @@ def _check_sums(question: Question) -> Iterator[Row]:
     ]
     # the moments of forces inside cancel
     inside: Any = np.abs(read("A") * read("F32")) + np.abs(read("B") * read("F43"))
-    acting = actions.wrenches(Wrenches())
-    driving = of_drive.wrenches(Wrenches())
+    # a force that drives and the loads nearly cancel in the couple of their bar, and
+    # the force has the rounding of its own moment: they act apart
+    acting = [(one, one.wrenches(Wrenches())) for one in (actions, of_drive)]
     first_pins = (("O2", 0.0), ("", read("A")), ("O4", O4))
     for number, (ground_pin, pin) in zip(MOVING_BARS, first_pins, strict=True):
-        force_on, couple = acting.on(number)
-        # the ground's pull on bars 2 and 4 goes through their pins; between moving bars
-        # it cancels
-        resultant = force_on + actions.through.get(ground_pin, 0.0)
-        exerted.append((resultant, pin, couple))
-        # a force that drives and the loads nearly cancel in the couple of their bar,
-        # and the force has the rounding of its own moment
-        inside += np.abs(driving.on(number)[1])
+        for part, wrenches in acting:
+            force_on, couple = wrenches.on(number)
+            # the ground's pull on bars 2 and 4 goes through their pins; between moving
+            # bars it cancels
+            force_on = force_on + part.through.get(ground_pin, 0.0)
+            exerted.append((force_on, pin, couple))
         inertia = linkage.bar(number).mass * read(f"a_G{number}")
         turned = actions.bodies[number - 2].I * solution[f"alpha_{number}"]
         exerted.append((-inertia, read(f"G{number}"), -turned))
@@ -210,7 +209,7 @@ def _sum_actions(question: Question) -> tuple[Actions, Actions, complex]:
     """Sum what acts at the speeds that were answered.
 
     Another evaluation of them is not used. What a drive that exerts a force does is
-    returned alone too, and the place of O4.
+    returned apart, and the place of O4.
     """
     scene = question.scene
     command = question.at
@@ -229,7 +228,6 @@ def _sum_actions(question: Question) -> tuple[Actions, Actions, complex]:
                 term.act_known(actions, forces)
         of_drive = Actions(state, bodies)
         if solution.drive is not None:
-            solution.drive.act(actions, solution.drive_force)
             solution.drive.act(of_drive, solution.drive_force)
     return actions, of_drive, complex(np.ravel(state.foot(4))[0])
 

@@ -29,6 +29,8 @@ from fourbar_validation.run.question import Question
 
 EXACT = "exact"
 """Setting of an engine whose errors are round-off."""
+CLOSES = "assembled"
+"""Quantity of where the loop closes."""
 _TIMES_NEARER = 10.0
 """Factor by which two engines are nearer to each other than to us if they agree against
 us: two that miss what they declare by as much do not.
@@ -59,43 +61,44 @@ def find_agreement(question: Question, rows: Sequence[Row]) -> dict[str, list[st
         engine.name: getattr(engine, "stated_name", "") or engine.name
         for engine in question.engines
     }
-    quantities = {*UNITS, "assembled"}
-    exact = [row for row in rows if row.setting == EXACT and row.quantity in quantities]
-    for quantity in dict.fromkeys(row.quantity for row in exact if row.failed):
-        of_quantity = [row for row in exact if row.quantity == quantity]
+    exact: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.setting == EXACT and (row.quantity in UNITS or row.quantity == CLOSES):
+            exact.setdefault(row.quantity, []).append(row)
+    for quantity, of_quantity in exact.items():
         right = {versions[row.engine] for row in of_quantity if row.passed}
         failing = [row for row in of_quantity if row.failed]
         for row in failing:
-            alike = [
-                one.engine for one in failing if _agree(question, row, one, quantity)
-            ]
+            alike = [one.engine for one in failing if _agree(question, row, one)]
             names = {versions[name] for name in alike}
             if len(names) > max(1, len(right), len(against.get(quantity, ()))):
                 against[quantity] = alike
     return against
 
 
-def _agree(question: Question, row: Row, other: Row, quantity: str) -> bool:
+def _agree(question: Question, row: Row, other: Row) -> bool:
     """Return whether two engines that differ from us have one number.
 
     The position is that where the first one is worst, and the two may differ by the
     larger error that either is allowed, and by a tenth of what they differ from us.
     """
-    values = _values_of(question, row.engine, quantity)
-    others = _values_of(question, other.engine, quantity)
+    quantity = row.quantity
     ours = getattr(question.solution, quantity)
-    if not math.isfinite(row.error) or ours is None or values is None or others is None:
-        return False
-    if not len(values) == len(others) == len(ours):
+    answers = [_values_of(question, one.engine, quantity) for one in (row, other)]
+    if ours is None or not math.isfinite(row.error):
         return False
     theta_2 = np.nan_to_num(question.solution.theta_2 - row.theta_2, nan=np.inf)
     position = np.abs(theta_2).argmin()
-    at = slice(position, position + 1)
-    apart = compute_difference(quantity, values[at], others[at])
-    from_us = compute_difference(quantity, 1.0 * ours[at], values[at])
+    here = [1.0 * ours[position : position + 1]]
+    for values in answers:
+        if values is None or len(values) != len(ours):
+            return False
+        here.append(values[position : position + 1])
+    (apart,) = compute_difference(quantity, *here[1:])
+    (from_us,) = compute_difference(quantity, *here[:2])
     allowed = 2.0 * max(row.allowed, other.allowed)
-    near = apart[0] * row.error <= allowed * from_us[0]
-    return bool(near and apart[0] * _TIMES_NEARER <= from_us[0])
+    near = apart * row.error <= allowed * from_us
+    return bool(near and apart * _TIMES_NEARER <= from_us)
 
 
 def _values_of(question: Question, engine: str, quantity: str) -> Array | None:
@@ -104,7 +107,7 @@ def _values_of(question: Question, engine: str, quantity: str) -> Array | None:
     Where the loop closes is told by 1, elsewhere 0.
     """
     answer, _ = question.answered[engine]
-    if quantity == "assembled" and answer.assembled is not None:
+    if quantity == CLOSES and answer.assembled is not None:
         return np.asarray(answer.assembled, dtype=float)
     values = answer.quantities.get(quantity)
     if values is None:

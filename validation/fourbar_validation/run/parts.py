@@ -11,8 +11,7 @@ import click
 
 from fourbar.errors import InputError
 from fourbar_validation.report.run_summary import Summary
-from fourbar_validation.run.plan import Plan, Progress
-from fourbar_validation.run.progress import show_progress
+from fourbar_validation.run.plan import Plan, Progress, show_progress
 from fourbar_validation.run.request import (
     Request,
     keep_request,

@@ -1,21 +1,32 @@
-"""Tasks into which a run is cut.
+"""Tasks into which a run is cut, and their scenes judged over processes.
 
-Every machine cuts a run alike.
+Every machine cuts a run alike. A scene that breaks down is judged again engine by
+engine.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from fourbar.errors import FAILED, DependencyError, InputError
-from fourbar_validation.compare.rows import FAILS, escape_controls
+from fourbar_validation.compare.rows import (
+    FAILS,
+    FORMULAS,
+    escape_controls,
+    make_breakdown,
+)
+from fourbar_validation.engines import workers
+from fourbar_validation.engines.guests import QUESTIONS, Guest
+from fourbar_validation.engines.programs import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
-from fourbar_validation.run.jobs import judge_tasks, make_jobs
+from fourbar_validation.report.scene_record import Record
+from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Suite
 
@@ -33,16 +44,152 @@ JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 
 
 class Progress:
-    """Listener to a run; this one ignores what it is told."""
+    """Listener to a run: it notes lines, and on a terminal shows a bar per stage.
+
+    Without bars it ignores what it is told.
+    """
+
+    def __init__(self, bars: Any = None, scenes: int = 0) -> None:
+        self.bars = bars
+        self.scenes = scenes
+        self.stages: dict[str, Any] = {}
 
     def note(self, line: str) -> None:
-        """Hear why a task of an earlier run is judged again."""
+        """Print above the bars why a task of an earlier run is judged again."""
+        if self.bars is not None:
+            self.bars.console.print(line, markup=False, highlight=False)
 
     def advance(self, stage: str, scenes: int) -> None:
-        """Note that a stage has done so many scenes more."""
+        """Note that a stage has done so many scenes more.
+
+        How many scenes are drawn is not told before.
+        """
+        if self.bars is None:
+            return
+        if stage not in self.stages:
+            total = None if stage == DRAWING else self.scenes
+            self.stages[stage] = self.bars.add_task(stage, total=total)
+        self.bars.advance(self.stages[stage], scenes)
 
 
 UNHEARD = Progress()
+
+
+@contextmanager
+def show_progress(scenes: int) -> Iterator[Progress]:
+    """Show the progress of a run of so many scenes, and leave the bars as they are."""
+    from rich import progress
+    from rich.console import Console
+
+    columns = (
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(),
+    )
+    console = Console(stderr=True)
+    hidden = not console.is_terminal
+    with progress.Progress(*columns, console=console, disable=hidden) as bars:
+        yield Progress(bars, scenes)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One scene of a task, for a worker.
+
+    The scene is a number in a suite; beside it stand its engines, and what is made of
+    it.
+    """
+
+    suite: Suite
+    scene: int
+    engines: Sequence[Engine]
+    draw: bool
+    sketch: bool = False
+
+    @property
+    def name(self) -> str:
+        """Return the scene's name."""
+        return escape_controls(self.suite.name(self.scene))
+
+
+def make_jobs(
+    suite: Suite,
+    scenes: Iterable[int],
+    engines: Sequence[Engine],
+    draw: bool,
+    sketch: bool = False,
+) -> list[Job]:
+    """Make the jobs of some scenes; one of a file carries its own text alone."""
+    return [
+        Job(
+            *suite.alone(i),
+            engines,
+            draw and suite.name(i) not in suite.not_drawn,
+            sketch,
+        )
+        for i in scenes
+    ]
+
+
+def judge_job(job: Job) -> Record:
+    """Judge one scene; runs in a worker."""
+    scene = job.suite.scene(job.scene)
+    how = {"draw": job.draw, "sketch": job.sketch}
+    return judge_for_report(job.name, scene, job.engines, **how)
+
+
+def _judge_by_engine(
+    job: Job,
+    _: BaseException,
+    attempt: workers.Attempt,
+) -> Record:
+    """Judge a scene that broke down one engine at a time.
+
+    An engine at fault gets a row that says what broke down; where the formulas do, no
+    engine is asked.
+    """
+    record = attempt(replace(job, engines=[]))
+    if not isinstance(record, Record):
+        return Record(job.name, rows=[make_breakdown(job.name, FORMULAS, record)])
+    breakdowns = []
+    for engine in job.engines:
+        outcome = attempt(replace(job, engines=[engine]))
+        if isinstance(outcome, Record):
+            record = record.joined(outcome)
+        else:
+            breakdowns.append(make_breakdown(job.name, engine.name, outcome))
+    return replace(record, rows=[*record.rows, *breakdowns])
+
+
+def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
+    """Return the seconds after which a scene of the suite counts as hanging.
+
+    Guests have limits of their own besides.
+    """
+    limit = workers.SCENE_SECONDS + SECONDS_PER_POSITION * suite.positions
+    return limit + QUESTIONS * sum(
+        guest.seconds or limit for guest in engines if isinstance(guest, Guest)
+    )
+
+
+def judge_tasks(
+    suite: Suite,
+    engines: Iterable[Engine],
+    tasks: Iterable[tuple[int, list[Job]]],
+    count: int,
+) -> Iterator[tuple[int, list[Record]]]:
+    """Judge numbered tasks by so many processes, each as it is done.
+
+    A job that takes too long hangs.
+    """
+    return workers.apply_over_processes(
+        judge_job,
+        tasks,
+        count,
+        seconds=find_time_limit(suite, engines),
+        instead=_judge_by_engine,
+    )
 
 
 def read_part(text: str) -> tuple[int, int]:
@@ -158,10 +305,6 @@ class Plan:
             "kept from an interrupted run: the answers of all engines on"
             f" {len(scenes)} of {len(self.suite)} scenes, {listed}"
         )
-
-    def summarise(self) -> Summary:
-        """Return a summary that knows the engines, and no scene yet."""
-        return Summary(self.engines, self.missing, bool(self.chosen))
 
     def conclude(self, summary: Summary, *, worse: bool = False) -> int:
         """Return the exit status of a run.

@@ -230,11 +230,10 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
     def take(value: Any) -> Any:
         if isinstance(value, dict):
-            return {name: values[index] for name, values in value.items()}
-        if isinstance(value, np.ndarray):
-            return value[index]
-        return value
+            return {name: take(values) for name, values in value.items()}
+        return value[index] if isinstance(value, np.ndarray) else value
 
     taken = {one.name: take(getattr(study, one.name)) for one in fields(study)}
-    taken |= {"at": study.at.part(index), "ground": None, "lengths": None}
-    return Solution(**taken)
+    return Solution(
+        **taken | {"at": study.at.part(index), "ground": None, "lengths": None}
+    )

@@ -32,12 +32,6 @@ from fourbar_validation.scenes.suites import (
 )
 
 ALL_TYPES = ",".join(kind.value for kind in DrawnType)
-_EXCLUDED = (
-    ("random", "scenes", "judges random linkages; leave out the scene files"),
-    ("suite", "scenes", "has its own scenes; leave out scene files and --random"),
-    ("suite", "random", "has its own scenes; leave out scene files and --random"),
-)
-"""Option, what it cannot be combined with, and why."""
 HARD_SUITE = "hard"
 """Name of the suite of hard cases."""
 _REQUEST = "request.json"
@@ -80,26 +74,33 @@ class Request:
 
         Files that cannot be written are refused too.
         """
-        for option, excluded, why in _EXCLUDED:
-            if getattr(self, option) is not None and getattr(self, excluded):
-                raise InputError(f"--{option}", getattr(self, option), why)
-        for option in ("seed", "type"):
+        own_scenes = "has its own scenes; leave out scene files and --random"
+        of_random = "is of random linkages; say --random N too"
+        of_report = "is of a report: leave it out, and collect the parts first"
+        of_two = "tells differences; say --against BASELINE too"
+        drawn = self.random is not None
+        part = self.part is not None
+        alone = self.against is None
+        for option, wrong, why in (
+            (
+                "random",
+                self.scenes,
+                "judges random linkages; leave out the scene files",
+            ),
+            ("suite", self.scenes or drawn, own_scenes),
+            ("seed", not drawn, of_random),
+            ("type", not drawn, of_random),
+            ("against", part, of_report),
+            *((form, part, of_report) for form in FORMS),
+            *((form, alone and form != "junit", of_two) for form in FORMS),
+        ):
             value = getattr(self, option)
-            if value is not None and self.random is None:
-                why = "is of random linkages; say --random N too"
-                raise InputError(f"--{option}", value, why)
-        for option in ("against", *FORMS) if self.part is not None else ():
-            if (value := getattr(self, option)) is not None:
-                why = "is of a report: leave it out, and collect the parts first"
-                raise InputError(f"--{option}", str(value), why)
-        for form, path in self.forms.items():
-            if path is None:
-                continue
-            if self.against is None and form != "junit":
-                why = "tells differences; say --against BASELINE too"
-                raise InputError(f"--{form}", str(path), why)
+            if value is not None and wrong:
+                shown = str(value) if isinstance(value, Path) else value
+                raise InputError(f"--{option}", shown, why)
+        for path in self.forms.values():
             # the run will make its own folder
-            if self.out.exists() or path.parent != self.out:
+            if path is not None and (self.out.exists() or path.parent != self.out):
                 require_file(path, *self.scenes)
         if self.against is not None:
             open_run(find_baseline(self.against), "--against")

@@ -3,8 +3,8 @@
 The results are streamed to disk, and the pictures drawn.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,8 @@ from fourbar_validation.compare.rows import (
     write_csv_rows,
 )
 from fourbar_validation.engines.guests import number_guests
-from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.accept import find_differences
-from fourbar_validation.regression.changes import Differences, Kind
+from fourbar_validation.regression.changes import Kind
 from fourbar_validation.regression.history import (
     collect_history,
     find_since,
@@ -45,19 +44,20 @@ from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.sections import collect_sections
 from fourbar_validation.report.svg import STYLE_NUMBERS
-from fourbar_validation.run.jobs import Job, judge_tasks, make_jobs
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.plan import (
     COLLECTING,
     DRAWING,
     UNHEARD,
+    Job,
     Plan,
     Progress,
+    judge_tasks,
+    make_jobs,
 )
 from fourbar_validation.run.request import forget_request
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.hard_families import Hard
-from fourbar_validation.scenes.suites import Suite
 
 TIMING_COLUMNS = (
     "scene",
@@ -116,13 +116,16 @@ def write_outcome(
     """
     suite = plan.suite
     engines = plan.engines
-    summary = plan.summarise()
+    summary = Summary(engines, plan.missing, bool(plan.chosen))
     first_lines = _collect_tasks(plan, read, out, summary, progress)
-    pictured = {record.name for record in summary.pictured if plan.drawn}
     names = [escape_controls(suite.name(index)) for index in range(len(suite))]
-    shown = [index for index, name in enumerate(names) if name in pictured]
-    if shown and not plan.draw_at_once:
-        jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
+    pictured = {record.name: record for record in summary.pictured if plan.drawn}
+    if not plan.draw_at_once:
+        jobs = (
+            (index, [_redraw(plan, index, pictured[name])])
+            for index, name in enumerate(names)
+            if name in pictured
+        )
         for _, records in judge_tasks(suite, engines, jobs, plan.workers):
             summary.picture(*records)
             progress.advance(DRAWING, 1)
@@ -136,20 +139,7 @@ def write_outcome(
         summary.scene = names[0]
     if plan.against is not None:
         before = open_run(plan.against, "--against")
-        if failure := next((one.worst for one in summary.causes), None):
-            key = (failure.scene, failure.engine, failure.quantity)
-            since = find_since(read_history(before), before, [key])
-            summary.since = f"It {since[key]}."
-        weakened = list_weakened(before.about.rules, about.rules)
-        summary.weaker = [*map(str, weakened)]
-        summary.baseline = before.describe()
-        with suppress(InputError):  # raised again where the differences are printed
-            after = Recorded(about, out / PARQUET_FILE)
-            differences = find_differences(before, after, {})
-            summary.gone = differences.gone
-            if not summary.counts[FAILS]:  # its cause stands first
-                summary.gone += _list_rows(differences, Kind.GONE)
-                summary.worse = _list_rows(differences, Kind.VERDICT_WORSE, Kind.WORSE)
+        _hold_against(before, summary, Recorded(about, out / PARQUET_FILE))
     write_text(out / "report.md", write_summary_page(summary))
     rows = read_columns(out / PARQUET_FILE)
     sections = collect_sections(rows if isinstance(suite, Hard) else None, out)
@@ -161,9 +151,26 @@ def write_outcome(
     return summary
 
 
-def _list_rows(differences: Differences, *kinds: Kind) -> list[str]:
-    """Write the rows of some kinds, the worst first."""
-    return [write_change_line(row) for row in differences.of(*kinds).itertuples()]
+def _hold_against(before: Recorded, summary: Summary, after: Recorded) -> None:
+    """Tell a summary what an earlier run says of it."""
+    summary.baseline = before.describe()
+    for cause in summary.causes[:1]:
+        row = cause.worst
+        key = (row.scene, row.engine, row.quantity)
+        since = find_since(read_history(before), before, [key])
+        summary.since = f"It {since[key]}."
+    weakened = list_weakened(before.about.rules, after.about.rules)
+    summary.weaker = [*map(str, weakened)]
+    try:
+        differences = find_differences(before, after, {})
+    except InputError:  # raised again where the differences are printed
+        return
+    summary.gone = differences.gone
+    if not summary.counts[FAILS]:  # its cause stands first
+        lines = differences.of(Kind.GONE).itertuples()
+        summary.gone += map(write_change_line, lines)
+        lines = differences.of(Kind.VERDICT_WORSE, Kind.WORSE).itertuples()
+        summary.worse = [*map(write_change_line, lines)]
 
 
 def _collect_tasks(
@@ -202,22 +209,16 @@ def _collect_tasks(
     return columns.first_lines
 
 
-def _redraw(
-    suite: Suite,
-    scene: int,
-    summary: Summary,
-    engines: Sequence[Engine],
-) -> Job:
+def _redraw(plan: Plan, scene: int, record: Record) -> Job:
     """Return the job of judging a scene once more, now with its pictures.
 
     The scene's answers were not kept. An engine that broke down, or hung, in the scene
     is not started in it again.
     """
-    name = escape_controls(suite.name(scene))
-    rows = next(record.rows for record in summary.pictured if record.name == name)
-    broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
-    sound = [engine for engine in engines if engine.name not in broken]
-    return make_jobs(suite, [scene], sound, draw=True)[0]
+    whole = [row for row in record.rows if row.quantity == "all"]
+    broken = {row.engine for row in whole if row.failed}
+    sound = [engine for engine in plan.engines if engine.name not in broken]
+    return make_jobs(plan.suite, [scene], sound, draw=True)[0]
 
 
 def _list_timings(record: Record) -> Iterator[list[str]]:

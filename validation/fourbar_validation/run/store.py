@@ -15,7 +15,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -62,27 +62,23 @@ class Store:
         if self.parts.exists() and not self.parts.is_dir():
             why = "must be a folder, in which a run keeps its parts"
             raise InputError("--out", str(self.parts), why)
-        lock = FileLock(self.folder / "lock", timeout=0)
         try:
-            lock.acquire()
+            lock = FileLock(self.folder / "lock", timeout=0).acquire()
         except Timeout:
             why = "another run is writing into this folder"
             raise RunningError(f"{self.folder}: {why}") from None
-        try:
+        with lock:
             self._begin()
             yield self
-        finally:
-            lock.release()
 
     def _begin(self) -> None:
         marker = self.folder / UNFINISHED
         same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
         if not same:
-            if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
+            if marker.is_file() and any(self.parts.glob("*")):
                 difference = self._name_difference(marker)
-                self.notes.append(
-                    f"made again: the parts of another run ({difference})"
-                )
+                note = f"made again: the parts of another run ({difference})"
+                self.notes.append(note)
             marker.unlink(missing_ok=True)
             shutil.rmtree(self.parts, ignore_errors=True)
         self.parts.mkdir(exist_ok=True)
@@ -93,16 +89,13 @@ class Store:
 
     def _name_difference(self, marker: Path) -> str:
         """Return what the earlier run differs in from this one, or ""."""
+        now = json.loads(self._identity)
         try:
-            before = json.loads(marker.read_text(encoding="utf-8"))
-            now = json.loads(self._identity)
-            return ", ".join(
-                name
-                for name in sorted({*before, *now})
-                if before.get(name) != now.get(name)
-            )
-        except (AttributeError, TypeError, ValueError):
+            before = dict(json.loads(marker.read_text(encoding="utf-8")))
+        except (TypeError, ValueError):
             return "its run.json is damaged"
+        names = sorted({*before, *now})
+        return ", ".join(name for name in names if before.get(name) != now.get(name))
 
     def require_same(self) -> None:
         """Raise InputError unless the folder holds tasks of this run."""
@@ -160,10 +153,9 @@ class Store:
         if not path.is_file():
             raise ValueError("is no file")
         first, _, packed = path.read_bytes().partition(b"\n")
-        try:
+        head = {}
+        with suppress(TypeError, ValueError):
             head = dict(json.loads(first))
-        except (TypeError, ValueError):
-            raise ValueError("is damaged") from None
         if head.get("sha256") != hashlib.sha256(packed).hexdigest():
             raise ValueError("is damaged")
         if head.get("run") != self._run:

@@ -173,26 +173,29 @@ class _Few:
 
     def compare(
         self,
-        expected: dict[str, Array],
-        theirs: Callable[[str], Array],
-        parts: Any = None,
+        *parts: tuple[int, Solution],
+        read: Callable[[str, Solution], Array] = lambda name, other: other[name],
     ) -> dict[str, Array]:
-        """Compare what is expected of another scene with its numbers by their names.
+        """Compare the numbers here with a sum of multiples of those of other scenes.
 
         Errors (n,) are returned, in parts of the size of each quantity here, times the
-        condition of the quantity.
+        condition of the quantity. Forces alone are sums.
 
-        `parts`: sizes of the numbers that were summed to these, (q, n).
+        `read`: reads what a solution says of a quantity here.
         """
         terms = TermSizes(self.scene, self.solution)
         errors = {}
-        for i, (name, values) in enumerate(expected.items()):
-            size = terms.scale(name, self.numbers[name]).of_terms
-            if parts is not None:
+        for name, values in self.numbers.items():
+            if len(parts) > 1 and name not in _FORCES:
+                continue
+            theirs = [times * read(name, other) for times, other in parts]
+            size = terms.scale(name, values).of_terms
+            if len(parts) > 1:
                 # what cancels within a part is among the terms of the whole
-                size = np.maximum(size, np.maximum(parts[i], terms.sum_terms(name)))
+                of_parts = sum(map(magnitude, theirs))
+                size = np.maximum(size, np.maximum(of_parts, terms.sum_terms(name)))
             condition = find_condition(name, self.scene.linkage, self.solution)
-            error = find_error(name, values, theirs(name), size)
+            error = find_error(name, values, np.sum(theirs, axis=0), size)
             errors[name] = error * np.minimum(condition, 1.0)
         return errors
 
@@ -321,17 +324,17 @@ def _measure_moved(
     at = few.command
     rates = {name: sense * getattr(at, name) for name in ("speed", "acceleration")}
     other = few.solve(scene, int(sense), angle=sense * at.angle + turn, **rates)
-    expected = {}
-    for name, values in few.numbers.items():
-        expected[name] = values * size ** _POWERS.get(UNITS[name], 0)
+
+    def read(name: str, other: Solution) -> Array:
+        values = other[name] / size ** _POWERS.get(UNITS[name], 0)
         if name in PIN_FORCES:
-            turned = (
-                expected[name] @ np.array([1.0, sense * 1j]) * cmath.rect(1.0, turn)
-            )
-            expected[name] = join_components(turned.real, turned.imag)
-        elif name not in ("drive_force", "power"):
-            expected[name] = sense * expected[name] + turn * name.startswith("theta")
-    return few.compare(expected, partial(getattr, other))
+            turned = (values @ np.array([1.0, 1j])) * cmath.rect(1.0, -turn)
+            return join_components(turned.real, sense * turned.imag)
+        if name in ("drive_force", "power"):
+            return values
+        return sense * (values - turn * name.startswith("theta"))
+
+    return few.compare((1, other), read=read)
 
 
 def _turns_with_the_ground(scene: Scene, number: SceneNumber) -> bool:
@@ -352,14 +355,14 @@ def _measure_exchanged(few: _Few) -> dict[str, Array]:
     angle = command.angle + math.pi if bar == 3 else command.angle
     scene = read_from_other_end(few.scene)
     other = few.solve(scene, -1 if bar == 3 else 1, angle=angle, bar=bar)
-    expected = {
-        name: -values if name in ("F32", "F43") else values
-        for name, values in few.numbers.items()
-    }
-    expected["theta_3"] = expected["theta_3"] + math.pi
-    return few.compare(
-        expected, lambda name: getattr(other, _OTHER_END.get(name, name))
-    )
+
+    def read(name: str, other: Solution) -> Array:
+        values = other[_OTHER_END.get(name, name)]
+        if name == "theta_3":
+            return values - math.pi
+        return -values if name in ("F32", "F43") else values
+
+    return few.compare((1, other), read=read)
 
 
 def read_from_other_end(scene: Scene) -> Scene:
@@ -425,7 +428,8 @@ def _measure_superposed(few: _Few) -> dict[str, Array]:
     if len(alone) < 2:
         raise NotAskedError("the scene has fewer than two loads and effects")
     # inertia acts in each of them, and once in the scene
-    return _measure_sum(few, [(1, part) for part in alone] + [(1 - len(alone), bare)])
+    inertia = (1 - len(alone), few.solve(bare))
+    return few.compare(inertia, *((1, few.solve(part)) for part in alone))
 
 
 def _measure_split_masses(few: _Few) -> dict[str, Array]:
@@ -445,8 +449,9 @@ def _measure_split_masses(few: _Few) -> dict[str, Array]:
     parts = []
     for body, part, away in bodies:
         bars = [_take_part(bar, part, away) for bar in scene.linkage.moving]
-        parts.append((1, copy_with(body, linkage=_put_bars(scene.linkage, bars))))
-    return _measure_sum(few, parts)
+        stated = copy_with(body, linkage=_put_bars(scene.linkage, bars))
+        parts.append((1, few.solve(stated)))
+    return few.compare(*parts)
 
 
 def _take_part(bar: Bar, part: float, away: float) -> Bar:
@@ -464,20 +469,6 @@ def _require_linear(scene: Scene) -> None:
     """Raise NotAskedError where forces are not the sum of what each effect adds."""
     if any(isinstance(effect, Friction | PinFriction) for effect in scene.effects):
         raise NotAskedError("forces with dry friction are no sum of what each adds")
-
-
-def _measure_sum(few: _Few, parts: list[tuple[int, Scene]]) -> dict[str, Array]:
-    """Compare the forces with the sum of multiples of those of scenes."""
-    solved = [(times, few.solve(part)) for times, part in parts]
-    totals = {}
-    sizes = []
-    for name in filter(_FORCES.__contains__, few.numbers):
-        of_parts = [times * getattr(part, name) for times, part in solved]
-        totals[name] = np.sum(of_parts, axis=0)
-        sizes.append(sum(map(magnitude, of_parts)))
-    return few.compare(
-        {name: few.numbers[name] for name in totals}, totals.__getitem__, sizes
-    )
 
 
 class _Transformation(NamedTuple):
