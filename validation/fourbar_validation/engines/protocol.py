@@ -136,12 +136,10 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
     """
     place, speed, acceleration = command.names
     values = command.stated
-    data = {place: _write_json_numbers(values[0])}
+    data = {place: np.asarray(values[0], dtype=float).tolist()}
     if values[1] is not None:
-        data |= {
-            speed: _write_json_numbers(values[1]),
-            acceleration: _write_json_numbers(values[2]),
-        }
+        for name, rate in ((speed, values[1]), (acceleration, values[2])):
+            data[name] = np.asarray(rate, dtype=float).tolist()
     if command.moves_stroke:
         data["side"] = scene.motion.side
     same = bool((command.branch == command.branch[0]).all())
@@ -157,12 +155,6 @@ def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
             )  # they read back as they were
         data["remainder"] = [digits] * len(command.angle)
     return data
-
-
-def _write_json_numbers(value: Any) -> Any:
-    if np.ndim(value) == 0:
-        return float(value)
-    return np.asarray(value, dtype=float).tolist()
 
 
 def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
@@ -189,7 +181,7 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
         alpha = 0.0
     time = None
     if data.get("time") is not None:
-        time = _read_list("time", data["time"], n)
+        time = _read_numbers("command.time", data["time"], n)
     bar = scene.motion.bar
     if of_stroke:
         unknown: Array = np.full(n, np.nan)  # no motion of the bar is commanded
@@ -226,7 +218,7 @@ def _read_motion(
     names: tuple[str, str, str], data: dict[str, Any], n: int | None = None
 ) -> tuple[Array, float | Array | None, float | Array | None]:
     """Read places, speed and acceleration; None where a rate is not stated."""
-    places = _read_list(names[0], data[names[0]], n)
+    places = _read_numbers(f"command.{names[0]}", data[names[0]], n)
     n = len(places)
     speed, acceleration = (
         None if data.get(name) is None else _read_rate(name, data[name], n)
@@ -235,24 +227,53 @@ def _read_motion(
     return places, speed, acceleration
 
 
-def _read_list(name: str, value: Any, n: int | None = None) -> Array:
-    wanted = "must be a list of one finite number or more"
-    if n is not None:
-        wanted = f"must be a list of {n} finite numbers"
-    array = _make_array(value) if isinstance(value, list) else None
-    if array is None or len(array) != (n or len(array) or 1) or np.isnan(array).any():
-        raise InputError(f"command.{name}", value, wanted)
-    return array
-
-
 def _read_rate(name: str, value: Any, n: int) -> float | Array:
+    """Read one number of all positions, or n of them."""
     if isinstance(value, list):
-        return _read_list(name, value, n)
-    array = _make_array([value])
-    if array is None or np.isnan(array[0]):
-        wanted = f"must be a finite number, or a list of {n}"
-        raise InputError(f"command.{name}", value, wanted)
-    return float(array[0])
+        return _read_numbers(f"command.{name}", value, n)
+    return _read_number(f"command.{name}", value)
+
+
+def _read_number(key: str, value: Any) -> float:
+    """Read a finite number."""
+    return float(_read_numbers(key, [value])[0])
+
+
+def _read_numbers(
+    key: str,
+    value: Any,
+    n: int | None = None,
+    *,
+    pairs: bool = False,
+    gaps: bool = False,
+) -> Array:
+    """Read n numbers, or n pairs of them; without n, one number or more.
+
+    `gaps`: null becomes NaN.
+    """
+    kind = "pairs [x, y]" if pairs else "numbers"
+    wanted = f"must be a list of {'one or more' if n is None else n} {kind}"
+    if gaps:
+        wanted += ", null where there is no value"
+    if not isinstance(value, list):
+        raise InputError(key, value, wanted)
+    if len(value) != (n or len(value) or 1):
+        raise InputError(f"entries of {key}", len(value), wanted)
+    entries = value
+    if pairs:
+        both = [(None, None) if pair is None else pair for pair in value]
+        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in both):
+            raise InputError(key, both, wanted)
+        entries = list(chain.from_iterable(both))
+    array = _make_array(entries, gaps)
+    if array is None:
+        wrong = next(
+            i for i, one in enumerate(entries) if _make_array([one], gaps) is None
+        )
+        place = f"{key}, entry {wrong // (1 + pairs)}"
+        allowed = "must be a finite number" + " or null" * gaps
+        raise InputError(place, entries[wrong], allowed)
+    return array.reshape(-1, 2) if pairs else array
 
 
 def _read_branch(value: Any, n: int) -> Any:
@@ -286,12 +307,12 @@ def _read_digits(value: Any, n: int) -> Any:
     raise InputError("command.remainder", wrong, wanted)
 
 
-def _make_array(values: list[Any]) -> Array | None:
-    """Make an array of numbers and None, which becomes NaN.
+def _make_array(values: list[Any], gaps: bool) -> Array | None:
+    """Make an array of numbers, and with gaps of None, which becomes NaN.
 
     None if there is anything else.
     """
-    if not set(map(type, values)) <= {int, float, type(None)}:
+    if not set(map(type, values)) <= {int, float, *([type(None)] * gaps)}:
         return None
     try:
         array = np.array(values, dtype=float)
@@ -360,6 +381,9 @@ def answer_from_json(
         raise InputError("alarms", alarms, "must be a list of texts")
     predicted = _read_arrays("predicted", data, n, ())
     evidence = _read_object("evidence", data)
+    seconds = _read_number("seconds", data.get("seconds", 0.0))
+    if seconds < 0.0:
+        raise InputError("seconds", seconds, "must be a number of 0 or more")
     return Answer(
         engine,
         setting,
@@ -369,12 +393,12 @@ def answer_from_json(
         predicted=predicted,
         alarms=[require_text("alarms", alarm) for alarm in alarms],
         evidence={
-            name: float(_read_values(f"evidence.{name}", [value], 1)[0])
+            name: float(_read_numbers(f"evidence.{name}", [value], gaps=True)[0])
             for name, value in evidence.items()
         },
         shared=require_text("shared", data.get("shared", "")) or "not stated",
         own=require_text("own", data.get("own", "")) or "not stated",
-        seconds=_read_seconds(data.get("seconds", 0.0)),
+        seconds=seconds,
     )
 
 
@@ -406,13 +430,6 @@ def require_text(name: str, value: Any) -> str:
     return write_one_line(value)
 
 
-def _read_seconds(value: Any) -> float:
-    seconds = _make_array([value])
-    if seconds is None or not seconds[0] >= 0.0:
-        raise InputError("seconds", value, "must be a number of 0 or more")
-    return float(seconds[0])
-
-
 def _read_object(name: str, data: dict[str, Any]) -> dict[str, Any]:
     value = data.get(name)
     if value is None and name != "answers":
@@ -427,33 +444,11 @@ def _read_arrays(
 ) -> dict[str, Array]:
     """Read n numbers under each name, or n pairs of them."""
     return {
-        name: _read_values(f"{table}.{name}", values, n, pairs=name in vectors)
+        name: _read_numbers(
+            f"{table}.{name}", values, n, pairs=name in vectors, gaps=True
+        )
         for name, values in _read_object(table, data).items()
     }
-
-
-def _read_values(key: str, value: Any, n: int, *, pairs: bool = False) -> Array:
-    """Read n numbers, or n pairs of them; null becomes NaN."""
-    wanted = (
-        f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where"
-        " there is no value"
-    )
-    if not isinstance(value, list):
-        raise InputError(key, value, wanted)
-    if len(value) != n:
-        raise InputError(f"entries of {key}", len(value), wanted)
-    entries = value
-    if pairs:
-        both = [(None, None) if pair is None else pair for pair in value]
-        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in both):
-            raise InputError(key, both, wanted)
-        entries = list(chain.from_iterable(both))
-    array = _make_array(entries)
-    if array is None:
-        wrong = next(i for i, one in enumerate(entries) if _make_array([one]) is None)
-        place = f"{key}, entry {wrong // (1 + pairs)}"
-        raise InputError(place, entries[wrong], "must be a finite number or null")
-    return array.reshape(n, 2) if pairs else array
 
 
 def _read_assembled(
@@ -509,13 +504,12 @@ def read_answered_motion(data: Any, command: Command) -> Command:
     if command.moves_stroke:  # no motion of the bar is commanded: the caller knows it
         return made
     require_near(made, command)
-    names_of_parts = "angle", "speed", "acceleration"
-    stated = {name: getattr(made, name) for name in names_of_parts}
-    if all(
-        np.array_equal(value, getattr(command, name)) for name, value in stated.items()
-    ):
+    parts = zip(made[:4], command[:4], strict=True)
+    if all(np.array_equal(x, y) for x, y in parts):  # type: ignore[arg-type]
         return command
-    return command.as_doubles()._replace(**stated)
+    return command.as_doubles()._replace(
+        angle=angle, speed=speed, acceleration=acceleration
+    )
 
 
 def require_near(made: Command, command: Command) -> None:
@@ -536,26 +530,22 @@ def require_near(made: Command, command: Command) -> None:
     )
     # the positions of a command are independent; an engine that runs through time is
     # faster by what accelerates it
+    faster = 1.0
     if speed:
-        faster = float(
-            np.sqrt(1.0 + 2.0 * acceleration * np.ptp(command.angle) / speed**2)
-        )
-    else:
-        faster = 1.0
-    sizes = (1.0, speed, speed**2 + acceleration)
-    allowances = (_FURTHEST, _FURTHEST + faster - 1.0, _FURTHEST + faster**2 - 1.0)
-    names = ("angle", "speed", "acceleration")
-    for key, name, size, most in zip(
-        COMMAND_NAMES[command.bar],
-        names,
-        sizes,
-        allowances,
-        strict=True,
+        turned = float(np.ptp(command.angle))
+        faster = math.sqrt(1.0 + 2.0 * acceleration * turned / speed**2)
+    most = {
+        "angle": _FURTHEST,
+        "speed": (_FURTHEST + faster - 1.0) * speed,
+        "acceleration": (_FURTHEST + faster**2 - 1.0) * (speed**2 + acceleration),
+    }
+    for key, (name, apart) in zip(
+        COMMAND_NAMES[command.bar], most.items(), strict=True
     ):
         value = getattr(made, name)
         commanded = getattr(command, name)
-        if value is not None and not np.abs(value - commanded).max() <= most * size:
-            allowed = f"must be within {most * size:g} of the command"
+        if value is not None and not np.abs(value - commanded).max() <= apart:
+            allowed = f"must be within {apart:g} of the command"
             raise InputError(f"at.{key}", None, allowed)
 
 
@@ -613,9 +603,9 @@ def release_from_json(
             "must be an object with theta_2, omega_2 and branch",
         )
     _refuse_unknown(command, ("theta_2", "omega_2", "branch"))
-    instants = _read_list("times", times)
+    instants = _read_numbers("times", times)
     theta, omega = (
-        float(_read_list(name, [command.get(name, 0.0)])[0])
+        _read_number(f"command.{name}", command.get(name, 0.0))
         for name in ("theta_2", "omega_2")
     )
     sign = _read_branch(command.get("branch", 1), 1)
@@ -646,6 +636,7 @@ def released_from_json(
         return ReleasedAnswer.refused(engine, setting, refusal)
     answers = _read_object("answers", data)
     theta, omega, energy, terms = (
-        _read_values(f"answers.{name}", answers.get(name), n) for name in _OF_RELEASED
+        _read_numbers(f"answers.{name}", answers.get(name), n, gaps=True)
+        for name in _OF_RELEASED
     )
     return ReleasedAnswer(engine, setting, theta, omega, energy, terms)

@@ -4,7 +4,6 @@ The results are the same whatever the number of processes. A task has some items
 each item a limit of time. A worker that dies or hangs costs the item that it was at.
 """
 
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
@@ -37,16 +36,10 @@ A worker that is killed while it reads or writes there leaves the pipe locked fo
 the others then wait twice as long, and the run ends and can be resumed. A message takes
 milliseconds.
 """
-_ENDED_BY_PEBBLE = ("Task timeout",)
-"""First argument of the TimeoutError of an item that took too long. One that an item
-raises itself has another.
-"""
 Task = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
 """Do one item by itself: its result, or the exception that it ended with."""
-_Submitted = tuple["Future[Any]", float]
-"""An item's future, and when the item was handed in by the monotonic clock, s."""
 _Instead = Callable[[Any, BaseException, Attempt], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
 
@@ -79,35 +72,31 @@ class _PoolOfItems:
     seconds: float | None
     instead: _Instead
 
-    def submit(self, item: Any) -> _Submitted:
+    def submit(self, item: Any) -> "Future[Any]":
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
             with hold_interruption():
-                future = self.pool.schedule(
+                future: Future[Any] = self.pool.schedule(
                     self.function, args=(item,), timeout=self.seconds
                 )
         except RuntimeError:
             raise _lost_workers() from None
-        return future, time.monotonic()
+        return future
 
     def attempt(self, item: Any) -> Any:
         """Do one item: its result, or the exception that it ended with."""
-        return self.outcome(item, *self.submit(item))
+        return self.outcome(item, self.submit(item))
 
-    def outcome(self, item: Any, future: "Future[Any]", since: float) -> Any:
+    def outcome(self, item: Any, future: "Future[Any]") -> Any:
         """Return an item's result, or the exception that it ended with.
 
         A worker may have been killed from outside, for example where memory ran out.
         Its item is tried once more, and then it is held to have killed the worker.
-        Pebble measures the limit of time by the clock on the wall, which jumps when a
-        machine sleeps: an item that was ended too soon is tried again.
         """
         from pebble import ProcessExpired
 
-        while self._is_too_soon(future.exception(), since):
-            future, _ = self.submit(item)
         if isinstance(future.exception(), ProcessExpired):
-            future, _ = self.submit(item)
+            future = self.submit(item)
         error = future.exception()
         if isinstance(error, BrokenProcessPool):
             raise _lost_workers()
@@ -115,16 +104,8 @@ class _PoolOfItems:
             raise error
         return future.result() if error is None else error
 
-    def _is_too_soon(self, error: BaseException | None, since: float) -> bool:
-        return (
-            self.seconds is not None
-            and isinstance(error, TimeoutError)
-            and error.args[:1] == _ENDED_BY_PEBBLE
-            and time.monotonic() - since < self.seconds
-        )
-
     def finish(
-        self, number: int, items: Sequence[Any], waiting: Sequence[_Submitted]
+        self, number: int, items: Sequence[Any], waiting: Sequence["Future[Any]"]
     ) -> tuple[int, list[Any]]:
         """Return a task's number and the results of its items in order.
 
@@ -132,7 +113,7 @@ class _PoolOfItems:
         """
         results = []
         for item, submitted in zip(items, waiting, strict=True):
-            result = self.outcome(item, *submitted)
+            result = self.outcome(item, submitted)
             if isinstance(result, BaseException):
                 result = self.instead(item, result, self.attempt)
             results.append(result)
@@ -193,7 +174,7 @@ def apply_over_processes(
         initargs=[function],
     ) as pool:
         items_of = _PoolOfItems(pool, function, seconds, instead)
-        in_flight: deque[tuple[int, Sequence[Any], list[_Submitted]]] = deque()
+        in_flight: deque[tuple[int, Sequence[Any], list[Future[Any]]]] = deque()
         try:
             for number, items in tasks:
                 waiting = [items_of.submit(item) for item in items]

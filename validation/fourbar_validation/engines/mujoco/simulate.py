@@ -1,6 +1,5 @@
 """MuJoCo simulates the closed loop of the generated MJCF, driven through the sweep."""
 
-import math
 import time
 from collections.abc import Container
 from dataclasses import dataclass, replace
@@ -10,11 +9,9 @@ import numpy as np
 
 from fourbar.effects import PointDrive
 from fourbar.errors import InputError, LimitError
-from fourbar.linkage import FourBar
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import compute_mass_ratio
 from fourbar.mjcf.model import CYLINDER, unwind
-from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar_validation.compare.answer import Answer
@@ -60,10 +57,6 @@ COMPUTED_BY_MUJOCO = (
 )
 LONGEST_STEP_OF_A_CHECK = np.radians(2.0)
 """Greatest step between positions at which the loop is tried for closure, rad."""
-COLLINEAR = 1e-9
-"""Part of the sum of the lengths, and of half a turn, that counts as none. The time
-step itself resolves no less.
-"""
 _OF_TENDON = ("stroke", "stroke_speed")
 """Quantities of a cylinder that MuJoCo has."""
 _RESIDUALS = (
@@ -146,30 +139,6 @@ def _require_run(course: RunCourse) -> None:
     scene = course.scene
     if reason := find_exceeded(scene, abs(scene.motion.omega_2 or 0.0)):
         raise LimitError(reason)
-    if _passes_change_point(scene.linkage, theta_2):
-        raise LimitError(
-            "the sweep meets a change point, where all bars are collinear and MuJoCo's"
-            " closure loses a direction"
-        )
-
-
-def _passes_change_point(linkage: FourBar, theta_2: Array) -> bool:
-    """Return whether all four bars become collinear within the sweep.
-
-    At such a position +-a +-b +-c = d.
-    """
-    d, a, b, c = linkage.lengths
-    least = float(theta_2.min()) - linkage.ground_angle
-    most = float(theta_2.max()) - linkage.ground_angle
-    for half_turn in range(
-        math.ceil(least / math.pi - COLLINEAR),
-        math.floor(most / math.pi + COLLINEAR) + 1,
-    ):
-        diagonal = abs(d - a if half_turn % 2 == 0 else d + a)
-        missed = min(abs(diagonal - abs(b - c)), abs(diagonal - (b + c)))
-        if missed <= COLLINEAR * (a + b + c + d):
-            return True
-    return False
 
 
 class _Simulation:
