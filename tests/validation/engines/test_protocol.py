@@ -249,6 +249,11 @@ def test_what_an_answer_leaves_out_has_defaults():
     assert read_answer({"answers": echoed}).assembled.all()
     with raises(EngineError, match="no licence"):
         read_answer({"error": "no licence"})
+    faster = {"theta_2": [0, 1, 2], "omega_2": 1.01}
+    assert read_answer({"answers": {}, "at": faster}).at.speed == 1.01
+    half = [[1, 2], [3, "y"], None]
+    with raises(InputError, match="F12, entry 1 = 'y'"):
+        read_answer({"answers": {"F12": half}})
 
 
 READ = {
@@ -277,6 +282,7 @@ command | {"theta_2": [1.0], "theta_3": [1.0]}
 command | {"theta_2": [true]}
 command | {"theta_2": ["1"]}
 command | {"theta_2": [NaN]}
+command | {"theta_2": [null]}
 command | {"theta_2": [1.0], "omega_2": [1.0, 2.0]}
 command | {"theta_2": [1.0], "omega_2": "fast"}
 command | {"theta_2": [1.0], "branch": 0}

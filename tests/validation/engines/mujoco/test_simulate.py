@@ -138,6 +138,7 @@ def test_a_change_point_is_a_declared_limit():
     for lengths, refused in (
         ((0.3, 0.1, 0.3, 0.1), True),
         ((0.1, 0.1, 0.25, 0.25), True),
+        ((0.4, 0.1, 0.25, 0.25 - 1e-10), True),
         ((0.3, 0.1, 0.3, 0.11), False),
     ):
         posed = fourbar.Scene(fourbar.uniform(*lengths), motion)
