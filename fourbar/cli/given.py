@@ -299,12 +299,11 @@ def take_motion(scene: Scene, text: str) -> Scene:
         allowed = "needs a scene whose motion commands an angle"
         raise InputError("--positions", text, allowed)
     file, name, sign, added = match.groups()
-    added = added or "0 deg"
+    added = f"{sign}{added}" if added else "0 deg"
     require_unit("--positions", text, added, "deg")
-    offset = read_number("--positions", added, "rad")
     first = load(file)
     moved = solve(first, find_last_stage(first))
-    angle = getattr(moved, name) + (-offset if sign == "-" else offset)
+    angle = getattr(moved, name) + read_number("--positions", added, "rad")
     speed, acceleration = (
         getattr(moved, name.replace("theta", rate)) for rate in ("omega", "alpha")
     )

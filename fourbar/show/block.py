@@ -442,8 +442,8 @@ class SceneBlock(Facts):
             yield _row(name, self._write_held(self.drive.unit))
         if (start := self.motion.start) is not None:
             value = self._value(start.value, self.drive.unit)
-            row = f"{value} at {self._place(start.place)}, against dry friction"
-            yield _row("to start", row)
+            place = self._place(start.place)
+            yield _row("to start", f"{value} at {place}, against dry friction")
         yield from self._write_stroke()
         yield from self._write_power()
         if self.pressure is not None and self.stroke_range is not None:
@@ -691,8 +691,8 @@ class SceneBlock(Facts):
 
         The list is empty where dry friction does not hold the linkage, or adds nothing.
         """
-        moves = np.any(self.solution.at.speed)
-        if self.drive is None or moves or not (self.held or self.motion.start):
+        rests = self.drive is not None and not np.any(self.solution.at.speed)
+        if not rests or not (self.held or self.motion.start):
             return []
         from_rest = self.motion.from_rest
         has_value = self.motion.panels.has_value

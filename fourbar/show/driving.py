@@ -1,9 +1,8 @@
 """What drives a linkage, and whether its motion closes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.formulas.path import count_turns
 from fourbar.linkage import BAR_NAMES
@@ -54,7 +53,7 @@ def read_drive_demand(solution: Solution) -> Driving:
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
-def find_held(solution: Solution) -> tuple[NDArray[np.intp], Array]:
+def find_held(solution: Solution) -> tuple[Any, Array]:
     """Find the rows in which dry friction holds a pin, and where a motion starts.
 
     At rest with an acceleration nothing is held: the sense is that of the start,
@@ -62,7 +61,7 @@ def find_held(solution: Solution) -> tuple[NDArray[np.intp], Array]:
     """
     low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
     if low is None:
-        return np.zeros(0, dtype=np.intp), np.zeros(0)
+        return [], np.zeros(0)
     held = np.isfinite(high - low) & (low < high)
     at_rest = held & (solution.at.speed == 0.0)
     senses = at_rest * np.sign(solution.at.acceleration)

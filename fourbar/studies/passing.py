@@ -64,8 +64,9 @@ def find_positions(scene: Scene, name: str, value: float) -> Command:
             places.append(place)
     if not places:
         # of the range that the scene's own motion is in
-        first = float(command(scene).angle[0])
-        places_of_range = default_places(scene, first, INSIDE_LIMIT)
+        places_of_range = default_places(
+            scene, float(command(scene).angle[0]), INSIDE_LIMIT
+        )
         whole = solve(scene, "position", at=command_at(scene, places_of_range))
         values = getattr(whole, name)
         low = _write_position(name, float(np.nanmin(values)), _GRID_DIGITS)

@@ -262,7 +262,10 @@ def list_demand(view: View) -> Chart:
     chart = _list_drive(view, drive.keys.value, drive.symbol[0], drive.unit, what)
     for end, label in zip(drive.keys[2:], ("begins to move", "_"), strict=True):
         held = getattr(view.sweep, end)
-        if held is not None and np.any(apart := held != drive.values):
+        if held is None:
+            break
+        apart = np.abs(held - drive.values) > 0.0
+        if np.any(apart[1:] & apart[:-1]):  # one position alone is no line
             look = {"color": MUTED, "ls": "--", "label": label}
             chart.curves.append(Curve(end, np.where(apart, held, np.nan), look))
     return chart

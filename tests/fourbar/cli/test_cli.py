@@ -616,7 +616,7 @@ analyze @crank_rocker | did you mean "
 analyze @drag_link.toml --positions @crank_rocker.toml | must be a file and an angle
 analyze @drag_link.toml --positions @crank_rocker.toml:theta_5 | must be a file and an
 analyze @drag_link.toml --positions '@crank_rocker.toml:theta_4 + 3 mm' | convert to rad
-analyze @drag_link.toml --positions '@crank_rocker.toml:theta_4 - 40' | mean "40 deg"?
+analyze @drag_link.toml --positions '@crank_rocker.toml:theta_4 - 40' | mean "-40 deg"?
 analyze @drag_link.toml --positions none.toml:theta_4 | none.toml
 """)
 """Command lines, and words of the line that refuses them; @ stands for the models."""
