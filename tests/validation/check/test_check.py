@@ -192,7 +192,7 @@ def test_blank_cells_are_counted_and_the_rest_of_their_row_is_judged(read):
 def test_whole_degrees_are_positions_that_somebody_chose(angle, half, read):
     """Zeros may be left off: a column has the decimals of its longest number."""
     table = read(f"theta_2 [deg],torque\n10,1.0\n{angle},1.0\n")
-    assert table.places_rounding == approx(np.radians(half), rel=1e-9)
+    assert table.find_half(table.place) == approx(np.radians(half), rel=1e-9)
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.1])
@@ -739,8 +739,7 @@ def test_the_table_of_another_scene_is_explained(words, read):
     name = scene.motion.commanded if scene.motion.law is None else "time"
     at = solve(scene)[name]
     text = tabulate({name: at, "F12_x": numbers.F12[:, 0], "F14_y": numbers.F14[:, 1]})
-    motion = {"commanded": scene.motion.commanded, "law": scene.motion.law}
-    judgement = Judgement(scene, read(text, **motion))
+    judgement = Judgement(scene, read(text, commanded=scene.motion.commanded))
     first, *more = (one.text for one in judgement.explanations)
     assert first == words and not any("of two bars" in text for text in more)
 

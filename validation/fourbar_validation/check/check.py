@@ -29,7 +29,6 @@ from fourbar_validation.check.judge_table import (
     Judge,
 )
 from fourbar_validation.check.mistakes import Explanation, explain
-from fourbar_validation.check.row_commands import find_steady
 from fourbar_validation.check.theirs import read_table
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.compare.tolerance import EPS
@@ -314,9 +313,7 @@ def check_command(
         return check_problem(scene, theirs)
     stated = load(scene)
     points = list_names_of_points(stated)
-    motion = stated.motion
-    law = motion.law or find_steady(stated)
-    table = read_table(theirs, motion.commanded, points, law)
+    table = read_table(theirs, stated.motion.commanded, points)
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)

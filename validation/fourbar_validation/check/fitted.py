@@ -333,7 +333,7 @@ def _list_commands(
             yield _Family((1.0,), partial(_hasten, scene, at, field, rate))
     law, times = judge.scene.motion.law, judge.table.times
     if law is not None and times is not None:
-        yield _Family((0.0,), partial(_delay, scene, at, law, times[:, 0]))
+        yield _Family((0.0,), partial(_delay, scene, at, law, times.values))
     if at.moves_stroke:
         return
     n = len(at.angle)

@@ -345,7 +345,7 @@ class Judge:
             if not (rows.by_time and why == NOT_JUDGED["time"])
         }
         table = replace(table, columns=columns, left_out=left_out)
-        if self.at.moves_stroke:
+        if self.at.moves_stroke or table.found_by == "time":
             place = table.place._replace(values=self.at.angle)
             table = replace(table, place=place, found_by=f"theta_{self.at.bar}")
         self.table = table

@@ -16,7 +16,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import compute_times
 from fourbar.solving import solve
-from fourbar_validation.check.theirs import Steady, TheirTable, fill_zeros
+from fourbar_validation.check.theirs import TheirTable
 from fourbar_validation.compare.tolerance import EPS, wrap_difference
 
 _AS_PRINTED = 4.0 * EPS
@@ -47,13 +47,43 @@ class RowCommands(NamedTuple):
     """True if the rates are those of a law at the times of the rows."""
 
 
-def find_steady(scene: Scene) -> Steady | None:
-    """Return the motion of a scene whose positions have times at one speed."""
-    at = command(scene)
-    times = compute_times(scene, at)
-    if times is None:
-        return None
-    return Steady(at.places[np.argmin(times)], np.ravel(at.stated[1])[0])
+def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
+    """Command the law, or the one speed of the scene, at the times of the rows.
+
+    Raises InputError for a time that the law does not have.
+    """
+    law: Any = scene.motion.law
+    if law is not None:
+        first, *_, last = law.time
+    elif (starts := compute_times(scene, base)) is not None:
+        first, last = -math.inf, math.inf
+        places, *rates = base.stated
+        start = places[np.argmin(starts)]
+    else:
+        wanted = f"needs a column {base.commanded}: the scene has no motion over time"
+        raise InputError("table", "time", wanted)
+    printed = table.places
+    beyond = np.abs(printed - np.clip(printed, first, last)) > table.place.rounding
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        wanted = f"the law lasts from {first:g} to {last:g} s"
+        raise InputError(f"line {table.lines[row]}, time", printed[row], wanted)
+
+    def command_at(shift: Array | float) -> Command:
+        time = np.clip(printed + shift, first, last)
+        if law is None:
+            place, speed, acceleration = start + np.ravel(rates[0])[0] * time, *rates
+        else:
+            place, speed, acceleration = law.at(time)
+        if scene.motion.stroke is not None:
+            return command(replace(scene, motion=scene.motion.replace(angle=place)))
+        at = _command_each(base, place, scene)
+        return at._replace(speed=speed, acceleration=acceleration)
+
+    # zeros at the ends of times may be left off
+    filled = table.place._replace(rounding=table.place.filled)
+    near = _command_beside(replace(table, place=filled), command_at)
+    return RowCommands(command_at(0.0), near, by_time=True)
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
@@ -68,7 +98,7 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     angle that the motion passes at several positions.
     """
     base = command(scene)
-    if scene.motion.stroke is not None:
+    if scene.motion.stroke is not None and table.found_by != "time":
         return _find_strokes(scene, table, base)
     if scene.motion.free is not None:
         allowed = (
@@ -76,13 +106,10 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
             " its own omega_2"
         )
         raise InputError("motion.free", None, allowed)
+    if table.found_by == "time":
+        return _find_by_time(scene, table, base)
     commanded = table.found_by == base.commanded
-    if not commanded:
-        same = _has_positions_of(scene, table)
-    elif base.angle.shape != table.places.shape:
-        same = False
-    else:
-        same = np.allclose(base.angle, table.places, rtol=_AS_PRINTED, atol=0.0)
+    same = _has_positions_of(scene, table, base)
     varies = scene.motion.law is not None or scene.motion.has_rate_of_each
     if varies and not same and commanded:
         along = _follow_law(scene, table, base)
@@ -133,7 +160,7 @@ def _command_beside(
     command_at: Callable[[Array], Command],
 ) -> tuple[Command, ...]:
     """Command the rows at both ends of the rounding of their places."""
-    rounding = table.places_rounding
+    rounding = table.find_half(table.place)
     if not rounding.any():
         return ()
     return command_at(-rounding), command_at(rounding)
@@ -142,7 +169,7 @@ def _command_beside(
 def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
     """Command the stroke of each row, or the scene's own if the angles are theirs."""
     if table.found_by != base.commanded:
-        if _has_positions_of(scene, table):
+        if _has_positions_of(scene, table, base):
             return RowCommands(base)
         why = "a table at other positions than the scene's own needs a column stroke"
         raise InputError("motion.stroke", None, why)
@@ -199,7 +226,7 @@ def _follow_law(
     if law is None or table.times is None:
         return None
     first, *_, last = law.time
-    printed, half = table.times.T
+    printed, half, filled, _ = table.times
     stated = np.clip(printed, first, last)
     rounding = table.place.rounding
     rounding = rounding + _AS_PRINTED * (1.0 + np.abs(table.places))
@@ -219,7 +246,7 @@ def _follow_law(
 
     fits_stated = np.abs(measure(stated)) <= rounding + _ONE_PLACE
     # zeros at the end of a time that fits may be left off; start and end are exact
-    half = np.where(fits_stated, fill_zeros(printed, half), half)
+    half = np.where(fits_stated, filled, half)
     half = np.where(fits_stated & np.isin(printed, (first, last)), 0.0, half)
     ends = [np.clip(printed + side, first, last) for side in (-half, half)]
     nearest, several = _find_root(measure, ends[0], ends[1], stated, _TIMES_TRIED)
@@ -312,11 +339,15 @@ def _find_own_positions(base: Command, table: TheirTable) -> Array | None:
     return nearest if rounds.all() and by_chance < _BY_CHANCE else None
 
 
-def _has_positions_of(scene: Scene, table: TheirTable) -> bool:
+def _has_positions_of(scene: Scene, table: TheirTable, base: Command) -> bool:
     """Return whether the rows are the scene's own positions, as they are printed."""
-    angles = getattr(solve(scene, "position"), table.found_by)
+    angles = base.angle
+    if table.found_by != base.commanded:
+        angles = getattr(solve(scene, "position"), table.found_by)
     if angles.shape != table.places.shape:
         return False
+    if angles is base.angle:
+        return np.allclose(angles, table.places, rtol=_AS_PRINTED, atol=0.0)
     apart = np.abs(wrap_difference(angles - table.places))
     return bool(np.all(apart <= table.place.rounding + _ONE_PLACE))
 

@@ -18,7 +18,7 @@ import io
 import math
 import re
 from collections.abc import Collection
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
@@ -28,7 +28,6 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
-from fourbar.scene.motion import Law, Rise, Sine
 from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
 from fourbar_validation.check.csv_columns import GROWING
@@ -130,24 +129,6 @@ stand between bars.
 """
 
 
-class Steady(NamedTuple):
-    """A motion at one speed, with the methods of a law that rows need."""
-
-    start: float
-    """What is commanded at time 0."""
-    speed: float
-    time: tuple[float, float] = (-math.inf, math.inf)
-    """It lasts for ever."""
-
-    def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """Compute what is commanded, its speed and acceleration at times, each (n,)."""
-        zero = np.zeros_like(time)
-        return self.start + self.speed * time, zero + self.speed, zero
-
-
-_OverTime = Law | Rise | Sine | Steady
-
-
 @dataclass(frozen=True, slots=True)
 class Unit:
     """Unit of the numbers of a column."""
@@ -189,15 +170,10 @@ class TheirTable:
     """Sentences on how the table was read where it does not say so itself."""
     found_by: str = "theta_2"
     """Name of the angle by which rows are found."""
-    times: Array | None = None
-    """Time of each row and half a unit of its last digit, s, (n, 2)."""
+    times: TheirColumn | None = None
+    """Time of each row; None if it is not known of all."""
     is_rounded: bool = False
     """True to take no place, speed or acceleration for one that somebody chose."""
-
-    @property
-    def places_rounding(self) -> Array:
-        """Return half a unit of the last digit of each angle, rad, (n,), or 0."""
-        return self.find_half(self.place)
 
     def find_half(self, column: TheirColumn) -> Array:
         """Find half a unit of the last digit of each place or rate of a row.
@@ -237,34 +213,19 @@ def name_quantity(key: str) -> str:
     return key.strip("|")
 
 
-class _Heading(NamedTuple):
-    """What a heading means."""
-
-    name: str
-    """Quantity, or the component of one; |name| for the magnitudes of a vector."""
-    unit: Unit | None = None
-    """Unit of its numbers; None if they are not read."""
-    why: str = ""
-    """Reason for which it is not judged."""
-
-
 def read_table(
-    path: Path,
-    commanded: str = "theta_2",
-    points: Collection[str] = (),
-    law: _OverTime | None = None,
+    path: Path, commanded: str = "theta_2", points: Collection[str] = ()
 ) -> TheirTable:
     """Read a CSV table; InputError names the column or line that cannot be read.
 
     `commanded`: name of the angle that the scene commands. Rows are found by it, or by
-    another bar's angle where the table does not have it. Without an angle they are
-    found by their time, along the scene's law or at its one speed.
+    another bar's angle where the table does not have it, or else by their time.
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
     text = read_text(path, "table", LARGEST_TABLE_FILE)
     try:
-        return _read_columns(*_read_lines(text, path.name), commanded, points, law)
+        return _read_columns(*_read_lines(text, path.name), commanded, points)
     except InputError as error:
         raise error.in_file(str(path)) from None
 
@@ -275,149 +236,112 @@ def _read_columns(
     rows: list[tuple[int, list[str]]],
     commanded: str,
     points: Collection[str],
-    law: _OverTime | None,
 ) -> TheirTable:
     """Read the columns of the rows of a table, each a line number and its cells."""
-    columns, left_out = _read_headings(headings, unit_line, commanded, points)
-    times = _read_times(columns, rows)
-    indices: dict[str, int] = {}
-    for index, read in columns.items():
-        if (first := indices.setdefault(read.name, index)) != index:
-            both = f"columns {first + 1} and {index + 1} are both {read.name}"
-            raise InputError("header", headings, f"{both}: rename or remove one")
-    lines = [line for line, _ in rows]
-    found_by = next((name for name in (commanded, *_PLACES) if name in indices), None)
-    place = None
-    if found_by is None and law is not None and times is not None:
-        found_by = commanded
-        place = _follow(law, times, lines)
-        left_out = {
-            name: why for name, why in left_out.items() if why != NOT_JUDGED["time"]
-        }
-    if found_by is None:
+    found, left_out = _find_columns(headings, unit_line, commanded, points)
+    names = (commanded, *_PLACES, "time")
+    found_by = next(filter(found.__contains__, names), "")
+    if not found_by:
         raise InputError(
             "header",
             headings,
             f"needs a column {commanded} (say {commanded} [deg] for degrees), or the"
             f" angle of another bar; {_KNOWN}",
         )
-    numbers = _read_numbers(columns, headings, rows)
+    _require_cells(len(headings), rows)
+    numbers = {}
+    for name, (index, unit) in found.items():
+        with suppress(InputError) if name == "time" != found_by else nullcontext():
+            numbers[name] = _read_numbers(name, headings[index], unit, index, rows)
+    times = numbers.pop("time", None)
+    place = times if found_by == "time" else numbers.pop(found_by)
+    assert place is not None
+    missing = np.isnan(place.values)
+    if missing.any():
+        line, cells = rows[int(np.argmax(missing))]
+        raise InputError(f"line {line}", cells, f"needs a {found_by}")
+    if times is not None and np.isnan(times.values).any():
+        times = None
     notes: tuple[str, ...] = ()
-    if place is None:
-        index = indices[found_by]
-        del columns[index]
-        place = numbers.pop(index)
-        missing = np.isnan(place.values)
-        if missing.any():
-            line, cells = rows[int(np.argmax(missing))]
-            raise InputError(f"line {line}", cells, f"needs a {found_by}")
-        if place.unit.text == "rad" and not re.search(r"[\[(]", headings[index]):
-            place, notes = _read_degrees(found_by, place)
+    if place.unit.text == "rad" and not re.search(
+        r"[\[(]", headings[found[found_by][0]]
+    ):
+        place, notes = _read_degrees(found_by, place)
     read_columns: dict[str, TheirColumn] = {}
     blank = {}
-    for index, column in numbers.items():
+    for name, column in numbers.items():
         if np.isnan(column.values).all():
-            blank[headings[index]] = _BLANK
+            blank[headings[found[name][0]]] = _BLANK
         else:
-            _enter_column(read_columns, columns[index].name, column)
+            _enter_column(read_columns, name, column)
     if not read_columns:
-        stated = " in place of blank cells" * bool(blank)
-        raise InputError("header", headings, f"needs a result{stated}; {_KNOWN}")
-    return TheirTable(
-        place,
-        read_columns,
-        lines,
-        left_out | blank,
-        notes,
-        found_by,
-        times,
-    )
+        wanted = " in place of blank cells" * bool(blank)
+        raise InputError("header", headings, f"needs a result{wanted}; {_KNOWN}")
+    lines = [line for line, _ in rows]
+    left_out |= blank
+    return TheirTable(place, read_columns, lines, left_out, notes, found_by, times)
 
 
-def _read_headings(
+def _find_columns(
     headings: list[str],
     unit_line: list[str],
     commanded: str,
     points: Collection[str],
-) -> tuple[dict[int, _Heading], dict[str, str]]:
-    """Return the columns that are read, and why others are left out."""
-    columns: dict[int, _Heading] = {}
+) -> tuple[dict[str, tuple[int, Unit]], dict[str, str]]:
+    """Return place and unit of the columns that are read, and why others are not."""
     left_out: dict[str, str] = {}
+    found: dict[str, tuple[int, Unit]] = {}
     for index, heading in enumerate(headings):
-        unit = "".join(unit_line[index : index + 1]).strip(" []()")
-        read = _read_heading(heading, unit, commanded, points)
-        if not read.name and index == len(headings) - 1:
+        stated = "".join(unit_line[index : index + 1]).strip(" []()")
+        name, unit, why = _read_heading(heading, stated, commanded, points)
+        if not name and index == len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
-        if read.why:
-            left_out[heading.strip() or f"column {index + 1}"] = read.why
-        if read.unit is not None:
-            columns[index] = read
-    return columns, left_out
+        if why:
+            left_out[heading.strip() or f"column {index + 1}"] = why
+        if unit is None:
+            continue
+        if name in found:
+            both = f"columns {found[name][0] + 1} and {index + 1} are both {name}"
+            raise InputError("header", headings, f"{both}: rename or remove one")
+        found[name] = index, unit
+    return found, left_out
 
 
-def _read_times(
-    columns: dict[int, _Heading],
-    rows: list[tuple[int, list[str]]],
-) -> Array | None:
-    """Take the times out of the columns; None if they are not all numbers."""
-    of_time = [index for index, column in columns.items() if column.name == "time"]
-    units = [columns.pop(index).unit for index in of_time]
-    with suppress(InputError, IndexError):
-        times = np.array([_read_cell(cells[of_time[0]]) for _, cells in rows])
-        if units[0] is not None and np.isfinite(times).all():
-            return times * units[0].factor
-    return None
-
-
-def _follow(law: _OverTime, times: Array, lines: list[int]) -> TheirColumn:
-    """Return the law's angle at each time, and what the rounding of the time moves it.
-
-    Raises InputError for a time that the law does not have.
-    """
-    printed, half = times.T
-    first, *_, last = law.time
-    inside = np.clip(printed, first, last)
-    beyond = np.abs(printed - inside) > half
-    if beyond.any():
-        row = int(np.argmax(beyond))
-        wanted = f"the law lasts from {first:g} to {last:g} s"
-        raise InputError(f"line {lines[row]}, time", printed[row], wanted)
-    angle, speed, _ = law.at(inside)
-    moved = np.abs(speed) * _find_rounding(half, Unit("s", 1.0))
-    return TheirColumn(angle, moved, moved, Unit("rad", 1.0))
-
-
-def _read_numbers(
-    columns: dict[int, _Heading],
-    headings: list[str],
-    rows: list[tuple[int, list[str]]],
-) -> dict[int, TheirColumn]:
-    """Read the cells of the columns, by their places in a row."""
-    numbers = np.empty((len(headings), 2, len(rows)))
-    for row, (line, cells) in enumerate(rows):
-        more = cells[len(headings) :]
-        if len(cells) < len(headings) or "".join(more).strip():
-            allowed = f"needs {len(headings)} cells"
+def _require_cells(count: int, rows: list[tuple[int, list[str]]]) -> None:
+    """Raise InputError for a row with fewer cells, or with more that are not blank."""
+    for line, cells in rows:
+        more = cells[count:]
+        if len(cells) < count or "".join(more).strip():
+            allowed = f"needs {count} cells"
             if more:
                 allowed += "; with decimal commas, semicolons between them"
             raise InputError(f"line {line}", cells, allowed)
-        for index in columns:
-            try:
-                numbers[index, :, row] = _read_cell(cells[index])
-            except InputError as error:
-                place = f"line {line}, {headings[index].strip()}"
-                raise error.moved_to(place, None) from None
-    read = {}
-    for index, (name, unit, *_) in columns.items():
-        assert unit is not None
-        values, half = numbers[index]
-        if name.endswith(("_x", "_y")) and headings[index].strip()[:3] in _REACTIONS:
-            values = -values
-        half = np.where(np.isnan(values), 0.0, half)
-        filled = unit.factor * fill_zeros(values, half)
-        factor = unit.factor
-        read[index] = TheirColumn(values * factor, half * factor, filled, unit)
-    return read
+
+
+def _read_numbers(
+    name: str,
+    heading: str,
+    unit: Unit,
+    index: int,
+    rows: list[tuple[int, list[str]]],
+) -> TheirColumn:
+    """Read the cells of a column, at a place in each row."""
+    numbers = np.empty((len(rows), 2))
+    for row, (line, cells) in enumerate(rows):
+        try:
+            numbers[row] = _read_cell(cells[index])
+        except InputError as error:
+            place = f"line {line}, {heading.strip()}"
+            raise error.moved_to(place, None) from None
+    values, half = numbers.T
+    if name.endswith(("_x", "_y")) and heading.strip()[:3] in _REACTIONS:
+        values = -values
+    half = np.where(np.isnan(values), 0.0, half)
+    factor = unit.factor
+    filled = factor * fill_zeros(values, half)
+    if name == "time":
+        unit = Unit("s", 1.0)
+    return TheirColumn(values * factor, half * factor, filled, unit)
 
 
 def _read_degrees(
@@ -577,8 +501,13 @@ def _read_heading(
     unit: str,
     commanded: str,
     points: Collection[str],
-) -> _Heading:
-    """Find what a heading means, in any letters; `unit`: stated in another line."""
+) -> tuple[str, Unit | None, str]:
+    """Find what a heading means, in any letters; `unit`: stated in another line.
+
+    Returned are the quantity, or the component of one, |name| for the magnitudes of a
+    vector; the unit of its numbers, None if they are not read; and the reason for which
+    it is not judged.
+    """
     from fourbar.quantities.units import converts
 
     plain = heading.strip()
@@ -598,16 +527,16 @@ def _read_heading(
             break
     vector = _name_vector(name, points)
     quantity = vector or name
-    if match is None or quantity in NOT_JUDGED or not _is_known(name, points):
-        if quantity in NOT_JUDGED:
-            known = None
-            if quantity == "time":
-                with suppress(InputError):
-                    known = _read_unit(heading, quantity, unit)
-            return _Heading(name, known, NOT_JUDGED[quantity])
-        return _Heading(name, None, f"not a known column: {_KNOWN}")
+    if quantity in NOT_JUDGED:
+        known = None
+        if quantity == "time":
+            with suppress(InputError):
+                known = _read_unit(heading, quantity, unit)
+        return name, known, NOT_JUDGED[quantity]
+    if match is None or not _is_known(name, points):
+        return name, None, f"not a known column: {_KNOWN}"
     key = f"|{name}|" if name == vector else name
-    return _Heading(key, _read_unit(heading, quantity, unit))
+    return key, _read_unit(heading, quantity, unit), ""
 
 
 def _read_unit(heading: str, quantity: str, text: str) -> Unit:
