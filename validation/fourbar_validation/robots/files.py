@@ -20,6 +20,7 @@ _DROPPED = r"<!--.*?-->|<\?.*?\?>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
 """Comments, declarations and control characters, which MuJoCo's reader lets stand
 anywhere.
 """
+_PREFIX = r"[<\s](?!xml)([a-zA-Z]\w*):"
 _NO_ENTITY = r"&(?!(?:#\d+|#x[\da-fA-F]+|amp|lt|gt|quot|apos);)"
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 _KINDS = {"mujoco": "MJCF", "sdf": "SDF", "robot": "URDF"}
@@ -108,7 +109,7 @@ def mend_text(text: str) -> str:
         text,
     )
     text = re.sub(_NO_ENTITY, "&amp;", text)
-    used, bound = (set(re.findall(one, text)) for one in (r"<(\w+):", r"xmlns:(\w+)"))
+    used, bound = (set(re.findall(one, text)) for one in (_PREFIX, r"xmlns:(\w+)"))
     spaces = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(used - bound))
     return re.sub(r"<\w+", rf"\g<0>{spaces}", text, count=1)
 

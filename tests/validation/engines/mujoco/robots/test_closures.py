@@ -292,6 +292,9 @@ def test_a_body_that_floats_between_two_pins_is_told_its_hinge():
     assert closure_of(spatial).reason == (
         f"free floats freely on 3 pins: several loops in one ({served})"
     )
+    universal = '<joint axis="1 0 0"/><joint axis="0 1 0"/><joint type="slide" '
+    legs = spatial.replace("<joint ", universal)
+    assert "on 3 pins: several loops in one" in closure_of(legs).reason
     hinge = '<joint name="j3" axis="0 1 0" pos="-.4 0 0"/>'
     typed = TOP.format(pos=".9 0 .3", joint=hinge)
     loop = loop_of(FLOATING.format(inside=typed, outside="", pin=""))
@@ -582,6 +585,7 @@ def test_a_slide_beside_four_pins_is_to_be_held(cut, by):
     guided = planar.text().replace('"O4" axis="0 0 1"', '"O4" type="slide"')
     coaxial = replace(planar, pins={**planar.pins, "O4": planar.pins["O2"]})
     coaxial = coaxial.text().replace(hinge, slide + hinge)
-    for other in (skew, guided, coaxial):
+    for other in (guided, coaxial):
         reason = closure_of(other).reason
         assert "is a slide" in reason and "--hold" not in reason
+    assert "5.71 deg apart: the loop is spatial" in closure_of(skew).reason

@@ -382,7 +382,8 @@ class _Finder:
         if [*chain.others.values()] == [BALL] and is_four and not is_skew:
             yield self._explain_ball(chain)
         for joint, kind in chain.others.items():
-            yield f"{name_joint(model, joint)} {self._explain_joint(chain, kind)}"
+            if kind != SLIDE or not is_skew:  # a slider-crank lies in a plane
+                yield f"{name_joint(model, joint)} {self._explain_joint(chain, kind)}"
         if angle is not None and is_skew:
             spatial = f"the loop is spatial ({_SERVE_SPATIAL})"
             places = self.data.xanchor[chain.hinges].round(6)
@@ -451,7 +452,8 @@ class _Finder:
         pins are loops of another kind, and the text is empty without a second one.
         """
         model = self.model
-        floating = {int(model.jnt_bodyid[joint]) for joint in chain.others}
+        free = [joint for joint, kind in chain.others.items() if kind == FREE_JOINT]
+        floating = {int(model.jnt_bodyid[joint]) for joint in free}
         pins = [
             one
             for one in self.chains.values()
