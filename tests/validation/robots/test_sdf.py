@@ -307,6 +307,9 @@ LOOP_JOINT = (
     f'<loop_joint name="B" type="spherical"><link1 link="rod" xyz="{B} 0 0" rpy="0 0 0"'
     f'/><link2 link="rocker" xyz="{C} 0 0" rpy="0 0 0"/></loop_joint>'
 )
+STATED["a prefix that nothing binds"] = put(
+    ('<model name="linkage">', '<model name="linkage" gz:kind="12:30 a:b">')
+)
 STATED["loop joint of a URDF"] = write_urdf(LOOP_JOINT)
 STATED["ball constraint of a URDF"] = write_urdf(
     '<drake:ball_constraint><drake:ball_constraint_body_A name="rod"/>'
