@@ -619,8 +619,11 @@ def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path):
 
 def test_what_stands_and_what_floats(tmp_path):
     alone = "<model name='{}'>{}<link name='part'/></model>"
-    shelf = alone.format("shelf", f"<static>1</static>{alone.format('board', '')}")
-    models = shelf + alone.format("ball", "")
+    hinge = "<joint name='j' type='revolute'><parent>part</parent><child>{}</child>"
+    idle = f"{hinge}{AXIS}</joint>"  # among what stands, and of a link on itself
+    board = alone.format("board", "") + idle.format("board::part")
+    shelf = alone.format("shelf", f"<static>1</static>{board}")
+    models = shelf + alone.format("ball", idle.format("part"))
     model, notes = compile_text(
         tmp_path, put(("</world>", f"{models}<plugin/><light/></world>"))
     )
@@ -631,6 +634,7 @@ def test_what_stands_and_what_floats(tmp_path):
     assert model.body("ball::part").mass == 1.0
     assert model.body("ball::part").inertia.tolist() == [1.0, 1.0, 1.0]
     assert model.nv == 3 + 6
+    assert model.neq == 1
     assert "left out of the SDF: plugin" in notes
 
 

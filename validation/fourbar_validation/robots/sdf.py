@@ -378,7 +378,7 @@ class _Conversion:
         self.left_out |= {child.tag for child in element} - _NAMED_NOWHERE
         if element.tag == "link" and member.static:
             self.edges.append(_Edge("", "fixed", "", name, "", element))
-        if element.tag != "joint":
+        if element.tag != "joint" or member.static:
             return
         kind = element.get("type", "")
         if kind not in _AXES:
@@ -388,7 +388,8 @@ class _Conversion:
             self._find_link(_join(member.scope, _text(element, end)))
             for end in ("parent", "child")
         )
-        self.edges.append(_Edge(name, kind, parent, child, member.scope, element))
+        if parent != child:
+            self.edges.append(_Edge(name, kind, parent, child, member.scope, element))
 
     def _find_member(self, name: str) -> _Member:
         """Return a member by its full name."""
