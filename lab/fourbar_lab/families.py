@@ -29,16 +29,21 @@ from fourbar.scene.motion import Motion
 from fourbar.scene.numbers import Point
 from fourbar.solving import solve
 from fourbar_validation.scenes.random import (
+    DrawAngle,
     DrawnLinkage,
     RandomFamily,
     Ranges,
-    command_angle,
     draw_chance,
     draw_decades,
     draw_product,
     draw_uneven_lengths,
     draw_uniform,
 )
+
+
+def command_angle(psi: float) -> DrawAngle:
+    """Command the angle theta_2 - theta_1, rad."""
+    return lambda _, linkage: linkage.ground_angle + psi
 
 
 def _spread_masses(spread: float) -> Ranges:

@@ -15,9 +15,9 @@ import click
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar_lab import injection
+from fourbar_lab.each import apply_each
 from fourbar_lab.injection import read_faults
 from fourbar_validation.engines.programs import Ended, run_to_end
-from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.places import CHECKOUT, FORMULAS_FOLDER, PACKAGE
 
 _TESTS_FAIL = 1

@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 import numpy as np
+from flint import arb
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -20,6 +21,7 @@ from fourbar.quantities import OK, PIN_FORCES, UNITS
 from fourbar.scene import Scene, command, find_signs, with_signs
 from fourbar.scene.motion import Motion
 from fourbar.solving import solve
+from fourbar_lab.each import apply_each
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.tally import (
@@ -30,9 +32,13 @@ from fourbar_lab.tally import (
     list_components,
 )
 from fourbar_validation.compare.tolerance import find_used
+from fourbar_validation.engines.balls import (
+    OF_PIECE,
+    BallValues,
+    Responses,
+    make_balls,
+)
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.prediction import compute_reference
-from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.report.sentences import make_words_table
 
 SAMPLES_OF_A_FAMILY = 10_000
@@ -54,6 +60,28 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     solution = solve(scene, "error")
     arrays = {name: getattr(solution, name) for name in UNITS}
     return {name: array[0] for name, array in arrays.items() if array is not None}
+
+
+def compute_reference(
+    scene: Scene,
+    branch: int,
+    angle: float,
+) -> tuple[BallValues, dict[str, float]] | None:
+    """Return values at one position as balls, and sum |x_i dy/dx_i| of each.
+
+    The answer is None if the loop does not close.
+    """
+    exact = make_balls(scene, angle)
+    for k, load in enumerate(scene.loads):
+        if load.table:
+            exact |= {f"{name}_{k}": arb(1) for name in OF_PIECE}
+    responses = Responses(scene, branch, exact)
+    if responses.base is None:
+        return None
+    sensitivity = dict.fromkeys(responses.base, 0.0)
+    weights = {name: abs(float(value)) for name, value in exact.items() if value != 0}
+    responses.add_of_inputs(sensitivity, weights)
+    return responses.base, sensitivity
 
 
 def judge_sample(

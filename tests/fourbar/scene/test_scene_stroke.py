@@ -22,7 +22,7 @@ from fourbar import (
     vary,
 )
 from fourbar.mjcf import write_mjcf
-from fourbar_validation.engines.prediction import compute_reference
+from fourbar_lab.stability import compute_reference
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 

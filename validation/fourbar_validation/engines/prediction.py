@@ -41,7 +41,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.description import find_unknown, list_speeds
 
 if TYPE_CHECKING:
-    from fourbar_validation.engines.balls import BallValues
+    pass
 
 DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""
@@ -297,29 +297,3 @@ def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
     )
     weights["theta_2"] = max(abs(stored["theta_2"]), 1.0)
     return weights
-
-
-def compute_reference(
-    scene: Scene,
-    branch: int,
-    angle: float,
-) -> "tuple[BallValues, dict[str, float]] | None":
-    """Return values at one position as balls, and sum |x_i dy/dx_i| of each.
-
-    The answer is None if the loop does not close.
-    """
-    from flint import arb
-
-    from fourbar_validation.engines.balls import OF_PIECE, Responses, make_balls
-
-    exact = make_balls(scene, angle)
-    for k, load in enumerate(scene.loads):
-        if load.table:
-            exact |= {f"{name}_{k}": arb(1) for name in OF_PIECE}
-    responses = Responses(scene, branch, exact)
-    if responses.base is None:
-        return None
-    sensitivity = dict.fromkeys(responses.base, 0.0)
-    weights = {name: abs(float(value)) for name, value in exact.items() if value != 0}
-    responses.add_of_inputs(sensitivity, weights)
-    return responses.base, sensitivity

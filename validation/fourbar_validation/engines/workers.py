@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import Any, NoReturn
+from typing import Any
 
 from fourbar.errors import DependencyError
 from fourbar_validation.engines.programs import (
@@ -125,32 +125,6 @@ def _lost_workers() -> NoWorkersError:
         "the workers died while none was at work; what is finished is kept: "
         "give the same command again, and it goes on from there"
     )
-
-
-def fail(
-    _: object,
-    error: BaseException,
-    __: Attempt,
-) -> NoReturn:
-    """Raise what an item failed with."""
-    raise error
-
-
-def apply_each(
-    function: Callable[[Any], Any],
-    items: Iterable[Any],
-    workers: int,
-) -> Iterator[Any]:
-    """Apply the function to each item, however long it takes; results in order."""
-    tasks = enumerate([item] for item in items)
-    for _, results in apply_over_processes(
-        function,
-        tasks,
-        workers,
-        seconds=None,
-        instead=fail,
-    ):
-        yield from results
 
 
 def apply_over_processes(

@@ -130,11 +130,6 @@ class RandomFamily:
         )
 
 
-def command_angle(psi: float) -> DrawAngle:
-    """Command the angle theta_2 - theta_1, rad."""
-    return lambda _, linkage: linkage.ground_angle + psi
-
-
 def draw_bars(
     rng: np.random.Generator,
     lengths: Sequence[float],
