@@ -118,16 +118,14 @@ def _prepare_formulas(effect: str) -> Callable[[int], Any]:
 
 def prepare_simulation(effect: str) -> Callable[[int], Any]:
     """Prepare a given number of steps of the generated MJCF."""
-    import mujoco
-
-    from fourbar_validation.engines.mujoco.closed_loop import open_model
+    from fourbar_validation.engines.mujoco.closed_loop import make_stepper
 
     text = write_mjcf(make_effect_scene(effect if effect in EFFECTS else "none", 91))
     if effect == DEFAULT_FLAGS:
         text = re.sub(r"<flag [^>]*/>", "", text)
     elif effect not in EFFECTS:
         text = text.replace(f' {_list_flags()[effect]}="disable"', "")
-    return partial(mujoco.mj_step, *open_model(text))
+    return make_stepper(text)
 
 
 @cache

@@ -4,6 +4,7 @@ MuJoCo's own kinematics gives its assembly, velocities and pin forces.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -60,6 +61,14 @@ def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     return model, data
+
+
+def make_stepper(text: str) -> Callable[[int], None]:
+    """Return a function that takes steps of a model from its first keyframe.
+
+    Each call steps on from where the last one ended.
+    """
+    return partial(mujoco.mj_step, *open_model(text))
 
 
 class ClosedLoop(Assembled):
