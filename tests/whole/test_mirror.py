@@ -82,7 +82,7 @@ validation/report/test_report.py | scene_record svg templating words
 lab/test_bench.py | contenders starts thirteen thirteen_bodies
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
-lab/test_faults.py | fault_scenes injection
+lab/test_faults.py | each fault_scenes injection
 validation/cost/test_cost.py | charts series work_precision
 validation/cost/test_cost.py | validation/advise: clocks
 validation/advise/test_advise.py | judged_setup matters
