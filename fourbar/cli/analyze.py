@@ -7,10 +7,16 @@ import click
 
 from fourbar.cli import given
 from fourbar.errors import ELSEWHERE, InputError, NotAssembledError, state_messages_in
-from fourbar.linkage import POSITIVE
+from fourbar.linkage import PINS, POSITIVE, Bar, FourBar
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar.solution import DEGREES, SI, Conversion, Solution
+from fourbar.show.lines import wrap_line
+from fourbar.show.shown_units import suit_units, units_of_length
+from fourbar.solution import DEGREES, SI, Conversion, Solution, write_csv, write_json
+from fourbar.solving import find_last_stage, solve
+from fourbar.studies.course import follow
+from fourbar.studies.passing import join_commands, say_nowhere
+from fourbar.writing import STANDARD_STREAM, write_text
 
 
 @click.command("classify", cls=given.LengthsCommand)
@@ -34,9 +40,6 @@ def classify_command(
     D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths
     like 30cm work too.
     """
-    from fourbar.linkage import Bar, FourBar
-    from fourbar.show.lines import wrap_line
-    from fourbar.show.shown_units import suit_units, units_of_length
     from fourbar.show.studies import write_type, write_type_json
 
     ratios = [given.is_bare(text) for text in lengths]
@@ -108,8 +111,6 @@ def new(
         write_drawn_scene,
         write_new_scene,
     )
-    from fourbar.show.shown_units import units_of_length
-    from fourbar.writing import STANDARD_STREAM, write_text
 
     if (lengths is None) == (pins is None):
         raise click.UsageError("give --lengths D A B C or --pins, one of the two")
@@ -164,8 +165,6 @@ def _add_unit(option: str, text: str, unit: str | None) -> str:
 
 def _read_pins(text: str, unit: str | None) -> dict[str, tuple[str, str]]:
     """Read four pairs like "0,0 0,100 175,50 250,50" as x and y of the pins."""
-    from fourbar.linkage import PINS
-
     pairs = [pair.split(",") for pair in text.split()]
     if len(pairs) != len(PINS) or any(len(pair) != 2 for pair in pairs):
         raise InputError(
@@ -302,10 +301,6 @@ def analyze(  # noqa: PLR0913 - one for each option
             )
         _print_sensitivity(scene, form == "json", out)
         return
-    from fourbar.show.lines import wrap_line
-    from fourbar.solving import find_last_stage, solve
-    from fourbar.studies.course import follow
-    from fourbar.studies.passing import join_commands
 
     with given.open_scene(scene) as stated, given.show_waiting(stated):
         if positions is None:
@@ -396,8 +391,6 @@ def _write_summary(
     from fourbar.show.block import write_block
     from fourbar.show.located import list_positions
     from fourbar.show.path_rows import write_paths
-    from fourbar.solving import find_last_stage, solve
-    from fourbar.studies.course import follow
 
     if not asked:
         block = write_block(solution, units, pressure=pressure, width=width)
@@ -435,7 +428,6 @@ def _write_positions(
     from fourbar.show.duty import list_duty
     from fourbar.show.path_rows import collect_paths
     from fourbar.show.tables import print_positions
-    from fourbar.solution import write_csv, write_json
 
     scene = solution.scene
     columns = [] if names is None else choose_columns(solution, names)
@@ -458,8 +450,6 @@ def _write_positions(
 
 
 def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:
-    from fourbar.studies.passing import say_nowhere
-
     return NotAssembledError(f"{path}: {say_nowhere(scene)}")
 
 

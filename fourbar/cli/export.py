@@ -19,8 +19,9 @@ from fourbar.errors import (
     state_messages_in,
 )
 from fourbar.scene import Scene
+from fourbar.show.shown_units import units_of_length
 from fourbar.solution import Conversion
-from fourbar.writing import STANDARD_STREAM
+from fourbar.writing import STANDARD_STREAM, require_file
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
@@ -115,7 +116,6 @@ def _open_or_make_scene(
             yield described
         return
     from fourbar.mjcf import list_defaults, make_scene
-    from fourbar.show.shown_units import units_of_length
 
     assert lengths is not None
     speed = {}
@@ -331,8 +331,6 @@ def edit_command(
 
     Ctrl-C ends it, and so does a minute and a half without a page.
     """
-    from fourbar.writing import require_file
-
     if scene is None:
         names = (Path(f"linkage{number}.toml") for number in chain([""], count(2)))
         scene = next(path for path in names if not path.exists())

@@ -9,11 +9,20 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
+from fourbar.effects.linear_drive import LinearDrive
 from fourbar.errors import ELSEWHERE, InputError, state_messages_in
 from fourbar.linkage import ANY_NUMBER, BAR_NAMES, POSITIVE, require
+from fourbar.quantities.units import half_unit_of_text, read_bare
 from fourbar.scene import Command, Scene
+from fourbar.scene.motion import require_steps
+from fourbar.show.lines import find_terminal_width
+from fourbar.show.shown_units import states_radians, units, units_of_scene
 from fourbar.solution import Conversion
+from fourbar.solving import find_last_stage, solve
+from fourbar.studies.passing import STATED_POSITIONS, find_positions, meet_limit
+from fourbar.writing import require_file, write_text
 
 _FILE_TABLES = "fourbar.file_tables"
 """Key of the tables of the scene file in the context of a command."""
@@ -38,8 +47,6 @@ def _read_units(
     parameter: click.Parameter,
     text: str | None,
 ) -> Conversion | None:
-    from fourbar.show.shown_units import units
-
     return None if text is None else units(text)
 
 
@@ -157,8 +164,6 @@ def open_scene(path: Path) -> Iterator[Scene]:
     then name the file too.
     """
     from fourbar.files import parse_tables, read_scene_text, read_tables
-    from fourbar.scene.motion import require_steps
-    from fourbar.writing import require_file
 
     context = click.get_current_context()
     tables = parse_tables(read_scene_text(path), str(path))
@@ -202,29 +207,21 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
 
 def suit_file_units() -> Conversion:
     """Return the units that suit the file of `open_scene`."""
-    from fourbar.show.shown_units import units_of_scene
-
     return units_of_scene(click.get_current_context().meta[_FILE_TABLES])
 
 
 def commands_radians() -> bool:
     """Return True if the file of `open_scene` commands an angle in rad."""
-    from fourbar.show.shown_units import states_radians
-
     return states_radians(click.get_current_context().meta[_FILE_TABLES])
 
 
 def is_bare(text: str) -> bool:
     """Return True if a text is a number without a unit."""
-    from fourbar.quantities.units import read_bare
-
     return read_bare(text) is not None
 
 
 def read_number(key: str, text: str, unit: str, bound: str = ANY_NUMBER) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
-    from fourbar.quantities.units import read_bare
-
     number = read_bare(text)
     return require(key, text if number is None else number, unit, bound)
 
@@ -236,11 +233,8 @@ def read_positions(scene: Scene, text: str) -> Command:
     that the linkage can have; any other column, and each of a motion over time, has its
     value in the scene's motion.
     """
-    from fourbar.effects.linear_drive import LinearDrive
     from fourbar.files.drawn_pins import list_drawn
-    from fourbar.quantities.units import half_unit_of_text
     from fourbar.show.located import EXTREMES, locate
-    from fourbar.studies.passing import STATED_POSITIONS, find_positions, meet_limit
 
     name, equals, value = (part.strip() for part in text.rpartition("="))
     motion = scene.motion
@@ -286,10 +280,7 @@ def take_motion(scene: Scene, text: str) -> Scene:
     Angles, speeds and accelerations are those of the bar at the positions of the other
     scene that have them; an angle that the text adds is where the two are joined.
     """
-    import numpy as np
-
     from fourbar.files import load
-    from fourbar.solving import find_last_stage, solve
 
     match = _ANGLE_OF_SCENE.fullmatch(text.strip())
     if match is None:
@@ -334,15 +325,11 @@ def read_three(key: str, text: str, unit: str = "m") -> tuple[float, float, floa
 
 def find_width(out: Path | None = None) -> int | None:
     """Return the columns of the terminal that is printed to; None: a file or pipe."""
-    from fourbar.show.lines import find_terminal_width
-
     return find_terminal_width() if out is None else None
 
 
 def print_to(text: str, out: Path | None) -> None:
     """Print to standard output, or write a file atomically."""
-    from fourbar.writing import write_text
-
     if out is None:
         click.echo(text, nl=False)
     else:

@@ -189,13 +189,13 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
         return InputError("--columns", name, f"unknown; {ELSEWHERE}")
     if _is_number(with_speed, name):
         return _ask_for_speed(scene, name)
-    known = ["time", *_list_column_quantities(with_speed)]
+    known = ["time", *list_column_quantities(with_speed)]
     if name in ("status", "branch", "drive_bar"):
         text = "is no quantity: --csv without --columns has it"
         return InputError("--columns", name, text)
     close = get_close_matches(name, known, 1)
     hint = f'did you mean "{close[0]}"? ' if close else ""
-    there = ", ".join(["time", *_list_column_quantities(solution)])
+    there = ", ".join(["time", *list_column_quantities(solution)])
     return InputError(
         "--columns",
         name,
@@ -216,24 +216,25 @@ def _is_number(solution: Solution, name: str) -> bool:
     stem, axis = _split_axis(name)
     if name == "time":
         return True
-    known = stem in _list_column_quantities(solution)
+    known = stem in list_column_quantities(solution)
     return known and (axis is None or not is_scalar(stem))
 
 
-def _list_column_quantities(solution: Solution) -> list[str]:
-    """List the quantities that a scene has, those of its points among them.
-
-    Derived ones of another drive are left out.
-    """
+def list_column_quantities(solution: Solution) -> list[str]:
+    """List the quantities of a solution, those of its points and derived ones too."""
     names = [name for name in solution.evaluated() if name != "time"]
     points = [
         f"{start}{name}" for start in ("", "v_", "a_") for name in solution.points
     ]
-    return [*names, *points, *list_derived_names(solution)]
+    for name in list_derived_names(solution):
+        quantity = find_derived(name)
+        if quantity and (quantity.stage != "force" or solution.F12 is not None):
+            names.append(name)
+    return names + points
 
 
 def _is_place(solution: Solution, name: str) -> bool:
-    known = name in _list_column_quantities(solution)
+    known = name in list_column_quantities(solution)
     return known and not is_scalar(name) and find_unit_of_quantity(name) == "m"
 
 

@@ -14,14 +14,16 @@ import numpy as np
 from fourbar.errors import clean_line
 from fourbar.quantities import (
     ANGLES,
+    COUPLE,
     DERIVED_NAMES,
+    LINE,
     OK,
     PIN_FORCES,
+    RATES,
     Array,
-    find_derived,
 )
 from fourbar.show.acting import list_arm_notes
-from fourbar.show.columns import Column, read_column
+from fourbar.show.columns import Column, list_column_quantities, read_column
 from fourbar.show.derived import list_derived_names
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.lines import wrap_line
@@ -187,10 +189,10 @@ def list_columns(
     for name in _list_names(solution):
         column = read_column(solution, name)
         shown |= _write_column(column, headings.get(name, name), units)
-        if name != "sin_mu" or solution.time is not None or drive.error is None:
-            continue
-        digits = _count_torque_digits(drive.values, drive.error)
-        shown[f"digits\nof {drive.symbol[0]}"] = digits
+        released = solution.scene.motion.free is not None
+        if name == "sin_mu" and drive.error is not None and not released:
+            digits = _count_digits(drive.sizes, drive.error)
+            shown[f"digits\nof {drive.symbol[0]}"] = digits
     return shown
 
 
@@ -205,45 +207,28 @@ def _write_column(
 
 
 def _list_names(solution: Solution) -> Iterator[str]:
-    """List the names of the columns of a table, most wanted first."""
-    drive = read_drive_demand(solution)
-    over_time = solution.time is not None
-    if over_time:
-        yield "time"
-    yield "theta_2"
-    if drive.values is not None:
-        if not over_time:  # released, it has no drive: its torque is rounding
-            yield from (drive.keys.value, "power")
-        yield from PIN_FORCES
-    of_points = {
-        "": solution.points,
-        "v_": solution.velocity,
-        "a_": solution.acceleration,
-    }
-    for start, vectors in of_points.items():
-        for name in vectors:
-            yield from (f"{start}{name}_x", f"{start}{name}_y")
-    others = [bar for bar in "234" if bar != solution.commanded[-1]]
-    rates = [f"{rate}_{bar}" for rate in ("omega", "alpha") for bar in others]
-    for name in (*ANGLES, "stroke", "stroke_speed", *rates):
-        if getattr(solution, name) is not None:
-            yield name
-    yield "sin_mu"
-    if not over_time and compute_times(solution.scene, solution.at) is not None:
-        yield "time"
-    yield from _list_derived_columns(solution, drive.values is not None)
+    """List the names of the columns of a table, most wanted first.
 
-
-def _list_derived_columns(solution: Solution, has_forces: bool) -> Iterator[str]:
-    """List the derived quantities as columns: components, of a force the size first."""
-    for name in list_derived_names(solution):
-        quantity = find_derived(name)
-        assert quantity is not None
-        if quantity.stage == "force" and not has_forces:
+    A vector has its components, and a force its size first; a pin force has that alone.
+    """
+    scene = solution.scene
+    names = ["theta_2", COUPLE.value, LINE.value, "power", *PIN_FORCES]
+    names += solution.points
+    names += [f"v_{name}" for name in solution.velocity]
+    names += [f"a_{name}" for name in solution.acceleration]
+    names += [*ANGLES, "stroke", "stroke_speed", *RATES, "sin_mu"]
+    known = {*list_column_quantities(solution)}
+    if scene.motion.free is not None:  # its torque is rounding
+        known -= {COUPLE.value, LINE.value, "power"}
+    if solution.time is not None or compute_times(scene, solution.at) is not None:
+        known.add("time")
+        names.insert(0 if solution.time is not None else len(names), "time")
+    for name in (*names, *list_derived_names(solution)):
+        if name not in known:
             continue
-        if has_size(name) or is_scalar(name):
+        if is_scalar(name) or has_size(name):
             yield name
-        if not is_scalar(name):
+        if not is_scalar(name) and name not in PIN_FORCES:
             yield from (f"{name}_x", f"{name}_y")
 
 
@@ -258,13 +243,12 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
 
 
-def _count_torque_digits(torque: Array, error: Array) -> list[str]:
+def _count_digits(sizes: Array, error: Array) -> list[str]:
     """Count the digits of the torque that are not round-off."""
     with np.errstate(all="ignore"):
-        digits = np.floor(np.log10(np.abs(torque) / error))
-    digits = np.clip(digits, 0, MOST_DIGITS)
-    digits = np.where(error == 0.0, MOST_DIGITS, digits)
-    finite = np.isfinite(torque) & np.isfinite(error)
+        digits = np.clip(np.floor(np.log10(sizes / error)), 0, MOST_DIGITS)
+    digits[error == 0.0] = MOST_DIGITS
+    finite = np.isfinite(sizes) & np.isfinite(error)
     return write_cells(np.where(finite, digits, np.nan))
 
 
