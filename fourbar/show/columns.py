@@ -24,7 +24,6 @@ from fourbar.solution import (
     compute_times,
     find_unit_in,
     find_unit_of_quantity,
-    find_values,
     is_scalar,
     unwrap,
 )
@@ -164,8 +163,7 @@ def _read_number(solution: Solution, name: str) -> Column:
     stem, axis = _split_axis(name)
     if not _is_number(solution, name):
         raise _refuse_name(solution, name)
-    find = find_values if find_derived(stem) is None else derive
-    values = find(solution, stem)
+    values = derive(solution, stem)
     if values is None:
         raise _ask_for_speed(solution.scene, name)
     unit = find_unit_of_quantity(stem)

@@ -27,6 +27,7 @@ from fourbar.solution import (
     Solution,
     find_unit_in,
     find_unit_of_quantity,
+    find_values,
     shift_to_drawing,
     where_assembled,
 )
@@ -34,13 +35,14 @@ from fourbar.studies.points import instant_centres
 
 
 def derive(solution: Solution, name: str) -> Any:
-    """Compute a quantity of `DERIVED`, (n,) or (n, 2); None without its stage.
+    """Compute a quantity of a solution, (n,) or (n, 2); None without its stage.
 
     NaN marks a position where the quantity has no value: a ratio at a dead centre of
     bar 2, a centre at infinity.
     """
     quantity = find_derived(name)
-    assert quantity is not None
+    if quantity is None:
+        return find_values(solution, name)
     if quantity.stage == "force" and read_drive_demand(solution).values is None:
         return None
     with np.errstate(all="ignore"):

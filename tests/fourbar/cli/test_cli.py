@@ -217,6 +217,16 @@ def test_a_terminal_gets_some_forty_rows():
     assert lines.index(rows[-1]) < lines.index(shown)
 
 
+def test_a_table_over_time_has_the_drive_of_a_law_and_none_of_a_release():
+    law, released = (
+        tables.list_columns(solve(load(MODELS / f"capabilities/{name}.toml")))
+        for name in ("law_sine", "released")
+    )
+    names = [heading.split("\n")[0] for heading in law]
+    assert names[:4] == ["time", "theta_2", "T2", "power"]
+    assert not {"T2\nN m", "power\nW"} & released.keys()
+
+
 def test_the_digits_of_the_torque():
     solution = solve(crank_rocker(), "error")
     columns = tables.list_columns(solution)
