@@ -38,9 +38,13 @@ def ask(tmp_path, capsys, monkeypatch):
     return run
 
 
-def row_of(text, label):
-    """Return the numbers of the first row with a label."""
-    row = re.search(rf"^ *{re.escape(label)}  +(.*)$", text, re.MULTILINE)
+def row_of(text, label, after=""):
+    """Return the numbers of the first row with a label.
+
+    The row is below one that begins with `after`.
+    """
+    start = text.index(f"\n{after}") if after else 0
+    row = re.search(rf"^ *{re.escape(label)}  +(.*)$", text[start:], re.MULTILINE)
     assert row is not None, (label, text)
     return [float(x) for x in re.findall(r"(?<!\S)-?\d[\d.e+-]*(?!\S)", row[1])]
 
