@@ -117,7 +117,7 @@ class PositionSheet:
         rows = [
             _VECTOR_HEADS,
             *self._write_vectors(forces, "N"),
-            self._write_number("shaking_moment", "shaking moment", moment),
+            self._write_number("shaking_moment", "moment about O2", moment),
         ]
         if self.on_change_point:
             rows.append(self.on_change_point)

@@ -49,8 +49,6 @@ MOST_ROWS_PRINTED = 40
 """Rows of the table on a terminal if --every does not state them. They can be read at a
 glance.
 """
-ROW_STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
-"""Steps of the rows on a terminal. Of a longer sweep it is a multiple of the last."""
 
 
 def write_table(
@@ -131,9 +129,7 @@ def print_positions(
     """
     step = every or 1
     if every is None and width is not None:
-        wanted = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1))
-        multiple = ROW_STEPS[-1] * math.ceil(wanted / ROW_STEPS[-1])
-        step = next((step for step in ROW_STEPS if step >= wanted), multiple)
+        step = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1))
     cells = dict[str, list[str]]()
     for column in columns:
         cells |= _write_column(column, column.name, units)
