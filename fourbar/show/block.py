@@ -1,7 +1,7 @@
 """Output of `analyze`: one block of aligned lines, at most 80 columns wide."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain
 
@@ -18,7 +18,7 @@ from fourbar.formulas.mobility import (
     name_assembly,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import (
     JAMMED,
     LINE,
@@ -82,10 +82,8 @@ _BESIDE_CHANGE_POINT = 1e-9
 """rad; an angle nearer to a change point is rounded from it: files state angles with
 nine decimals and more.
 """
-_MOST_POLES = 4
-"""Number of places at which a quantity grows without bound that are listed."""
-_MOST_HELD = 4
-"""Number of places at which dry friction holds a pin that are listed."""
+_MOST_PLACES = 4
+"""Number of places that are listed: of poles, and where dry friction holds a pin."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 _NOT_IN_PEAKS = (WOUND, JAMMED, SEVERAL)
@@ -184,10 +182,10 @@ class SceneBlock(Facts):
         motion = chain([self._write_place()], self._write_statuses())
         loads = [self._write_stroke()]
         if self.solution.F12 is not None and acts(self.scene):
-            from_rest = self._list_from_rest([*PIN_FORCES], "N")
+            from_rest = self._list_from_rest(PIN_FORCES, "N")
             forces = sheet.write_pin_forces()
             if from_rest:
-                rows = [("pins", [*self.pins]), *from_rest]
+                rows = [("pins", [*PIN_FORCE]), *from_rest]
                 forces += _align(rows, self.width)
             loads = [chain(self._write_drive(), forces), self._write_bending()]
         return [
@@ -291,7 +289,7 @@ class SceneBlock(Facts):
         ]
         total = write_count(len(self.solution), "position")
         yield f"{total}: {', '.join(parts)}"
-        if self.pins and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
+        if self.has_forces and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
             yield "    peaks and means are without the positions that have no forces"
 
     def _find_beside_change_points(self) -> Array:
@@ -459,7 +457,7 @@ class SceneBlock(Facts):
         if self.duty is None:
             return peak
         row = f"peak {peak} at {self._place(self.peak.place)}{self._of_positions}"
-        rms = self.duty.rms_force if self.linear else self.duty.rms_torque
+        rms = self.motion.find_rms(drive.keys.value)
         if rms is None:
             return row
         rms = self._without_rounding(rms)
@@ -470,10 +468,8 @@ class SceneBlock(Facts):
         """Write where a quantity grows without bound."""
         poles = self.motion.panels.list_poles(name)
         places = [self._place(poles[0])]
-        places += [self._place(pole, named=False) for pole in poles[1:_MOST_POLES]]
-        if len(poles) > _MOST_POLES:
-            places.append(f"{len(poles) - _MOST_POLES} more places")
-        return f"grows without bound at {' and '.join(places)}"
+        places += [self._place(pole, named=False) for pole in poles[1:]]
+        return f"grows without bound at {' and '.join(_shorten(places))}"
 
     @property
     def _of_positions(self) -> str:
@@ -482,12 +478,11 @@ class SceneBlock(Facts):
 
     def _write_held(self, unit: str) -> str:
         """Write between which torques or forces dry friction holds, and where."""
-        held = self.held
         rests = "dry friction holds"
         if not self.is_held_at_rest:
             rests = "a pin with dry friction rests"
         parts = []
-        for least, most, (first, last), varies in held[:_MOST_HELD]:
+        for least, most, (first, last), varies in self.held:
             bounds = [*map(self._without_rounding, (least, most))]
             size = max(map(abs, bounds))
             holds = " to ".join(self._value(bound, unit, size) for bound in bounds)
@@ -500,9 +495,7 @@ class SceneBlock(Facts):
                 over = f"{self._place(first)} to {until}"
                 share = ", a part of it at each position" if varies else ""
                 parts.append(f"{holds} over {over}{share}")
-        if len(held) > _MOST_HELD:
-            parts.append(f"and at {len(held) - _MOST_HELD} more places")
-        return f"{', '.join(parts)}: {rests}"
+        return f"{', '.join(_shorten(parts))}: {rests}"
 
     def _without_rounding(self, value: float) -> float:
         """Return zero for a torque or force of the drive within its rounding."""
@@ -548,7 +541,14 @@ class SceneBlock(Facts):
             forward, back = self._cells(energies, "J")
             row += f"; {forward} {over} given, {back} taken back"
         yield _row("power", row)
-        yield from self._write_cycle(duty)
+        if duty.energy_swing is not None:
+            mean = ""
+            if duty.mean_torque is not None:
+                torque = self._without_rounding(duty.mean_torque)
+                mean = self._value(torque, "N m", duty.peak_torque, FAR_BELOW_PEAK)
+                mean = f"mean torque {mean}; "
+            energy = self._value(duty.energy_swing, "J")
+            yield _row("cycle", f"{mean}energy swings by {energy} about the mean")
         if not self.linear:
             yield f"motor: {self._write_motor_needs(duty)}"
 
@@ -577,19 +577,6 @@ class SceneBlock(Facts):
             return text
         driving = 0.0 if driving <= SHOWN_AS_ZERO * peak else driving
         return f"{text} braking, {self._value(driving, 'W', peak)} driving"
-
-    def _write_cycle(self, duty: MotorDuty) -> Iterator[str]:
-        """Write the mean torque of a closed sweep, and what a flywheel must store."""
-        if duty.energy_swing is None:
-            return
-        mean = ""
-        if duty.mean_torque is not None:
-            torque = self._without_rounding(duty.mean_torque)
-            peak = duty.peak_torque
-            mean = self._value(torque, "N m", peak, FAR_BELOW_PEAK)
-            mean = f"mean torque {mean}; "
-        energy = self._value(duty.energy_swing, "J")
-        yield _row("cycle", f"{mean}energy swings by {energy} about the mean")
 
     def _write_drive_head(self) -> str:
         scene = self.scene
@@ -671,21 +658,20 @@ class SceneBlock(Facts):
 
     def _write_pins(self) -> Iterator[str]:
         """Write the loads of the four pins, side by side."""
-        pins = self.pins
-        if not pins:
+        if not self.has_forces:
             return
-        cells, places = self._write_peaks([*PIN_FORCES], "N")
-        rows = [("pins", [*pins]), ("  peak", cells), ("  at", places)]
-        means = [load.rms for load in pins.values()]
+        cells, places = self._write_peaks(PIN_FORCES, "N")
+        rows = [("pins", [*PIN_FORCE]), ("  peak", cells), ("  at", places)]
+        means = [self.motion.find_rms(name) for name in PIN_FORCES]
         if means != [None] * len(means):
             rows.append(("  RMS", self._cells(means, "N")))
-        rows += self._list_from_rest([*PIN_FORCES], "N")
+        rows += self._list_from_rest(PIN_FORCES, "N")
         yield from _align(rows, self.width)
         if self.kind in ("list", "released"):
             yield "  peak and RMS are those of these positions"
 
     def _list_from_rest(
-        self, names: list[str], unit: str
+        self, names: Sequence[str], unit: str
     ) -> list[tuple[str, list[str]]]:
         """List the row of what a linkage at rest bears as it begins to move.
 
@@ -729,7 +715,9 @@ class SceneBlock(Facts):
         yield from _align(rows, self.width)
         yield from list_couple_notes(self.scene)
 
-    def _write_peaks(self, names: list[str], unit: str) -> tuple[list[str], list[str]]:
+    def _write_peaks(
+        self, names: Sequence[str], unit: str
+    ) -> tuple[list[str], list[str]]:
         """Write the largest sizes of curves of one kind, and where they are taken.
 
         A curve may grow without bound there.
@@ -761,18 +749,18 @@ class SceneBlock(Facts):
         """Write where pin forces jump, and what rounding does."""
         scene = self.scene
         solution = self.solution
-        passes = self.pins and solution.change_points
+        passes = self.has_forces and solution.change_points
         if passes and has_growing_forces(solution):
             yield (
                 "at a change point pin forces grow without bound: the peaks are those "
                 "of these instants"
             )
-        if self.pins and not self.motion.is_steady:
+        if self.has_forces and not self.motion.is_steady:
             yield "the positions are passed at no one speed: no RMS values, no energies"
         yield from self.motion.list_jumps(
             self.symbol, lambda place: self._place(place, named=False)
         )
-        pins_from_rest = self._list_from_rest([*PIN_FORCES], "N")
+        pins_from_rest = self._list_from_rest(PIN_FORCES, "N")
         if pins_from_rest or self._list_from_rest(_BENDING, "N m"):
             yield (
                 "to move: the largest as it begins to move, against the whole of dry "
@@ -834,6 +822,12 @@ class SceneBlock(Facts):
         gap = math.asin(min(sines[bars], 1.0))
         apart = write_short(gap, "rad", self.units, digits=2)
         yield f"{start}: bars {bars} are {apart} from being {_name_meeting(bars)}"
+
+
+def _shorten(places: list[str]) -> list[str]:
+    """Return the first places, and how many follow."""
+    more = [f"{len(places) - _MOST_PLACES} more places"]
+    return places[:_MOST_PLACES] + (more if len(places) > _MOST_PLACES else [])
 
 
 def _row(label: str, text: str) -> str:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas.mobility import TURN, find_intervals
-from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OK
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import find_stroke_ranges
@@ -55,15 +55,6 @@ class BarBending(NamedTuple):
     """Index of the peak's position in `solution`, or of the position of the motion with
     the largest moment.
     """
-
-
-class PinLoad(NamedTuple):
-    """Load of one pin over the motion, N."""
-
-    peak: Peak | None
-    """None if it grows without bound."""
-    rms: float | None
-    """None if there is none."""
 
 
 class HeldRange(NamedTuple):
@@ -146,7 +137,8 @@ class Facts:
         return drive if np.isfinite(drive.sizes).any() else None
 
     @property
-    def _has_forces(self) -> bool:
+    def has_forces(self) -> bool:
+        """Return True if pin forces are known at any position."""
         F12 = self.solution.F12
         return F12 is not None and bool(np.isfinite(F12).any())
 
@@ -167,16 +159,6 @@ class Facts:
         return None if at_one else motor_duty(self.solution)
 
     @cached_property
-    def pins(self) -> dict[str, PinLoad]:
-        """Largest and RMS load of each pin."""
-        motion = self.motion
-        return {
-            pin: PinLoad(motion.find_peak(name), motion.find_rms(name))
-            for pin, name in PIN_FORCE.items()
-            if self._has_forces
-        }
-
-    @cached_property
     def transmission(self) -> Peak:
         """Smallest transmission angle; it is 0 where its sine changes its sign."""
         panels = self.motion.positions
@@ -195,7 +177,7 @@ class Facts:
     @cached_property
     def bending(self) -> dict[int, BarBending]:
         """Largest bending moment of each bar, and where along the bar it is."""
-        if not self._has_forces:
+        if not self.has_forces:
             return {}
         motion = self.motion
         peaks = {bar: motion.find_peak(f"bending_{bar}") for bar in MOVING_BARS}
@@ -299,15 +281,14 @@ class Facts:
         times = np.asarray(motion.time)
         rows = np.flatnonzero(~np.isin(times[1:], solution.time)) + 1
         speeds = np.array([getattr(motion, f"omega_{bar}") for bar in MOVING_BARS])
-        same_speed = TIED * np.abs(speeds).max()
-        units = np.exp(1j * np.array([motion.theta_2, motion.theta_4]))
+        turned = np.exp(1j * np.array([motion.theta_2, motion.theta_4]))
+        states = np.concatenate([turned, speeds / (np.abs(speeds).max() or 1.0)])
         for start in [0, *rows[:1].tolist()]:
             later = rows[rows > start]
-            is_same = (np.abs(units[:, later] - units[:, [start]]) <= TIED).all(axis=0)
-            speed_changes = np.abs(speeds[:, later] - speeds[:, [start]])
-            is_same &= (speed_changes <= same_speed).all(axis=0)
-            if is_same.any():
-                return float(times[later[np.argmax(is_same)]] - times[start])
+            away = np.abs(states[:, later] - states[:, [start]]).max(axis=0)
+            same = times[later[away <= TIED]]
+            if same.size:
+                return float(same[0] - times[start])
         return None
 
     @cached_property

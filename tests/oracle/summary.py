@@ -384,7 +384,6 @@ def _judge_integrals(judged):
 
     for pin, name in PIN_FORCE.items():
         if pin in judged.loaded_pins:
-            judge_mean(judged.facts.pins[pin].rms, name)
             judge_mean(entry["pins"][pin]["rms"], name)
     if not judged.drives:
         return
@@ -439,15 +438,15 @@ def _judge_pins(judged):
     """
     facts = judged.facts
     for pin, name in PIN_FORCE.items():
-        load = facts.pins[pin]
         if pin not in judged.loaded_pins or name in judged.growing:
             continue
-        there = judged.ask(load.peak.place)
+        peak = facts.motion.find_peak(name)
+        there = judged.ask(peak.place)
         at_peak = magnitude(there.quantities[name])
         fine = magnitude(judged.fine.quantities[name])
-        judged.add_peak("pins", load.peak, at_peak, fine)
+        judged.add_peak("pins", peak, at_peak, fine)
         of_pin = judged.motor["pins"][pin]
-        judged.add_value("pins", of_pin["peak"], load.peak.value)
+        judged.add_value("pins", of_pin["peak"], peak.value)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
         judged.add("pins", np.abs(wrap_difference(apart)))
     ends = {

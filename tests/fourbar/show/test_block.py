@@ -419,11 +419,12 @@ def test_the_block_has_the_numbers_of_the_facts():
     ):
         assert words in text
     rows = {line[2:11].strip(): line[11:].split("  ") for line in text.splitlines()}
-    loads = [*facts.pins.values()]
+    peaks = [facts.motion.find_peak(name) for name in PIN_FORCES]
+    means = [facts.motion.find_rms(name) for name in PIN_FORCES]
     for label, numbers in (
-        ("peak", [f"{load.peak.value:.4g} N" for load in loads]),
-        ("at", [write(load.peak.place) for load in loads]),
-        ("RMS", [f"{load.rms:.4g} N" for load in loads]),
+        ("peak", [f"{load.value:.4g} N" for load in peaks]),
+        ("at", [write(load.place) for load in peaks]),
+        ("RMS", [f"{mean:.4g} N" for mean in means]),
     ):
         assert [*filter(None, map(str.strip, rows[label]))] == numbers
 
