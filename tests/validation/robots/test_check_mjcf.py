@@ -51,7 +51,6 @@ from fourbar_validation.robots.judge_loop import _EXAMINE as EXAMINE
 from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
-    JudgedError,
     LoopJudgement,
     answer_changed,
     judge_file,
@@ -645,14 +644,14 @@ def test_a_setting_that_is_finer_is_no_difference(key, finer):
 
 
 def test_what_to_type_is_advised_where_a_setting_differs():
-    rows = [JudgedError(row, 0.0) for row in rows_with(0.05, 0.3)]
+    rows = rows_with(0.05, 0.3)
     for key, written, advised in (
         ("option.timestep", "option timestep", 1),
         ("option.timestep", "", 0),  # an SDF has no place for it
         ("lift.output", "body gravcomp", 0),
     ):
         listed = [Difference(key, 0.0, 1.0, "", written)]
-        sentences = LoopJudgement(None, listed, rows, []).sentences()  # type: ignore[arg-type]
+        sentences = LoopJudgement(None, listed, rows, {}, []).sentences()  # type: ignore[arg-type]
         assert sum("advise SCENE FILE" in text for text in sentences) == advised
 
 
@@ -663,9 +662,10 @@ def test_a_range_is_asked_of_both_files(monkeypatch):
     judgement = judge_file("range", CRANK_ROCKER, file, options)
     joints = [row.joint for row in judgement.measured.states.rows]
     assert (min(joints), max(joints)) == approx((0.5, 0.9))
-    at_states = [e for e in judgement.errors if e.row.engine == FILE_AT_ONE_STATE]
-    for error in at_states:
-        assert error.generated == approx(error.row.error, rel=1e-6, abs=1e-12)
+    at_states = [row for row in judgement.rows if row.engine == FILE_AT_ONE_STATE]
+    for row in at_states:
+        generated = judgement.generated[row.engine, row.quantity]
+        assert generated == approx(row.error, rel=1e-6, abs=1e-12)
 
 
 NOT_CLOSED = "has no equality that closes a loop; where something else does, say where"

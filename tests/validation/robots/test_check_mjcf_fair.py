@@ -152,9 +152,9 @@ def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(tmp_path)
     report = judge_path("dry", DRY, written(default_friction(), tmp_path))
     assert report.counts.status == 0
     at_one_state = {
-        cost.row.quantity: cost.row.verdict
-        for cost in report.errors
-        if cost.row.engine == FILE_AT_ONE_STATE
+        row.quantity: row.verdict
+        for row in report.rows
+        if row.engine == FILE_AT_ONE_STATE
     }
     assert at_one_state["torque"] == AGREES
     assert at_one_state["F43"] == DEGRADED
@@ -339,7 +339,7 @@ def test_the_cause_that_explains_the_error_stands_first(spoil, key, tmp_path):
     assert report.differences[0].key == key
     cost = report.differences[0].cost
     worst = max(
-        c.row.error for c in report.errors if c.row.quantity in ("torque", "F12", "F43")
+        row.error for row in report.rows if row.quantity in ("torque", "F12", "F43")
     )
     assert cost > 0.1 * worst
     (mass,) = (one for one in report.differences if one.key.endswith(".mass"))

@@ -156,8 +156,7 @@ def check_mjcf_command(
     file = read_robot(theirs, assets)
     judgement = judge_file(suite.name(0), suite.scene(0), file, options)
     blocks = [*describe_judgement(judgement, _write_stated(robot))]
-    rows = [one.row for one in judgement.errors]
-    write_report(theirs, out, blocks, rows, [judgement.measured])
+    write_report(theirs, out, blocks, judgement.rows, [judgement.measured])
     return judgement.counts.status
 
 

@@ -4,10 +4,9 @@ Lengths, numbers of bars and gravity are put one at a time into the scene; all o
 differences are corrected in their file.
 """
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -81,47 +80,21 @@ _LENGTHS_FIRST = (
 
 
 @dataclass(frozen=True, slots=True)
-class JudgedError:
-    """One quantity by one method: the error of their file, and of the generated one."""
-
-    row: Row
-    generated: float
-
-    @property
-    def method(self) -> str:
-        """Engine and setting."""
-        return f"{self.row.engine} {self.row.setting}"
-
-    def cells(self) -> tuple[str, ...]:
-        """Return quantity, both errors, what is allowed and the verdict, as text.
-
-        A row without an error says why.
-        """
-        row = self.row
-        verdict = row.verdict
-        if math.isnan(row.error):
-            verdict += f": {row.reason}"
-        errors = map(write_error, (row.error, self.generated, row.allowed))
-        return row.quantity, *errors, verdict
-
-
-@dataclass(frozen=True, slots=True)
 class LoopJudgement:
     """Report on the loop of a user's file that is nearest to a scene."""
 
     measured: LoopMeasurement
     differences: list[Difference]
     """Differences, the dearest first."""
-    errors: list[JudgedError]
+    rows: list[Row]
+    """Errors of each quantity by one method."""
+    generated: dict[tuple[str, str], float]
+    """Errors of the generated file by engine and quantity."""
     notes: list[str]
-
-    def methods(self) -> list[str]:
-        """List the methods by which their file was evaluated."""
-        return list(dict.fromkeys(error.method for error in self.errors))
 
     def sentences(self) -> Iterator[str]:
         """Say why the file is right, or what is to be mended first."""
-        soft = [error.row for error in self.errors if error.row.verdict == DEGRADED]
+        soft = [row for row in self.rows if row.verdict == DEGRADED]
         if soft and not self.counts[FAILS]:
             softest = max(soft, key=lambda row: row.error)
             left = write_error(softest.allowed / TIMES_PREDICTED)
@@ -144,7 +117,7 @@ class LoopJudgement:
     @property
     def counts(self) -> Counts:
         """Return the comparisons of their file by verdict."""
-        return Counts(error.row for error in self.errors)
+        return Counts(self.rows)
 
 
 def judge_file(
@@ -182,13 +155,12 @@ def judge_file(
         differences = find_differences(generated.described, theirs.described)
         if any(row.failed for row in rows):
             at = theirs.measured.command(theirs.measured.states)
-            differences = _price(
-                differences,
-                rows,
-                lambda one: answer_changed(scene, one, at),
-                lambda ones: judge_answers(name, theirs.measured, ones, tolerance),
-                lambda changes: examined(_MENDED, scene, file, held, changes),
-            )
+            judge = partial(judge_answers, name, theirs.measured, tolerance=tolerance)
+            mend = partial(examined, _MENDED, scene, file, held)
+            priced = _price(differences, rows, scene, at, judge, mend)
+            differences = [
+                one for one in priced if one.cost is None or one.cost > _NOTHING
+            ]
     notes = [*theirs.notes]
     if file.kind != "URDF" and (parts := list_unread(file.text)):
         notes.append(f"not looked at: {', '.join(parts)}")
@@ -198,40 +170,37 @@ def judge_file(
             for one in differences
         ]
         notes.append(SETTINGS_OF_AN_SDF)
-    errors = [
-        JudgedError(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows
-    ]
-    return LoopJudgement(theirs.measured, order(differences), errors, notes)
+    return LoopJudgement(theirs.measured, order(differences), rows, ours, notes)
 
 
 def _price(
-    differences: list[Difference],
-    rows: list[Row],
-    answer: Callable[[Difference], Answer | None],
-    judge: Callable[[Sequence[Answer]], list[Row]],
-    mend: Callable[[Sequence[Any]], list[LoopMeasurement | None]],
-) -> list[Difference]:
-    """Return the differences that change something, each with its cost in accuracy.
+    differences: Sequence[Difference],
+    rows: Sequence[Row],
+    scene: Scene,
+    at: Command,
+    judge: Callable[..., list[Row]],
+    mend: Callable[..., list[LoopMeasurement | None]],
+) -> Iterator[Difference]:
+    """Yield differences with their costs in accuracy.
 
     Parameters
     ----------
-    answer : answer of the formulas with one entry as in the file, if they have it.
     judge : judges answers.
     mend : measures the file with each of some entries mended.
     """
-    priced = {one.key: one for one in differences}
     left = []
     for one in differences:
-        changed = answer(one)
+        changed = answer_changed(scene, one, at)
         if changed is None:
             left.append(one)
         else:
-            priced[one.key] = price(one, judge([changed]), ())
+            yield price(one, judge(answers=[changed]), ())
     mended = mend([(one.key, one.generated) for one in left])
     for one, measured in zip(left, mended, strict=True):
-        if measured is not None:
-            priced[one.key] = price(one, rows, judge(list_answers(measured)))
-    return [one for one in priced.values() if one.cost is None or one.cost > _NOTHING]
+        if measured is None:
+            yield one
+        else:
+            yield price(one, rows, judge(answers=list_answers(measured)))
 
 
 def answer_changed(scene: Scene, one: Difference, at: Command) -> Answer | None:

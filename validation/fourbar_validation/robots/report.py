@@ -36,7 +36,7 @@ from fourbar_validation.engines.mujoco.robots.answers import (
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import name_following
 from fourbar_validation.report.sentences import make_words_table, print_sentence
-from fourbar_validation.report.templating import escape_cell
+from fourbar_validation.report.templating import escape_cell, write_error
 from fourbar_validation.robots.judge_loop import LoopJudgement
 from fourbar_validation.robots.loop_errors import (
     MEASURED_THROUGH_TIME,
@@ -149,10 +149,16 @@ def _describe_differences(judgement: LoopJudgement) -> Iterator[ReportBlock]:
         yield _ABOUT_COSTS
         rows = [(one.price, one.write()) for one in judgement.differences]
         yield TextTable(_DIFFERENCES, rows, 2)
-    for method in judgement.methods():
+    by_method: dict[str, list[tuple[str, ...]]] = {}
+    for row in judgement.rows:
+        generated = judgement.generated.get((row.engine, row.quantity), math.nan)
+        errors = map(write_error, (row.error, generated, row.allowed))
+        why = f": {row.reason}" if math.isnan(row.error) else ""
+        cells = (row.quantity, *errors, f"{row.verdict}{why}")
+        by_method.setdefault(f"{row.engine} {row.setting}", []).append(cells)
+    for method, errors_of_method in by_method.items():
         yield f"what it costs, {method}:"
-        errors = [one.cells() for one in judgement.errors if one.method == method]
-        yield TextTable(JUDGED_HEADINGS, errors)
+        yield TextTable(JUDGED_HEADINGS, errors_of_method)
 
 
 def write_driven_range(loop: LoopMeasurement) -> str:

@@ -1,12 +1,13 @@
 """Bodies of a model, the joints between them, and what acts on them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from fourbar.errors import InputError
 from fourbar.quantities import Array
 
 EQUALITY_KINDS = {
@@ -89,6 +90,20 @@ def name_joint(model: mujoco.MjModel, joint: int) -> str:
 def name_body(model: mujoco.MjModel, body: int) -> str:
     """Name a body; the world is its own."""
     return name_part(model, "body", body)
+
+
+def find_named(
+    names: Sequence[str], name: str, what: str, option: str, value: str = ""
+) -> int:
+    """Find the place of a name; an InputError lists what is there.
+
+    `value`: of the option, if it is not the name alone.
+    """
+    if name in names:
+        return names.index(name)
+    listed = ", ".join(filter(None, names)) or "none"
+    reason = f"no such {what}; the file has: {listed}"
+    raise InputError(option, value or name, reason)
 
 
 class Follower(NamedTuple):
@@ -192,18 +207,9 @@ def list_tied_joints(model: mujoco.MjModel, equality: int) -> set[int]:
 
 
 def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:
-    """Describe an actuator: as the file names it, or by what it acts on."""
-    name = model.actuator(actuator).name
-    if name:
-        return f"the actuator {name}"
-    kind = model.actuator_trntype[actuator]
-    target = int(model.actuator_trnid[actuator, 0])
-    where = f"number {actuator} of the file"
-    if kind == mujoco.mjtTrn.mjTRN_JOINT:
-        where = f"on {name_joint(model, target)}"
-    elif kind == mujoco.mjtTrn.mjTRN_SITE and model.site(target).name:
-        where = f"on the site {model.site(target).name}"
-    return f"an actuator without a name, {where}"
+    """Describe an actuator: as the file names it, or by its number."""
+    name = model.actuator(actuator).name or f"number {actuator} of the file"
+    return f"the actuator {name}"
 
 
 def list_dofs(model: mujoco.MjModel, joint: int) -> list[int]:

@@ -21,6 +21,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     EQUALITY_KINDS,
     climb,
     find_ends,
+    find_named,
     find_parent,
     find_roots,
     find_tied_bodies,
@@ -122,11 +123,8 @@ def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]
 
 def _find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
     """Return the closure of a name, or raise an InputError that lists what is there."""
-    for closure in closures:
-        if closure.name == name:
-            return closure
-    names = ", ".join(closure.name for closure in closures) or "none"
-    raise InputError("--loop", name, f"no such closure; the file has: {names}")
+    names = [closure.name for closure in closures]
+    return closures[find_named(names, name, "closure", "--loop")]
 
 
 def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:

@@ -85,9 +85,9 @@ _STRIDE = math.radians(2.0)
 """Largest turn of the commanded bar from one closed state to the next. The assembly is
 kept so.
 """
-LEAST_TRANSMISSION = 1e-5
-"""Transmission over the longest bar below which the bars of pin B are in line. A closed
-pose is known to the residual over it, and to less than that below.
+LEAST_SINE = 1e-5
+"""|sin(theta_4 - theta_3)| below which the bars of pin B are in line. A closed pose is
+known to the residual over it, and to less than that below.
 """
 GAP_OF_ROUNDING = 2.0
 """Gap of a closed loop over the rounding of its lengths. Where the bars are in line the
@@ -382,17 +382,7 @@ class LoopInside:
         qpos[:] = best
         return least <= max(RESIDUAL_OF_AN_OPEN_LOOP, skew, rounding)
 
-    def measure_transmission(self, qpos: Array) -> float:
-        """Return the least movement of the gap by the hinges that follow, m/rad.
-
-        At zero the bars that follow are in line, and cannot close a gap in one
-        direction.
-        """
-        _, jacobian = self._evaluate_closure(qpos)
-        sizes = np.linalg.svd(jacobian @ self.basis, compute_uv=False)
-        return float(sizes[-1])
-
-    def _measure_sine(self, qpos: Array) -> float:
+    def measure_sine(self, qpos: Array) -> float:
         """Return the sine of the angle between the bars that follow in a pose."""
         self._evaluate_closure(qpos)
         frame = LoopFrame(self.loop, self.closing)
@@ -407,11 +397,9 @@ class LoopInside:
         Nor are they where the digits of the file turn these bars by a part of the
         angle between them, which is their rounding over the squared sine.
         """
-        longest = self.loop.longest
-        if self.measure_transmission(qpos) < LEAST_TRANSMISSION * longest:
-            return True
-        turned = self.loop.rounding / longest
-        return turned > KNOWN_TRANSMISSION * self._measure_sine(qpos) ** 2
+        sine = abs(self.measure_sine(qpos))
+        turned = self.loop.rounding / self.loop.longest
+        return sine < LEAST_SINE or turned > KNOWN_TRANSMISSION * sine**2
 
     def _evaluate_closure(self, qpos: Array) -> tuple[Array, Array]:
         """Return the closure's residual in the plane, (m,), and its derivative."""
@@ -498,7 +486,7 @@ class LoopInside:
             rigid,
             self._measure_gap(qpos),
             self._read_bars(data),
-            abs(self._measure_sine(closed.qpos)),
+            abs(self.measure_sine(closed.qpos)),
         )
         return record_states([row])[0]
 
@@ -754,7 +742,7 @@ class LoopInside:
         row = rows[-1]
         closed = self.close(row.angle)
         assert closed is not None  # the row was evaluated there
-        now, due = (self._measure_sine(pose) for pose in (qpos, closed))
+        now, due = (self.measure_sine(pose) for pose in (qpos, closed))
         if now * due > 0.0:
             doubtful.clear()
             return None

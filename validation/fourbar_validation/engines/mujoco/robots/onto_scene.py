@@ -22,6 +22,7 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_named,
     is_enabled,
     list_closing,
     name_body,
@@ -143,11 +144,8 @@ def _close_by_sites(file: RobotFile, names: Mapping[str, str]) -> RobotFile:
         return file
     sites = [model.site(number).name for number in range(model.nsite)]
     for role, name in names.items():
-        if role in SITE_ROLES and name not in sites:
-            listed = ", ".join(filter(None, sites)) or "none"
-            raise InputError(
-                "--name", f"{role}={name}", f"no such site; the file has: {listed}"
-            )
+        if role in SITE_ROLES:
+            find_named(sites, name, "site", "--name", f"{role}={name}")
     stated = {f"site{i}": names.get(r, r) for i, r in enumerate(SITE_ROLES, 1)}
     if not {*stated.values()} <= {*sites}:
         raise InputError("MJCF", None, _NOTHING_CLOSES[file.kind])
@@ -172,11 +170,8 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
     names = [name_body(model, body) for body in range(model.nbody)]
     wanted = {}
     for role, name in options.names.items():
-        if role in BAR_ROLES and name not in names:
-            listed = ", ".join(names[1:])
-            raise InputError("--name", name, f"no such body; the file has: {listed}")
         if role in BAR_ROLES:
-            wanted[role] = names.index(name)
+            wanted[role] = 1 + find_named(names[1:], name, "body", "--name")
     usual = {role: names.index(role) for role in BAR_ROLES if role in names}
 
     def rank(way: RobotLoop) -> tuple[int, float, int]:
@@ -293,7 +288,7 @@ def _leave_flat(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> Array:
     inside = LoopInside(posed.model, turn(loop, scene), bar=commanded.bar)
     poses = [inside.close(angle) for angle in np.unique(commanded.angle).tolist()]
     closed = [loop.qpos, *(qpos for qpos in poses if qpos is not None)]
-    return max(closed, key=inside.measure_transmission)
+    return max(closed, key=lambda qpos: abs(inside.measure_sine(qpos)))
 
 
 def _fits_gravity(

@@ -18,6 +18,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    find_named,
     list_dofs,
     list_motors,
     list_tied_joints,
@@ -80,7 +81,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         unit = JOINT_UNITS.get(model.jnt_type[joint])
         if unit is None:
             raise InputError("--pose", f"{name}={text}", "must be a hinge or a slide")
-        stated[model.jnt_qposadr[joint]] = _read_joint_position(name, text, unit)
+        position = 0.0 if text == "0" else require(f"--pose {name}", text, unit)
+        stated[model.jnt_qposadr[joint]] = position
         fixed.add(joint)
     closing = _Closing(model, held)
     tied = {*closing.tied, *fixed}
@@ -145,10 +147,7 @@ def find_joint(
     Raises an InputError that lists the joints.
     """
     names = [name_joint(model, joint) for joint in range(model.njnt)]
-    if name not in names:
-        listed = ", ".join(names) or "none"
-        raise InputError(option, name, f"no such joint; the file has: {listed}")
-    return names.index(name)
+    return find_named(names, name, "joint", option)
 
 
 def find_outside(model: mujoco.MjModel, qpos: Array) -> list[int]:
@@ -163,33 +162,10 @@ def _choose_start(model: mujoco.MjModel, options: PoseOptions) -> Array:
     """Return the positions to begin with, (nq,)."""
     if options.key is None:
         return np.array(model.qpos0)
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, options.key)
-    if number < 0 and options.key.isdigit() and int(options.key) < model.nkey:
-        number = int(options.key)
-    if number < 0:
-        names = ", ".join(model.key(i).name or str(i) for i in range(model.nkey))
-        raise InputError(
-            "--key",
-            options.key,
-            f"no such keyframe; the file has: {names or 'none'}",
-        )
+    keys = range(model.nkey)
+    names = [*(model.key(i).name for i in keys), *map(str, keys)]
+    number = find_named(names, options.key, "keyframe", "--key") % model.nkey
     return np.array(model.key_qpos[number])
-
-
-def _read_joint_position(name: str, text: str, unit: str) -> float:
-    option = f"--pose {name}"
-    try:
-        number = float(text)
-    except ValueError:
-        return require(option, text, unit)
-    if number == 0.0:
-        return number
-    other = "deg" if unit == "rad" else "mm"
-    raise InputError(
-        option,
-        text,
-        f'the unit is missing; did you mean "{text}{unit}" or "{text}{other}"?',
-    )
 
 
 def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
