@@ -195,20 +195,14 @@ def advise(
 
 def _describe_time(setup: TrialSetup, attempt: SearchRun) -> str:
     """Write the CPU time of a simulated second and of a revolution."""
-    seconds = _time_attempt(setup, attempt)
-    second = 1e3 * seconds / setup.simulated_seconds
-    revolution = 1e3 * seconds / setup.revolutions
-    return (
-        f"This costs {second:.2g} ms of processor time per simulated second"
-        f" ({revolution:.2g} ms per revolution): {attempt.steps} steps, and"
-        f" {attempt.readings} readings of torque and pin forces."
-    )
-
-
-def _time_attempt(setup: TrialSetup, attempt: SearchRun) -> float:
-    """Time the steps and readings of an attempt, CPU seconds."""
     ((step, reading),) = _time_settings(setup, [attempt.settings])
-    return attempt.steps * step + attempt.readings * reading
+    thousandths = 1e3 * (attempt.steps * step + attempt.readings * reading)
+    return (
+        f"This costs {thousandths / setup.simulated_seconds:.2g} ms of processor time"
+        f" per simulated second ({thousandths / setup.revolutions:.2g} ms per"
+        f" revolution): {attempt.steps} steps, and {attempt.readings} readings of"
+        " torque and pin forces."
+    )
 
 
 def _time_settings(
@@ -249,14 +243,15 @@ class _CheapestSearch:
         Steps are bisected, then shorter and longer time constants and cheaper kinds of
         step are tried.
         """
-        first, tc = guess(self.error)
-        self._bisect(tc, first)
+        n, tc = guess(self.error)
+        self._bisect(tc, n)
         for factor in (0.5, 2.0, 4.0):
-            constant = tc * factor
-            constant = max(constant, SHORTEST_TIME_CONSTANT)
-            constant = min(constant, LONGEST_TIME_CONSTANT)
+            longest = min(tc * factor, LONGEST_TIME_CONSTANT)
+            constant = max(longest, SHORTEST_TIME_CONSTANT)
             if constant != tc:
-                self._polish(constant)
+                served = self._list_served() or [self._find_nearest()]
+                fewest = min(served, key=lambda run: (run.steps, run.errors.worst))
+                self._bisect(constant, fewest.settings.steps_per_revolution)
         served = self._list_served()
         if served:
             self._try_kinds(min(served, key=lambda attempt: attempt.steps))
@@ -294,34 +289,25 @@ class _CheapestSearch:
             )
             part = steps / start.steps
             if name not in INTEGRATORS_OF_FIRST_ORDER:
-                # of the same order: what serves needs no fewer steps by much
-                part = min(part, 1.0)
+                # of the same order: what serves needs about as many steps
+                part = min(part, _CLOSE_ENOUGH)
             n = settings.steps_per_revolution * part
             tc = settings.time_constant_steps
-            if n >= FEWEST_STEPS and part >= 1.0 / _CLOSE_ENOUGH:
-                self._refine(tc, n, name)
+            if part >= 1.0 / _CLOSE_ENOUGH:
+                self._bisect(tc, n * _CLOSE_ENOUGH, name)
 
-    def _polish(self, tc: float) -> None:
-        """Try whether another time constant serves, or serves with fewer steps."""
-        served = self._list_served()
-        if not served:
-            nearest = self._find_nearest()
-            self._bisect(tc, nearest.settings.steps_per_revolution)
+    def _bisect(self, tc: float, n: float, kind: str = "") -> None:
+        """Narrow down the least steps per revolution at one time constant.
+
+        Where other settings serve, it begins with somewhat fewer steps than n, and
+        leaves off if these do not.
+        """
+        fewer = bool(self._list_served())
+        if fewer:
+            n /= _CLOSE_ENOUGH
+        if n < FEWEST_STEPS:
             return
-        fewest = min(served, key=lambda a: (a.steps, a.errors.worst))
-        n = fewest.settings.steps_per_revolution / _CLOSE_ENOUGH
-        if n >= FEWEST_STEPS:
-            self._refine(tc, n)
-
-    def _refine(self, tc: float, n: float, kind: str = "") -> None:
-        """Try so many steps, and fewer if they serve."""
-        if self._serves(self._try(n, tc, kind)):
-            self._bisect(tc, n / _CLOSE_ENOUGH, kind, serves=n)
-
-    def _bisect(
-        self, tc: float, n: float, kind: str = "", serves: float | None = None
-    ) -> None:
-        """Narrow down the least steps per revolution at one time constant."""
+        serves: float | None = None
         fails: float | None = None
         last: SearchRun | None = None
         for _ in range(_MOST_TRIALS):
@@ -338,7 +324,8 @@ class _CheapestSearch:
                 fails = n
                 last = attempt
                 ahead = n * min(max(step, _CLOSE_ENOUGH), 3.0)
-                if attempt.steps >= MOST_STEPS_OF_A_RUN:
+                is_worse = fewer and serves is None
+                if is_worse or attempt.steps >= MOST_STEPS_OF_A_RUN:
                     return
             if serves is not None and fails is not None:
                 if serves / fails <= _CLOSE_ENOUGH:
