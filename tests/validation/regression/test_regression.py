@@ -623,6 +623,17 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
     assert compare(kept, nights[0])[0] == HOLDS
 
 
+def test_a_run_that_leaves_out_what_was_judged_is_accepted_if_that_is_meant(
+    tmp_path, saved, call, accepts
+):
+    assert accepts(saved("all", ROW, OTHER)) == HOLDS
+    part = saved("part", ROW)
+    code, _, refused = call("accept", part, "--to", tmp_path / "kept")
+    assert code == BAD_INPUT and "leaves out what was judged in" in refused
+    assert "(scene other (1 row)): say --allow-weaker" in refused
+    assert accepts(part, "--allow-weaker") == HOLDS
+
+
 def test_rows_whose_allowance_grew_are_told():
     """K eps/condition may grow at a worse position."""
     hard, easier = (
