@@ -35,7 +35,7 @@ _COST_OF_A_LEADER = 3.0
 """What a led label costs beside one that stands near but less outward, or that touches
 a thin line: as much as three dots of that line.
 """
-POINT_DISTANCE = 3.0
+POINT_DISTANCE = 2.5
 """Distance of the dots along a line."""
 _MARGIN = 2.5
 """Space around a label: half the width of a bar and a little more."""
