@@ -224,37 +224,27 @@ def _drag_pin(
 
 
 def put_place(
-    document: SceneDocument,
-    path: KeyPath,
-    place: complex,
-    grain: float,
-    by: str = "",
+    document: SceneDocument, path: KeyPath, place: complex, grain: float
 ) -> None:
-    """State a place as the file does, in its units.
+    """State a place as the file does, by coordinates or in polar form, in its units.
 
-    `by`: "xy" or "polar" changes between distance and angle, and x and y. Where the
-    file has no place yet, its unit is that of the ground's length.
+    Where the file has no place yet, its unit is that of the ground's length.
     """
-    old = document.at(path)
-    by = by or ("xy" if isinstance(old, dict) else "polar")
-    keys: Any = ("x", "y") if by == "xy" else (0, 1)
-    if any(document.at((*path, key)) is None for key in keys):
+    by_coordinates = isinstance(document.at(path), dict)
+    keys: Any = ("x", "y") if by_coordinates else (0, 1)
+    first, second = ((*path, key) for key in keys)
+    if document.at(first) is None:
         # what is drawn is a place of its bar from now on
         lengths = (
             (*path, DRAWN_WORD, 0),
-            (*path, "x"),
-            (*path, 0),
             ("lengths", "ground", "x"),
             ("lengths", "ground"),
             ("pins", "A", 0),
         )
-        length = next(filter(None, map(document.at, lengths)))
-        new: Any = [str(length), "0 deg"]
-        if by == "xy":
-            new = {"x": str(length), "y": str(length)}
+        length = str(next(filter(None, map(document.at, lengths))))
+        new: Any = {"x": length, "y": length} if by_coordinates else [length, "0 deg"]
         document.put(path, new)
-    first, second = ((*path, key) for key in keys)
-    if by == "xy":
+    if by_coordinates:
         put_number(document, first, place.real, grain)
         put_number(document, second, place.imag, grain)
         return

@@ -9,7 +9,6 @@ its server runs: two servers on one file would share its state file and lose wor
 import os
 import re
 import sys
-import tempfile
 import time
 import webbrowser
 from pathlib import Path
@@ -51,15 +50,8 @@ class Redirect:
                     0o600,
                 )
             except OSError as error:
-                if os.path.lexists(self.path):
-                    reason = (
-                        f"may be open in another workbench: {self.path} cannot be read"
-                        f" ({error.strerror})"
-                    )
-                    raise InputError("scene file", str(self.scene), reason) from None
-                # nothing can be written next to the scene, no state either
-                handle, name = tempfile.mkstemp(suffix=REDIRECT_ENDING)
-                self.path = Path(name)
+                reason = f"{self.path} cannot be written beside it: {error.strerror}"
+                raise InputError("scene file", str(self.scene), reason) from None
             if not _lock(handle):
                 os.close(handle)
                 return False

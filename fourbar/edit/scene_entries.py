@@ -4,7 +4,7 @@ Comments, order and units of the rest stay as they were.
 """
 
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -240,11 +240,6 @@ class SceneDocument:
         parent = self.at(path[:-1])
         parent[path[-1]] = made
         return self.at(path)
-
-
-def name_entry(path: Iterable[str | int]) -> str:
-    """Name an entry as errors do."""
-    return ".".join(map(str, path))
 
 
 def _find_entry(entry: Any, path: KeyPath) -> Any:

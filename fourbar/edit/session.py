@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from itertools import chain, count, pairwise, product
+from itertools import chain, count, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,9 +17,7 @@ import numpy as np
 from fourbar.edit.dragging import (
     Dragged,
     drag,
-    list_handles,
     put_number,
-    put_place,
     write_rounded,
 )
 from fourbar.edit.exports import Exports, evaluate_scene, list_peaks
@@ -409,13 +407,13 @@ class Session:
     def _do_command(self, asked: Asked) -> None:
         """Command another bar, or the cylinder.
 
-        The range is what the present motion covers of it without turning back.
+        The range is what the present motion covers of it.
         """
         commanded = str(asked["command"])
         names_of = {
             names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)
         }
-        _, rate_name, *_ = names_of[commanded]
+        names = names_of[commanded]
         now = self.now
         has_speed = now.scene.motion.speed is not None
         before = solve(now.scene, "force" if has_speed else "position")
@@ -423,15 +421,14 @@ class Session:
         if values is None:
             reason = "needs a cylinder: add one in place of the bar first"
             raise InputError("command", commanded, reason)
-        shown = None
-        if asked.get("theta_2") is not None:
-            turned = np.exp(1j * before.theta_2)
-            distances = np.abs(turned - np.exp(1j * float(asked["theta_2"])))
-            shown = int(np.argmin(np.nan_to_num(distances, nan=np.inf)))
-        first, last = _find_monotone(values, shown)
+        first, last = float(np.nanmin(values)), float(np.nanmax(values))
         if last == first:
             reason = "does not move in this motion: choose another sweep first"
             raise InputError("command", commanded, reason)
+        row = int(np.nanargmin(np.abs(values - 0.5 * (first + last))))
+        if asked.get("theta_2") is not None:
+            away = np.exp(1j * before.theta_2) - np.exp(1j * float(asked["theta_2"]))
+            row = int(np.argmin(np.where(before.assembled, np.abs(away), np.inf)))
 
         document = SceneDocument(now.text)
         motion = now.plain["motion"]
@@ -442,34 +439,26 @@ class Session:
         if is_stroke:
             si, unit = "m", find_unit(find_length(now.plain), "m")
             rate_unit = f"{unit}/s"
-        steps = max(60, min(last - first, 360))
+        steps = max(60, min(len(before) - 1, 360))
         zero = f"0 {unit}"
         document.put(["motion", commanded], {"from": zero, "to": zero, "steps": steps})
         # so that rounding leads to no position beyond
-        inset = 1e-3 * (values[last] - values[first])
-        for end, value in (
-            ("from", values[first] + inset),
-            ("to", values[last] - inset),
-        ):
-            put_number(document, ["motion", commanded, end], value, abs(inset), si)
-        middle = (first + last) // 2
+        inset = 1e-3 * (last - first)
+        for end, value in (("from", first + inset), ("to", last - inset)):
+            put_number(document, ["motion", commanded, end], value, inset, si)
         if has_speed:
-            rate = float(getattr(before, rate_name)[middle])
-            of_rate = ["motion", rate_name]
+            rate = float(getattr(before, names[1])[row])
+            of_rate = ["motion", names[1]]
             document.put(of_rate, f"0 {rate_unit}")
             put_number(document, of_rate, rate, abs(rate) / 100.0, f"{si}/s")
-
-        pose = _read_bar_directions(before, middle)
-        text = self._choose_nearest_assembly(document, is_stroke, pose)
+        text = self._choose_nearest_assembly(document, is_stroke, before, row)
         self.change(lambda changed: changed.become(text))
 
     def _choose_nearest_assembly(
-        self, document: SceneDocument, has_side: bool, pose: Any
+        self, document: SceneDocument, has_side: bool, before: Solution, row: int
     ) -> str:
-        """State the branch and the side whose motion passes nearest to a pose.
-
-        `pose`: directions of the three moving bars.
-        """
+        """State the branch and the side whose motion passes nearest to a position."""
+        pose = _list_directions(before)[:, [row]]
         # a drawing states the assembly by its pins, and refuses a branch beside them
         branches = [""] if document.at(["pins"]) is not None else list(BRANCH_OF_NAME)
         distances = dict[str, float]()
@@ -478,20 +467,10 @@ class Session:
                 if word:
                     document.put(["motion", name], word)
             text = document.text()
-            after = solve(self.read(text).scene, "position")
-            directions = _read_bar_directions(after, len(after) // 2)
-            distance = np.abs(directions - pose).sum()
-            distances[text] = float(np.nan_to_num(distance, nan=np.inf))
+            after = _list_directions(solve(self.read(text).scene, "position"))
+            away = np.abs(after - pose).sum(axis=0)
+            distances[text] = float(np.min(np.nan_to_num(away, nan=np.inf)))
         return min(distances, key=distances.__getitem__)
-
-    def _do_restate(self, asked: Asked) -> None:
-        """State a place by x and y, or by distance and angle."""
-        path = asked["path"]
-        by = str(asked["by"])
-        places = {handle.path: handle.beyond for handle in list_handles(self.now.scene)}
-        place = places[tuple(path)]
-        grain = 1e-6 * abs(place)
-        self.change(lambda document: put_place(document, path, place, grain, by))
 
     def _do_picture(self, asked: Asked) -> Asked:
         """Keep a picture beside the scene, never over a file, under the drawing.
@@ -601,22 +580,7 @@ def _read_typed_pressure(text: str) -> str:
     return text.strip()
 
 
-def _read_bar_directions(solution: Solution, index: int) -> Any:
-    """Return the directions of the three moving bars at one position."""
+def _list_directions(solution: Solution) -> Any:
+    """Return the directions of the three moving bars at each position, (3, n)."""
     angles = solution.theta_2, solution.theta_3, solution.theta_4
-    return np.exp(1j * np.array(angles)[:, index])
-
-
-def _find_monotone(values: Any, shown: int | None) -> tuple[int, int]:
-    """Return the ends of a run in which numbers exist and rise, or fall, throughout.
-
-    The run with the position shown is chosen, or else the longest.
-    """
-    signs = np.nan_to_num(np.sign(np.diff(values)))
-    turns = np.flatnonzero(np.diff(signs)) + 1
-    runs = pairwise([0, *turns.tolist(), len(signs)])
-    moving = [run for run in runs if signs[slice(*run)].any()]
-    around = []
-    if shown is not None:
-        around = [run for run in moving if run[0] <= shown <= run[1]]
-    return max(around or moving, key=lambda run: run[1] - run[0], default=(0, 0))
+    return np.exp(1j * np.array(angles))
