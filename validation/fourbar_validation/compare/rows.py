@@ -135,22 +135,14 @@ class Row:
         errors = np.array(error, dtype=float, ndmin=1)
         if where is not None:
             errors = np.where(where, errors, 0.0)
-        index = int(find_used(errors, allowed).argmax())
-        worst = float(errors[index])
-        bound = _take_at(index, allowed)
+        numbers = np.broadcast_arrays(errors, allowed, theta_2, condition)
+        index = int(find_used(*numbers[:2]).argmax())
+        worst, bound, place, sound = (float(each.flat[index]) for each in numbers)
         verdict = AGREES if math.isfinite(worst) and worst <= bound else FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
-        return cls(
-            *who,
-            quantity,
-            worst,
-            bound,
-            verdict,
-            escape_controls(reason),
-            _take_at(index, theta_2),
-            _take_at(index, condition),
-        )
+        why = escape_controls(reason)
+        return cls(*who, quantity, worst, bound, verdict, why, place, sound)
 
     @property
     def compared(self) -> bool:
@@ -176,13 +168,6 @@ class Row:
             return 0.0
         share = self.error / self.allowed if self.allowed else math.inf
         return share if math.isfinite(share) else math.inf
-
-
-def _take_at(index: int, number: Array | float) -> float:
-    """Take the number of a position, or the one number of all positions."""
-    if isinstance(number, np.ndarray):
-        number = number.flat[index if number.size > 1 else 0]
-    return float(number)
 
 
 def make_breakdown(
