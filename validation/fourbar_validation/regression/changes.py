@@ -26,7 +26,7 @@ from fourbar_validation.compare.tolerance import (
     SIMULATED,
     K,
 )
-from fourbar_validation.regression.engines import move_engines, pair_engines
+from fourbar_validation.regression.engines import pair_engines
 from fourbar_validation.regression.record import About
 from fourbar_validation.regression.rules import NOTABLE, Weakening, list_weakened
 from fourbar_validation.regression.scenes import (
@@ -284,7 +284,7 @@ def compare_runs(
     `chosen`: names, of either run, by the column that rows are chosen by.
     """
     pairs, notes = pair_engines(old, new)
-    before, after = move_engines(old[0], pairs), new[0]
+    before, after = old[0], new[0]
     names = find_renamed(before.scenes, after.scenes)
     notes += [f"renamed: {first} -> {then}" for first, then in names.items()]
     changed = list_scene_changes(before.scenes, after.scenes)
@@ -294,7 +294,8 @@ def compare_runs(
         runs = [rows[rows[column].isin(now)] for rows in runs]
     table = _join_runs(*map(_keep_worst, runs))
     _classify_rows(table, changed, before, after)
-    weakened = list_weakened(before.rules, after.rules)
+    rules = {pairs.get(name, name): rule for name, rule in before.rules.items()}
+    weakened = list_weakened(rules, after.rules)
     surroundings = _list_surroundings(before, after)
     differences = Differences(table, surroundings, changed, weakened, notes)
     suites = [

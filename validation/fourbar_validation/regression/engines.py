@@ -1,8 +1,6 @@
 """Pair the engines of two runs: versions of one name, and a guest of another name."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fourbar_validation.compare.rows import FORMULAS
 from fourbar_validation.regression.record import About
@@ -60,18 +58,3 @@ def _name_version(about: About, engine: str) -> tuple[str, str]:
     """Return name and version of an engine of a run."""
     version = about.versions.get(engine, "")
     return engine.removesuffix(f" {version}"), version
-
-
-def move_engines(about: About, pairs: Mapping[str, str]) -> About:
-    """Return a record whose engines bear the names that they are paired with."""
-
-    def move(entries: Mapping[str, Any]) -> dict[str, Any]:
-        return {pairs.get(name, name): entry for name, entry in entries.items()}
-
-    engines = ", ".join(move(dict.fromkeys(about.engines)))
-    return replace(
-        about,
-        versions=move(about.versions),
-        rules=move(about.rules),
-        settings=about.settings | {"engines": engines},
-    )
