@@ -224,19 +224,26 @@ def _drag_pin(
 
 
 def put_place(
-    document: SceneDocument, path: KeyPath, place: complex, grain: float
+    document: SceneDocument,
+    path: KeyPath,
+    place: complex,
+    grain: float,
+    by: str = "",
 ) -> None:
     """State a place as the file does, by coordinates or in polar form, in its units.
 
-    Where the file has no place yet, its unit is that of the ground's length.
+    `by`: "xy" or "polar" changes from the one to the other. Where the file has no place
+    yet, its unit is that of the ground's length.
     """
-    by_coordinates = isinstance(document.at(path), dict)
+    by_coordinates = by == "xy" or (not by and isinstance(document.at(path), dict))
     keys: Any = ("x", "y") if by_coordinates else (0, 1)
     first, second = ((*path, key) for key in keys)
     if document.at(first) is None:
         # what is drawn is a place of its bar from now on
         lengths = (
             (*path, DRAWN_WORD, 0),
+            (*path, "x"),
+            (*path, 0),
             ("lengths", "ground", "x"),
             ("lengths", "ground"),
             ("pins", "A", 0),

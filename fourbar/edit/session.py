@@ -17,7 +17,9 @@ import numpy as np
 from fourbar.edit.dragging import (
     Dragged,
     drag,
+    list_handles,
     put_number,
+    put_place,
     write_rounded,
 )
 from fourbar.edit.exports import Exports, evaluate_scene, list_peaks
@@ -471,6 +473,15 @@ class Session:
             away = np.abs(after - pose).sum(axis=0)
             distances[text] = float(np.min(np.nan_to_num(away, nan=np.inf)))
         return min(distances, key=distances.__getitem__)
+
+    def _do_restate(self, asked: Asked) -> None:
+        """State a place by x and y, or by distance and angle."""
+        path = asked["path"]
+        by = str(asked["by"])
+        places = {handle.path: handle.beyond for handle in list_handles(self.now.scene)}
+        place = places[tuple(path)]
+        grain = 1e-6 * abs(place)
+        self.change(lambda document: put_place(document, path, place, grain, by))
 
     def _do_picture(self, asked: Asked) -> Asked:
         """Keep a picture beside the scene, never over a file, under the drawing.

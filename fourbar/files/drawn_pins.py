@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.effects import ForceDrive, LinearDrive
 from fourbar.errors import InputError
-from fourbar.files.fields import DRAWN_PLACE, Entry
+from fourbar.files.fields import Entry
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.mobility import count_equalities, meet_change_points
 from fourbar.linkage import (
@@ -81,8 +81,7 @@ def read_drawing(top: Entry) -> DrawnPins | None:
     motion = top["motion"]
     if isinstance(motion.value, dict) and "branch" in motion.value:
         raise motion["branch"].refuse("must be left out: the pins state the assembly")
-    pins.table(PINS)
-    return DrawnPins(*(pins[pin].pair(DRAWN_PLACE) for pin in PINS))
+    return pins.described(DrawnPins)  # type: ignore[no-any-return]
 
 
 class DrawnGround(NamedTuple):

@@ -48,7 +48,7 @@ from fourbar.quantities.units import (
     UnitError,
     to_si,
 )
-from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
+from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import is_length
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -101,8 +101,6 @@ _WAYS = {
 PLACES_OF_ENDS = (*STATED_PLACES, "point", DRAWN_WORD)
 """Keys of which one states an end of a spring or cylinder, or the point of a force."""
 _KEYS_OF_PLACE = ("bar", *PLACES_OF_ENDS)
-DRAWN_PLACE = Declared("m", pair="m")
-"""x and y of a place in the drawing."""
 _PAIR = ["0", "1"]
 """Keys of two numbers that are written as a pair [magnitude, angle]."""
 

@@ -16,7 +16,6 @@ from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
 from fourbar.files.drawn_pins import choose_assembly, meet_lengths
 from fourbar.files.fields import (
-    DRAWN_PLACE,
     Entry,
     SceneFile,
     write_described,
@@ -25,7 +24,6 @@ from fourbar.files.fields import (
 from fourbar.linkage import (
     BAR_NAMES,
     MOVING_BARS,
-    PINS,
     Bar,
     Described,
     FourBar,
@@ -118,7 +116,7 @@ def _write_lengths(
     drawing = scene.drawing
     if drawing is None:
         return [("lengths", lengths)]
-    pins = {pin: [write_quantity(x, "m") for x in drawing.place(pin)] for pin in PINS}
+    pins = write_described(drawing)
     drawn = (*meet_lengths(drawing, pins), drawing.angle(1))
     stated = (*scene.linkage.lengths, scene.linkage.ground_angle)
     motion_drawn = choose_assembly(scene, drawing).motion if drawn == stated else None
@@ -284,13 +282,11 @@ def write_drawn_scene(
 
     Raises InputError as `DrawnPins` does.
     """
-    file = SceneFile("--pins")
     rows = ["[pins]  # x and y in the position that is drawn"]
-    places = []
     for pin, (x, y) in pins.items():
-        places.append(Entry(file, pin, [x, y]).pair(DRAWN_PLACE))
         rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
-    drawing = DrawnPins(*places)
+    stated = {pin: [*place] for pin, place in pins.items()}
+    drawing = Entry(SceneFile("--pins"), "pins", stated).described(DrawnPins)
     moving = [*map(drawing.length, MOVING_BARS)]
     return _fill_in(rows, moving, "", find_unit(pins["A"][0], "m"), template)
 

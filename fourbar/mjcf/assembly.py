@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
+import numpy as np
+
 from fourbar.errors import LimitError, clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import NOTES, Start, find_start
@@ -180,92 +182,66 @@ def write_sdf(
             raise LimitError("Drake's ball constraint at pin B has no damping")
     comment = _write_comment(scene, "SDF", reader, assembled, at_B, plane)
     add_comments(root, comment.splitlines())
-    world = ET.SubElement(root, "world", name="four_bar")
-    _add_numbers(world, "gravity", *plane.turn(*gravity))
-    model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")
+    world = _add(root, "world", {"gravity": plane.turn(*gravity)}, name="four_bar")
+    model = _add(world, "model", {}, name=clean_line(scene.title) or "four-bar")
     if plane.is_moved:
-        _add_numbers(model, "pose", *plane.origin, *plane.roll_pitch_yaw)
-    _add_link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
-    _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
+        _add(model, "pose", (*plane.origin, *plane.roll_pitch_yaw))
+
+    def add_link(bar: int, mass: float, inertia: float, centre: complex) -> None:
+        # izz alone acts in the plane; three equal ones are a possible body
+        tensor = dict.fromkeys(("ixx", "iyy", "izz"), inertia)
+        tensor |= dict.fromkeys(("ixy", "ixz", "iyz"), 0.0)
+        inertial = {
+            "pose": (centre.real, centre.imag, 0, 0, 0, 0),
+            "mass": mass,
+            "inertia": tensor,
+        }
+        pose = foot[bar].real, foot[bar].imag, 0, 0, 0, turn[bar]
+        link = {"pose": pose, "inertial": inertial}
+        _add(model, "link", link, name=BAR_NAMES[bar])
+
+    def add_joint(pin: str, parent: int, child: int, **more: Any) -> None:
+        axis: dict[str, Any] = {"xyz": (0, 0, 1)}
+        if pin in dynamics:
+            axis["dynamics"] = dynamics[pin]
+        ends = {"parent": BAR_NAMES[parent], "child": BAR_NAMES[child]}
+        joint = {**ends, "axis": axis, **more}
+        _add(model, "joint", joint, name=pin, type="revolute")
+
+    add_link(1, 1.0, 1.0, 0j)
+    ends = {"parent": "world", "child": BAR_NAMES[1]}
+    _add(model, "joint", ends, name="ground_on_world", type="fixed")
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        name = BAR_NAMES[number]
-        _add_link(
-            model,
-            name,
-            foot[number],
-            turn[number],
-            bar.mass,
-            inertia[number],
-            bar.to_centre,
-        )
-        pin = FIRST_PIN[number]
-        at_pin = dynamics.get(pin, {})
-        _add_joint(model, pin, "revolute", BAR_NAMES[_PARENT[number]], name, at_pin)
-    _, coupler, output = (BAR_NAMES[number] for number in MOVING_BARS)
+        add_link(number, bar.mass, inertia[number], bar.to_centre)
+        add_joint(FIRST_PIN[number], _PARENT[number], number)
     length_3 = linkage.coupler.length
-    if reader == "gazebo":
-        at_pin = dynamics.get("B", {})
-        joint = _add_joint(model, "B", "revolute", output, coupler, at_pin)
-        # in the frame of its child
-        _add_numbers(joint, "pose", length_3, 0, 0, 0, 0, 0)
+    if reader == "gazebo":  # the pose is in the frame of the child
+        add_joint("B", 4, 3, pose=(length_3, 0, 0, 0, 0, 0))
     else:
         name = "drake:ball_constraint"
-        ball = ET.SubElement(model, name)
-        ET.SubElement(ball, f"{name}_body_A").text = coupler
-        ET.SubElement(ball, f"{name}_body_B").text = output
-        _add_numbers(ball, f"{name}_p_AP", length_3, 0, 0)
-        _add_numbers(ball, f"{name}_p_BQ", linkage.output.length, 0, 0)
+        ball = {
+            "body_A": BAR_NAMES[3],
+            "body_B": BAR_NAMES[4],
+            "p_AP": (length_3, 0, 0),
+            "p_BQ": (linkage.output.length, 0, 0),
+        }
+        _add(model, name, {f"{name}_{key}": value for key, value in ball.items()})
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_numbers(parent: ET.Element, name: str, *numbers: float) -> None:
-    """Add an element that holds numbers."""
-    ET.SubElement(parent, name).text = write_exactly(*numbers)
-
-
-def _add_link(
-    model: ET.Element,
-    name: str,
-    foot: complex,
-    turn: float,
-    mass: float,
-    inertia: float,
-    centre: complex,
-) -> None:
-    link = ET.SubElement(model, "link", name=name)
-    _add_numbers(link, "pose", foot.real, foot.imag, 0, 0, 0, turn)
-    inertial = ET.SubElement(link, "inertial")
-    _add_numbers(inertial, "pose", centre.real, centre.imag, 0, 0, 0, 0)
-    _add_numbers(inertial, "mass", mass)
-    tensor = ET.SubElement(inertial, "inertia")
-    # izz alone acts in the plane; three equal ones are a possible body
-    for axes in ("ixx", "iyy", "izz"):
-        _add_numbers(tensor, axes, inertia)
-    for axes in ("ixy", "ixz", "iyz"):
-        _add_numbers(tensor, axes, 0)
-
-
-def _add_joint(
-    model: ET.Element,
-    name: str,
-    kind: str,
-    parent: str,
-    child: str,
-    dynamics: dict[str, float] | None = None,
-) -> ET.Element:
-    joint = ET.SubElement(model, "joint", name=name, type=kind)
-    ET.SubElement(joint, "parent").text = parent
-    ET.SubElement(joint, "child").text = child
-    if dynamics is not None:
-        axis = ET.SubElement(joint, "axis")
-        _add_numbers(axis, "xyz", 0, 0, 1)
-        if dynamics:
-            values = ET.SubElement(axis, "dynamics")
-            for key, value in dynamics.items():
-                _add_numbers(values, key, value)
-    return joint
+def _add(parent: ET.Element, tag: str, content: Any, **attributes: str) -> ET.Element:
+    """Add an element that holds a text, numbers, or elements by their tags."""
+    element = ET.SubElement(parent, tag, attributes)
+    if isinstance(content, dict):
+        for inner, value in content.items():
+            _add(element, inner, value)
+    elif isinstance(content, str):
+        element.text = content
+    else:
+        element.text = write_exactly(*np.ravel(content))
+    return element
 
 
 def write_usd(

@@ -1,42 +1,38 @@
 """A linkage as it is drawn: the places of its four pins in the plane of the drawing."""
 
 import math
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import cross, vector
-from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, require
+from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, Declared, Described
 
 DRAWN_WORD = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a drawn place."""
 PINS_IN_LINE = 1e-12
 """Part of the drawing's size within which four pins lie in one line: a change point."""
 PlanePoint = tuple[float, float]
+DRAWN_PLACE = Declared("m", pair="m")
+"""x and y of a place in the drawing."""
 
 
 @dataclass(frozen=True, slots=True)
-class DrawnPins:
+class DrawnPins(Described):
     """Places of the pins, each (x, y), m or texts with units.
 
     Raises InputError where two pins of a bar lie in one place, and where all four lie
     in one line: on a change point a drawing does not tell one assembly from the other.
     """
 
-    O2: PlanePoint
-    A: PlanePoint
-    B: PlanePoint
-    O4: PlanePoint
+    O2: Annotated[PlanePoint, DRAWN_PLACE]
+    A: Annotated[PlanePoint, DRAWN_PLACE]
+    B: Annotated[PlanePoint, DRAWN_PLACE]
+    O4: Annotated[PlanePoint, DRAWN_PLACE]
+    stated_at: ClassVar[str] = "pins"
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            place = getattr(self, field.name)
-            key = f"pins.{field.name}"
-            if not isinstance(place, (tuple, list)) or len(place) != 2:
-                raise InputError(key, place, "must be a pair (x, y)")
-            x = require(f"{key}.0", place[0], "m")
-            y = require(f"{key}.1", place[1], "m")
-            object.__setattr__(self, field.name, (x, y))
+        Described.__post_init__(self)
         for bar, (first, second) in ENDS.items():
             if self.vector(bar) == 0.0:
                 name = f"both ends of the {BAR_NAMES[bar]}"

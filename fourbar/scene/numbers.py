@@ -30,7 +30,7 @@ from fourbar.linkage import (
     require,
 )
 from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
-from fourbar.scene.drawing import DRAWN_WORD
+from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import Motion
 
 LONGEST_POINT_NAME = 40
@@ -129,10 +129,11 @@ def find_unit_of_key(key: str) -> str | None:
     None: no scene has such a number.
     """
     table, *names = key.split(".")
-    if table == "pins" or names[-2:-1] == [DRAWN_WORD]:
+    if names[-2:-1] == [DRAWN_WORD]:
         return PIN_COORDINATE.unit
     tables = {"lengths": LENGTH_NUMBERS, "motion": Motion.numbers}
     kinds: dict[str, Any] = {
+        "pins": DrawnPins,
         "bars": Bar,
         "points": Point,
         "loads": effects.Load,

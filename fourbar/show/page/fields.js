@@ -128,6 +128,11 @@ function group(path, node, example) {
     else if (path.length || inner !== undefined || model !== undefined || partsAt(own).length) box.append(branchOf(own, inner, model));
   }
   for (const part of partsAt(path)) box.append(part);
+  if (offers.pairs[path[path.length - 1]]?.[0] === "distance") {   // a place, stated in one of two ways
+    const by = Array.isArray(node) ? "xy" : "polar", other = element("button", { type: "button", className: "take", textContent: by === "xy" ? "By x and y" : "By distance and angle" });
+    other.addEventListener("click", () => ask({ do: "restate", path, by }));
+    box.append(other);
+  }
   if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(["bars", "pins"].includes(path[0]) && path.length === 2) && !["from", "to"].includes(path[path.length - 1])) {
     const take = element("button", { type: "button", className: "take", textContent: `Remove ${path.slice(path.length > 2 ? -2 : -1).map((_, n, last) => labelOf(path.slice(0, path.length - last.length + n + 1))).join(", ")}` });
     take.addEventListener("click", () => ask({ do: "remove", path }));

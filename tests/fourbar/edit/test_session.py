@@ -221,6 +221,8 @@ REFUSED = [
 {"do": "redo"} | no further state
 {"do": "units", "units": "parsec"} | units
 {"do": "export", "format": "../x"} | cannot be done
+{"do": "restate", "path": ["lengths"], "by": "xy"} | cannot be done
+{"do": "restate", "path": ["no"], "by": "xy"} | cannot be done
 {"do": "pressure", "pressure": "210"} | pressure
 {"do": "pressure", "pressure": "-1 bar"} | pressure
 {"do": "pressure", "pressure": "3 mm"} | pressure
@@ -414,6 +416,15 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays
     turned = angle + (float(s.theta_3[0]) if frame == "bar" else 0.0)
     acts = pull * np.exp(1j * turned)
     assert np.angle(acts / arrow) == approx(0.0, abs=0.02)
+
+
+def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
+    path = ["loads", 3, "from_pin"]
+    stated = loaded.now.scene.loads[3].from_pin
+    for by, kind in (("polar", list), ("xy", dict)):
+        ask(loaded, "restate", path=path, by=by)
+        assert isinstance(loaded.now.plain["loads"][3]["from_pin"], kind)
+        assert loaded.now.scene.loads[3].from_pin == approx(stated, rel=1e-5)
 
 
 @pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
