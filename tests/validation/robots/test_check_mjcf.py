@@ -55,6 +55,7 @@ from fourbar_validation.robots.judge_loop import (
     answer_changed,
     judge_file,
 )
+from fourbar_validation.robots.report import _describe_differences
 from tests.support.robots import AS_DRAWN, answer_of, answers_of, mend, notes_of
 from tests.support.robots import examine_text as examine
 from tests.support.rows import read_rows
@@ -653,6 +654,31 @@ def test_what_to_type_is_advised_where_a_setting_differs():
         listed = [Difference(key, 0.0, 1.0, "", written)]
         sentences = LoopJudgement(None, listed, rows, {}, []).sentences()  # type: ignore[arg-type]
         assert sum("advise SCENE FILE" in text for text in sentences) == advised
+
+
+def test_an_error_stands_before_that_of_the_generated_file():
+    torque, force = rows_with(0.05, 0.3)
+    ours = {("how", "torque"): 0.2}
+    judgement = LoopJudgement(None, [], [torque, force], ours, [])  # type: ignore[arg-type]
+    *_, table = _describe_differences(judgement)
+    assert table.rows == [
+        ("torque", "5.00e-02", "2.00e-01", "1.00e-05", FAILS),
+        ("F12", "3.00e-01", "-", "1.00e-05", FAILS),
+    ]
+
+
+@pytest.mark.parametrize("turns", [-2, 1, 3])
+def test_a_loop_counts_the_whole_turns_of_its_scene(turns):
+    """A spring of the file is wound as the angle of the scene says."""
+    file = RobotFile(MINE_XML, GENERATED)
+    motion = FEW.motion.replace(angle=FEW.motion.angle + math.tau * turns)
+    loops = [
+        find_loop_of_scene(file, scene, AS_DRAWN).loop
+        for scene in (FEW, replace(FEW, motion=motion))
+    ]
+    one, other = (loop.angles[1] for loop in loops)
+    assert other == approx(one + math.tau * turns)
+    assert abs(one - np.mean(FEW.motion.angle)) <= math.pi
 
 
 def test_a_range_is_asked_of_both_files(monkeypatch):

@@ -455,6 +455,14 @@ def test_an_offset_is_named_with_the_force_that_mujoco_has_there(offset):
         assert (words in said) == bool(offset)
 
 
+def test_the_force_of_an_offset_is_that_without_dry_friction():
+    text = apart_along_the_axes(1e-3)
+    rubbing = text.replace("<joint ", '<joint frictionloss="0.5" ')
+    assert rubbing != text
+    one, other = (list_closures(file_of(t), PoseOptions()) for t in (text, rubbing))
+    assert one.closures[0].loop.remarks == other.closures[0].loop.remarks
+
+
 @pytest.mark.slow
 def test_a_weld_holds_the_turn_whatever_the_axes_of_its_bodies():
     """Both halves of the coupler turn alike: no motion of the loop parts them.
