@@ -359,7 +359,7 @@ class Effect(Placed):
         The code is a second derivation and uses nothing of `act`.
 
         `bars`: of `engines.loaded.Loaded`, with `push`, `couple`, `angle`, `velocity`,
-        `alpha`, `rotate`, `point`, `first_pin`, `pin_loads`.
+        `alpha`, `rotate`, `first_pin`, `locate`, `end`, `pin_loads`.
         """
         raise NotImplementedError
 
