@@ -11,11 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 import fourbar
-from fourbar.effects import Load
-from fourbar.effects.load import Table
-from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, LINE, UNKNOWNS, Array
-from fourbar.scene.numbers import POINT_STAGES, Point
+from fourbar.scene.numbers import POINT_STAGES
 from fourbar.studies.keys import command_key
 from fourbar_validation.compare.rows import keep_worst
 from fourbar_validation.compare.scales import make_reference
@@ -48,37 +45,6 @@ _APART_NEAR_CHANGE_POINT = 1e-5
 """The same near a change point, where larger differences make linkages of their own."""
 _POINTS = "points"
 """Quantity of the row of all points of a scene."""
-_CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
-"""rad from the first position; where the table of a load that the run adds is bent."""
-
-
-def furnish(scene, question):
-    """Give the scene a point on each bar and a load over a table, if it has none.
-
-    The load is as large as the scene's forces.
-    """
-    coupler = scene.linkage.coupler
-    first = question.solution.theta_2[0]
-    if not scene.points:
-        lengths = {bar: scene.linkage.bar(bar).length for bar in MOVING_BARS}
-        made = [Point(f"P{k}", k, (0.6 * lengths[k], 0.4 * k)) for k in lengths]
-        scene = replace(scene, points=tuple(made))
-    size = magnitude(question.free_body.quantities["F12"])
-    positive = size[np.isfinite(size) & (size > 0.0)]
-    tabled = any(load.table for load in scene.loads)
-    if positive.size and not tabled and scene.motion.law is None:
-        force = 0.5 * np.median(positive)
-        table = Table(tuple(first + x for x in _CORNERS), (1.0, -0.5, 2.0, 1.0))
-        load = Load(
-            3,
-            (force, 0.3),
-            from_centre=(0.2 * coupler.length, 0.5),
-            moment=0.1 * force * coupler.length,
-            frame="bar",
-            table=table,
-        )
-        scene = replace(scene, loads=(*scene.loads, load))
-    return scene
 
 
 def _group_keys(keys):
@@ -100,7 +66,7 @@ def study(question):
     In one these are the numbers of a scene that is stated by lengths, of a drawn scene
     in another one all coordinates of its drawing.
     """
-    scene = furnish(take_few(question), question)
+    scene = take_few(question)
     nominal = ask_free_bodies(scene)
     rows = []
     for setting, keys in _group_keys(fourbar.sensitivity(scene).keys).items():

@@ -17,13 +17,12 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.polynomial.legendre import leggauss
 
-from fourbar.effects import Springs
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
 from fourbar.scene import command_at
 from fourbar.scene.motion import FromLimit
 from fourbar.show.block import write_block
-from fourbar.show.duty import list_duty, shaking_force
+from fourbar.show.duty import list_duty
 from fourbar.show.summary import Facts
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.scales import make_reference
@@ -228,7 +227,7 @@ def _find_conditions(scene, answer):
 def summary(question):
     """Judge ranges, peaks, RMS, energies, pin loads and more.
 
-    Shaking force, bending and bore are judged too.
+    Bending and bore are judged too.
     """
     judged = _SummaryJudge(question, _summarize_scene(question))
     _judge_ranges(judged)
@@ -432,10 +431,7 @@ def _judge_bore(judged, fine):
 
 
 def _judge_pins(judged):
-    """Judge peak and place of each pin's load, printed and in the JSON.
-
-    The force on the frame is judged too.
-    """
+    """Judge peak and place of each pin's load, printed and in the JSON."""
     facts = judged.facts
     for pin, name in PIN_FORCE.items():
         if pin not in judged.loaded_pins or name in judged.growing:
@@ -449,19 +445,6 @@ def _judge_pins(judged):
         judged.add_value("pins", of_pin["peak"], peak.value)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
         judged.add("pins", np.abs(wrap_difference(apart)))
-    ends = {
-        end.bar
-        for effect in judged.scene.effects
-        if isinstance(effect, Springs)
-        for spring in effect.springs
-        for end in (spring.start, spring.end)
-    }
-    if judged.scene.drive is None and 1 not in ends:  # pins alone hold the frame
-        forces = [judged.own.quantities[name] for name in ("F12", "F14")]
-        size = sum(magnitude(force).max() for force in forces)
-        if size != 0.0:
-            apart = magnitude(shaking_force(judged.solution) + sum(forces))
-            judged.add("frame_force", apart / size)
 
 
 def _judge_bending(judged):

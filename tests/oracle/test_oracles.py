@@ -27,6 +27,7 @@ SEED = 68
 LAWS, LAW_SHARE = 60, min(SHARE, 7)
 SAMPLE = {
     "slender": ORACLES,
+    "table": ("study",),
     "limited": ("study", "sensitivity", "equilibria"),
     "loaded": ("internal_forces", "summary"),
     "part of a turn": ("summary",),

@@ -8,7 +8,6 @@ import sys
 
 import numpy as np
 
-from fourbar_validation import Answer
 from fourbar_validation.engines.free_body import FreeBody
 
 
@@ -25,13 +24,8 @@ class Angle(Right):
 
     def answer(self, scene, command):
         answer = super().answer(scene, command)
-        return Answer(
-            self.name,
-            "exact",
-            command,
-            answer.assembled,
-            {"theta_3": answer.quantities["theta_3"]},
-        )
+        answer.quantities = {"theta_3": answer.quantities["theta_3"]}
+        return answer
 
 
 class Releases(Right):
@@ -111,13 +105,8 @@ class Lacks(Right):
     def answer(self, scene, command):
         answer = super().answer(scene, command)
         theta = answer.quantities["theta_3"]
-        return Answer(
-            self.name,
-            "wrong",
-            command,
-            answer.assembled,
-            {"theta_3": theta, "theta_4": np.nan * theta},
-        )
+        answer.quantities = {"theta_3": theta, "theta_4": np.nan * theta}
+        return answer
 
 
 class Shapes(Right):

@@ -7,7 +7,6 @@ import csv
 import json
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
 from unittest.mock import Mock
 
 import numpy as np
@@ -32,9 +31,10 @@ from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, writ
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.run import run
-from fourbar_validation.scenes.suites import LARGEST_LIST, Suite, read_suite
+from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
+from tests.support.unlucky import Few
 
 HOSTILE = {
     "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",
@@ -58,38 +58,27 @@ EXACT = choose_engines("free-body")
 FORMS = ("markdown", "html", "junit")
 
 
-@dataclass(frozen=True)
-class Named(Suite):
-    """Scenes whose name, title and source are hostile.
+NAMES = (
+    *(HOSTILE[kind] for kind in ("path", "markdown", "rich")),
+    " ".join(HOSTILE.values()),
+)
+"""Where the beginning or the whole matters each by itself."""
 
-    Where the beginning or the whole matters each by itself.
-    """
 
-    texts: tuple[str, ...] = (
-        *(HOSTILE[kind] for kind in ("path", "markdown", "rich")),
-        " ".join(HOSTILE.values()),
-    )
-
-    def __len__(self):
-        return len(self.texts)
-
-    def name(self, index):
-        return self.texts[index]
+class Named(Few):
+    """Scenes whose name, title and source are hostile."""
 
     def scene(self, index):
-        text = self.texts[index]
+        text = self.names[index]
         motion = fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)
         return crank_rocker(title=text, source=text, motion=motion)
-
-    def fingerprint(self):
-        return repr(self.texts)
 
 
 @pytest.mark.slow
 def test_reports_hold_hostile_text_as_text(tmp_path, monkeypatch, capsys):
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
-    summary = run(Plan(Named(), EXACT, workers=1), out)
+    summary = run(Plan(Named(NAMES), EXACT, workers=1), out)
     html = (out / "report.html").read_text()
     assert not ACTIVE.search(html) and "7*7 }}" in html
     markdown = (out / "report.md").read_text()

@@ -14,7 +14,6 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import pandas as pd
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from pytest import raises
@@ -224,8 +223,6 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
     # a bit of a number, which the checksum of its page shows
     place = contents.index(struct.pack("<d", ROW.error))
     flipped = contents[:place] + bytes([contents[place] ^ 1]) + contents[place + 1 :]
-    (read,) = pq.read_table(pa.BufferReader(flipped))["error"].to_pylist()
-    assert read != ROW.error
     for damaged in (
         b"",
         b"no columns",
