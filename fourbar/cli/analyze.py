@@ -11,7 +11,7 @@ from fourbar.linkage import PINS, POSITIVE, Bar, FourBar
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
 from fourbar.show.lines import wrap_line
-from fourbar.show.shown_units import suit_units, units_of_length
+from fourbar.show.shown_units import units_of_length
 from fourbar.solution import DEGREES, SI, Conversion, Solution, write_csv, write_json
 from fourbar.solving import find_last_stage, solve
 from fourbar.studies.course import follow
@@ -50,9 +50,8 @@ def classify_command(
             "must be four ratios, or four lengths each with its unit",
         )
     d, a, b, c = given.read_lengths(lengths)
-    units = None if all(ratios) else suit_units(lengths[0])
-    ratios_only = {"m": ("", 1.0)}
-    with state_messages_in(ratios_only if all(ratios) else units_of_length(lengths[0])):
+    units = {"m": ("", 1.0)} if all(ratios) else units_of_length(lengths[0])
+    with state_messages_in(units):
         linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     if as_json:
         text = write_type_json(linkage)
@@ -64,14 +63,7 @@ def classify_command(
 
 
 @click.command(cls=given.LengthsCommand)
-@click.argument("file", type=given.FILE_PATH, required=False)
-@click.option(
-    "-o",
-    "--out",
-    type=given.FILE_PATH,
-    metavar="FILE",
-    help="Name of the new file.",
-)
+@click.argument("file", type=given.FILE_PATH)
 @click.option(
     "--lengths",
     nargs=4,
@@ -94,8 +86,7 @@ def classify_command(
     help="Leave out masses, gravity, speed and drive.",
 )
 def new(
-    file: Path | None,
-    out: Path | None,
+    file: Path,
     lengths: tuple[str, ...] | None,
     pins: str | None,
     unit: str | None,
@@ -114,11 +105,6 @@ def new(
 
     if (lengths is None) == (pins is None):
         raise click.UsageError("give --lengths D A B C or --pins, one of the two")
-
-    if (file is None) == (out is None):
-        raise click.UsageError("name the new file once: FILE, or -o FILE")
-    file = file or out
-    assert file is not None
     if file.exists():
         raise InputError(
             "FILE",

@@ -122,26 +122,6 @@ def _hint_at_unit(name: str) -> str:
     return ""
 
 
-def suit_units(length: str) -> Conversion:
-    """Return the units that suit a length as it was typed.
-
-    Inches, feet and yards give imperial units, other lengths `COMMON`: a result has the
-    prefix that suits its size, where a message repeats the unit that was typed.
-    """
-    from fourbar.quantities.units import find_unit
-
-    return _find_imperial(find_unit(length, "m")) or COMMON
-
-
-def _find_imperial(name: str) -> Conversion:
-    """Return the imperial units that suit a unit of length; none if it is metric."""
-    from fourbar.quantities.units import IMPERIAL
-
-    if name.casefold() not in IMPERIAL:
-        return SI
-    return units("imperial" if name.casefold().startswith("in") else _FEET)
-
-
 def units_of_length(length: str) -> Conversion:
     """Return the units of messages on a length as it was typed.
 
@@ -193,11 +173,12 @@ def states_radians(document: Mapping[str, Any]) -> bool:
 @cache
 def _suit_texts(length: str, *rates: str) -> Conversion:
     """Return the units that suit a length, speeds and accelerations as written."""
-    from fourbar.quantities.units import converts, find_unit
+    from fourbar.quantities.units import IMPERIAL, converts, find_unit
 
     name = find_unit(length, "m")
-    if imperial := _find_imperial(name):
-        shown = dict(imperial)
+    if name.casefold() in IMPERIAL:
+        inches = name.casefold().startswith("in")
+        shown = dict(units("imperial" if inches else _FEET))
     else:
         named = units(name.replace(" ", ".")) if converts(name, "m") else {}
         shown = {**COMMON, **named}

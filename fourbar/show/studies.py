@@ -54,7 +54,7 @@ from fourbar.writing import write_object
 
 def write_type(
     linkage: FourBar,
-    units: Conversion | None,
+    units: Conversion,
     *,
     everything: bool,
 ) -> Iterator[str]:
@@ -62,16 +62,13 @@ def write_type(
 
     Further lines say which bars turn, how far, and between which limits.
 
-    `units`: of the lengths; None where they are ratios. `everything`: the limits of the
-    coupler too.
+    `units`: of the lengths, which may be ratios. `everything`: limits of the coupler
+    too.
     """
     mobility = classify(linkage)
     relation = {1.0: "<", -1.0: ">", 0.0: "="}[float(np.sign(mobility.surplus))]
     outer = min(linkage.lengths) + max(linkage.lengths)
-    factor = 1.0
-    unit = ""
-    if units is not None:
-        factor, unit = choose_unit(max(linkage.lengths), "m", units)
+    factor, unit = choose_unit(max(linkage.lengths), "m", units)
 
     def write(length: float) -> str:
         return f"{factor * length:.6g} {unit}".rstrip()

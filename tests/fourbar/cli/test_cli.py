@@ -264,7 +264,7 @@ CLASSIFIED = read_rows(r"""
 0.3 0.1 0.2 0.2 | change-point crank-rocker
 20cm 48cm 55cm 20cm | triple rocker
 300 100 250 220 | s + l = 400 < p + q = 470
-30cm 100mm 25cm 0.22m | s + l = 400 mm < p + q = 470 mm
+30cm 100mm 25cm 0.22m | s + l = 40 cm < p + q = 47 cm
 30in 10in 25in 22in | s + l = 40 in < p + q = 47 in
 # at its limits the input is the corner of 80, 100 and 90 + 50, or 90 - 50 mm
 80mm 100mm 50mm 90mm | input: coupler, output folded      22.3316
@@ -591,7 +591,7 @@ plot @crank_rocker.toml -o a.doc | a.doc
 plot @crank_rocker.toml -o a.svg --figure torque --dimensions | --dimensions: must
 plot @crank_rocker.toml -o a.svg --figure pie | --figure = 'pie': must be one of
 mjcf @crank_rocker.toml -o a.xml --axis '0 0 0' | --axis = (0.0, 0.0, 0.0): must
-new --lengths 3 1 2 2 | name the new file once
+new --lengths 3 1 2 2 | Missing argument
 new a.toml --lengths 300 100 250 220 | --unit mm
 new a.toml --lengths 3m 1m 2m 0m | error: --lengths: output = '0m': must be a
 classify 30cm 100 250 220 | unit
