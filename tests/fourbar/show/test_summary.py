@@ -344,6 +344,20 @@ def test_a_released_turn_has_its_period():
     assert release_pendulum(30.0, 0.5).period == approx(period, rel=EXTREME)
 
 
+def test_the_angles_of_two_stretches_cover_no_more_than_those_of_one():
+    """A turn from 0 has a gap within, a turn from 2 rad at its ends alone."""
+    linkage = bare(4.0, 5.0, 3.0, 3.5)
+    two, one = (
+        Facts(solve(Scene(linkage, Motion(Sweep(start, start + tau, 24)))))
+        for start in (0.0, 2.0)
+    )
+    assert (len(two.motion.stretches), len(one.motion.stretches)) == (2, 1)
+    for bar in (3, 4):
+        ranges = (facts.angles[bar] for facts in (two, one))
+        cover, whole = (high.value - low.value for low, high in ranges)
+        assert cover == approx(whole, abs=1e-6)  # a limit leaves the root of rounding
+
+
 @pytest.mark.slow
 def test_transmission_angle_is_the_least_of_all_stretches():
     """The coupler rocks in two stretches, of which the sine of mu has both signs."""
