@@ -188,7 +188,7 @@ def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     assert abs(solve(scene, at=at_limit).omega_4[0]) > 0.0
     assert rows[3].split()[3] == "0" and rows[2].split()[3] != "0"
     parallel = PositionSheet(solve(scene, at=locate(scene, "theta_3", "max")), COMMON)
-    assert [row.split()[2] for row in parallel.write_ratios()[4:]][0] == "-"
+    assert parallel.write_ratios()[4].split()[2] == "-"
     turned = Scene(PARALLELOGRAM, Motion(Sweep(0.0, 2.0 * np.pi, 4), 1.0))
     one = solve(turned, at=command_at(turned, np.array([2.0 * np.pi])))
     course.follow(turned, one)
