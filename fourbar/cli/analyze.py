@@ -63,7 +63,14 @@ def classify_command(
 
 
 @click.command(cls=given.LengthsCommand)
-@click.argument("file", type=given.FILE_PATH)
+@click.argument("file", type=given.FILE_PATH, required=False)
+@click.option(
+    "-o",
+    "--out",
+    type=given.FILE_PATH,
+    metavar="FILE",
+    help="Name of the new file.",
+)
 @click.option(
     "--lengths",
     nargs=4,
@@ -86,7 +93,8 @@ def classify_command(
     help="Leave out masses, gravity, speed and drive.",
 )
 def new(
-    file: Path,
+    file: Path | None,
+    out: Path | None,
     lengths: tuple[str, ...] | None,
     pins: str | None,
     unit: str | None,
@@ -105,6 +113,11 @@ def new(
 
     if (lengths is None) == (pins is None):
         raise click.UsageError("give --lengths D A B C or --pins, one of the two")
+
+    if (file is None) == (out is None):
+        raise click.UsageError("name the new file once: FILE, or -o FILE")
+    file = file or out
+    assert file is not None
     if file.exists():
         raise InputError(
             "FILE",
