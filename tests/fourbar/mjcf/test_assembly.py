@@ -6,6 +6,7 @@ The adapters of the lab read them in each simulator as their comments say.
 import re
 from dataclasses import replace
 from functools import partial
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -76,6 +77,37 @@ def test_the_pin_at_B_alone_closes_the_loop_from_outside():
         "false",
         "true",
     ]
+
+
+@pytest.mark.parametrize("reader", ["gazebo", "drake"])
+def test_an_sdf_stands_closed_at_B_and_its_joints_are_damped(reader):
+    root = ElementTree.fromstring(write_sdf(released(), reader))
+    places = {}
+    for link in root.iter("link"):
+        x, y, *_, turn = map(float, link.findtext("pose").split())
+        places[link.get("name")] = complex(x, y), np.exp(1j * turn)
+
+    def stand(bar, along):
+        foot, direction = places[bar]
+        return foot + float(along.split()[0]) * direction
+
+    output = f"{released().linkage.output.length} 0 0"
+    ball = root.find(".//{*}ball_constraint")
+    joint = root.find(".//joint[@name='B']")
+    if reader == "gazebo":
+        assert [joint.findtext(end) for end in ("parent", "child")] == [
+            "output",
+            "coupler",
+        ]
+        of_coupler = joint.findtext("pose")
+    else:
+        bodies = [ball.findtext(f"{{*}}ball_constraint_body_{end}") for end in "AB"]
+        assert bodies == ["coupler", "output"] and joint is None
+        of_coupler, output = (
+            ball.findtext(f"{{*}}ball_constraint_{name}") for name in ("p_AP", "p_BQ")
+        )
+    assert stand("coupler", of_coupler) == approx(stand("output", output), abs=1e-12)
+    assert [one.text for one in root.iter("damping")] == ["0.05"]
 
 
 LOADED = crank_rocker(loads=(fourbar.Load(4, moment=1.0),))
