@@ -294,9 +294,10 @@ class Panels:
         terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1).sum(axis=1)
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
-        x = _X[node]
+        is_flat = terms <= _FLAT * scale
+        x = np.where(is_flat, _INSIDE - 1.0, _X[node])
         values = sizes[rows, node]
-        may_exceed = smooth & (best + 2.0 * terms >= best.max())
+        may_exceed = smooth & ~is_flat & (best + 2.0 * terms >= best.max())
         for row in np.flatnonzero(may_exceed):
             x[row], values[row] = _find_extreme(curve.series[row], rank)
         ranks = np.where(np.isfinite(values), rank(values), -np.inf)
@@ -323,10 +324,12 @@ def _measure(values: Array) -> Array:
 def _find_extreme(series: Array, rank: Callable[[Array], Array]) -> tuple[float, float]:
     """Find the first place at which a polynomial, (N, k), ranks highest, and its value.
 
-    The square of its size has no slope there, unless the place is an end of the panel.
+    A number, or the square of a size, has no slope there, unless it is an end.
     """
-    scaled = series / (np.abs(series).max() or 1.0)
-    square: Any = sum(Legendre(terms) ** 2 for terms in scaled.T)
+    square: Any = Legendre(series[:, 0])
+    if series.shape[1] > 1:
+        scaled = series / (np.abs(series).max() or 1.0)
+        square = sum(Legendre(terms) ** 2 for terms in scaled.T)
     stops = [-1.0, *_find_panel_zeros(square.deriv().coef), 1.0]
     x = np.clip(stops, _INSIDE - 1.0, 1.0 - _INSIDE)
     values = _measure(np.moveaxis(legval(x, series), 0, -1))
