@@ -12,7 +12,6 @@ from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import Edit, TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.second_loop import LoopSettings, measure
-from tests.support.shares import slow_but
 
 AGREES = 0.05
 """Part by which two loops may differ that read the same run at positions of their own.
@@ -54,12 +53,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", slow_but({"defaults, Euler", "no pads", "pads"}, CASES)
-)
-def test_the_plotted_error_is_that_of_a_second_loop(name):
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_the_plotted_error_is_that_of_a_second_loop(case):
     """Of bars with their weight: `test_simulate.py` has loads and other drives."""
-    case = CASES[name]
     scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), loads=())
     setup = TrialSetup(scene, fourbar.command(scene))
     settings = replace(case.settings, steps_per_revolution=float(case.steps))
