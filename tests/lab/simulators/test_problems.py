@@ -33,6 +33,7 @@ from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
+from tests.lab.simulators.test_simulators import ask_position
 from tests.support.checkout import ROOT, read
 from tests.support.shares import slow_but
 
@@ -117,23 +118,16 @@ def test_a_problem_is_what_the_schema_says(name):
         assert not check.is_valid({**problem, wrong: {}})
 
 
-def read_question(name):
-    """Read scene and command as an engine does."""
-    problem = read_stored(name)
-    scene = protocol.scene_from_json(problem["scene"])
-    return protocol.command_from_json(scene, problem["command"])
-
-
 @pytest.mark.parametrize("name", BY_FREE_BODIES)
 def test_the_free_bodies_answer_the_same(name):
-    answers = FreeBody().answer(*read_question(name)).quantities
+    answers = FreeBody().answer(*ask_position(name)).quantities
     least = float(np.abs(answers["sin_mu"]).min())
     assert_agreement(name, answers, K * EPS / least**2)
 
 
 @pytest.mark.parametrize("name", sorted(IN_MANY_DIGITS))
 def test_ninety_digits_answer_the_same(name):
-    answer = BallArithmetic().answer(*read_question(name))
+    answer = BallArithmetic().answer(*ask_position(name))
     assert_agreement(name, answer.quantities)
 
 
@@ -372,7 +366,7 @@ def test_error_bars_are_allowed_where_they_are_larger():
 
 def test_an_answer_at_its_own_motion_is_judged_there():
     problem = read_stored("crank_rocker")
-    scene, command = read_question("crank_rocker")
+    scene, command = ask_position("crank_rocker")
     speed = np.full(len(command.angle), 10.01)
     moved = command._replace(angle=command.angle + 1e-3, speed=speed)
     theirs = fourbar.solve(scene, at=moved)

@@ -3,13 +3,13 @@ module of this project.
 """
 
 import ast
-import json
 from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from fourbar_lab.simulators.problems import PROBLEMS
+from fourbar_validation.check.problem import read_problem
 from tests.whole.test_imports import ROOT
 
 UPSTREAM = ROOT / "docs/upstream"
@@ -17,10 +17,6 @@ FILES = sorted(UPSTREAM.glob("*/*four_bar*.py"))
 NEWTON = UPSTREAM / "newton" / "test_fourbar_forces.py"
 DIGITS = 1e-8
 """Of the ten digits that the files state."""
-
-
-def read_problem_file(name):
-    return json.loads((PROBLEMS / f"{name}.json").read_text("utf-8"))
 
 
 def run_statements(path, *kinds):
@@ -34,7 +30,7 @@ def run_statements(path, *kinds):
 
 
 def test_newton_s_free_bodies_find_our_answers():
-    problem = read_problem_file("newton_128")
+    problem = read_problem(PROBLEMS / "newton_128.json")
     command = problem["command"]
     solve = run_statements(NEWTON, ast.Assign, ast.FunctionDef)["solve_free_bodies"]
     solved = [solve(theta, command["omega_2"], 0.0) for theta in command["theta_2"]]
@@ -54,7 +50,7 @@ def test_a_file_for_another_project_states_our_answers(path):
     assert tables.keys() <= set(problems)
     compared = 0
     for name, table in tables.items():
-        problem = read_problem_file(name)
+        problem = read_problem(PROBLEMS / f"{name}.json")
         angles = np.rad2deg(problem["command"]["theta_2"])
         for degrees, row in table.items():
             index = int(np.argmin(np.abs(angles - degrees)))
