@@ -11,7 +11,7 @@ import pytest
 from fourbar_lab.simulators.mujoco_c import MujocoFile
 from fourbar_lab.worlds import CONTENDERS, FORMULAS_ON_ONE_CORE, measure_worlds
 from tests.lab.simulators.test_simulators import ask_position
-from tests.support.checkout import read
+from tests.support.checkout import read, read_table
 
 MUJOCO = "MuJoCo, one core"
 EXACT = 1e-10
@@ -62,12 +62,8 @@ def test_a_world_that_is_not_finite_fails():
 
 
 def test_the_page_states_errors_that_hold():
-    page = read("docs/cost.md")
-    table = page.partition("<!-- data worlds -->")[2].partition("<!-- end -->")[0]
-    rows = {}
-    for line in table.strip().splitlines()[2:]:
-        name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
-        rows[name] = cells
+    table = read_table(read("docs/cost.md"), "worlds")
+    rows = {name: cells for name, *cells in table}
     assert list(rows) == [FORMULAS_ON_ONE_CORE, *CONTENDERS]
     for name in CONTENDERS:
         check_errors(name, *map(float, rows[name][-3:-1]))

@@ -16,6 +16,13 @@ def read(name):
     return (ROOT / name).read_text("utf-8")
 
 
+def read_table(page, name):
+    """Return the cells of each row of a table of data in the text of a page."""
+    table = page.partition(f"<!-- data {name} -->")[2].partition("<!-- end -->")[0]
+    lines = table.strip().splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
 def run_python(*words, folder=ROOT, **variables):
     """Run Python with further variables in its environment, and return how it ended."""
     return subprocess.run(

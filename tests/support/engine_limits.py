@@ -71,12 +71,11 @@ def _near_toggle(sine):
     ).alarms
 
 
-def _base():
-    return sweep_turn(dress((0.3, 0.1, 0.25, 0.22)))
+_BASE = sweep_turn(dress((0.3, 0.1, 0.25, 0.22)))
 
 
 def _at_speed(omega_2):
-    return replace(_base(), motion=_base().motion.replace(speed=omega_2))
+    return replace(_BASE, motion=_BASE.motion.replace(speed=omega_2))
 
 
 def _crank_acceleration(value):
@@ -121,8 +120,7 @@ def _centre_kept(r):
     """Tell whether the compiled MJCF keeps a mass centre at a distance r from its pin,
     m.
     """
-    base = _base()
-    scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
+    scene = replace_bars(_BASE, output=replace(_BASE.linkage.output, centre=(r, 0.5)))
     loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
     body = loop.model.body("output").id
     return loop.model.body_sameframe[body] != mujoco.mjtSameFrame.mjSAMEFRAME_BODY
@@ -130,7 +128,7 @@ def _centre_kept(r):
 
 def _proximal(mu):
     """Tell whether Pinocchio's constrained acceleration is finite at a proximal mu."""
-    scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
+    scene = replace(_BASE, loads=(), motion=Motion(1.0, 3.0))
     kept = pinocchio.PROXIMAL_SETTINGS
     try:
         pinocchio.PROXIMAL_SETTINGS = (kept[0], mu, kept[2] if mu else 1)

@@ -17,11 +17,6 @@ from fourbar.scene import Command
 from fourbar_validation.compare.pins import state_from_pins
 from tests.support.textbook import Bodies, Textbook, polar
 
-SAMPLES = 720
-"""States of a revolution that are read, at most; every step's where there are fewer
-steps.
-"""
-
 
 @dataclass(frozen=True)
 class LoopSettings:
@@ -123,14 +118,9 @@ class Loop:
     def run(self, theta_2):
         """Step through a turn from an angle on and read states on the way."""
         self.start(theta_2)
-        steps = round(self.settings.steps_per_revolution)
-        stride = max(1, round(steps / SAMPLES))
-        samples = []
-        for step in range(steps + 1):
-            if step % stride == 0:
-                samples.append(self.read())
+        for _ in range(round(self.settings.steps_per_revolution) + 1):
+            yield self.read()
             mujoco.mj_step(self.model, self.data)
-        return samples
 
     def read(self):
         """Read angle, speed and acceleration of the crank in one state, pin forces, and

@@ -19,7 +19,7 @@ from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP
 from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
 from fourbar_validation.report.svg import write_alone
-from tests.support.checkout import ROOT, read
+from tests.support.checkout import ROOT, read, read_table
 
 PAGE = read("docs/cost.md")
 README = read("README.md")
@@ -29,14 +29,7 @@ PRINTED = 0.06
 DRAWS = runpy.run_path(ROOT / "docs/cost.py")
 
 
-def read_rows():
-    """Read the table of settings."""
-    table = PAGE.partition("<!-- data settings -->")[2].partition("<!-- end -->")[0]
-    lines = table.strip().splitlines()[2:]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-
-
-ROWS = read_rows()
+ROWS = read_table(PAGE, "settings")
 
 
 def read_settings(text, steps):

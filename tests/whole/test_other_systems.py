@@ -6,8 +6,6 @@ without saying its encoding makes Python warn.
 """
 
 import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
@@ -17,7 +15,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import save
 from fourbar_validation.cli import status as harness
-from tests.support.checkout import ROOT
+from tests.support.checkout import ROOT, run_python
 
 HOSTILE = {
     "LC_ALL": "C",
@@ -62,29 +60,15 @@ def folder(tmp_path):
     ],
 )
 def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
-    path = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "validation")])}
-    arguments = line.format(models=ROOT / "models").split()
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-X",
-            "warn_default_encoding",
-            "-c",
-            BEGIN.format(module=module),
-            *arguments,
-        ],
-        cwd=folder,
-        env=os.environ | HOSTILE | path,
-        capture_output=True,
-        check=False,
-    )
-    said = done.stderr.decode(errors="replace")
-    assert done.returncode == (1 if "check-mjcf" in line else HOLDS), (
-        said
-    )  # a bar of that model is heavier
+    path = os.pathsep.join([str(ROOT), str(ROOT / "validation")])
+    words = ["-X", "warn_default_encoding", "-c", BEGIN.format(module=module)]
+    words += line.format(models=ROOT / "models").split()
+    done = run_python(*words, folder=folder, PYTHONPATH=path, **HOSTILE)
+    # a bar of the model of `check-mjcf` is heavier
+    assert done.returncode == ("check-mjcf" in line), done.stderr
     assert not [
         line
-        for line in said.splitlines()
+        for line in done.stderr.splitlines()
         if "EncodingWarning" in line and line.startswith(tuple(OURS))
     ]
 
