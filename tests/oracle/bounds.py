@@ -20,13 +20,12 @@ drawing, by 1e-4 of the shortest bar at most.
 """
 SPREAD = ErrorBound(
     "spread",
-    "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024"
-    " quasi-random samples against cubature and 20 000 draws, twice what they were seen"
-    " to differ by",
+    "3 % of a deviation or of a worst case: 1024 quasi-random samples against cubature,"
+    " twice what they were seen to differ by",
     0.03,
     conditioned=False,
 )
-"""Tolerance of spreads and percentiles that tolerances make."""
+"""Tolerance of spreads that tolerances make."""
 REST = ErrorBound(
     "rest",
     "K eps of the sum of what moving each stored number by its own size would change,"

@@ -116,12 +116,10 @@ _CONVERGED = 1e-5
 absolute terms: it leaves out some hundred times the square of that. Elsewhere a linkage
 that does not assemble is too near for differences.
 """
-SPREAD_SAMPLES, DRAWN = 1024, 20_000
-"""Samples of the tolerances, and of the first-order sum for percentiles."""
-_NEARLY_STRAIGHT, NEARLY_LINEAR = 0.1, 1e-4
-"""Relative differences of cubature and first order. Below the first, three points are
-enough for a deviation; below the second, percentiles are those of the first order: what
-bends a curve by q skews it by q and widens it by q^2.
+SPREAD_SAMPLES = 1024
+_NEARLY_STRAIGHT = 0.1
+"""Relative difference of cubature and first order, below which three points are enough
+for a deviation.
 """
 _SLIGHT = 1e-3
 """Part of the greatest worst case of a quantity that is not judged. Differences and
@@ -295,11 +293,6 @@ class Expected(NamedTuple):
     """Relative difference of cubature and first order. It is that of their deviations,
     or the square of the skewness.
     """
-    low: Array
-    """Percentiles of the first order, from the nominal value. NaN where the quantity is
-    not straight.
-    """
-    high: Array
 
 
 def _compute_expected(scene):
@@ -337,12 +330,7 @@ def _compute_expected(scene):
         h = FIRST_ORDER_STEP * max(abs(step), tolerance.width)
         up, down = (changed({tolerance.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
-    rng = np.random.default_rng(0)
     w = np.array(weights)[:, None]
-    drawn = [
-        rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN)
-        for tolerance in scene.tolerances
-    ]
     widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
     normal = np.array([[tolerance.sigma] for tolerance in scene.tolerances])
     variances = np.where(normal, 1.0, 1.0 / 3.0)
@@ -356,38 +344,23 @@ def _compute_expected(scene):
         first_order = np.sqrt((variances * (slope * widths) ** 2).sum(axis=0))
         bent = divide(np.abs(deviation - first_order), deviation)
         bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
-        percentiles = np.full((2, len(mean)), np.nan)
-        straight = bent <= NEARLY_LINEAR
-        if straight.any():
-            percentiles[:, straight] = np.percentile(
-                np.transpose(drawn) @ (slope * widths)[:, straight], (1.0, 99.0), axis=0
-            )
         worst = np.abs(slope * widths * np.where(normal, 3.0, 1.0)).sum(axis=0)
-        expected[part] = Expected(deviation, first_order, worst, bent, *percentiles)
+        expected[part] = Expected(deviation, first_order, worst, bent)
     return expected
 
 
 def _compute_off(spread, expected, slight):
     """Compute by what part the figures of a spread are off, (n,)."""
-    bent = expected.bent
     errors = []
-
-    def judge(ours, theirs, size, most):
-        apart = divide(np.abs(ours - theirs), size)
-        judged = (bent <= most) & (expected.worst > slight)
-        errors.append(np.where(judged, apart, 0.0))
-
     for name, most in (
         ("worst", np.inf),
         ("first_order", np.inf),
         ("deviation", _NEARLY_STRAIGHT),
     ):
         theirs = getattr(expected, name)
-        judge(getattr(spread, name), theirs, theirs, most)
-    for name in ("low", "high"):
-        ours = getattr(spread, name) - spread.nominal
-        theirs = getattr(expected, name)
-        judge(ours, theirs, 10.0 * expected.deviation, NEARLY_LINEAR)
+        apart = divide(np.abs(getattr(spread, name) - theirs), theirs)
+        judged = (expected.bent <= most) & (expected.worst > slight)
+        errors.append(np.where(judged, apart, 0.0))
     return np.max(errors, axis=0)
 
 

@@ -67,6 +67,9 @@ def test_a_number_that_the_torque_is_proportional_to():
     assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
     assert_allclose(torque.first_order, 2 * 0.03 / sqrt(3) * size, rtol=1e-12)
     assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
+    # of 1 % and of 99 % of an even distribution
+    band = np.multiply.outer((0.9706**2, 1.0294**2), torque.nominal)
+    assert_allclose((torque.low, torque.high), np.sort(band, axis=0), rtol=1e-4)
     assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
     assert not torque.parted.any() and study.apart == study.invalid == 0
 
