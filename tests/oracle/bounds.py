@@ -60,10 +60,3 @@ LOCATED_ROUGHLY = ErrorBound(
     conditioned=False,
 )
 """Tolerance of the largest bending moments."""
-PRINTED_TO_FOUR_DIGITS = ErrorBound(
-    "summary, printed",
-    "6e-4 of the value: what is printed has four digits",
-    6e-4,
-    conditioned=False,
-)
-"""Tolerance of what is printed alone."""

@@ -7,7 +7,6 @@ forces.
 """
 
 import math
-import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -21,7 +20,6 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, Array
 from fourbar.scene import command_at
 from fourbar.scene.motion import FromLimit
-from fourbar.show.block import write_block
 from fourbar.show.duty import list_duty
 from fourbar.show.summary import Facts
 from fourbar_validation.compare.pins import state_from_pins
@@ -35,7 +33,7 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.question import NotAskedError, Question
-from tests.oracle.bounds import CUT, LOCATED_ROUGHLY, PRINTED, PRINTED_TO_FOUR_DIGITS
+from tests.oracle.bounds import CUT, LOCATED_ROUGHLY, PRINTED
 from tests.oracle.cuts import CUT_POSITIONS, free_piece, move_bars
 from tests.oracle.variants import ask_free_bodies, make_row
 
@@ -70,9 +68,7 @@ _REPEATS = 1e-9
 """Greatest difference, rad, of angles of which one repeats the other, and of rates in
 parts of the largest.
 """
-_PRESSURE = 1e6
-"""Pressure of the cylinder whose bore is judged, Pa."""
-ROW_TOLERANCES = {"bore": PRINTED_TO_FOUR_DIGITS, "bending": LOCATED_ROUGHLY}
+ROW_TOLERANCES = {"bending": LOCATED_ROUGHLY}
 
 
 @dataclass
@@ -227,7 +223,7 @@ def _find_conditions(scene, answer):
 def summary(question):
     """Judge ranges, peaks, RMS, energies, pin loads and more.
 
-    Bending and bore are judged too.
+    Bending is judged too.
     """
     judged = _SummaryJudge(question, _summarize_scene(question))
     _judge_ranges(judged)
@@ -297,7 +293,7 @@ def _find_work(judged, answer):
 
 
 def _judge_drive(judged):
-    """Judge the peaks of the drive and its bore, as printed and in the JSON."""
+    """Judge the peaks of the drive, as printed and in the JSON."""
     facts = judged.facts
     entry = judged.motor
     if not judged.drives:
@@ -315,7 +311,6 @@ def _judge_drive(judged):
         if name not in judged.growing and most != 0.0:
             beyond = entry[f"peak_{name}"] / most - 1.0
             judged.add_excess("peaks", -beyond, beyond - EXCESS_BETWEEN_POSITIONS)
-    _judge_bore(judged, fine_values)
 
 
 def _find_turned(judged):
@@ -409,25 +404,6 @@ def _judge_integrals(judged):
     if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
         of_mean = given - entry["mean_torque"] * _find_turned(judged)
         judged.add("integrals", divide(abs(of_mean), most))
-
-
-def _judge_bore(judged, fine):
-    """Judge the bores that are printed for a cylinder that pushes, and that pulls."""
-    if not judged.facts.linear or judged.growing:
-        return
-    if judged.scene.drive is None or not judged.scene.drive.has_stroke:
-        return
-    units = {"m": ("mm", 1e3), "N": ("N", 1.0)}
-    lines = write_block(judged.solution, units, pressure=_PRESSURE)
-    text = " ".join(" ".join(lines).split()).partition("bore at least ")[2]
-    printed = {
-        word: 1e-3 * float(number)
-        for number, word in re.findall(r"(\d\S*) mm\b[^;]*? to (\w+) ", text)
-    }
-    for word, force in ("push", fine.max()), ("pull", -fine.min()):
-        if not force <= 0.0:
-            bore = math.sqrt(4.0 * force / (math.pi * _PRESSURE))
-            judged.add_value("bore", printed.get(word), bore)
 
 
 def _judge_pins(judged):

@@ -560,6 +560,18 @@ def test_a_bore_at_rest_moves_the_linkage_against_its_friction():
     assert re.search(rf"{bore:.4g} mm\b[^;]* to pull {force:.4g} N", text)
 
 
+def test_a_bore_pushes_and_pulls_the_most_of_a_motion():
+    coarse, fine = (
+        crank_rocker(motion=Motion(Sweep(1.0, 2.6, steps), 10.0), drive=CYLINDER)
+        for steps in (8, 4000)
+    )
+    force = solve(fine).drive_force
+    text = block(coarse, pressure=1e5)
+    for does, most in (("push", force.max()), ("pull", -force.min())):
+        bore = 1e3 * sqrt(4.0 * most / (pi * 1e5))
+        assert re.search(rf"{bore:.4g} mm\b[^;]* to {does} {most:.4g} N", text)
+
+
 @pytest.mark.parametrize("angle", (Sweep(1.0, 2.6, 8), 1.7))
 def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     """The peaks of the motion either way, slow enough for its inertia not to show."""
