@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
-from fourbar.effects.linear_drive import LinearDrive
+# first of all: with it an interruption while NumPy is imported is one line
 from fourbar.errors import ELSEWHERE, InputError, state_messages_in
 from fourbar.linkage import ANY_NUMBER, BAR_NAMES, POSITIVE, require
 from fourbar.quantities.units import half_unit_of_text, read_bare
@@ -233,6 +232,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     that the linkage can have; any other column, and each of a motion over time, has its
     value in the scene's motion.
     """
+    from fourbar.effects.linear_drive import LinearDrive
     from fourbar.files.drawn_pins import list_drawn
     from fourbar.show.located import EXTREMES, locate
 
@@ -280,6 +280,8 @@ def take_motion(scene: Scene, text: str) -> Scene:
     Angles, speeds and accelerations are those of the bar at the positions of the other
     scene that have them; an angle that the text adds is where the two are joined.
     """
+    import numpy as np
+
     from fourbar.files import load
 
     match = _ANGLE_OF_SCENE.fullmatch(text.strip())
