@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
-from fourbar_validation.engines.workers import Attempt, apply_over_processes
+from fourbar_validation.engines import workers
 
 
 def _fail(
     _: object,
     error: BaseException,
-    __: Attempt,
+    __: workers.Attempt,
 ) -> NoReturn:
     """Raise what an item failed with."""
     raise error
@@ -18,14 +18,14 @@ def _fail(
 def apply_each(
     function: Callable[[Any], Any],
     items: Iterable[Any],
-    workers: int,
+    processes: int,
 ) -> Iterator[Any]:
     """Apply the function to each item, however long it takes; results in order."""
     tasks = enumerate([item] for item in items)
-    for _, results in apply_over_processes(
+    for _, results in workers.apply_over_processes(
         function,
         tasks,
-        workers,
+        processes,
         seconds=None,
         instead=_fail,
     ):
