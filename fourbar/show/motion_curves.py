@@ -38,6 +38,8 @@ _PANELS_OF_A_TURN, _MOST_FIRST_PANELS = 48, 960
 """Panels that a motion is cut to before they are halved, for each turn of what is
 commanded.
 """
+_MOST_SIZED = 10_000
+"""Positions that tell the sizes of a motion's curves; of a million they take memory."""
 _SAME_EDGE = 1e-9
 """Part of the motion within which two ends of panels are one."""
 _BESIDE_A_BREAK = 1e-6
@@ -259,7 +261,11 @@ def _fit_curves(solution: Solution) -> MotionCurves:
             there = solve(scene, stage, at=command_at(scene, places))
             return _take_values(list_curves(there))
 
-        wanted = {name: asked for name, (_, asked) in list_curves(solution).items()}
+        sized = solution
+        if len(solution) > _MOST_SIZED:
+            rows = np.arange(0, len(solution), len(solution) // _MOST_SIZED)
+            sized = solve(scene, stage, at=solution.at.part(rows))
+        wanted = {name: asked for name, (_, asked) in list_curves(sized).items()}
         panels = fit_panels(compute, edges, wanted, most_halvings)
         return panels.with_points(exact, compute(exact))
 

@@ -390,7 +390,7 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
 @pytest.mark.usefixtures("hosted")
 def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     pytest.importorskip("mujoco")
-    longest = "fourbar_validation.run.released.LONGEST_TIMESTEP"
+    longest = "fourbar_validation.run.released.LONGEST_OF_A_GUEST"
     monkeypatch.setattr(longest, 1e-3)  # MuJoCo's here
     motion = Motion(1.0, 2.0, free=fourbar.Free(0.2, 10))
     by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")

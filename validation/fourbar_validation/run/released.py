@@ -66,7 +66,9 @@ FORWARD = {
 and its library.
 """
 LONGEST_TIMESTEP = 1e-3
-"""s; a guest may have twice as long a one."""
+"""s, of an engine of `FORWARD`."""
+LONGEST_OF_A_GUEST = 2e-3
+"""s."""
 RELEASED_ERRORS = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
 """Errors (rad, of the greatest speed, of the greatest energies) at which a free motion
 agrees: the formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify
@@ -155,7 +157,7 @@ def check_released(question: Question) -> Iterator[Row]:
     for engine in question.engines:
         if isinstance(engine, Guest) and "release" in engine.effects:
             yield from question.attempt(
-                partial(rows, engine.at_step, 2.0 * LONGEST_TIMESTEP), engine.name
+                partial(rows, engine.at_step, LONGEST_OF_A_GUEST), engine.name
             )
     for adapter, (start, library) in FORWARD.items():
         if reason := find_missing(library):
