@@ -20,6 +20,7 @@ from fourbar.formulas.arithmetic import (
     is_any,
     make_like,
     polar,
+    split_sum,
 )
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.mobility import TURN
@@ -90,7 +91,11 @@ class Table(Described):
         return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:
-        """Interpolate the factor; InputError for a position outside the table."""
+        """Interpolate the factor; InputError for a position outside the table.
+
+        An angle beyond the table's last point before it is theta_2 less the point and
+        whole turns, of which nothing is rounded but the result.
+        """
         first = self.theta_2[0]
         wrapped = shorten(angle(polar(1.0, theta_2)))
         place = first + np.remainder(wrapped - first, TURN)
@@ -103,8 +108,11 @@ class Table(Described):
         width = points[piece + 1] - points[piece]
         before = factors[piece]
         rise = factors[piece + 1] - factors[piece]
+        away, lost = split_sum(theta_2, -start)
+        rest = np.fmod(away, TURN)
         turns = np.rint((theta_2 - place) / TURN)
-        past = (theta_2 - start) - turns * TURN - turns * _BEYOND_TURN
+        turns_left = np.rint((away - rest) / TURN) - turns
+        past = rest + turns_left * TURN + (lost - turns * _BEYOND_TURN)
         return before + rise * (past / width)
 
     def _require_covered(self, theta_2: Any, place: Any) -> Any:

@@ -54,8 +54,10 @@ ONCE_BAD = {
         2997,
         4506,  # bar: the arm about pin B as a difference
     ],
-    # 3.9 without the load's factor, which two numbers of a table leave of each other
-    ("tables", 0): [8523],
+    ("tables", 0): [
+        1374,  # 1.8: whole turns off theta_2 in one step
+        8523,  # 3.9 without the load's factor, which two numbers leave of each other
+    ],
     # F12_y of 1.8 mN: the spring between input and coupler pulls with 5.4 N, and was in
     # the sums of a third pin
     ("springs", 0): [2515],
