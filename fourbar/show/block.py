@@ -13,6 +13,7 @@ from fourbar.formulas.mobility import (
     TURN,
     change_points,
     classify,
+    find_intervals,
     find_miss,
     list_met_equalities,
     name_assembly,
@@ -33,6 +34,7 @@ from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
     list_arm_notes,
     list_couple_notes,
+    list_drawn_notes,
     list_law_notes,
     list_spring_notes,
     list_torsion_notes,
@@ -59,6 +61,7 @@ from fourbar.show.shown_units import (
 )
 from fourbar.show.summary import Facts
 from fourbar.solution import Conversion, Solution
+from fourbar.studies.passing import move_inside_limit
 
 _NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
@@ -84,6 +87,8 @@ nine decimals and more.
 """
 _MOST_PLACES = 4
 """Number of places that are listed: of poles, and where dry friction holds a pin."""
+_IN_LINE = 1e-9
+"""Sine below which two bars are in line: places are located to some 1e-12."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 _NOT_IN_PEAKS = (WOUND, JAMMED, SEVERAL)
@@ -198,12 +203,25 @@ class SceneBlock(Facts):
         ]
 
     def _write_place(self) -> str:
-        """Write what is commanded at the position, and the time of a motion over it."""
+        """Write what is commanded at the position, and which bar is at a limit there.
+
+        A motion over time has its time written too.
+        """
         one = self.solution
         place = self._value(float(one.at.stated[0][0]), one.at.unit)
         text = f"at {one.commanded} = {place}"
         if one.time is not None:
             text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
+        for bar, pair in BARS_IN_LINE.items():
+            first, second = (one[f"theta_{word}"] for word in pair.split(" and "))
+            theta = f"theta_{bar}"
+            _, is_limit = move_inside_limit(self.scene, bar, float(one[theta][0]))
+            # at a change point each bar moves on
+            is_alone = bar != one.at.bar and one.status_code[0] == OK
+            sine = math.sin((second - first)[0])
+            if is_limit and is_alone and abs(sine) <= _IN_LINE:
+                bars = f"bars {pair} are {_name_meeting(pair)}"
+                return f"{text}, where {theta} is at a limit: {bars}"
         return text
 
     def _value(
@@ -372,11 +390,26 @@ class SceneBlock(Facts):
             begin = f"{name} {self._write_swing(bar)} by a law over {over} s"
         else:
             name = "stroke" if self.unit == "m" else name
-            begin = f"{name} from {start} to {stop}"
+            begin = f"{name} from {start} to {stop}{self._write_inset()}"
         swings = [
             f"{BAR_NAMES[other]} {self._write_swing(other)}" for other in following
         ]
         return "; ".join([begin, *swings])
+
+    def _write_inset(self) -> str:
+        """Write how far a range that the scene leaves out stays inside the limits."""
+        motion = self.scene.motion
+        stated = motion.angle is not None or motion.stroke is not None
+        if stated or turns_fully(self.linkage, motion.bar):
+            return ""
+        first, last = self.ends
+        inset = min(
+            (first - low) % TURN
+            for low, high in find_intervals(self.linkage, motion.bar)
+            if (first - low) % TURN <= high - low
+        )
+        inside, low, high = map(self._angle, (inset, first - inset, last + inset))
+        return f", {inside} inside its limits {low} and {high}"
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.angles[bar]
@@ -767,6 +800,7 @@ class SceneBlock(Facts):
                 "friction; the rows above take friction at rest as 0"
             )
         yield from self._warn()
+        yield from list_drawn_notes(scene, self.units)
         yield from list_arm_notes(scene)
         yield from list_law_notes(scene, self.units)
         yield from list_spring_notes(scene, solution, self.units)

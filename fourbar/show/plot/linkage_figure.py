@@ -30,6 +30,7 @@ from fourbar.show.plot.style import (
 from fourbar.show.plot.symbols import draw_symbol, draw_vectors, list_acting, pose_of
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
+from fourbar.studies.paths import measure_paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -184,6 +185,11 @@ def draw_linkage(axes: "Axes", view: View, *, moving: bool = False) -> None:
     `moving`: with velocities.
     """
     draw_frame(axes, view)
+    if not moving:  # stroke and straightness of paths, as rectangles about them
+        for measured in measure_paths(view.sweep).values():
+            corners = join_points(measured.corners)
+            outline = view.plane.factor * np.append(corners, corners[0])
+            plot_points(axes, outline, color=POINT, lw=0.6, zorder=2)
     if view.dimensions:
         pins = pose_of(view, view.here, 0).pins
         middle = 0.5 * (pins["O2"] + pins["O4"])

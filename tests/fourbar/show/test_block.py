@@ -361,8 +361,13 @@ SAID = {
     ),
     "a range that is left out": (
         move(LIMITED, omega_2=1.0),
-        [f"input from {write(radians(1.0) - LIMIT)} to {write(LIMIT - radians(1.0))}"],
+        [f"1 deg inside its limits {write(-LIMIT)} and {write(LIMIT)}; "],
         "change point",
+    ),
+    "that range as it is stated": (
+        move(LIMITED, theta_2=Sweep(radians(1.0) - LIMIT, LIMIT - radians(1.0), 72)),
+        ["input from"],
+        "inside its limits",
     ),
     "a lamp that a spring balances": (
         balanced_lamp(0.0),

@@ -28,6 +28,7 @@ from fourbar.errors import (
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
+from fourbar.show.block import write_block
 from fourbar.studies.passing import (
     INSIDE_LIMIT,
     find_positions,
@@ -86,6 +87,8 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
     found = find_positions(scene, "theta_4", theta_1 + pi - at_O4 + beside)
     theta_2 = theta_1 + at_O2 + (0.0 if side > 0.0 else pi)
     assert found.angle == approx([theta_2], abs=AT_LIMIT)
+    told = "deg, where theta_4 is at a limit: bars 2 and 3 are in line"
+    assert told in " ".join(write_block(solve(scene, at=found)))
 
 
 def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
@@ -94,6 +97,8 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     there = solve(scene, at=find_positions(scene, "theta_3", limit))
     between = there.theta_4 - there.theta_2
     assert np.sin(between) == approx([0.0], abs=AT_LIMIT)
+    told = "theta_3 is at a limit: bars 2 and 4 are parallel"
+    assert told in " ".join(write_block(there))
 
 
 REFUSED = [

@@ -390,7 +390,7 @@ def test_what_stands_at_an_axis_is_whole():
 
 
 @pytest.mark.parametrize("from_pin", [(0.2, -0.3), (0.15, -0.35)])
-def test_a_label_keeps_off_the_arrow_of_gravity(from_pin):
+def test_a_label_keeps_off_the_arrow_of_gravity_and_the_outline_of_a_path(from_pin):
     scene = crank_rocker(points=(Point("tip", 4, from_pin),))
     (axes,) = composed(scene, "linkage").axes
     boxes = {text.get_text(): text.get_window_extent() for text in axes.texts}
@@ -398,6 +398,9 @@ def test_a_label_keeps_off_the_arrow_of_gravity(from_pin):
     shaft = arrow.get_path().transformed(axes.transData)
     assert "tip" in boxes
     assert not any(shaft.intersects_bbox(box, False) for box in boxes.values())
+    (outline,) = (line for line in axes.lines if line.get_linewidth() == 0.6)
+    shown = outline.get_path().transformed(axes.transData)
+    assert not any(shown.intersects_bbox(box, False) for box in boxes.values())
 
 
 def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
