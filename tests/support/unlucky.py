@@ -64,3 +64,12 @@ def dies_at_first(*_):
     if lives:
         lives[0].unlink(missing_ok=True)
         os._exit(1)
+
+
+def start_and_sleep(starts):
+    """Work for some looks of the pool, before and after telling of it in a file."""
+    time.sleep(1.0)
+    with starts.open("a") as file:
+        file.write("begun\n")
+    time.sleep(1.0)
+    return "done"

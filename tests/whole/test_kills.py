@@ -12,6 +12,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -44,7 +45,7 @@ from tests.support.checkout import BUSY, ROOT
 from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
 from tests.support.texts import LENGTHS
-from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first
+from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first, start_and_sleep
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -137,6 +138,24 @@ def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
             judge_all(Few(), tmp_path / "run", workers=1)
     assert not (tmp_path / "run" / "results.csv").exists()
     assert judge_all(Few(), tmp_path / "run", workers=1).counts[FAILS] == 0
+
+
+@pytest.mark.slow
+def test_a_clock_that_jumps_forward_ends_nothing(tmp_path, monkeypatch):
+    """As that of a machine does which slept while an item was worked at."""
+    starts = tmp_path / "starts"
+
+    def now():
+        return time.time() + 1e6 * starts.exists()
+
+    clock = SimpleNamespace(time=now, sleep=time.sleep)
+    monkeypatch.setattr("pebble.pool.process.time", clock)
+    judging = {"seconds": workers.SCENE_SECONDS, "instead": lambda _, error, __: error}
+    results = workers.apply_over_processes(
+        start_and_sleep, [(0, [starts])], 1, **judging
+    )
+    assert list(results) == [(0, ["done"])]
+    assert len(starts.read_text().splitlines()) > 1
 
 
 def test_random_scenes_depend_on_seed_and_index_alone():

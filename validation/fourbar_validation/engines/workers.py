@@ -4,6 +4,7 @@ The results are the same whatever the number of processes. A task has some items
 each item a limit of time. A worker that dies or hangs costs the item that it was at.
 """
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
@@ -36,10 +37,16 @@ A worker that is killed while it reads or writes there leaves the pipe locked fo
 the others then wait twice as long, and the run ends and can be resumed. A message takes
 milliseconds.
 """
+_ENDED_BY_PEBBLE = ("Task timeout",)
+"""First argument of the TimeoutError of an item that took too long. One that an item
+raises itself has another.
+"""
 Task = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
 """Do one item by itself: its result, or the exception that it ended with."""
+_Submitted = tuple["Future[Any]", float]
+"""An item's future, and when the item was handed in by the monotonic clock, s."""
 _Instead = Callable[[Any, BaseException, Attempt], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
 
@@ -72,7 +79,7 @@ class _PoolOfItems:
     seconds: float | None
     instead: _Instead
 
-    def submit(self, item: Any) -> "Future[Any]":
+    def submit(self, item: Any) -> _Submitted:
         """Hand in an item; NoWorkersError where the pool is broken."""
         try:
             with hold_interruption():
@@ -81,22 +88,26 @@ class _PoolOfItems:
                 )
         except RuntimeError:
             raise _lost_workers() from None
-        return future
+        return future, time.monotonic()
 
     def attempt(self, item: Any) -> Any:
         """Do one item: its result, or the exception that it ended with."""
-        return self.outcome(item, self.submit(item))
+        return self.outcome(item, *self.submit(item))
 
-    def outcome(self, item: Any, future: "Future[Any]") -> Any:
+    def outcome(self, item: Any, future: "Future[Any]", since: float) -> Any:
         """Return an item's result, or the exception that it ended with.
 
         A worker may have been killed from outside, for example where memory ran out.
         Its item is tried once more, and then it is held to have killed the worker.
+        Pebble measures the limit of time by the clock on the wall, which jumps when a
+        machine sleeps: an item that was ended too soon is tried again.
         """
         from pebble import ProcessExpired
 
+        while self._is_too_soon(future.exception(), since):
+            future, _ = self.submit(item)
         if isinstance(future.exception(), ProcessExpired):
-            future = self.submit(item)
+            future, _ = self.submit(item)
         error = future.exception()
         if isinstance(error, BrokenProcessPool):
             raise _lost_workers()
@@ -104,8 +115,16 @@ class _PoolOfItems:
             raise error
         return future.result() if error is None else error
 
+    def _is_too_soon(self, error: BaseException | None, since: float) -> bool:
+        return (
+            self.seconds is not None
+            and isinstance(error, TimeoutError)
+            and error.args[:1] == _ENDED_BY_PEBBLE
+            and time.monotonic() - since < self.seconds
+        )
+
     def finish(
-        self, number: int, items: Sequence[Any], waiting: Sequence["Future[Any]"]
+        self, number: int, items: Sequence[Any], waiting: Sequence[_Submitted]
     ) -> tuple[int, list[Any]]:
         """Return a task's number and the results of its items in order.
 
@@ -113,7 +132,7 @@ class _PoolOfItems:
         """
         results = []
         for item, submitted in zip(items, waiting, strict=True):
-            result = self.outcome(item, submitted)
+            result = self.outcome(item, *submitted)
             if isinstance(result, BaseException):
                 result = self.instead(item, result, self.attempt)
             results.append(result)
@@ -148,7 +167,7 @@ def apply_over_processes(
         initargs=[function],
     ) as pool:
         items_of = _PoolOfItems(pool, function, seconds, instead)
-        in_flight: deque[tuple[int, Sequence[Any], list[Future[Any]]]] = deque()
+        in_flight: deque[tuple[int, Sequence[Any], list[_Submitted]]] = deque()
         try:
             for number, items in tasks:
                 waiting = [items_of.submit(item) for item in items]
