@@ -35,7 +35,7 @@ from fourbar_lab.contenders import (
     time_positions,
 )
 from fourbar_lab.starts import measure_starts
-from fourbar_lab.thirteen_bodies import make_bodies, solve_thirteen
+from fourbar_lab.thirteen import make_bodies, solve_thirteen
 from fourbar_validation.advise.clocks import time_call
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.machine import name_machine

@@ -15,7 +15,7 @@ from fourbar.solving import solve
 from fourbar_lab import bench, contenders
 from fourbar_lab.contenders import command_positions, make_example
 from fourbar_lab.starts import measure_starts
-from fourbar_lab.thirteen_bodies import make_bodies, solve_thirteen
+from fourbar_lab.thirteen import make_bodies, solve_thirteen
 from tests.support.scenes import crank_rocker, thesis
 
 ROUNDING = 1e-11
