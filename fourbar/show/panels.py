@@ -73,6 +73,11 @@ _FLAT = 1e-13
 _X, _WEIGHTS = leggauss(NODES)
 _TO_SERIES = np.linalg.inv(legvander(_X, NODES - 1))
 """Matrix from the values at the nodes to the terms of the Legendre series."""
+_DEGREES = np.arange(1.0, NODES)
+_BEYOND_NODES = 0.25 * np.diff(_X).max() * _DEGREES * (_DEGREES + 1.0)
+"""Amounts by which the terms of a series may exceed the values at the nodes: half the
+largest gap of these, times the steepest slope k (k + 1)/2 of each term.
+"""
 _CHECKED = np.array([-1.0, 1.0]) * (1.0 - 2.0 * _BESIDE_END)
 _TO_CHECKED = legvander(_CHECKED, NODES - 1) @ _TO_SERIES
 """Matrix from the values at the nodes to the polynomial where it is checked."""
@@ -291,13 +296,14 @@ class Panels:
         scale = np.nanmax(np.abs(sizes))
         best = at_nodes.max(axis=1)
         smooth = curve.error <= HELD * scale
-        terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1).sum(axis=1)
+        terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1)
+        excess = terms @ _BEYOND_NODES
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
-        is_flat = terms <= _FLAT * scale
+        is_flat = terms.sum(axis=1) <= _FLAT * scale
         x = np.where(is_flat, _INSIDE - 1.0, _X[node])
         values = sizes[rows, node]
-        may_exceed = smooth & ~is_flat & (best + 2.0 * terms >= best.max())
+        may_exceed = smooth & ~is_flat & (best + excess >= best.max() - TIED * scale)
         for row in np.flatnonzero(may_exceed):
             x[row], values[row] = _find_extreme(curve.series[row], rank)
         ranks = np.where(np.isfinite(values), rank(values), -np.inf)
