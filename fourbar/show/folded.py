@@ -40,15 +40,24 @@ class FoldedTable(Table):
         One of two columns is not split, and rich breaks the words in it.
         """
         wide = options.update_width(_ANY_WIDTH)
+
+        def measure(*columns: Column) -> int:
+            return Measurement.get(console, wide, self._keep([*columns])).maximum
+
         first, *others = self.columns or [Column()]
-        parts = [self._keep([first])]
+        width_of_first = measure(first)
+        # what two tables have beyond one of both columns, whichever these are
+        shared = 2 * width_of_first - measure(first, first)
+        groups = [[first]]
+        width = width_of_first
         for column in others:
-            wider = self._keep([*parts[-1].columns, column])
-            needed = Measurement.get(console, wide, wider).maximum
-            if len(wider.columns) <= 2 or needed <= options.max_width:
-                parts[-1] = wider
-            else:
-                parts.append(self._keep([first, column]))
+            added = measure(column) - shared
+            if len(groups[-1]) > 1 and width + added > options.max_width:
+                groups.append([first])
+                width = width_of_first
+            groups[-1].append(column)
+            width += added
+        parts = [self._keep(columns) for columns in groups]
         parts[0].title = self.title
         parts[-1].caption = self.caption
         return parts
