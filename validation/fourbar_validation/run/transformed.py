@@ -67,8 +67,10 @@ from fourbar_validation.run.question import NotAskedError, Question, spread_even
 
 POSITIONS_STATED_OTHERWISE = 5
 """Positions of a scene that are stated otherwise."""
-TURNED = 0.7
-"""Angle by which a scene is turned, rad."""
+TURNED = 0.75
+"""Angle by which a scene is turned, rad: of few bits, so that sums with it are seldom
+rounded. A rounded theta_2 is another one.
+"""
 SCALE = 2.0**7
 """Factor of every length."""
 PART, MASSES_APART = 0.3, 0.4
