@@ -49,11 +49,11 @@ COMMANDS = {
     ),
     "loops": LazyCommand(
         "fourbar_validation.robots.loops:loops_command",
-        "List the closed loops of a robot's MJCF or SDF.",
+        "List the closed loops of a robot's MJCF, SDF or URDF.",
     ),
     "check-mjcf": LazyCommand(
         "fourbar_validation.robots.check_mjcf:check_mjcf_command",
-        "Measure the loops of your own MJCF or SDF in MuJoCo, or judge one by a scene.",
+        "Measure the loops of a robot's file in MuJoCo, or judge one by a scene.",
         "mujoco",
     ),
     "published": LazyCommand(

@@ -143,6 +143,21 @@ def written(text, folder):
     return path
 
 
+def test_what_stands_in_for_a_missing_mesh_touches_nothing(tmp_path):
+    """Two bars have one at the same pin, in a file whose contacts act."""
+    mesh = '<geom type="mesh" mesh="m" mass="0"/>'
+    text = write_mjcf(BARE)
+    for old, new in (
+        ("<worldbody>", '<asset><mesh name="m" file="m.stl"/></asset><worldbody>'),
+        ('<site name="O2"', f'{mesh}<site name="O2"'),
+        ('<site name="A"', f'{mesh}<site name="A"'),
+    ):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    report = judge_path("bare", BARE, written(text, tmp_path))
+    assert report.counts.status == 0
+
+
 @pytest.mark.slow
 def test_a_file_that_is_as_right_as_a_soft_loop_can_be_is_called_right(tmp_path):
     """Its pin forces are 4.6e-5 off, which is what MuJoCo's stiffest constraint leaves.

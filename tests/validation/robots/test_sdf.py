@@ -785,3 +785,19 @@ def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
     assert closure.reason.startswith("knee follows hip, polycoef 0.2 -1.5 0 0 0")
     notes = ("left out of the URDF: gazebo", *ways)
     assert report.notes[: len(notes)] == notes
+
+
+def test_two_points_of_one_pin_are_two_connects(tmp_path):
+    """Drake's constraints have no names, and join the same two links twice."""
+    for way in ("ball constraint of a URDF", "ball constraint"):
+        text = STATED[way]
+        start = text.index("<drake:ball_constraint>")
+        stop = text.index("</drake:ball_constraint>") + len("</drake:ball_constraint>")
+        model, _ = compile_text(tmp_path, text[:stop] + text[start:])
+        assert model.neq == 2
+
+
+def test_a_loop_joint_within_another_element_is_left_out(tmp_path):
+    text = write_urdf(f"<isaac>{LOOP_JOINT}</isaac>")
+    model, notes = compile_text(tmp_path, text)
+    assert model.neq == 0 and "left out of the URDF: isaac" in notes

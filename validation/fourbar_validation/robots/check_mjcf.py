@@ -123,7 +123,7 @@ def check_mjcf_command(
     out: Path,
     **robot: Any,
 ) -> int:
-    """Measure the loops of your own MJCF or SDF in MuJoCo, or judge one by a scene.
+    """Measure the loops of a robot's file in MuJoCo, or judge one by a scene.
 
     With SCENE the loop whose lengths are nearest is judged at its motion: errors of
     torque and pin forces, what differs from the generated MJCF, and what each

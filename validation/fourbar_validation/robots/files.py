@@ -232,10 +232,12 @@ class _RobotReading:
                 body.attrib["link"] = body.attrib["name"]
                 body.attrib["xyz"] = point.attrib["value"]
         known = {link.get("name") for link in root.iter("link")}
-        pins = [pin for pin in root.iter("loop_joint") if pin.get("type") in _TURNING]
+        pins = [
+            pin for pin in root.findall("loop_joint") if pin.get("type") in _TURNING
+        ]
         for pin in pins:
             links = [end.attrib["link"] for end in pin.findall("*[@link][@xyz]")]
-            name = pin.attrib.setdefault("name", "-".join(links))
+            name = pin.get("name") or "-".join(links)
             if len(links) != 2 or not known.issuperset(links):
                 raise self._refuse(
                     name, "must name two links, with the pin's x, y and z in each"

@@ -354,6 +354,7 @@ def show_mimic(report: _MimicReport) -> None:
         print_sentence(
             "nothing tells from which side the scene is drawn: the tip of the axis of"
             f" {equality.leader} is assumed, and --pose theta_2=ANGLE states another"
+            " where theta_2 differs there"
         )
     print_sentence(_write_errors(report))
     for largest, zero in report.zeros[1:]:

@@ -88,7 +88,7 @@ def loops_command(
     out: Path | None,
     **pose: Any,
 ) -> None:
-    """List the closed loops of a robot's MJCF or SDF.
+    """List the closed loops of a robot's MJCF, SDF or URDF.
 
     The command says which loops are planar four-bars.
     """

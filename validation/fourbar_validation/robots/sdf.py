@@ -643,13 +643,14 @@ class _Conversion:
             tag = constraint.tag.replace("drake_", "drake:")
             raise _refuse(tag, "must join two bodies")
         kind = "weld" if constraint.tag == _WELD else "connect"
-        self._close(kind, "-".join(self.names[link] for link in ends), ends)
+        self._close(kind, "", ends)  # two may join the same two links
 
     def _close(self, kind: str, name: str, ends: dict[str, Array]) -> None:
         """Close a loop between places of two links, (4, 4) each."""
         closure = ET.SubElement(self.equality, kind, name=name)
         for number, (link, place) in enumerate(ends.items(), 1):
-            site = {"name": f"{name} {number}", **_write_place(place)}
+            name_of_site = f"closure {len(self.equality)} {number}"
+            site = {"name": name_of_site, **_write_place(place)}
             ET.SubElement(self.body[link], "site", site)
             closure.set(f"site{number}", site["name"])
 

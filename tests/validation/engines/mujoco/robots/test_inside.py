@@ -250,3 +250,17 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
     if branch == CROSSED:
         wanted = mirror(wanted, moved, 0.25 if bar == 2 else 0.0)
     assert follows == approx(wanted, abs=1e-9)
+
+
+def test_a_torque_meets_the_stops_of_the_file_after_a_motion_too():
+    """A motion through time passes its ends by a step, and meets no stop there."""
+    gaps = []
+    for moves in (False, True):
+        inside, _ = open_loop.__wrapped__("gripper")
+        start = inside.loop.angles[1]
+        if moves:
+            motion = make_motion(start + np.linspace(0.0, 0.2, 5), (2.0, 0.0))
+            inside.answer_through_time(motion)
+        (state,) = inside.answer_under_torque([start], 5.0, 0.2)
+        gaps.append(state.gap)
+    assert gaps[0] == gaps[1]

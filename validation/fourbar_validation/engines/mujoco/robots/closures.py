@@ -768,9 +768,7 @@ class _Finder:
         chosen = next((joint for joint in driven if joint in at_ground), None)
         reason = f"motors act on {names}"
         if chosen is None:
-            chosen = min(
-                at_ground
-            )  # of the hinges without a sign the first of the file
+            chosen = min(at_ground)  # the first of the file
             reason = "no motor acts on it"
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"

@@ -1,6 +1,6 @@
 """A robot's file compiled as MuJoCo compiles it.
 
-What is missing and moves nothing is left out.
+A mesh that is missing is a tetrahedron that touches nothing.
 """
 
 import math
@@ -62,7 +62,7 @@ def collect_warnings() -> Iterator[list[str]]:
 def compile_robot(file: RobotFile) -> CompiledRobot:
     """Compile a robot's file.
 
-    Geoms whose mesh is missing are left out where the body states its inertia.
+    What stands in for a missing mesh touches nothing; the body states its inertia.
 
     Raises
     ------
@@ -76,16 +76,10 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
                 None,
                 f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
             )
-        for pin in ET.fromstring(file.text).iter("loop_joint"):  # of a URDF
-            name = pin.attrib["name"]
-            closure = spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_CONNECT)
-            closure.objtype = mujoco.mjtObj.mjOBJ_SITE
-            for number, end in enumerate(pin.findall("*[@link]"), 1):
-                site = f"{name} {number}"
-                place = [float(part) for part in end.attrib["xyz"].split()]
-                spec.body(end.attrib["link"]).add_site(name=site, pos=place)
-                setattr(closure, f"name{number}", site)
+        _add_loop_joints(spec, file)
         unknown = _name_unknown(spec, file)
+        for pair in [*spec.pairs] if file.missing else ():
+            spec.delete(pair)  # it may name what stands in for a mesh
         quaternions = {
             number: tuple(body.quat.tolist())
             for number, body in enumerate(spec.bodies)
@@ -158,11 +152,30 @@ def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
     return parts
 
 
+def _add_loop_joints(spec: mujoco.MjSpec, file: RobotFile) -> None:
+    """Add a connect for each pin by which a URDF closes a loop."""
+    for place, pin in enumerate(ET.fromstring(file.text).iter("loop_joint")):
+        closure = spec.add_equality(
+            name=pin.get("name", ""), type=mujoco.mjtEq.mjEQ_CONNECT
+        )
+        closure.objtype = mujoco.mjtObj.mjOBJ_SITE
+        for number, end in enumerate(pin.findall("*[@link]"), 1):
+            site = f"loop_joint {place} {number}"
+            at = [float(part) for part in end.attrib["xyz"].split()]
+            spec.body(end.attrib["link"]).add_site(name=site, pos=at)
+            setattr(closure, f"name{number}", site)
+
+
 def _name_unknown(spec: mujoco.MjSpec, file: RobotFile) -> set[str]:
-    """Return the names of the bodies whose mass missing meshes would give."""
+    """Return the names of the bodies whose mass missing meshes would give.
+
+    What stands in for such a mesh touches nothing.
+    """
     unknown = set()
     for number, body in enumerate(spec.bodies):
         geoms = [geom for geom in body.geoms if geom.meshname in file.missing]
+        for geom in geoms:
+            geom.contype = geom.conaffinity = 0
         if geoms and _needs_geoms(spec, body, geoms):
             body.name = body.name or f"body_{number}"
             unknown.add(body.name)

@@ -774,6 +774,7 @@ class LoopInside:
         model, _ = self._hold_others()
         # the motor may meet the stops of the file
         model.opt.disableflags &= ~(LIMITS_OFF & ~self.given.opt.disableflags)
+        model.jnt_margin[:] = self.given.jnt_margin
         steps = max(round(seconds / model.opt.timestep), 1)
 
         def let_go(qpos: Array) -> Iterator[TornState]:

@@ -176,7 +176,7 @@ class _RestPose:
             theta_2=ground + side * angles[1] if stated is None else stated,
             follower_zero=zero if 3 in bars or rocker == follower else math.nan,
             side=side,
-            is_side_told=told is not None or math.isnan(angles[1]),
+            is_side_told=told is not None or (stated is None and math.isnan(angles[1])),
         )
 
     def _find_bars(self, follower: int) -> tuple[int, int]:
