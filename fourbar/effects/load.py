@@ -93,8 +93,8 @@ class Table(Described):
     def at(self, theta_2: Any) -> Any:
         """Interpolate the factor; InputError for a position outside the table.
 
-        An angle beyond the table's last point before it is theta_2 less the point and
-        whole turns, of which nothing is rounded but the result.
+        Between two points theta_2 is taken less the first of them and less whole turns:
+        only the difference is rounded.
         """
         first = self.theta_2[0]
         wrapped = shorten(angle(polar(1.0, theta_2)))

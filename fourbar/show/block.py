@@ -860,7 +860,7 @@ class SceneBlock(Facts):
 
 def _shorten(places: list[str]) -> list[str]:
     """Return the first places, and how many follow."""
-    more = [f"{len(places) - _MOST_PLACES} more places"]
+    more = [write_count(len(places) - _MOST_PLACES, "more place")]
     return places[:_MOST_PLACES] + (more if len(places) > _MOST_PLACES else [])
 
 

@@ -54,10 +54,10 @@ def read_drive_demand(solution: Solution) -> Driving:
 
 
 def find_held(solution: Solution) -> tuple[Any, Array]:
-    """Find the rows in which dry friction holds a pin, and where a motion starts.
+    """Return the rows in which dry friction holds a pin, (k,), and senses of starts.
 
-    At rest with an acceleration nothing is held: the sense is that of the start,
-    elsewhere 0, (n,).
+    A position at rest with an acceleration starts to move, and nothing is held there:
+    its sense is that of the acceleration, 1 or -1. Elsewhere it is 0, (n,).
     """
     low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
     if low is None:

@@ -160,9 +160,13 @@ class MotionCurves:
         It has the stated acceleration, against dry friction. Along a law it is a limit
         of what stands between the positions, and None here.
         """
+        if self.panels.located and (
+            self.scene.motion.law or np.any(self.solution.at.speed)
+        ):
+            return None
         solution = self.solve_between()
         _, senses = find_held(solution)
-        if not senses.any() or (self.panels.located and self.scene.motion.law):
+        if not senses.any():
             return None
         at = solution.at._replace(speed=_BEGINNING * senses)
         begun = solve(self.scene, at=at)[read_drive_demand(solution).keys.value]
@@ -254,28 +258,37 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     exact = np.unique(np.concatenate([exact, breaks]))
     edges = _join_edges(exact, even)
 
+    stage = "acceleration" if solution.F12 is None else "force"
+    if solution.omega_4 is None:
+        stage = "position"
+    sized = solution
+    if len(solution) > _MOST_SIZED:
+        rows = np.linspace(0, len(solution) - 1, _MOST_SIZED).astype(np.intp)
+        sized = solve(scene, stage, at=solution.at.part(rows))
+
     def fit(
-        list_curves: Callable[[Solution], _Curves], stage: str, most_halvings: int
+        list_curves: Callable[[Solution], _Curves],
+        asked: _Curves,
+        stage: str,
+        most_halvings: int,
     ) -> Panels:
         def compute(places: Array) -> dict[str, Array]:
             there = solve(scene, stage, at=command_at(scene, places))
             return _take_values(list_curves(there))
 
-        sized = solution
-        if len(solution) > _MOST_SIZED:
-            rows = np.arange(0, len(solution), len(solution) // _MOST_SIZED)
-            sized = solve(scene, stage, at=solution.at.part(rows))
-        wanted = {name: asked for name, (_, asked) in list_curves(sized).items()}
+        wanted = {name: of_curve for name, (_, of_curve) in asked.items()}
         panels = fit_panels(compute, edges, wanted, most_halvings)
         return panels.with_points(exact, compute(exact))
 
-    positions = fit(_list_position_curves, "position", DEEP)
+    positions = fit(
+        _list_position_curves, _list_position_curves(sized), "position", DEEP
+    )
     for bar in MOVING_BARS:
         _join_turns(positions, solution, bar)
     panels = positions
     if solution.omega_4 is not None:
-        stage = "acceleration" if solution.F12 is None else "force"
-        panels = fit(_list_curves, stage, SHALLOW)
+        asked = _list_curves(sized, bent=False)
+        panels = fit(_list_curves, asked, stage, SHALLOW)
     reversals, rests = (
         [(place, name) for place, name in found if name in PINS]
         for found in (zeros, rests)
@@ -410,10 +423,13 @@ def _list_position_curves(solution: Solution) -> _Curves:
     return curves
 
 
-def _list_curves(solution: Solution) -> _Curves:
+def _list_curves(solution: Solution, *, bent: bool = True) -> _Curves:
     """List the curves of loads, or where nothing acts of rates, by name.
 
     Commanded rates end, as all others do, where the linkage ceases to assemble.
+
+    `bent`: False to leave out the values of bending moments, which take most of the
+    time, where only what is asked of the curves is wanted.
     """
     scene = solution.scene
     curves: _Curves = {}
@@ -429,9 +445,11 @@ def _list_curves(solution: Solution) -> _Curves:
         kept = drop_rounding(load, largest) != 0.0
         force = np.where(kept[:, None], getattr(solution, name), 0.0)
         curves[name] = force, Wanted(rounding, integrated=True)
-    for bar, bending in compute_bending(solution).items():
-        asked = Wanted(rounding * max(solution.lengths))
-        curves[f"bending_{bar}"] = np.abs(bending.moment), asked
+    asked = Wanted(rounding * max(solution.lengths))
+    bending = compute_bending(solution) if bent else {}
+    for bar in MOVING_BARS:
+        moment = np.abs(bending[bar].moment) if bent else np.zeros(0)
+        curves[f"bending_{bar}"] = moment, asked
     drive = read_drive_demand(solution)
     if scene.motion.free is not None:
         return curves

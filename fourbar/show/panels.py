@@ -129,6 +129,8 @@ class PanelCurve:
     @cached_property
     def series(self) -> Array:
         """Return the terms of the Legendre series of each panel, (p, N, k)."""
+        if self.values.shape[1] == 1:
+            return self.values
         return np.asarray(np.einsum("ij,pjk->pik", _TO_SERIES, self.values))
 
 
@@ -136,7 +138,7 @@ class PanelCurve:
 class Panels:
     """Curves over a motion, on panels that follow each other.
 
-    Single positions, with nothing between them, are panels of no width.
+    Single positions, with nothing between them, are panels of one node.
     """
 
     start: Array
@@ -157,13 +159,11 @@ class Panels:
         curves: Mapping[str, Array],
         share: Array,
     ) -> "Panels":
-        """Take positions for panels of no width, with curves (n,) or (n, k)."""
+        """Take positions for panels of one node each, with curves (n,) or (n, k)."""
         n = len(places)
         single = {}
         for name, values in curves.items():
-            numbers = values.reshape(n, 1, -1)
-            nodes = np.broadcast_to(numbers, (n, NODES, numbers.shape[-1]))
-            single[name] = PanelCurve(nodes, np.full(n, np.inf), [])
+            single[name] = PanelCurve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
         return cls(places, places, share, single, located=False)
 
     def with_points(self, places: Array, curves: Mapping[str, Array]) -> "Panels":
@@ -178,7 +178,8 @@ class Panels:
         added = {}
         for name, curve in self.curves.items():
             point = points.curves[name]
-            values = np.concatenate([point.values, curve.values])[order]
+            nodes = np.repeat(point.values, NODES, axis=1)
+            values = np.concatenate([nodes, curve.values])[order]
             error = np.append(point.error, curve.error)[order]
             poles = np.flatnonzero(np.isin(order - len(places), curve.poles))
             added[name] = PanelCurve(values, error, poles.tolist())
@@ -209,7 +210,7 @@ class Panels:
 
     def _average(self, of_nodes: Array) -> float:
         """Return the mean over the motion of values at the nodes, where there are."""
-        means = of_nodes @ (0.5 * _WEIGHTS)
+        means = of_nodes @ (0.5 * _WEIGHTS if self.located else np.ones(1))
         known = np.isfinite(means)
         return float(means[known] @ self.share[known] / self.share[known].sum())
 
@@ -297,7 +298,7 @@ class Panels:
         best = at_nodes.max(axis=1)
         smooth = curve.error <= HELD * scale
         terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1)
-        excess = terms @ _BEYOND_NODES
+        excess = terms @ _BEYOND_NODES[: terms.shape[1]]
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
         is_flat = terms.sum(axis=1) <= _FLAT * scale

@@ -63,8 +63,10 @@ class PositionSheet:
         Angles stay: that of a whole turn has the sign of its rounding on either side.
         """
         values = np.asarray(derive(self.solution, name)[0])
+        if find_derived(name) or find_unit_of_quantity(name) == "rad":
+            return values
         before, after = (derive(beside, name) for beside in self.beside)
-        if find_derived(name) or find_unit_of_quantity(name) == "rad" or before is None:
+        if before is None:  # a pin force
             return values
         return np.where(before[0] * after[0] < 0.0, 0.0, values)
 

@@ -129,7 +129,7 @@ def print_positions(
     """
     step = every or 1
     if every is None and width is not None:
-        step = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1))
+        step = math.ceil((len(solution) - 1) / (MOST_ROWS_PRINTED - 1)) or 1
     cells = dict[str, list[str]]()
     for column in columns:
         cells |= _write_column(column, column.name, units)
@@ -216,6 +216,9 @@ def _list_names(solution: Solution) -> Iterator[str]:
     known = {*list_column_quantities(solution)}
     if scene.motion.free is not None:  # its torque is rounding
         known -= {COUPLE.value, LINE.value, "power"}
+    if solution.time is None:  # the rates that are commanded
+        bar = solution.commanded[-1]
+        known -= {f"omega_{bar}", f"alpha_{bar}"}
     if solution.time is not None or compute_times(scene, solution.at) is not None:
         known.add("time")
         names.insert(0 if solution.time is not None else len(names), "time")

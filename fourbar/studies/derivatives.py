@@ -54,6 +54,7 @@ from fourbar.studies.keys import (
     SceneNumber,
     command_key,
     list_entries,
+    moves_before_pins,
     read_number,
     replace_number,
 )
@@ -351,9 +352,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
             ~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)])
         )
         seeded = scene
-        # a place moves before the pins of its bar do
         for number, (key, entry) in sorted(
-            enumerate(keys.items()), key=lambda one: ".from_pin." not in one[1][0]
+            enumerate(keys.items()), key=lambda one: not moves_before_pins(*one[1])
         ):
             if key.startswith("motion."):
                 continue

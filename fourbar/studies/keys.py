@@ -349,13 +349,16 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
     }
 
 
+def moves_before_pins(key: str, entry: SceneNumber) -> bool:
+    """Return True for a number of a place: the pins of its bar move after it."""
+    return ".from_pin." in key or entry.is_drawn_place
+
+
 def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
     entries = list_entries(scene)
-    # a place moves before the pins of its bar do
     places_first = sorted(
-        numbers,
-        key=lambda key: not (".from_pin." in key or entries[key].is_drawn_place),
+        numbers, key=lambda key: not moves_before_pins(key, entries[key])
     )
     changed = scene
     for key in places_first:

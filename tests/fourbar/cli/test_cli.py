@@ -215,6 +215,11 @@ def test_a_terminal_gets_some_forty_rows():
     assert [rows[n].split()[0] for n in (1, -1)] == ["10.0000", "360.0000"]
     shown = "shown: every 10th of the 361 positions; --all shows each"
     assert lines.index(rows[-1]) < lines.index(shown)
+    columns = tables.list_columns(solve(load(CRANK_ROCKER)))
+    assert any("omega_4" in name for name in columns)
+    assert not any(name.startswith("omega_2\n") for name in columns)
+    alone = tables.print_positions(solve(crank_rocker(motion=Motion(1.0, 10.0))), 80)
+    assert len([line for line in alone.splitlines() if ROW.match(line)]) == 1
 
 
 def test_a_table_over_time_has_the_drive_of_a_law_and_none_of_a_release():
