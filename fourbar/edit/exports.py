@@ -87,9 +87,7 @@ def evaluate_scene(
         }
     data["drawn"] = None if scene.drawing is None else scene.drawing.angle(2)
     data["turns"] = [
-        (words, *limit[:3])
-        for words, _, limits in list_limits(scene)
-        for limit in limits
+        (words, *limit[:3]) for words, limits in list_limits(scene) for limit in limits
     ]
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     shown_units = {**COMMON, **units}

@@ -423,11 +423,13 @@ class Session:
         if values is None:
             reason = "needs a cylinder: add one in place of the bar first"
             raise InputError("command", commanded, reason)
-        first, last = float(np.nanmin(values)), float(np.nanmax(values))
-        if last == first:
+        reached = np.unique(values[np.isfinite(values)])
+        if len(reached) < 2:
             reason = "does not move in this motion: choose another sweep first"
             raise InputError("command", commanded, reason)
-        row = int(np.nanargmin(np.abs(values - 0.5 * (first + last))))
+        first, last = reached[[0, -1]].tolist()
+        from_middle = np.abs(values - 0.5 * (first + last))
+        row = int(np.nanargmin(from_middle))
         if asked.get("theta_2") is not None:
             away = np.exp(1j * before.theta_2) - np.exp(1j * float(asked["theta_2"]))
             row = int(np.argmin(np.where(before.assembled, np.abs(away), np.inf)))
@@ -449,7 +451,10 @@ class Session:
         for end, value in (("from", first + inset), ("to", last - inset)):
             put_number(document, ["motion", commanded, end], value, inset, si)
         if has_speed:
-            rate = float(getattr(before, names[1])[row])
+            # of the middle: where the bar turns back it is none
+            rates = getattr(before, names[1])
+            runs_alike = rates * rates[row] >= 0.0
+            rate = float(rates[np.argmin(np.where(runs_alike, from_middle, np.inf))])
             of_rate = ["motion", names[1]]
             document.put(of_rate, f"0 {rate_unit}")
             put_number(document, of_rate, rate, abs(rate) / 100.0, f"{si}/s")

@@ -30,7 +30,7 @@ from fourbar.linkage import (
     require,
 )
 from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
-from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
+from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import Motion
 
 LONGEST_POINT_NAME = 40
@@ -116,7 +116,6 @@ TAKEN_NAMES = frozenset(
 
 _THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
-PIN_COORDINATE = Declared("m")
 LENGTH_NUMBERS = {
     **FourBar.numbers,
     **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
@@ -130,7 +129,7 @@ def find_unit_of_key(key: str) -> str | None:
     """
     table, *names = key.split(".")
     if names[-2:-1] == [DRAWN_WORD]:
-        return PIN_COORDINATE.unit
+        return DRAWN_PLACE.unit
     tables = {"lengths": LENGTH_NUMBERS, "motion": Motion.numbers}
     kinds: dict[str, Any] = {
         "pins": DrawnPins,

@@ -39,8 +39,8 @@ from fourbar.linkage import (
     list_numbers,
 )
 from fourbar.scene import Scene
-from fourbar.scene.drawing import DRAWN_WORD, DrawnPins
-from fourbar.scene.numbers import PIN_COORDINATE, Tolerance
+from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
+from fourbar.scene.numbers import Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
@@ -156,7 +156,7 @@ def _list_drawn_places(
             if not is_centre or read_place(scene, (*holder, form, 0)) == 0.0:
                 continue
         place = (*holder, DRAWN_WORD, axis)
-        drawn[f"{stem}.{DRAWN_WORD}.{axis}"] = SceneNumber(place, PIN_COORDINATE.unit)
+        drawn[f"{stem}.{DRAWN_WORD}.{axis}"] = SceneNumber(place, DRAWN_PLACE.unit)
     return drawn
 
 
@@ -186,7 +186,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     if scene.drawing is None:
         return entries
     of_pins = {
-        f"pins.{pin}.{axis}": SceneNumber(("drawing", pin, axis), PIN_COORDINATE.unit)
+        f"pins.{pin}.{axis}": SceneNumber(("drawing", pin, axis), DRAWN_PLACE.unit)
         for pin in PINS
         for axis in (0, 1)
     }

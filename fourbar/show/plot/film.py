@@ -117,14 +117,17 @@ def _write_gif(path: Path, frames: "Iterator[Image]") -> None:
     from PIL import Image
     from PIL.GifImagePlugin import getdata, getheader
 
-    shown = next(frames).quantize(_STAYS, Image.Quantize.MAXCOVERAGE)
+    shown = next(frames).quantize(_STAYS, Image.Quantize.MEDIANCUT)
     header, _ = getheader(shown, info={"loop": 0})
     look: Any = {"duration": 1000 // FRAMES_PER_SECOND, "transparency": _STAYS}
     before = np.asarray(shown)
+    # Pillow looks a colour up by the upper six bits of its channels
+    near = shown.copy()
+    near.putpalette([level & 0xFC for level in shown.getpalette() or []])
     with open(path, "wb") as file:
         file.writelines([*header, *getdata(shown, **look)])
         for frame in frames:
-            pixels = np.asarray(frame.quantize(palette=shown, dither=Image.Dither.NONE))
+            pixels = np.asarray(frame.quantize(palette=near, dither=Image.Dither.NONE))
             changes = Image.fromarray(np.where(pixels == before, _STAYS, pixels))
             file.writelines(getdata(changes, **look))
             before = pixels
@@ -136,7 +139,11 @@ def _encode_mp4(folder: str, program: str) -> None:
     command = [program, "-i", "film.gif", "-c:v", "h264", "-pix_fmt", "yuv420p"]
     try:
         subprocess.run(
-            [*command, "film.mp4"], cwd=folder, capture_output=True, check=True
+            [*command, "film.mp4"],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,  # it reads what a loop of the shell reads
+            capture_output=True,
+            check=True,
         )
     except subprocess.CalledProcessError:
         raise DependencyError(
@@ -202,6 +209,9 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Any
         moved.extend(artist for artist in drawn if artist not in still)
         place = write_cell(axis.factor * sweep.at.places[index], ".2f")
         words = f"{axis.symbol} = {place}{axis.unit}".replace("-", "−")
+        if shown.time is not None:
+            theta_2 = math.degrees(sweep.theta_2[index])
+            words += f", θ₂ = {write_cell(theta_2, '.1f')}°".replace("-", "−")
         title.set_text(f"{words}, {shown.branch_name} branch")
         return sorted([*moved, title], key=lambda artist: artist.get_zorder())
 

@@ -186,9 +186,10 @@ def draw_linkage(axes: "Axes", view: View, *, moving: bool = False) -> None:
     """
     draw_frame(axes, view)
     if not moving:  # stroke and straightness of paths, as rectangles about them
+        factor = view.plane.factor
         for measured in measure_paths(view.sweep).values():
             corners = join_points(measured.corners)
-            outline = view.plane.factor * np.append(corners, corners[0])
+            outline = factor * np.append(corners, corners[0])
             plot_points(axes, outline, color=POINT, lw=0.6, zorder=2)
     if view.dimensions:
         pins = pose_of(view, view.here, 0).pins

@@ -244,19 +244,15 @@ def where_in_words(solution: Solution) -> str:
     return f"{solution.commanded} = {where}"
 
 
-def list_limits(scene: Scene) -> list[tuple[str, int, tuple[LimitPosition, ...]]]:
-    """List limits of the commanded bar and dead centres.
-
-    An entry has words, the bar that reverses or that the drive cannot move, and the
-    positions.
-    """
+def list_limits(scene: Scene) -> list[tuple[str, tuple[LimitPosition, ...]]]:
+    """List limits of the commanded bar and dead centres: words and positions."""
     linkage = scene.linkage
     found = []
     for bar in dict.fromkeys((scene.motion.bar, 2, 4)):
         word = "limit" if bar == scene.motion.bar else "dead centre"
         one, other = (number for number in MOVING_BARS if number != bar)
         words = f"{word}: bars {one}, {other} in line"
-        found.append((words, bar, limit_positions(linkage, bar)))
+        found.append((words, limit_positions(linkage, bar)))
     return found
 
 

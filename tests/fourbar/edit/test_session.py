@@ -462,6 +462,15 @@ def test_what_does_not_move_cannot_be_commanded(session):
     assert "does not move" in refused
 
 
+@pytest.mark.parametrize("dead_centre", [0, 1])
+def test_a_bar_that_is_shown_turning_back_is_commanded_at_a_speed(session, dead_centre):
+    """It is that of the middle of its swing, where the shown position has none."""
+    limits = fourbar.limit_positions(session.now.scene.linkage, 4)
+    theta_2 = [one.theta_2 for one in limits if one.branch == 1][dead_centre]
+    ask(session, {"do": "command", "command": "theta_4", "theta_2": theta_2})
+    assert 1.0 < abs(session.now.scene.motion.speed) < 10.0
+
+
 def test_a_state_that_assembles_nowhere_names_what_it_commands(session):
     """The output of this linkage rocks, and does not come to 0 deg."""
     scene = replace(session.now.scene, motion=fourbar.Motion(theta_4=0.0))

@@ -229,6 +229,7 @@ def test_a_gif_moves_the_linkage(scene, frames, tmp_path, monkeypatch):
         for index in range(frames):
             film.seek(index)
             pictures.append(np.asarray(film.convert("L"), int))
+            assert film.convert("RGB").getpixel((2, 300)) == (255, 255, 255)
     assert all(np.any(p != q) for p, q in pairwise(pictures))
     with style.apply_style():  # nothing of an earlier frame stays
         shown = view.make_view(scene)
