@@ -276,6 +276,29 @@ def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypa
         assert np.isnan(got)[~right.assembled].all()
 
 
+@present(*TREES, "free-body")
+@pytest.mark.parametrize(
+    "lengths, motion",
+    [
+        ((0.1, 0.1, 0.3, 0.3), {"theta_2": np.array([0.0, 1.0, 2.0, 3.0])}),
+        (
+            (
+                0.2847894033060021,
+                0.18418422905598003,
+                0.6865587568491892,
+                0.5859535825991671,
+            ),
+            {"theta_3": np.array([9.03e-13])},
+        ),
+    ],
+)
+def test_a_loop_closes_on_its_change_points_and_beside(name, lengths, motion):
+    """What rounds there must not leave it open: nothing would be compared."""
+    scene = Scene(uniform(*lengths), Motion(**motion))
+    assert fourbar.solve(scene, "position").assembled.all()
+    assert answered(name, scene).assembled.all()
+
+
 def with_bar(number, **values):
     """A crank-rocker with another mass, inertia or mass centre of one bar."""
     bars = {2: Bar(0.1, 0.2), 3: Bar(0.25, 0.5), 4: Bar(0.22, 0.4)}

@@ -67,6 +67,7 @@ def close(
     # the gap is least where bars 3 and 4 lie along the diagonal
     least_gap = np.maximum(e - (b + c), abs(b - c) - e)
     possible = np.flatnonzero(least_gap <= closed)
+    e = np.maximum(e, closed / 4.0)
     start = np.array(
         [
             phi + branch * _compute_angle_between(e, b, c),
@@ -98,8 +99,8 @@ def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     Bars 3 and 4 are never collinear: the corner between them is at least so far off the
     diagonal as the shorter one is at `NEARLY_IN_LINE`.
     """
-    above = (e - near + far) * (far + near - e)
-    below = (e + near - far) * (e + near + far)
+    above = (e - (near - far)) * (near + far - e)
+    below = (e + (near - far)) * (near + far + e)
     angle = 2.0 * np.arctan2(
         np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0))
     )

@@ -119,6 +119,8 @@ class Assembler:
         least_gap = max(e - (near + far), abs(near - far) - e)
         if least_gap > closed:
             return None
+        # of equal bars that lie on each other the corner is not on the ground pin
+        e = max(e, closed / 4.0)
         first, second = self.closing
         angles = {
             bar: theta,
@@ -190,8 +192,8 @@ def _compute_triangle_angle(e: float, near: float, far: float) -> float:
 
     The corner is never on the side e, as for the free bodies.
     """
-    above = (e - near + far) * (far + near - e)
-    below = (e + near - far) * (e + near + far)
+    above = (e - (near - far)) * (near + far - e)
+    below = (e + (near - far)) * (near + far + e)
     angle = 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
     least = NEARLY_IN_LINE * min(near, far) / near
     return min(max(angle, least), math.pi - least)

@@ -143,7 +143,17 @@ def test_a_change_point_is_a_declared_limit():
     ):
         posed = fourbar.Scene(fourbar.uniform(*lengths), motion)
         refusal = simulate(posed).refusal
-        assert (refusal is not None and "change point" in refusal) == refused
+        assert (refusal is not None and "falls to 0.0" in refusal) == refused
+    kite = fourbar.uniform(0.1, 0.1, 0.3, 0.3)
+    passes = Motion(np.array([0.0, 1.0, 2.0, 3.0]), 1.0)
+    assert "falls to 0.0" in simulate(fourbar.Scene(kite, passes)).refusal
+
+
+def test_a_law_that_is_back_where_it_began_takes_the_steps_of_its_way():
+    """At its two positions theta_2 is the same but for a rounding."""
+    law = fourbar.Sine("1 rad", "0.5 rad", "1 rev/s", "1 s", steps=1)
+    answer = simulate(crank_rocker(motion=Motion(law=law)))
+    assert answer.refusal is None and 1000 < answer.evidence["steps"] < 20_000
 
 
 def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch):

@@ -18,6 +18,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
+from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Table
 from fourbar.errors import LimitError
+from fourbar.linkage import copy_with
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
@@ -67,7 +69,7 @@ class Segment:
         self.seconds = dict(zip(positions, (times - self.began).tolist(), strict=True))
         """Time at which each position is passed, from the start of the segment, s."""
         self.width = len(np.unique(times)) - 1
-        self.turned = float(np.ptp(course.input[positions]))
+        self.turned = course.turned(positions)
         instants = np.linspace(0.0, self.duration, INSTANTS_OF_A_LAW)
         speeds = course.speeds(self.began + instants)
         self.omega = float(speeds[0])
@@ -80,6 +82,8 @@ class Segment:
         The steps are as many as at the greatest speed of the input throughout, and at
         least as many as positions. One position alone takes any timestep.
         """
+        if settings.timestep is not None:
+            return settings.timestep * settings.timestep_scale
         if not self.width or not self.turned:
             return 1e-3
         most = self.duration * self.turning
@@ -120,11 +124,6 @@ class RunCourse:
         self.scene = replace(scene, motion=motion)
         """The scene whose MJCF is run through."""
 
-    @property
-    def input(self) -> Array:
-        """Return theta_2 at the positions, rad."""
-        return self.command.theta_2
-
     def order(self) -> NDArray[np.intp]:
         """Order the positions as they are passed, as indices."""
         values = self.values if self.speed > 0.0 else -self.values
@@ -142,6 +141,10 @@ class RunCourse:
     def speeds(self, times: Array) -> Array:
         """Return the commanded speed at times."""
         return self.speed + self.acceleration * times
+
+    def turned(self, positions: list[int]) -> float:
+        """Return the range of theta_2 over some positions, rad."""
+        return float(np.ptp(self.command.theta_2[positions]))
 
     def turning(self, positions: list[int], fastest: float) -> float:
         """Return the greatest speed of the input, rad/s; `fastest`: the commanded."""
@@ -173,7 +176,8 @@ class LawCourse(RunCourse):
         self.law = law
         self.time: Array = command.time
         self.command = self.of_input = command
-        _, _, self.at_knots = law.at(np.array(law.time))
+        self.knots = np.array(law.time)
+        _, _, self.at_knots = law.at(self.knots)
         instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
         _, *rates = law.at(instants)
         omega, alpha = (float(np.abs(rate).max()) for rate in rates)
@@ -187,7 +191,7 @@ class LawCourse(RunCourse):
         interpolated; another law is evaluated.
         """
         if isinstance(self.law, Law) and self.law.omega is None:
-            return float(np.interp(instant, self.law.time, self.at_knots))
+            return float(np.interp(instant, self.knots, self.at_knots))
         _, _, alpha = self.law.at(np.array([instant]))
         return float(alpha[0])
 
@@ -199,14 +203,25 @@ class LawCourse(RunCourse):
         """Return the times of the law."""
         return self.time[positions]
 
+    def turned(self, positions: list[int]) -> float:
+        """Return the range of theta_2 from the first position to the last, rad.
+
+        A law may go out and back between them.
+        """
+        times = self.time[positions]
+        instants = np.linspace(times.min(), times.max(), INSTANTS_OF_A_LAW)
+        angles, _, _ = self.law.at(instants)
+        return float(np.ptp(angles))
+
     def speeds(self, times: Array) -> Array:
         """Return omega_2 of the law."""
         _, speeds, _ = self.law.at(times)
         return speeds
 
     def accelerate(self, began: float) -> ActuatorForce | None:
-        """Return what evaluates the law at MuJoCo's time."""
-        return lambda _, data: self.alpha(began + data.time)
+        """Return what evaluates the law at MuJoCo's time, which stages share."""
+        alpha = lru_cache(maxsize=4)(self.alpha)
+        return lambda _, data: alpha(began + data.time)
 
 
 LIGHT_FLYWHEEL = 1e4
@@ -422,16 +437,14 @@ class Lead(RunCourse):
         self.scene = replace(scene, motion=largest)
         self.of_input = Command(theta_2, branch[closes], fastest, most_accelerated)
 
-    @property
-    def input(self) -> Array:
-        """Return theta_2 at the positions, rad, NaN where the loop does not close."""
-        return self.led
+    def turned(self, positions: list[int]) -> float:
+        """Return the range of theta_2 over some positions, rad."""
+        return float(np.ptp(self.led[positions]))
 
     def turning(self, positions: list[int], fastest: float) -> float:
         """Return the greatest speed of the input; LimitError if it must hurry."""
         greatest = float(np.abs(self.omega_2[positions]).max())
-        turned = float(np.ptp(self.led[positions]))
-        if turned:
+        if turned := self.turned(positions):
             uneven = float(np.ptp(self.times(positions))) * greatest / turned
             if uneven > _MOST_UNEVEN:
                 raise LimitError(
@@ -527,7 +540,9 @@ def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
 def _evaluate_table(table: Table) -> ActuatorForce:
     """Return the function that evaluates a table over its largest factor."""
     peak = _find_peak(table)
-    return lambda _, data: float(look_up(table, data.qpos[O2])) / peak
+    points, factors = np.array(table.theta_2), np.array(table.factor)
+    arrays = copy_with(table, theta_2=points, factor=factors)
+    return lambda _, data: float(look_up(arrays, data.qpos[O2])) / peak
 
 
 def clip_angles(scene: Scene, theta_2: Array) -> Array:
