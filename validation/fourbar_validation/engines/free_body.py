@@ -50,6 +50,10 @@ DRIVE_COLUMN = 12
 """The torque, or the force along a line."""
 EQUATION_ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
+POSITIONS_SOLVED_AT_ONCE = 4096
+"""Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
+are 22 MB.
+"""
 _FRICTION_STAGES = 16
 """Stages in which friction grows to its full coefficient. Each is the start of the
 next.
@@ -111,15 +115,35 @@ class FreeBody:
             ),
         )
         if command.speed is not None:
-            forces, answer.evidence["residual"] = _list_forces(scene, motion)
-            answer.quantities |= _list_rates(motion) | forces
-            if any(effect.dry for effect in scene.effects):
-                begins = []
-                for side in (1.0, -1.0):
-                    either = command._replace(speed=side, acceleration=0.0)
-                    begins.append(_move_bodies(scene.linkage, either, theta))
-                answer.quantities |= _find_range_at_rest(scene, motion, begins)
+            parts = []
+            for start in range(0, max(theta.shape[1], 1), POSITIONS_SOLVED_AT_ONCE):
+                block = slice(start, start + POSITIONS_SOLVED_AT_ONCE)
+                some = command.part(block)
+                parts.append(_list_dynamics(scene, some, theta[:, block]))
+            answer.evidence["residual"] = max(residual for _, residual in parts)
+            for name in parts[0][0]:
+                columns = [quantities[name] for quantities, _ in parts]
+                answer.quantities[name] = np.concatenate(columns)
         return answer
+
+
+def _list_dynamics(
+    scene: Scene, command: Command, theta: Array
+) -> tuple[dict[str, Array], float]:
+    """List rates, pin forces and what the drive takes, and the largest residual.
+
+    `theta`: angles of bars 2, 3 and 4, rad, (3, n).
+    """
+    motion = _move_bodies(scene.linkage, command, theta)
+    forces, residual = _list_forces(scene, motion)
+    quantities = _list_rates(motion) | forces
+    if any(effect.dry for effect in scene.effects):
+        begins = []
+        for side in (1.0, -1.0):
+            either = command._replace(speed=side, acceleration=0.0)
+            begins.append(_move_bodies(scene.linkage, either, theta))
+        quantities |= _find_range_at_rest(scene, motion, begins)
+    return quantities, residual
 
 
 def _move_bodies(linkage: FourBar, command: Command, theta: Array) -> BodyMotion:
@@ -502,16 +526,22 @@ def solve_couples(
 
     Return also where it converged, and the Jacobian, (n, p, p).
     """
+    x = x.copy()
+    settled = np.zeros(len(x), dtype=bool)
+    matrix = np.empty((*x.shape, x.shape[-1]))
+    left = np.arange(len(x))  # positions where a step is still to be taken
     for _ in range(_FRICTION_STEPS):
-        size, matrix = _compute_friction_jacobian(F, C, k, x)
-        gap = k * size - x
-        terms = k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
-        settled = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
-        step = solve_system(matrix, gap[..., None])[0][..., 0]
-        moving = ~settled & np.isfinite(step).all(axis=1)
-        if not moving.any():
+        load, adds, couples = F[left], C[left], x[left]
+        size, matrix[left] = _compute_friction_jacobian(load, adds, k, couples)
+        gap = k * size - couples
+        terms = k * (np.abs(load) + (np.abs(adds) * couples[:, None, :]).sum(axis=-1))
+        settled[left] = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
+        step = solve_system(matrix[left], gap[..., None])[0][..., 0]
+        moving = ~settled[left] & np.isfinite(step).all(axis=1)
+        left = left[moving]
+        if not len(left):
             break
-        x = np.where(moving[:, None], x + step, x)
+        x[left] += step[moving]
     return x, settled, matrix
 
 

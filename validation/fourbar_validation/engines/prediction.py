@@ -20,7 +20,7 @@ would excuse too much.
 import cmath
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,9 +39,6 @@ from fourbar_validation.compare.tolerance import (
     sum_lengths,
 )
 from fourbar_validation.engines.description import find_unknown, list_speeds
-
-if TYPE_CHECKING:
-    pass
 
 DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""

@@ -229,14 +229,20 @@ def _read_motion(
 
 def _read_rate(name: str, value: Any, n: int) -> float | Array:
     """Read one number of all positions, or n of them."""
+    key = f"command.{name}"
     if isinstance(value, list):
-        return _read_numbers(f"command.{name}", value, n)
-    return _read_number(f"command.{name}", value)
+        return _read_numbers(key, value, n)
+    return _read_number(key, value, f"must be a finite number, or a list of {n}")
 
 
-def _read_number(key: str, value: Any) -> float:
+def _read_number(
+    key: str, value: Any, allowed: str = "must be a finite number"
+) -> float:
     """Read a finite number."""
-    return float(_read_numbers(key, [value])[0])
+    array = _make_array([value], gaps=False)
+    if array is None:
+        raise InputError(key, value, allowed)
+    return float(array[0])
 
 
 def _read_numbers(
@@ -381,9 +387,10 @@ def answer_from_json(
         raise InputError("alarms", alarms, "must be a list of texts")
     predicted = _read_arrays("predicted", data, n, ())
     evidence = _read_object("evidence", data)
-    seconds = _read_number("seconds", data.get("seconds", 0.0))
+    allowed = "must be a number of 0 or more"
+    seconds = _read_number("seconds", data.get("seconds", 0.0), allowed)
     if seconds < 0.0:
-        raise InputError("seconds", seconds, "must be a number of 0 or more")
+        raise InputError("seconds", seconds, allowed)
     return Answer(
         engine,
         setting,
@@ -533,7 +540,8 @@ def require_near(made: Command, command: Command) -> None:
     faster = 1.0
     if speed:
         turned = float(np.ptp(command.angle))
-        faster = math.sqrt(1.0 + 2.0 * acceleration * turned / speed**2)
+        # no square of a speed that a double has not
+        faster = math.sqrt(1.0 + 2.0 * (acceleration / speed) * (turned / speed))
     most = {
         "angle": _FURTHEST,
         "speed": (_FURTHEST + faster - 1.0) * speed,
