@@ -191,6 +191,9 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
     if name in ("status", "branch", "drive_bar"):
         text = "is no quantity: --csv without --columns has it"
         return InputError("--columns", name, text)
+    reaction = re.sub(r"^F(\d)(\d)", r"F\2\1", name)
+    if reaction != name and _is_number(with_speed, reaction):
+        return InputError("--columns", name, f"is the reaction of {reaction}: minus it")
     close = get_close_matches(name, known, 1)
     hint = f'did you mean "{close[0]}"? ' if close else ""
     there = ", ".join(["time", *list_column_quantities(solution)])

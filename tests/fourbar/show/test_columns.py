@@ -67,6 +67,7 @@ torque_x | unknown
 P/F12 | is a place: P_x or P_y
 drive_force | unknown
 status | --csv without --columns has it
+F34_y | is the reaction of F43_y: minus it
 """)
 
 
