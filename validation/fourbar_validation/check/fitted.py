@@ -195,9 +195,10 @@ def _compute_residual(
 ) -> Array:
     """Compute theirs less what a mistake predicts at some rows, in parts of the size.
 
-    What they do not state, and what has no size, counts as right.
+    Return (rows, numbers). What they do not state, and what has no size, counts as
+    right.
     """
-    parts = [np.zeros(0)]
+    parts = []
     for column in columns:
         theirs = column.theirs[rows]
         predicted = column.predict(mistake.predict)
@@ -207,8 +208,8 @@ def _compute_residual(
         apart = apart.reshape(len(theirs), -1) / column.divisor[rows, None]
         judged = (column.where & (column.size > 0.0))[rows, None]
         stated = np.isfinite(theirs).reshape(apart.shape)
-        parts.append(np.where(judged & stated, apart, 0.0).ravel())
-    return np.concatenate(parts)
+        parts.append(np.where(judged & stated, apart, 0.0))
+    return np.concatenate(parts, axis=1)
 
 
 class _Family(NamedTuple):
@@ -244,7 +245,7 @@ def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
     numbers = np.array(family.start)
 
     def measure(numbers: Array) -> Array:
-        return _compute_residual(columns, family.make(*numbers.tolist()))
+        return _compute_residual(columns, family.make(*numbers.tolist())).ravel()
 
     least = math.inf
     for step in range(NEWTON):
@@ -338,11 +339,13 @@ def _list_commands(
         return
     n = len(at.angle)
     rows = np.unique(np.linspace(0, n - 1, _TRIED).round().astype(int))
-    part = at.part(rows)
     tried = TURN * np.arange(1, OFFSETS_TRIED) / OFFSETS_TRIED
-    wrong = [_turn(scene, part, offset) for offset in tried.tolist()]
-    residuals = [_compute_residual(columns, one, rows) for one in wrong]
-    misfits = np.mean(np.fmin(np.abs(residuals), 1.0), axis=1)
+    each = np.tile(rows, len(tried))
+    part = at.part(each)
+    turned = part._replace(angle=part.angle + np.repeat(tried, len(rows)))
+    residual = _compute_residual(columns, solve_other("", scene, turned), each)
+    shares = np.fmin(np.abs(residual), 1.0)
+    misfits = shares.reshape(len(tried), -1).mean(axis=1)
     if misfits.min() < PROMISING:
         start = float(tried[np.argmin(misfits)])
         yield _Family((start,), partial(_turn, scene, at))
