@@ -817,7 +817,7 @@ def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
     """A released scene is not judged at the speed of its start."""
     scene = replace(OURS, motion=fourbar.Motion(**motion))
     code, _, error = check(scene, "theta_2,torque\n0.3,1.0\n")
-    assert code == BAD_INPUT and words in error
+    assert code == BAD_INPUT and words in error and "scene.toml: motion" in error
 
 
 def noise(seed, values):
@@ -894,6 +894,7 @@ theta_2,torque\n1,"2,5"\n | line 2, torque = '2,5': must be a number
 \xff\xfe\x00\x01 | UTF-8
 theta_2,torque\n1,2\x00\n | table
 theta_2,\x1b[31mtorque\n1,2\n | known are
+theta_4 [deg],torque\n190,1\n | line 2, theta_4 = '190 deg': the motion passes it at
 """)
 
 
@@ -901,7 +902,7 @@ theta_2,\x1b[31mtorque\n1,2\n | known are
 def test_a_bad_table_is_one_line(text, words, check):
     written = text.encode().decode("unicode_escape").encode("latin-1")
     code, _, error = check(THESIS, written)
-    assert code == BAD_INPUT and words in error
+    assert code == BAD_INPUT and words in error and "theirs.csv" in error
     assert len(error.splitlines()) == 1 and "\x1b" not in error
 
 

@@ -238,6 +238,7 @@ LOGGED = read_rows("""
 time theta_2 torque |
 theta_2 omega_2 alpha_2 torque |
 time theta_2 omega_2 alpha_2 torque |
+time beyond theta_2 torque |
 theta_2 torque | needs a column time beside theta_2, or columns omega_2 and
 theta_2 omega_2 torque | needs a column time beside theta_2, or columns
 late theta_2 torque | the law is at 20.0067 deg then, and the table at 20.0043

@@ -561,12 +561,19 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
     for refusals, words in (
         (
             rows,
-            "(3 scenes): signs [1, 1] are lost",
+            "(3 scenes): signs [1, 1] are lost, with other numbers in the others",
         ),
         (alike, "(2 scenes): 4 bars, not 5"),
     ):
         summary = summary_of(record_of(row.scene, [row]) for row in refusals)
         assert [*summary.silent.values()] == [f"theirs: nothing compared {words}"]
+
+
+def test_an_engine_that_drew_nothing_is_not_in_the_caption_of_a_picture():
+    rows = [*demo().rows, refuse("demo", "it reads no cylinder")]
+    _, text = report([replace(demo(), rows=rows)])
+    (caption,) = re.findall("answers at some of the positions: (.*?). Beneath", text)
+    assert "free-body" in caption and "theirs" not in caption
 
 
 @pytest.mark.parametrize(

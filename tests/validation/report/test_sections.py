@@ -108,6 +108,11 @@ def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path):
     "value, text",
     read_rows("""
 628 | 628
+12345 | 12345
+-999999 | -999999
+1000000 | 1e+06
+nan | -
+inf | inf
 0 | 0
 0.125 | 0.125
 3.1e-09 | 3.1e-09

@@ -11,6 +11,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import Gravity
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Motion, Rise
@@ -191,6 +192,30 @@ def test_a_right_law_is_right_at_every_step(draw, kind):
         scene = crank_rocker(motion=Motion(law=draw(rng, kind)))
         (row,) = check_law(make_question("law", scene, ()))
         assert not row.failed, row
+
+
+@pytest.mark.parametrize("ends", ["free", "rest", "periodic"])
+def test_a_wrong_acceleration_along_a_table_of_uneven_steps_is_none_of_the_law(
+    ends, monkeypatch
+):
+    steps = np.full(40, 0.1)
+    steps[7] = 3e-5
+    time = np.concatenate(([0.0], np.cumsum(steps)))
+    angles = np.sin(TURN * time / time[-1])
+    angles[-1] = angles[0]
+    law = Law(time=tuple(time), theta_2=tuple(angles), ends=ends)
+
+    def be_wrong(law, time, at=Law.at):
+        angle, speed, acceleration = at(law, time)
+        return angle, speed, 1.05 * acceleration
+
+    question = make_question("law", crank_rocker(motion=Motion(law=law)), ())
+    (row,) = check_law(question)
+    assert row.passed
+    monkeypatch.setattr(Law, "at", be_wrong)
+    question = make_question("law", crank_rocker(motion=Motion(law=law)), ())
+    (row,) = check_law(question)
+    assert row.failed
 
 
 @pytest.mark.parametrize(

@@ -190,16 +190,22 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy
 
 
-def test_an_engine_that_predicts_nothing_of_itself_is_undecided(monkeypatch):
+@pytest.mark.parametrize(
+    "off, verdict",
+    [((3.0, 5.0), UNDECIDED), ((np.inf, 5.0), FAILS), ((3.0, np.inf), FAILS)],
+)
+def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
+    off, verdict, monkeypatch
+):
     """An engine that is wrong by 3 rad at its step and by 5 rad at twice it has no
-    digit by which it could agree.
+    digit by which it could agree. What is infinite predicts nothing.
     """
-    off = iter([3.0, 5.0])
+    shifts = iter(off)
     rows = answering(
         monkeypatch,
-        lambda released: replace(released, theta_2=released.theta_2 + next(off)),
+        lambda released: replace(released, theta_2=released.theta_2 + next(shifts)),
     )
-    assert row(rows, "pinocchio-forward", "theta_2").verdict == UNDECIDED
+    assert row(rows, "pinocchio-forward", "theta_2").verdict == verdict
 
 
 @pytest.mark.slow

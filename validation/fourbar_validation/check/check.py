@@ -325,7 +325,11 @@ def check_command(
     else:
         tolerance = Allowance(rtol or 0.0, atol or 0.0)
     table = table.from_pin(stated.origin)
-    judgement = Judgement(stated, table, tolerance)
+    try:
+        judgement = Judgement(stated, table, tolerance)
+    except InputError as error:
+        is_theirs = error.key.startswith(("line ", "table", "header"))
+        raise error.in_file(str(theirs if is_theirs else scene)) from None
     if json is not None:
         write_text(json, write_judgement_json(judgement))
     if junit is not None:

@@ -298,9 +298,10 @@ def _find_columns(
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if why:
             left_out[heading.strip() or f"column {index + 1}"] = why
-        if unit is None:
-            continue
-        if name in found:
+        again = name in found
+        if unit is None or (again and name == "time"):
+            continue  # of several columns of times the first is read
+        if again:
             both = f"columns {found[name][0] + 1} and {index + 1} are both {name}"
             raise InputError("header", headings, f"{both}: rename or remove one")
         found[name] = index, unit

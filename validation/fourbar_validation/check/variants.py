@@ -35,25 +35,25 @@ class Mistake(NamedTuple):
     text: str
     predict: Predict
     whole: bool = True
-    """True if it was made in the calculation and shows in every quantity. A column's
-    unit shows in that column only.
+    """True if it was made in the calculation and shows in every quantity; a wrong unit
+    of a column shows in that column alone.
     """
     times: float = 1.0
     """Factor on the allowed error. A number that was fitted to rounded ones carries
     their rounding once more.
     """
     left: float = 0.0
-    """Part of the largest value by which an engine may miss the prediction. The engine
-    makes this mistake.
+    """Part of the largest value by which the numbers of an engine that makes this
+    mistake may miss the prediction.
     """
 
     @property
     def fitted(self) -> bool:
-        """Return True if a number of it was fitted to the table."""
+        """Return whether a number of the mistake was fitted to the table."""
         return self.times > 1.0
 
     def within(self, names: Collection[str], words: str = "") -> "Mistake":
-        """Return the mistake in some quantities alone, with words at its end."""
+        """Return the mistake made in these quantities alone; words end its text."""
 
         def predict(quantity: str) -> Array | None:
             return self.predict(quantity) if quantity in names else None
@@ -61,7 +61,10 @@ class Mistake(NamedTuple):
         return self._replace(text=f"{self.text}{words}", predict=predict)
 
     def mirrored(self, y: float) -> "Mistake":
-        """Return it with angles, rates and torques reversed, and y times a factor."""
+        """Return the mistake with angles, rates and torques of the opposite sign.
+
+        The y components of its vectors are multiplied by a factor.
+        """
 
         def predict(quantity: str) -> Array | None:
             values = self.predict(quantity)

@@ -290,9 +290,9 @@ class Summary:
 
     @property
     def engines(self) -> list[EngineLine]:
-        """Return every engine as people look for them, then the formulas.
+        """Return the lines of all engines in the order of the table, the formulas last.
 
-        An engine that had nothing to compare is among them if that has a reason.
+        An engine that had nothing to compare has a line if a reason is known.
         """
         for engine in {*ENGINE_NAMES, *self.declared} & self._left_out.keys():
             self._line(engine)
@@ -312,12 +312,12 @@ class Summary:
 
     @property
     def independent(self) -> list[EngineLine]:
-        """Return them without the formulas."""
+        """Return the lines of the engines other than the formulas."""
         return [line for line in self.engines if line.engine != FORMULAS]
 
     @property
     def silent(self) -> dict[str, str]:
-        """Return a line for each engine with nothing to compare, with the reason.
+        """Return by its name why an engine compared nothing, in a sentence.
 
         Of several reasons the commonest is stated.
         """

@@ -9,6 +9,8 @@ from pathlib import Path
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.report.svg import choose_style
 
+_LEAST_POWER = 1e6
+"""Least whole number that is written by a power of ten."""
 _SCRIPT = Path(__file__).with_name("templates") / "report.js"
 
 
@@ -68,5 +70,10 @@ def write_error(value: float) -> str:
 
 
 def count_or_size(value: float) -> str:
-    """Write three significant digits, as few as there are; a dash stands for NaN."""
+    """Write at most three significant digits; a dash stands for NaN.
+
+    A count, which is a whole number below a million, is written in full.
+    """
+    if abs(value) < _LEAST_POWER and value == round(value):
+        return str(round(value))
     return f"{value:.3g}".replace("nan", "-")

@@ -16,16 +16,22 @@ class AlikeTexts:
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
         self._first: dict[str, str] = {}
+        self._differing: set[str] = set()
 
     def add(self, text: str) -> None:
         """Take in a text."""
         words = NUMBERS_IN_A_REASON.sub("#", text)
         self._counts[words] += 1
-        self._first.setdefault(words, text)
+        if self._first.setdefault(words, text) != text:
+            self._differing.add(words)
 
     def list_all(self) -> list[tuple[str, int]]:
         """List the first of each kind of texts, and their count, the commonest first.
 
-        What differs in the others is their numbers.
+        A text says if the others have other numbers.
         """
-        return [(self._first[words], n) for words, n in self._counts.most_common()]
+        listed = []
+        for words, count in self._counts.most_common():
+            others = ", with other numbers in the others" * (words in self._differing)
+            listed.append((self._first[words] + others, count))
+        return listed
