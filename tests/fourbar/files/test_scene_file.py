@@ -91,6 +91,7 @@ force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n |  | loads[0] | force
 ["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force[1] | no finite number
 force = ["3 N", "40 deg"] | torque = "1 N m" | loads[0].torque | "moment"?
 "60 deg" | "60" | motion.theta_2 | the unit is missing
+"60 deg" | "drawn" | motion.theta_2 | the scene has no [pins]
 "60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known
 [[loads]] | [loads] | loads | [[loads]]
 "60 deg" | "0 deg to 360 deg" | motion.theta_2 | steps = 360 }

@@ -14,7 +14,6 @@ from html.parser import HTMLParser
 from importlib.util import find_spec
 from itertools import pairwise
 from math import degrees, nan, pi, radians
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,6 +36,7 @@ from fourbar.scene.pictures import LARGEST_PICTURE
 from fourbar.show import animate
 from fourbar.show.plot import film as films
 from fourbar.show.plot import style, view
+from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
 from tests.support.scenes import bare, crank_rocker, thesis
 
@@ -46,7 +46,6 @@ HOSTILE = (
 )
 
 
-CAPABILITIES = Path(__file__).parents[3] / "models" / "capabilities"
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAAD0lEQVR4nGP4z8DwHwYBABv2A/0Fj9VPAAAAAElFTkSuQmCC"
 )
@@ -112,7 +111,7 @@ antiparallelogram | 18 | alpha_3
 
 @pytest.mark.parametrize("model, row, name", ROUNDING)
 def test_what_is_rounding_of_its_kind_is_zero(model, row, name):
-    scene = load(CAPABILITIES / f"{model}.toml")
+    scene = load(MODELS / f"capabilities/{model}.toml")
     columns = animate.collect_live_data(scene)["branches"][str(scene.motion.branch)]
     shown = columns[name]
     solved = getattr(solve(scene), name)
@@ -138,7 +137,6 @@ def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rat
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
     data = embedded(animate.write_page(crank_rocker(motion=Motion(law=law))))
     assert data["rate"] == approx(rate)
-    assert 1.5 <= duration / rate <= 60.0
     assert len(data["branches"]["1"]["torque"]) == 361
 
 
@@ -236,9 +234,8 @@ def test_a_gif_moves_the_linkage(scene, frames, tmp_path, monkeypatch):
         (last,) = films._draw_frames(
             shown, films.choose_frames(shown, frames)[-1:], False
         )
-    assert (
-        np.mean(np.abs(pictures[-1] - np.asarray(last.convert("L"), int)) > 64) < 1e-3
-    )
+    away = np.abs(pictures[-1] - np.asarray(last.convert("L"), int))
+    assert np.mean(away > 64) < 1e-3
 
 
 @pytest.mark.slow

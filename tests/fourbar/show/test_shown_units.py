@@ -1,4 +1,4 @@
-"""Results in other units: table, CSV, JSON, data frame, plot, page."""
+"""Results in other units: table, CSV, JSON, and which a scene is shown in."""
 
 import csv
 import io
@@ -12,11 +12,9 @@ from pytest import approx, raises
 from fourbar import load, solve
 from fourbar.cli import status
 from fourbar.errors import HOLDS, InputError
-from fourbar.show.plot.figures import draw_figure
 from fourbar.show.shown_units import units, units_of_scene, write_digits
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
 
 PURE = (
     "sin_mu",
@@ -106,13 +104,6 @@ def test_what_is_no_list_of_units_is_refused(text, words, capsys):
     assert "units" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_plots_say_theirs():
-    for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
-        figure = draw_figure(crank_rocker(), name, units=units("imperial")).figure
-        assert figure.subfigs[0].axes[0].get_ylabel() == label
-
-
 def test_units_are_read_as_people_write_them():
     assert units("mm, N,lbf-in") == units("mm N lbf-in")
     assert units("Imperial") == units("imperial")
@@ -143,19 +134,16 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
 """),
 )
 def test_lengths_have_results_in_their_unit(length, names, of_length, of_torque):
-    """12 in and 1 ft are 0.3048 m; 1 lbf ft is 1.35581795 N m."""
-    shown = units_of_scene({"lengths": {"ground": length}})
-    of = [shown.get(unit, (unit, 1.0)) for unit in ("m", "m/s", "N m")]
-    assert ", ".join(name for name, _ in of) == names
-    assert 0.3048 * of[0][1] == approx(float(of_length))
-    assert 1.3558179483314004 * of[2][1] == approx(float(of_torque))
+    """12 in and 1 ft are 0.3048 m; 1 lbf ft is 1.35581795 N m.
 
-
-def test_a_ground_by_coordinates_has_their_unit():
-    one = {"x": "3 in", "y": "1 in"}
-    other = "3 in"
-    shown = [units_of_scene({"lengths": {"ground": ground}}) for ground in (one, other)]
-    assert shown[0] == shown[1]
+    A ground may be stated by coordinates.
+    """
+    for ground in (length, {"x": length, "y": length}):
+        shown = units_of_scene({"lengths": {"ground": ground}})
+        of = [shown.get(unit, (unit, 1.0)) for unit in ("m", "m/s", "N m")]
+        assert ", ".join(name for name, _ in of) == names
+        assert 0.3048 * of[0][1] == approx(float(of_length))
+        assert 1.3558179483314004 * of[2][1] == approx(float(of_torque))
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from fourbar.files import loads, scene_file
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command_at
 from fourbar.show.duty import list_duty
-from fourbar.show.motion_curves import acts, describe_motion
+from fourbar.show.motion_curves import acts
 from fourbar.show.summary import Facts
 from fourbar.studies.internal_forces import largest_bending
 from fourbar_validation.places import MODELS
@@ -215,17 +215,6 @@ def check_loads(facts, sizes, weights):
     assert facts.peak == panels.find_peak(drive)
     for key, quantity in ((f"peak_{kind}", drive), ("peak_power", "power")):
         assert entry[key] == abs(panels.find_peak(quantity).value)
-
-
-def test_a_list_has_its_own_peaks_and_means():
-    angles = np.array([0.3, 2.5, 0.4])
-    scene = crank_rocker(motion=Motion(angles, 10.0))
-    solution = solve(scene)
-    assert describe_motion(solution).solve_with_peaks() is solution
-    entry = list_duty(solution, {})
-    assert entry["peak_torque"] == np.abs(solution.torque).max()
-    rms = sqrt(np.square(solution.torque).mean())
-    assert entry["rms_torque"] == approx(rms, rel=EXACT)
 
 
 @pytest.mark.slow
