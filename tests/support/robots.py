@@ -9,6 +9,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
+from fourbar_validation.engines.mujoco.robots.closures import (
+    find_closures,
+    list_closures,
+)
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import (
@@ -16,6 +21,7 @@ from fourbar_validation.engines.mujoco.robots.measure import (
     examine_mended,
     measure_loops,
 )
+from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import judge_file, list_answers
 
@@ -228,8 +234,25 @@ LIFTED = """
 
 
 def file_of(text):
-    """Return a text as a file that names no other."""
+    """Return a text as a file that names no other, and a file as it is."""
+    if isinstance(text, RobotFile):
+        return text
     return RobotFile(Path("robot.xml"), text)
+
+
+def report_of(file, **pose):
+    """Return the closures of a file or text in a pose."""
+    return list_closures(file_of(file), PoseOptions(**pose))
+
+
+def pose_loop(file, name=None, **pose):
+    """Return a robot, its pose, and its loop of this name or the first one."""
+    options = PoseOptions(**pose)
+    robot = compile_robot(file_of(file))
+    posed = pose_robot(robot.model, options)
+    found = find_closures(posed, options)
+    loop = next(one.loop for one in found if one.loop and name in (None, one.name))
+    return robot, posed, loop
 
 
 def read_scene(text, loop=None, speed=3.0, **pose):
@@ -249,19 +272,22 @@ def forward(text):
     return model, data
 
 
-def measure(file, scene=None, pose=None, **options):
+def measure_all(file, scene=None, joints=(), **options):
+    """Measure the loops of a file or text with its joints where they are stated."""
+    asked = MeasureOptions(PoseOptions(dict(joints)), **options)
+    return measure_loops(file_of(file), asked, scene)
+
+
+def measure(*asked, **options):
     """Measure the one loop of a file or text, or the one that is chosen."""
-    if isinstance(file, str):
-        file = file_of(file)
-    asked = MeasureOptions(pose or PoseOptions(), **options)
-    (loop,) = measure_loops(file, asked, scene).loops
+    (loop,) = measure_all(*asked, **options).loops
     return loop
 
 
-def examine_text(scene, text, names):
+def examine_text(scene, text=None, **names):
     """Examine a text as a file that names no other.
 
-    None: the file generated from the scene.
+    Without a text it is the file generated from the scene.
     """
     file = None if text is None else file_of(text)
     return examine_file(scene, file, replace(AS_DRAWN, names=names))
@@ -270,7 +296,8 @@ def examine_text(scene, text, names):
 def mend(scene, file, names, changes):
     """Return the answers of a file with each entry as in the generated one."""
     options = replace(AS_DRAWN, names=names)
-    return list(map(_answers_or_none, examine_mended(scene, file, options, changes)))
+    mended = examine_mended(scene, file_of(file), options, changes)
+    return list(map(_answers_or_none, mended))
 
 
 def _answers_or_none(measured):

@@ -12,7 +12,6 @@ import threading
 import time
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,11 +31,11 @@ from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry
 from fourbar_validation.engines.mujoco.describe import describe_model
 from fourbar_validation.engines.mujoco.robots import measure as measuring
-from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 from fourbar_validation.engines.programs import WORKER_MEMORY
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots import guard
 from fourbar_validation.robots.check_mjcf import check_mjcf_command
 from fourbar_validation.robots.differences import (
@@ -56,18 +55,23 @@ from fourbar_validation.robots.judge_loop import (
     judge_file,
 )
 from fourbar_validation.robots.report import _describe_differences
-from tests.support.robots import AS_DRAWN, answer_of, answers_of, mend, notes_of
-from tests.support.robots import examine_text as examine
+from tests.support.robots import (
+    AS_DRAWN,
+    answer_of,
+    answers_of,
+    examine_text,
+    file_of,
+    mend,
+    notes_of,
+)
 from tests.support.rows import read_rows
-from tests.whole.test_imports import ROOT
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
-SCENE = fourbar.load(ROOT / "models" / "crank_rocker.toml")
+SCENE = fourbar.load(MODELS / "crank_rocker.toml")
 TURN = fourbar.Sweep(0.0, math.tau, 6)
 CRANK_ROCKER = replace(SCENE, motion=SCENE.motion.replace(angle=TURN))
 GENERATED = write_mjcf(CRANK_ROCKER)
-MINE_XML = Path("mine.xml")
-NO_FILE = RobotFile(MINE_XML, "")
+NO_FILE = file_of("")
 MINE = {"input": "crank", "coupler": "rod", "output": "rocker"}
 FEW = fourbar.Scene(
     CRANK_ROCKER.linkage,
@@ -104,7 +108,7 @@ measured.
 
 @cache
 def generated(scene):
-    return examine(scene, None, {})
+    return examine_text(scene)
 
 
 def values(examined):
@@ -173,7 +177,7 @@ RIGHT = {
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_file_that_is_right_agrees_and_what_differs_is_named(name):
     text, keys = RIGHT[name]
-    examination = examine(CRANK_ROCKER, text, {})
+    examination = examine_text(CRANK_ROCKER, text)
     assert differences(CRANK_ROCKER, examination).keys() == keys
     for how in BOTH:
         assert worst_error(CRANK_ROCKER, examination, how) <= SIMULATED.factor
@@ -241,7 +245,7 @@ contacts | push each other
 
 def described(text, scene=CRANK_ROCKER):
     """Describe a file without measuring it."""
-    found = find_loop_of_scene(RobotFile(MINE_XML, text), scene, AS_DRAWN)
+    found = find_loop_of_scene(file_of(text), scene, AS_DRAWN)
     inside, _ = put_loop_inside(found)
     seen = SeenLoop(found.robot.model, found.loop, 2)
     return describe_model(seen, inside.flywheel)
@@ -307,7 +311,7 @@ def work_of_load(s):
 )
 def test_what_a_planted_difference_does_to_the_torque_is_its_virtual_work(what, more):
     scene = replace(CRANK_ROCKER, motion=STILL.motion)
-    answer = answer_of(examine(scene, planted(what), {}), FILE_AT_ONE_STATE)
+    answer = answer_of(examine_text(scene, planted(what)), FILE_AT_ONE_STATE)
     ours = solve(scene, "force", at=answer.at)
     off = answer.quantities["torque"] - ours.torque
     assert np.abs(off).max() > 0.01
@@ -318,7 +322,7 @@ def test_how_softly_dry_friction_slips_is_named_and_costs():
     """By default its couple rises over 0.02 s of slip."""
     text = re.sub(' sol(ref|imp)friction="[^"]*"', "", write_mjcf(DRY))
     text = text.replace('joint name="A"', 'joint name="rod"')
-    examination = examine(DRY, text, {})
+    examination = examine_text(DRY, text)
     by_key = differences(DRY, examination)
     fields = {
         f"pins.{pin}.{field}"
@@ -387,7 +391,7 @@ def test_bodies_are_guessed_from_what_hangs_together_and_from_the_lengths():
     rocker = re.search(' *<body name="rocker".*?</body>', text)
     # it comes first in the file
     text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
-    examination = examine(FEW, text, {})
+    examination = examine_text(FEW, text)
     bars = "Bars: ground world, input crank, coupler rod, output rocker."
     assert bars in examination.notes
     assert errors(FEW, examination)["theta_4"] < STIFF_ENOUGH
@@ -435,7 +439,7 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
     scene, right, names, _ = SPOILT[group]
     key, *edit = entry
     text = put(right, edit)
-    spoilt = examine(scene, text, names)
+    spoilt = examine_text(scene, text, **names)
     one = differences(scene, spoilt)[key]
     rows = rows_of(scene, answers_of(spoilt))
     at = spoilt.measured.command(spoilt.measured.states)
@@ -443,8 +447,7 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
     if answer is not None:
         priced = price(one, rows_of(scene, [answer]), ())
     else:
-        file = RobotFile(MINE_XML, text)
-        (mended,) = mend(scene, file, names, [(key, one.generated)])
+        (mended,) = mend(scene, text, names, [(key, one.generated)])
         priced = price(one, rows, rows_of(scene, mended))
     worst = max(errors(scene, spoilt)[name] for name in TORQUE_AND_PINS)
     assert (answer is None) == key.startswith(("pins.", "tendons."))
@@ -453,45 +456,46 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
 
 def test_an_entry_that_cannot_stand_alone_has_no_price():
     """Who turns the other way round, or closes the loop otherwise, is another file."""
-    file = RobotFile(MINE_XML, GENERATED)
     scene = replace(CRANK_ROCKER, motion=STILL.motion)
     changes = [
         ("pins.A.positive", "clockwise"),
         ("closure.by", "tendon"),
         ("loads.coupler, axes of the coupler.force", (0.0, 0.0)),
     ]
-    assert mend(scene, file, {}, changes) == [None] * 3
+    assert mend(scene, GENERATED, {}, changes) == [None] * 3
     ones = (Difference(key, "", theirs, "") for key, theirs in changes)
     assert not any(change_scene(scene, one) for one in ones)
 
 
-def test_each_entry_is_mended_in_a_model_of_its_own(monkeypatch):
-    file = RobotFile(MINE_XML, other_plane())
+def mend_settings(first=0):
+    """Mend two settings of another hand's file, or the second alone."""
     settings = [("closure.softness", None), ("option.tolerance", 1e-8)]
-    stiff, soft = mend(STILL, file, MINE, settings)
-    (alone,) = mend(STILL, file, MINE, settings[1:])
+    return mend(STILL, other_plane(), MINE, settings[first:])
+
+
+def test_each_entry_is_mended_in_a_model_of_its_own():
+    stiff, soft = mend_settings()
+    (alone,) = mend_settings(1)
     assert stiff and soft and alone
     torques = [one[0].quantities["torque"] for one in (stiff, soft, alone)]
     assert np.array_equal(*torques[1:])
     assert not np.array_equal(*torques[:2])
-    monkeypatch.setattr(measuring, "PRICING", 0.0)
-    assert mend(STILL, file, MINE, settings) == [None, None]
 
 
 def test_a_busy_machine_leaves_no_entry_unpriced(monkeypatch):
     """A minute of others' work between two readings of the clock does not count."""
-    file = RobotFile(MINE_XML, other_plane())
-    settings = [("closure.softness", None), ("option.tolerance", 1e-8)]
     minutes = itertools.count(step=60.0)
     monkeypatch.setattr(time, "perf_counter", lambda: next(minutes))
-    assert all(mend(STILL, file, MINE, settings))
+    assert all(mend_settings())
     monkeypatch.setattr(time, "process_time", lambda: next(minutes))
-    assert mend(STILL, file, MINE, settings) == [None, None]
+    assert mend_settings() == [None, None]
 
 
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
 def test_another_plane_and_a_reversed_axis_change_no_number(axis):
-    examination = examine(FEW, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
+    examination = examine_text(
+        FEW, other_plane(f'site1="r" site2="q" {STIFF}', axis), **MINE
+    )
     assert worst_error(FEW, examination) < STIFF_ENOUGH
     keys = differences(FEW, examination).keys()
     assert "plane" in keys
@@ -499,8 +503,8 @@ def test_another_plane_and_a_reversed_axis_change_no_number(axis):
 
 
 def test_body_anchors_on_an_open_rest_state_build_another_linkage():
-    examination = examine(
-        FEW, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE
+    examination = examine_text(
+        FEW, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), **MINE
     )
     assert (
         "in the pose of the file"
@@ -537,7 +541,7 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for():
         ' 1" forcerange="-1 1"/>'
     )
     for mine in (text, put(text, (driven, servo))):
-        examined = examine(scene, mine, {})
+        examined = examine_text(scene, mine)
         assert any("gives the cylinder's force" in note for note in notes_of(examined))
         for how, most in zip(BOTH, (1e-9, 1e-6), strict=True):
             of_file = errors(scene, examined, how)
@@ -545,10 +549,10 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for():
             for name in ("drive_force", "F12", "F43", "F14"):
                 assert of_file[name] < most
     start = 'name="cylinder_end" pos="'
-    moved = examine(scene, put(text, (start + "0.0", start + "0.1")), {})
+    moved = examine_text(scene, put(text, (start + "0.0", start + "0.1")))
     assert errors(scene, moved)["drive_force"] > 1e-2
     assert any(key.startswith("tendons.") for key in differences(scene, moved))
-    without = examine(scene, put(text, (driven, "")), {})
+    without = examine_text(scene, put(text, (driven, "")))
     assert errors(scene, without)["drive_force"] < 1e-9
 
 
@@ -558,7 +562,7 @@ def test_a_loop_that_nothing_closes_is_seen_in_the_numbers():
         .replace('site name="r"', 'site name="B3"')
         .replace('site name="q"', 'site name="B4"')
     )
-    examination = examine(FEW, text, MINE)
+    examination = examine_text(FEW, text, **MINE)
     assert values(examination)["closure.by"] == "nothing"
     assert np.isnan(errors(FEW, examination)["F43"])
     assert errors(FEW, examination)["torque"] > 0.01
@@ -572,7 +576,7 @@ def test_an_absurd_timestep_is_reported_and_not_run_through(timestep):
     """
     text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
     assert text != GENERATED
-    _, through = answers_of(examine(CRANK_ROCKER, text, {}))
+    _, through = answers_of(examine_text(CRANK_ROCKER, text))
     assert (
         through.refusal is not None
         and "steps of the motion; must be 1 to 130000" in through.refusal
@@ -600,9 +604,9 @@ def test_a_file_that_overdoes_it_is_one_line_with_its_name():
             text = re.sub(old, new, GENERATED)
             assert text != GENERATED
             with raises(InputError) as caught:
-                examined(EXAMINE, CRANK_ROCKER, RobotFile(MINE_XML, text))
+                examined(EXAMINE, CRANK_ROCKER, file_of(text))
             message = str(caught.value)
-            assert message.startswith("mine.xml: MJCF = 'mine.xml': "), what
+            assert message.startswith("robot.xml: MJCF = 'robot.xml': "), what
             assert words in message and "\n" not in message, what
 
 
@@ -670,10 +674,9 @@ def test_an_error_stands_before_that_of_the_generated_file():
 @pytest.mark.parametrize("turns", [-2, 1, 3])
 def test_a_loop_counts_the_whole_turns_of_its_scene(turns):
     """A spring of the file is wound as the angle of the scene says."""
-    file = RobotFile(MINE_XML, GENERATED)
     motion = FEW.motion.replace(angle=FEW.motion.angle + math.tau * turns)
     loops = [
-        find_loop_of_scene(file, scene, AS_DRAWN).loop
+        find_loop_of_scene(file_of(GENERATED), scene, AS_DRAWN).loop
         for scene in (FEW, replace(FEW, motion=motion))
     ]
     one, other = (loop.angles[1] for loop in loops)
@@ -684,8 +687,7 @@ def test_a_loop_counts_the_whole_turns_of_its_scene(turns):
 def test_a_range_is_asked_of_both_files(monkeypatch):
     monkeypatch.setattr(measuring, "POSITIONS_OF_A_LOOP", 5)
     options = replace(AS_DRAWN, span=(0.5, 0.9))
-    file = RobotFile(MINE_XML, GENERATED)
-    judgement = judge_file("range", CRANK_ROCKER, file, options)
+    judgement = judge_file("range", CRANK_ROCKER, file_of(GENERATED), options)
     joints = [row.joint for row in judgement.measured.states.rows]
     assert (min(joints), max(joints)) == approx((0.5, 0.9))
     at_states = [row for row in judgement.rows if row.engine == FILE_AT_ONE_STATE]
@@ -694,7 +696,6 @@ def test_a_range_is_asked_of_both_files(monkeypatch):
         assert generated == approx(row.error, rel=1e-6, abs=1e-12)
 
 
-NOT_CLOSED = "has no equality that closes a loop; where something else does, say where"
 REFUSED = {
     "no such body": (
         other_plane(),
@@ -706,17 +707,10 @@ REFUSED = {
         MINE,
         "joint 0 is a slide",
     ),
-    "nothing closes": (re.sub("<site [^>]*>", "", other_plane("")), MINE, NOT_CLOSED),
-    "too few": (
-        "<mujoco><worldbody><body name='input'><joint/><geom size='.1'/></body>"
-        "</worldbody></mujoco>",
-        {},
-        NOT_CLOSED,
-    ),
-    "does not compile": (
-        other_plane().replace("mass=", "weight="),
+    "nothing closes": (
+        re.sub("<site [^>]*>", "", other_plane("")),
         MINE,
-        "does not compile",
+        "has no equality that closes a loop; where something else does, say where",
     ),
     "two names, one body": (
         other_plane(),
@@ -729,7 +723,7 @@ REFUSED = {
 @pytest.mark.parametrize("text, names, word", REFUSED.values(), ids=REFUSED)
 def test_a_file_that_is_no_four_bar_is_one_line(text, names, word):
     with raises(InputError) as caught:
-        examine(FEW, text, names)
+        examine_text(FEW, text, **names)
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
 

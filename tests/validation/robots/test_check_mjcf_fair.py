@@ -7,7 +7,6 @@ import math
 import re
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -32,6 +31,7 @@ from fourbar_validation.engines.mujoco.robots.measure import (
     predict_softness,
 )
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.differences import find_differences
 from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
@@ -43,13 +43,13 @@ from tests.support.robots import (
     AS_DRAWN,
     Planar,
     answer_of,
+    examine_text,
     file_of,
     forward,
     judge_path,
     notes_of,
     read_scene,
 )
-from tests.support.robots import examine_text as examine
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
@@ -116,14 +116,14 @@ def bisect_on_the_couple(text):
 
 def list_keys(scene, examined, *parts):
     """List what differs from the generated file in some parts of the description."""
-    generated = examine(scene, None, {})
+    generated = examine_text(scene)
     listed = find_differences(generated.described, examined.described)
     return [one.key for one in listed if one.key.startswith(parts)]
 
 
 @cache
 def examined_dry():
-    return examine(DRY, default_friction(), {})
+    return examine_text(DRY, default_friction())
 
 
 @pytest.mark.slow
@@ -202,7 +202,7 @@ def test_the_couple_is_the_one_that_bisection_finds():
 
 
 def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene():
-    examined = examine(ROTOR, rotor_as_armature(), {})
+    examined = examine_text(ROTOR, rotor_as_armature())
     torque = answer_of(examined, FILE_AT_ONE_STATE).quantities["torque"]
     assert torque[0] == approx(0.3624249, abs=2e-7)
     for how in (FILE_AT_ONE_STATE, FILE_THROUGH_TIME):
@@ -213,7 +213,7 @@ def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene():
 def test_armature_that_the_scene_does_not_have_is_inertia_of_the_input():
     """By virtual work it adds its own moment alone: 0.02 kg m^2 times 20 rad/s^2."""
     scene = replace(ROTOR, effects=())
-    answer = answer_of(examine(scene, rotor_as_armature(), {}), FILE_AT_ONE_STATE)
+    answer = answer_of(examine_text(scene, rotor_as_armature()), FILE_AT_ONE_STATE)
     ours = solve(scene, "force", at=answer.at).torque
     np.testing.assert_allclose(answer.quantities["torque"] - ours, 0.4, rtol=1e-5)
 
@@ -252,7 +252,7 @@ def test_a_stop_that_the_motion_does_not_meet_is_no_difference():
         counted_from_elsewhere(limited("O4", low, high), "O4"),
         limited("O4", low + math.tau, high + math.tau),
     ):
-        examined = examine(BARE, text, {})
+        examined = examine_text(BARE, text)
         assert examined.described["pins.O4.range"].value == "free"
         assert any("the stops of joint 'O4'" in note for note in notes_of(examined))
         assert error_of(BARE, examined, FILE_AT_ONE_STATE, "torque") < 1e-4
@@ -261,8 +261,8 @@ def test_a_stop_that_the_motion_does_not_meet_is_no_difference():
 def test_a_stop_inside_the_motion_is_where_the_bars_meet_it():
     theta_4 = solve(BARE, "position").theta_4
     middle = float(theta_4.mean())
-    examined = examine(
-        BARE, counted_from_elsewhere(limited("O4", middle, 3.0), "O4"), {}
+    examined = examine_text(
+        BARE, counted_from_elsewhere(limited("O4", middle, 3.0), "O4")
     )
     stops = examined.described["pins.O4.range"].value
     assert stops == approx((middle, 3.0))
@@ -277,7 +277,7 @@ def test_a_stop_inside_the_motion_is_where_the_bars_meet_it():
 def measure_rocker(scene, drawn, theta_4, branch):
     """Measure the file of a drawn linkage at angles of its output."""
     motion = Motion(theta_4=theta_4, omega_4=1.0, branch=branch)
-    loop = examine(replace(scene, motion=motion), write_mjcf(drawn, drive="none"), {})
+    loop = examine_text(replace(scene, motion=motion), write_mjcf(drawn, drive="none"))
     assert find_left_out(loop.measured) < ROUND_OFF
     assert not loop.measured.states.open
     return " ".join(loop.measured.remarks)
@@ -317,7 +317,7 @@ def test_a_file_that_is_turned_against_gravity_is_not_the_same():
         linkage=replace(ARM, ground_angle=0.7),
         motion=HEAVY.motion.replace(angle=HEAVY.motion.angle + 0.7),
     )
-    examined = examine(HEAVY, write_mjcf(other, drive="none"), {})
+    examined = examine_text(HEAVY, write_mjcf(other, drive="none"))
     assert list_keys(HEAVY, examined, "gravity.") == ["gravity.x", "gravity.y"]
     assert error_of(HEAVY, examined, FILE_AT_ONE_STATE, "torque") > 0.1
 
@@ -369,7 +369,7 @@ def test_where_no_force_gives_the_acceleration_is_said(monkeypatch):
         return couple if data.qpos[0] < math.radians(45.0) else math.nan
 
     monkeypatch.setattr(inside, "find_couple", find_couple)
-    examined = examine(BARE, write_mjcf(BARE), {})
+    examined = examine_text(BARE, write_mjcf(BARE))
     answer = answer_of(examined, FILE_AT_ONE_STATE)
     reached = np.isfinite(answer.quantities["torque"])
     assert 0 < reached.sum() < len(reached)
@@ -388,14 +388,11 @@ def test_warnings_of_the_engine_are_notes_and_nothing_is_printed(
     text = re.sub('solref="[^"]*"', 'solref="-1e12 -1"', text)
     text = text.replace('integrator="RK4"', 'integrator="Euler"')
     turn = FAST.replace(angle=3.0 * FAST.angle)
-    examined = examine(replace(BARE, motion=turn), text, {})
+    examined = examine_text(replace(BARE, motion=turn), text)
     assert any(note.startswith("MuJoCo warns: ") for note in notes_of(examined))
     printed = capfd.readouterr()
     assert printed.out == printed.err == ""
     assert not list(tmp_path.iterdir())
-
-
-MODELS = Path(__file__).parents[3] / "models"
 
 
 def default_constraint(scene):
@@ -418,7 +415,7 @@ def default_constraint(scene):
 )
 def test_how_wrong_the_default_constraint_is_as_the_pages_say(name, off):
     scene = fourbar.load(MODELS / f"{name}.toml")
-    examined = examine(scene, default_constraint(scene), {})
+    examined = examine_text(scene, default_constraint(scene))
     assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == approx(
         off,
         rel=0.05,
@@ -445,7 +442,7 @@ PARALLELOGRAM = Scene(
 )
 def test_what_each_drive_reaches_as_the_guide_says(scene, motor):
     for drive, reached in (("flywheel", 1e-6), ("motor", motor), ("none", motor)):
-        examined = examine(scene, write_mjcf(scene, drive=drive), {})  # type: ignore[arg-type]
+        examined = examine_text(scene, write_mjcf(scene, drive=drive))  # type: ignore[arg-type]
         worst = max(
             error_of(scene, examined, FILE_AT_ONE_STATE, name)
             for name in ("torque", *PIN_FORCES)
@@ -458,7 +455,7 @@ def test_what_each_drive_reaches_as_the_guide_says(scene, motor):
 def test_loads_of_passive_motors_are_the_loads_of_the_scene():
     scene = fourbar.load(MODELS / "crank_rocker.toml")
     assert len(scene.loads) == 2
-    examined = examine(scene, write_mjcf(scene, drive="motor"), {})
+    examined = examine_text(scene, write_mjcf(scene, drive="motor"))
     assert not list_keys(scene, examined, "loads.", "actuators.")
     assert error_of(scene, examined, FILE_AT_ONE_STATE, "F32") < 1e-4
 

@@ -15,14 +15,11 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
-    MeasureOptions,
     RobotSettings,
     SettingsAdvice,
     TriedSettings,
     WorstState,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.loop_errors import list_errors_by_method, write_percent
 from fourbar_validation.robots.report import (
     STATES_FILE,
@@ -37,7 +34,7 @@ from fourbar_validation.robots.report import (
     write_report,
     write_states,
 )
-from tests.support.robots import FINGER, file_of
+from tests.support.robots import FINGER, measure_all
 from tests.support.rows import read_rows
 
 SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
@@ -47,8 +44,7 @@ SETTINGS = RobotSettings((0.02, 1.0), (0.9,), 1e-3, "Euler", "Newton", 100, 1e-8
 
 @cache
 def measured():
-    options = MeasureOptions(PoseOptions(), "pip_link-middle", torque=0.05)
-    return measure_loops(file_of(FINGER), options, None)
+    return measure_all(FINGER, loop="pip_link-middle", torque=0.05)
 
 
 @pytest.mark.slow

@@ -13,26 +13,17 @@ import pytest
 from pytest import approx, raises
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.closures import (
-    choose_loop,
-    list_closures,
-    require_loops,
-)
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.closures import choose_loop, require_loops
 from tests.support.robots import (
     ADAPTIVE,
     EXCAVATOR,
     TILT,
     Planar,
-    file_of,
     forward,
+    report_of,
     rotation,
 )
 from tests.support.rows import read_rows
-
-
-def report_of(text, **options):
-    return list_closures(file_of(text), PoseOptions(**options))
 
 
 def closure_of(text, **options):

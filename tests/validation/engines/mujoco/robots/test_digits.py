@@ -9,20 +9,17 @@ import pytest
 from pytest import approx
 
 from fourbar.formulas.mobility import classify
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.digits import find_rounding
 from fourbar_validation.engines.mujoco.robots.inside import (
     RESIDUAL_OF_AN_OPEN_LOOP,
     LoopInside,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
-from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
 from tests.support.robots import (
     FOOT_PARALLELOGRAM,
-    file_of,
     measure,
+    pose_loop,
     read_scene,
     rotation,
 )
@@ -177,15 +174,15 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
 
 def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     """The bars are in line there, and leave a gap of what a + d = b + c misses by."""
-    made = read_scene(LARGE)
-    model = pose_robot(compile_robot(file_of(LARGE)).model, PoseOptions()).model
+    _, posed, _ = pose_loop(LARGE)
+    loop = read_scene(LARGE).loop
     in_line = 0.5 * math.pi
-    ground, crank, coupler, output = made.loop.lengths
+    ground, crank, coupler, output = loop.lengths
     miss = abs(ground + crank - coupler - output)
-    assert RESIDUAL_OF_AN_OPEN_LOOP < miss == approx(made.loop.rounding)
-    assert LoopInside(model, made.loop).close(in_line) is not None
-    exact = replace(made.loop, read_lengths=())
-    assert LoopInside(model, exact).close(in_line) is None
+    assert RESIDUAL_OF_AN_OPEN_LOOP < miss == approx(loop.rounding)
+    assert LoopInside(posed.model, loop).close(in_line) is not None
+    exact = replace(loop, read_lengths=())
+    assert LoopInside(posed.model, exact).close(in_line) is None
 
 
 def test_one_equality_alone_is_met_by_chance():

@@ -66,7 +66,7 @@ def test_pin_forces_are_those_of_the_free_body(scene, flags):
     text, flagged = re.subn("<flag [^/]*", f'<flag contact="disable" {flags}', text)
     assert (bodies, flagged) == (2, 1)
     right = pytest.approx(F14_AT_90_DEG[flags], abs=5e-4)
-    answer = answer_of(examine_text(scene, text, {}), FILE_AT_ONE_STATE)
+    answer = answer_of(examine_text(scene, text), FILE_AT_ONE_STATE)
     theta_2 = np.asarray(answer.at.theta_2) % math.tau
     at = int(np.argmin(np.abs(theta_2 - math.pi / 2.0)))
     assert answer.quantities["F14"][at, 1] == right

@@ -5,7 +5,6 @@ MuJoCo asked a second way in the whole model, and the formulas.
 
 import math
 from functools import cache
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -24,14 +23,11 @@ from fourbar_validation.engines.mujoco.robots.answers import (
     make_motion,
     measure_sizes,
 )
-from fourbar_validation.engines.mujoco.robots.closures import find_closures
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
-from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.files import read_robot
 from tests.support.robots import (
     ADAPTIVE,
@@ -41,22 +37,19 @@ from tests.support.robots import (
     LIFTED,
     draw_knee,
     file_of,
+    pose_loop,
 )
 
-ROBOTS = Path(__file__).parents[5] / "models" / "robots"
+ROBOTS = MODELS / "robots"
 LOOPS = {
-    "biped_foot": (read_robot(ROBOTS / "biped_foot.xml"), None),
-    "gripper": (read_robot(ROBOTS / "gripper.xml"), None),
-    "finger": (file_of(FINGER), "pip_link-middle"),
-    "adaptive": (file_of(ADAPTIVE), "follower-coupler"),
-    "excavator": (file_of(EXCAVATOR), "bucket_linkage"),
-    "lifted": (file_of(LIFTED), "rod-arm"),
+    "biped_foot": (read_robot(ROBOTS / "biped_foot.xml"), None, {}),
+    "gripper": (read_robot(ROBOTS / "gripper.xml"), None, {}),
+    "finger": (FINGER, "pip_link-middle", {}),
+    "adaptive": (ADAPTIVE, "follower-coupler", {"held": ("spring_link",)}),
+    "excavator": (EXCAVATOR, "bucket_linkage", {"drive": "rocker"}),
+    "lifted": (LIFTED, "rod-arm", {}),
 }
-"""A file and the loop that is asked of it; None: the first."""
-OPTIONS = {
-    "adaptive": PoseOptions(held=("spring_link",)),
-    "excavator": PoseOptions(drive="rocker"),
-}
+"""A file, the loop that is asked of it, and how it is posed; None: the first loop."""
 ASKED_TWICE = 1e-6
 """Relative; the solver of the file stops at a tolerance of 1e-8 of its own."""
 RIGID = 1e-8
@@ -65,16 +58,10 @@ RIGID = 1e-8
 
 @cache
 def open_loop(name):
-    file, closing = LOOPS[name]
-    options = OPTIONS.get(name, PoseOptions())
-    compiled = compile_robot(file)
-    posed = pose_robot(compiled.model, options)
-    loop = next(
-        closure.loop
-        for closure in find_closures(posed, options)
-        if closure.loop is not None and closing in (None, closure.name)
-    )
-    return LoopInside(posed.model, loop), make_loop_scene(compiled, posed, loop, 2.0)
+    file, closing, pose = LOOPS[name]
+    parts = pose_loop(file, closing, **pose)
+    _, posed, loop = parts
+    return LoopInside(posed.model, loop), make_loop_scene(*parts, 2.0)
 
 
 def spread_over_range(inside, made, count):
@@ -129,10 +116,7 @@ def test_the_torque_is_the_one_that_mujoco_gives_when_asked_by_itself(name):
     inside, made = open_loop(name)
     theta_2 = float(spread_over_range(inside, made, 3)[-1])
     (row,) = inside.answer_states(make_motion([theta_2], (2.0, 3.0))).rows
-    assert row.soft.torque == approx(
-        ask_again(inside, theta_2, 3.0),
-        rel=ASKED_TWICE,
-    )
+    assert row.soft.torque == approx(ask_again(inside, theta_2, 3.0), rel=ASKED_TWICE)
 
 
 @pytest.mark.parametrize("impedance", ["0.9999 0.9999", "0.95 0.95"])
@@ -140,7 +124,7 @@ def test_beside_a_huge_flywheel_a_soft_closure_has_the_force_of_its_equations(
     impedance,
 ):
     """M a + c - J^T f = tau and J a + R f = r, solved at once, a of the input given."""
-    scene = load(ROBOTS.parent / "crank_rocker.toml")
+    scene = load(MODELS / "crank_rocker.toml")
     text = write_mjcf(scene).replace("0.9999 0.9999", impedance)
     found = find_loop_of_scene(file_of(text), scene, AS_DRAWN)
     inside, motion = put_loop_inside(found)
@@ -183,11 +167,7 @@ def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     angles = spread_over_range(inside, made, 5)
     rows = inside.answer_states(make_motion(angles, (2.0, 3.0))).rows
     assert len(rows) == len(angles)
-    branch = np.full(
-        len(rows),
-        made.scene.motion.branch,
-        dtype=np.int8,
-    )
+    branch = np.full(len(rows), made.scene.motion.branch, np.int8)
     command = Command(angles - _turn_back(inside, made), branch, 2.0, 3.0)
     formulas = solve(made.scene, "force", at=command)
     free_bodies = FreeBody().answer(made.scene, command).quantities
@@ -237,12 +217,9 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
     branch, bar, drawn, turned
 ):
     """The open one is the parallelogram, and the other its mirror image."""
-    options = PoseOptions()
-    compiled = compile_robot(file_of(draw_knee(drawn)))
-    posed = pose_robot(compiled.model, options)
-    (closure,) = find_closures(posed, options)
-    inside = LoopInside(posed.model, closure.loop, bar=bar, branch=branch)
-    angle = closure.loop.angles[bar - 1] + math.radians(turned)
+    _, posed, loop = pose_loop(draw_knee(drawn))
+    inside = LoopInside(posed.model, loop, bar=bar, branch=branch)
+    angle = loop.angles[bar - 1] + math.radians(turned)
     state = inside.state(angle, 1.0)
     crank, _, knee = np.exp(1j * (state.qpos + math.radians(drawn))) * 0.03
     moved, follows = (crank, 0.25 + knee) if bar == 2 else (0.25 + knee, crank)

@@ -8,17 +8,14 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.robots.judge_loop import FILE_THROUGH_TIME
 from fourbar_validation.robots.loop_errors import find_left_out, find_worst_of_loop
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
 from tests.support.robots import (
     answer_of,
     examine_text,
-    file_of,
     measure,
+    measure_all,
     notes_of,
     read_scene,
 )
@@ -39,7 +36,6 @@ TEXT = """
 <equality><connect name="close" site1="rodend" site2="rockerend"/></equality>
 <actuator><velocity name="m" joint="j_crank" kv="50"/></actuator></mujoco>"""
 """Its rest pose is flat and open: nothing in it tells an assembly."""
-FILE = file_of(TEXT)
 OPEN_POSE = {"j_crank": "60deg", "j_rod": "-30deg", "j_rocker": "95deg"}
 """Whole degrees near the open assembly; 6 mm are left."""
 
@@ -54,7 +50,13 @@ def read_advice(text):
     return dict(entry.split("=") for entry in typed.split(","))
 
 
-def make_scene(branch, gravity=None):
+def find_in_line(read):
+    """Return the one remark of a loop or scene that is drawn in line."""
+    (remark,) = [text for text in read.remarks if "in line" in text]
+    return remark
+
+
+def make_scene(branch, gravity=fourbar.Gravity()):  # noqa: B008
     linkage = fourbar.FourBar(
         0.5,
         fourbar.Bar(0.15, 0.3, 0.3 * 0.15**2 / 12.0, (0.075, 0.0)),
@@ -62,13 +64,8 @@ def make_scene(branch, gravity=None):
         fourbar.Bar(0.35, 0.7, 0.7 * 0.35**2 / 12.0, (0.175, 0.0)),
     )
     sign = {"open": OPEN, "crossed": CROSSED}[branch]
-    motion = fourbar.Motion(
-        fourbar.Sweep(0.0, math.tau, 36),
-        4.0,
-        branch=sign,
-    )
-    effects = (fourbar.Gravity() if gravity is None else gravity,)
-    return fourbar.Scene(linkage, motion, effects=effects)
+    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 4.0, branch=sign)
+    return fourbar.Scene(linkage, motion, effects=(gravity,))
 
 
 @pytest.mark.slow
@@ -78,8 +75,7 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch):
     loop = measure(TEXT, scene)
     assert find_left_out(loop) < SCENE_ROUND_OFF
     assert find_worst_of_loop(loop) < 0.06
-    (remark,) = [text for text in loop.remarks if "in line" in text]
-    assert f"onto the {branch} one of the scene" in remark
+    assert f"onto the {branch} one of the scene" in find_in_line(loop)
 
 
 @pytest.mark.slow
@@ -94,24 +90,24 @@ def test_gravity_tells_the_side_by_its_direction_alone(branch, axis):
 
 def test_a_pose_of_the_other_assembly_is_refused_for_another_size_of_gravity():
     with pytest.raises(InputError, match="to the open assembly"):
-        measure(TEXT, make_scene("crossed", NEAR_G), PoseOptions(OPEN_POSE))
+        measure(TEXT, make_scene("crossed", NEAR_G), OPEN_POSE)
 
 
 @pytest.mark.slow
 def test_a_pose_of_the_other_assembly_is_refused_with_one_that_closes():
     scene = make_scene("crossed")
     with pytest.raises(InputError, match="to the open assembly") as refused:
-        measure(TEXT, scene, PoseOptions(OPEN_POSE))
+        measure(TEXT, scene, OPEN_POSE)
     assert "the scene names the crossed one" in str(refused.value)
     advised = read_advice(str(refused.value))
-    measured = measure_loops(FILE, MeasureOptions(PoseOptions(advised)), scene)
+    measured = measure_all(TEXT, scene, advised)
     assert find_left_out(measured.loops[0]) < 1e-6
     assert not [note for note in measured.notes if "what is left" in note]
 
 
 def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
     made = read_scene(TEXT)
-    (remark,) = [text for text in made.remarks if "in line" in text]
+    remark = find_in_line(made)
     assert "closed to the crossed one" in remark
     assert made.scene.motion.branch == CROSSED
     other = read_scene(TEXT, joints=read_advice(remark))
@@ -119,8 +115,7 @@ def test_without_a_scene_it_is_said_what_a_flat_pose_closed_to():
     assert not [text for text in other.remarks if "in line" in text]
     # the rocker is at -100 deg there, in the other assembly at 100 deg
     limited = TEXT.replace('name="j_rocker"', 'name="j_rocker" range="-170 0"')
-    made = read_scene(limited)
-    (remark,) = [text for text in made.remarks if "in line" in text]
+    remark = find_in_line(read_scene(limited))
     assert remark.endswith("closed to the crossed one")
 
 
@@ -134,7 +129,7 @@ def test_joints_that_are_held_are_the_reason_why_a_pose_stays_open():
 @pytest.mark.slow
 def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too():
     scene = make_scene("open")
-    examined = examine_text(scene, write_mjcf(scene), {})
+    examined = examine_text(scene, write_mjcf(scene))
     judged = len(answer_of(examined, FILE_THROUGH_TIME).quantities["torque"])
     positions = len(fourbar.command(scene).theta_2) - 1
     assert judged < positions

@@ -12,36 +12,32 @@ from scipy.optimize import brentq
 
 from fourbar.errors import InputError
 from fourbar_validation.engines.mujoco.robots.answers import make_motion
-from fourbar_validation.engines.mujoco.robots.closures import find_closures
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
-from fourbar_validation.engines.mujoco.robots.measure import measure_loops
-from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.mujoco.robots.settings import (
     STIFFEST_IMPEDANCE,
     SettingsSearch,
     _set_settings,
     read_settings,
 )
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.loop_errors import (
     list_errors_by_method,
     read_measure_options,
 )
-from tests.support.robots import AS_DRAWN, measure
+from tests.support.robots import measure, pose_loop
 from tests.support.shares import slow_but
 
-FOOT = Path(__file__).parents[5] / "models" / "robots" / "biped_foot.xml"
+FOOT = MODELS / "robots" / "biped_foot.xml"
 LIGHT_LOAD = 0.3
 """rad to either side of the pose."""
 
 
 def find_loop(file):
     """Return the model of a robot with one loop, and the loop."""
-    posed = pose_robot(compile_robot(file).model, PoseOptions())
-    (closure,) = find_closures(posed, PoseOptions())
-    return posed.model, closure.loop
+    _, posed, loop = pose_loop(file)
+    return posed.model, loop
 
 
 def search(file):
@@ -218,21 +214,16 @@ def test_dry_friction_that_pushes_a_hinge_on_gets_settings_of_its_own():
 @pytest.mark.parametrize("sense", slow_but({-1}, [1, -1]))
 def test_a_range_is_that_of_the_driven_joint(sense):
     span = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
-    options = replace(AS_DRAWN, span=span)
-    measurement = measure_loops(write_leg(sense), options, None)
-    joints = [row.joint for row in measurement.loops[0].states.rows]
+    loop = measure(write_leg(sense), span=span)
+    joints = [row.joint for row in loop.states.rows]
     assert (min(joints), max(joints)) == approx(span, abs=1e-9)
-    far = [error.joint for error in list_errors_by_method(measurement.loops[0])]
+    far = [error.joint for error in list_errors_by_method(loop)]
     low, high = (span[0] - ONE_STEP, span[1] + ONE_STEP)
     assert all(low <= joint <= high for joint in far)
     loop = measure(write_leg(sense), span=(-9.0, 9.0))
     assert any("--range is cut to the motion of knee, " in one for one in loop.remarks)
     with raises(InputError, match="must overlap the motion of knee, "):
-        measure_loops(
-            write_leg(sense),
-            replace(options, span=(2.0, 3.0)),
-            None,
-        )
+        measure(write_leg(sense), span=(2.0, 3.0))
 
 
 @pytest.mark.parametrize(
