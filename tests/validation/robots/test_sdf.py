@@ -10,20 +10,18 @@ from pytest import approx, raises
 from scipy.spatial.transform import Rotation
 
 import fourbar
-from fourbar.scene import command as command_of
-from fourbar.solving import solve
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.mujoco.describe import UNLIMITED_RANGE
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
-from fourbar_validation.engines.mujoco.robots.closures import list_closures
 from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
-from fourbar_validation.engines.mujoco.robots.loop_facts import (
-    SETTINGS_OF_AN_SDF,
-    PoseOptions,
-)
-from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
-from fourbar_validation.engines.mujoco.robots.measure import examine_file, measure_loops
+from fourbar_validation.engines.mujoco.robots.loop_facts import SETTINGS_OF_AN_SDF
 from fourbar_validation.robots.files import read_robot
-from tests.support.robots import judge_path
+from tests.support.robots import (
+    examine_text,
+    judge_path,
+    measure,
+    read_scene,
+    report_of,
+)
 from tests.support.rows import read_rows
 from tests.validation.robots.test_files import TETRAHEDRON
 
@@ -111,15 +109,18 @@ def write_box(length):
     )
 
 
-def put(*changes):
-    """Return the plain file with texts replaced that stand in it once."""
-    text = PLAIN
+def put(*changes, text=PLAIN):
+    """Return a file with texts replaced that stand in it once."""
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
     return text
 
 
+OF_INNER = [
+    (pin, pin.replace(">rod<", ">inner::rod<")) for pin in (PIN_OF_CRANK, CLOSING)
+]
+"""The rod is that of a model within the model."""
 STATED = {
     "plain": PLAIN,
     "turned out of its plane, gravity too": put(
@@ -179,8 +180,7 @@ STATED = {
                 f"0 0 0 {ROD - 0.3}",
             ),
         ),
-        (PIN_OF_CRANK, PIN_OF_CRANK.replace(">rod<", ">inner::rod<")),
-        (CLOSING, CLOSING.replace(">rod<", ">inner::rod<")),
+        *OF_INNER,
     ),
     "included, placed by a frame": put(
         (
@@ -189,8 +189,7 @@ STATED = {
             f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose><placement_frame>start"
             "</placement_frame></include>",
         ),
-        (PIN_OF_CRANK, PIN_OF_CRANK.replace(">rod<", ">inner::rod<")),
-        (CLOSING, CLOSING.replace(">rod<", ">inner::rod<")),
+        *OF_INNER,
     ),
     "ball constraint": put(
         ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
@@ -334,19 +333,15 @@ def read(folder, text):
 def test_torque_and_pin_forces_are_those_of_the_bars(way, tmp_path):
     (tmp_path / "rod").mkdir()
     (tmp_path / "rod" / "model.sdf").write_text(ROD_MODEL)
-    made = read_loop_scene(read(tmp_path, STATED[way]), PoseOptions(), None, 10.0)
-    assert made.scene.linkage.lengths == approx((D, A, B, C), rel=AGREES)
-    turned = made.scene.linkage.ground_angle
-    command = command_of(SCENE)
-    expected = solve(SCENE, at=command)
-    theirs = solve(made.scene, at=command._replace(angle=command.theta_2 + turned))
+    made = read_scene(read(tmp_path, STATED[way]), speed=10.0).scene
+    assert made.linkage.lengths == approx((D, A, B, C), rel=AGREES)
+    command = fourbar.command(SCENE)
+    turned = command._replace(angle=command.theta_2 + made.linkage.ground_angle)
+    expected = fourbar.solve(SCENE)
+    theirs = fourbar.solve(made, at=turned)
     for name in ("torque", "F12", "F32", "F43", "F14"):
-        sizes = [np.abs(getattr(each, name)) for each in (expected, theirs)]
-        if name != "torque":
-            sizes = [np.hypot(*size.T) for size in sizes]
-        np.testing.assert_allclose(
-            sizes[1], sizes[0], atol=AGREES * sizes[0].max(), rtol=0.0
-        )
+        ours, size = magnitude(expected[name]), magnitude(theirs[name])
+        np.testing.assert_allclose(size, ours, atol=AGREES * ours.max(), rtol=0.0)
 
 
 def compile_text(folder, text):
@@ -414,7 +409,7 @@ def test_the_joint_that_loses_least_closes_the_loop(kinds, closing, tmp_path):
         start = text.index(f'<joint name="{pin}"')
         text = text[:start] + text[start:].replace("</axis>", more, 1)
     robot = read(tmp_path, text)
-    (closure,) = list_closures(robot, PoseOptions()).closures
+    (closure,) = report_of(robot).closures
     assert closure.name == closing
     lengths = sorted(closure.loop.lengths)
     assert lengths == approx(sorted((D, A, B, C)), rel=AGREES)
@@ -533,8 +528,7 @@ def start_at(axis, angle):
 def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
     """All links are drawn along the ground; the positions alone tell the assembly."""
     turned = [sign * angle for angle in (START, ROD - START, ROCKER)]
-    text = STATED["ball constraint"]
-    for old, new in (
+    text = put(
         (f"<pose>0 0 0 0 0 {START}</pose>", ""),
         (
             f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>",
@@ -550,10 +544,9 @@ def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
             f"<child>rocker</child>{AXIS}",
             f"<child>rocker</child>{start_at(AXIS, turned[2])}",
         ),
-    ):
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    (closure,) = list_closures(read(tmp_path, text), PoseOptions()).closures
+        text=STATED["ball constraint"],
+    )
+    (closure,) = report_of(read(tmp_path, text)).closures
     (gap,) = re.findall(r"gap (\S+) mm", closure.text)
     assert 1e-3 * float(gap) == approx(0.0, abs=AGREES * D)
     model, _ = compile_text(tmp_path, text)
@@ -588,7 +581,7 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path
     text = put(
         (PIN_OF_CRANK, joint), (crank, start_at(crank, starts[0])), (CLOSING, "")
     )
-    (closure,) = list_closures(read(tmp_path, text), PoseOptions()).closures
+    (closure,) = report_of(read(tmp_path, text)).closures
     assert closure.reason.startswith("A follows O2, polycoef ")
     model, _ = compile_text(tmp_path, text)
     data = mujoco.MjData(model)
@@ -691,8 +684,7 @@ def test_a_step_beyond_the_end_of_a_motion_meets_no_stop(tmp_path):
     stops = "<limit><lower>-1</lower><upper>1</upper></limit></axis>"
     crank = f"<child>crank</child>{AXIS}"
     file = read(tmp_path, put((crank, crank.replace("</axis>", stops))))
-    scene = read_loop_scene(file, PoseOptions(), None, 1.0).scene
-    examined = examine_file(scene, file)
+    examined = examine_text(read_scene(file, speed=1.0).scene, file)
     end = examined.measured.through_time.rows.joint.max()
     assert end > 1.0
     assert examined.described["pins.O2.range"].value == UNLIMITED_RANGE
@@ -714,10 +706,7 @@ def test_settings_are_not_asked_of_a_file_that_cannot_state_them(way, tmp_path):
 @pytest.mark.slow
 def test_the_pin_of_a_urdf_is_what_advice_changes(tmp_path):
     file = read(tmp_path, STATED["loop joint of a URDF"])
-    (measured,) = measure_loops(
-        file, MeasureOptions(PoseOptions(), error=0.01), None
-    ).loops
-    assert measured.advice.typed == (
+    assert measure(file, error=0.01).advice.typed == (
         '<connect name="B" solimp="0.9999 0.9999 0.001 0.5 2" />',
     )
 
@@ -780,7 +769,7 @@ def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
     gazebo, ways, tmp_path
 ):
     text = URDF.replace("<gazebo/>", gazebo)
-    report = list_closures(read(tmp_path, text), PoseOptions())
+    report = report_of(read(tmp_path, text))
     (closure,) = report.closures
     assert closure.reason.startswith("knee follows hip, polycoef 0.2 -1.5 0 0 0")
     notes = ("left out of the URDF: gazebo", *ways)

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.measure import examine_file
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.loop_errors import find_left_out, list_errors_by_method
 from tests.support.robots import AS_DRAWN, Planar, file_of, measure, read_scene
 from tests.support.shares import slow_but
@@ -65,7 +65,6 @@ a small lever. A wrench at a wrong place is off by tenths.
 """
 
 
-MODELS = Path(__file__).parents[5] / "models"
 VARIES = "omega or alpha differs"
 COMMANDS = {
     "capabilities/command_coupler": "",
@@ -102,11 +101,7 @@ ANGLES = ("theta_2", "theta_3", "theta_4")
 def command(scene, bar, angles, branch):
     """Return a scene that commands a bar, on which its drive acts too."""
     stated = {f"theta_{bar}": angles, f"omega_{bar}": 2.0}
-    return replace(
-        scene,
-        motion=Motion(**stated, branch=branch),
-        drive_bar=bar,
-    )
+    return replace(scene, motion=Motion(**stated, branch=branch), drive_bar=bar)
 
 
 def find_circuit_of(scene):

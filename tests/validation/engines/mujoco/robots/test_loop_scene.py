@@ -17,14 +17,14 @@ import pytest
 from pytest import approx, raises
 
 import fourbar
-from fourbar.errors import InputError
+from fourbar_validation.places import MODELS
 from tests.support.robots import Planar, forward, read_scene
 from tests.support.rows import read_rows
-from tests.whole.test_imports import ROOT
 
-MODELS = ROOT / "models" / "robots"
-FOOT = (MODELS / "biped_foot.xml").read_text()
-GRIPPER = (MODELS / "gripper.xml").read_text()
+FOOT, GRIPPER = (
+    (MODELS / "robots" / f"{name}.xml").read_text()
+    for name in ("biped_foot", "gripper")
+)
 EXACT = 1e-8
 """Relative: the difference quotient of the Jacobian loses half the digits of a double.
 """
@@ -179,8 +179,7 @@ EVERYTHING = {
     "output armature": Planar(cut="A", by="site"),
     "closure on the ground": Planar(cut="O4"),
     "axis the other way": Planar(
-        axes={"O2": "0 0 -1", "A": "0 0 -1"},
-        joint='stiffness="1"',
+        axes={"O2": "0 0 -1", "A": "0 0 -1"}, joint='stiffness="1"'
     ),
 }
 
@@ -251,33 +250,24 @@ def test_forces_across_the_plane_are_named_with_their_sizes():
     assert f"output {0.53 * pull:.4g} N" in remark
 
 
-def test_the_range_of_another_hinge_ends_the_sweep():
-    text = GRIPPER.replace(
-        '<joint name="right_follower" class="passive" />',
-        '<joint name="right_follower" class="passive" range="-10 20" />',
-    )
-    made = read_scene(text, loop="right_finger-right_follower")
-    motion = made.scene.motion.angle
-    assert motion.stop - motion.start == approx(math.radians(30.0), rel=0.01)
-    assert motion.stop - motion.start < math.radians(30.0) + 1e-9
+def find_width(made):
+    """Return the angle over which the input of a scene turns, rad."""
+    sweep = made.scene.motion.angle
+    return sweep.stop - sweep.start
 
 
 def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     planar = Planar()
-    made = read_scene(planar.text())
     d, a, b, c = planar.lengths()
     # the input turns fully, for it and the longest bar are shorter than the other two
     assert a + d < b + c
-    motion = made.scene.motion.angle
-    assert motion.stop - motion.start == approx(math.tau)
+    assert find_width(read_scene(planar.text())) == approx(math.tau)
     rocker = replace(planar, pins={**planar.pins, "A": (0.12, 0.2)})
-    made = read_scene(rocker.text())
     d, a, b, c = rocker.lengths()
     assert a + d > b + c
     # it stops where coupler and output are in one line
     most = math.acos((a * a + d * d - (b + c) ** 2) / (2.0 * a * d))
-    motion = made.scene.motion.angle
-    width = motion.stop - motion.start
+    width = find_width(read_scene(rocker.text()))
     assert width == approx(2.0 * most - 2.0 * math.radians(1.0))
 
 
@@ -314,15 +304,14 @@ def test_the_range_goes_both_ways_from_the_pose_but_for_at_most_a_turn(pin, low,
 
     limits = f'range="{math.radians(low)} {math.radians(high)}"'
     text = planar.text().replace(f'name="{pin}"', f'name="{pin}" {limits}', 1)
-    scene = read_scene(text).scene
-    motion = scene.motion.angle
+    made = read_scene(text)
     grid = math.radians(0.51)
     width = min(last - start, math.tau)
-    assert motion.stop - motion.start == approx(width, abs=2.0 * grid)
+    assert find_width(made) == approx(width, abs=2.0 * grid)
     if last - first > math.tau:
-        assert motion.stop - motion.start == approx(math.tau, rel=1e-12)
-    drawn = np.angle(p["A"]) - np.angle(p["O4"]) + scene.linkage.ground_angle
-    away = motion.start - drawn - start
+        assert find_width(made) == approx(math.tau, rel=1e-12)
+    drawn = np.angle(p["A"]) - np.angle(p["O4"]) + made.scene.linkage.ground_angle
+    away = made.scene.motion.angle.start - drawn - start
     assert abs(math.remainder(away, math.tau)) <= grid
 
 
@@ -403,17 +392,12 @@ def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts():
 
 
 def test_a_loop_is_asked_for_where_there_are_several():
-    with raises(InputError, match="right_finger-right_follower, left_finger"):
+    with raises(fourbar.InputError, match="right_finger-right_follower, left_finger"):
         read_scene(GRIPPER)
-    with raises(InputError, match="no such closure"):
-        read_scene(GRIPPER, loop="thumb")
 
 
 def test_a_pose_in_a_change_point_is_said():
     text = GRIPPER.replace('range="-40 40"', 'range="-100 100"')
-    made = read_scene(
-        text,
-        loop="right_finger-right_follower",
-        joints={"right_driver": "90deg"},
-    )
+    upright = {"right_driver": "90deg"}
+    made = read_scene(text, loop="right_finger-right_follower", joints=upright)
     assert any("in line in this pose" in remark for remark in made.remarks)

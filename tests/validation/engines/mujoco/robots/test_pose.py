@@ -15,16 +15,20 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.places import MODELS
 from tests.support.shares import slow_but
-from tests.whole.test_imports import ROOT
 
-FOOT = (ROOT / "models" / "robots" / "biped_foot.xml").read_text()
+FOOT = (MODELS / "robots" / "biped_foot.xml").read_text()
 
 
 def pose(text, key=None, **joints):
     """Pose a robot as stated."""
     model = mujoco.MjModel.from_xml_string(text)
     return pose_robot(model, PoseOptions(joints=joints, key=key))
+
+
+def position(posed, name):
+    return posed.data.joint(name).qpos[0]
 
 
 def gap(model, qpos):
@@ -88,16 +92,12 @@ def test_a_stated_joint_stays_and_the_loop_closes_around_it():
     joints = {"crank": "20deg", "knee": "60 deg"}
     posed = pose(FOOT, **joints)
     model = posed.model
-    at = {name: posed.data.qpos[model.joint(name).qposadr[0]] for name in joints}
-    assert at == {
-        "crank": approx(math.radians(20.0)),
-        "knee": approx(math.radians(60.0)),
-    }
+    at = [position(posed, name) for name in joints]
+    assert np.degrees(at) == approx((20.0, 60.0))
     assert gap(model, posed.stated) > 0.01
     assert gap(model, posed.data.qpos) < 1e-9
-    ankle = posed.data.qpos[model.joint("ankle").qposadr[0]]
     low, high = model.joint("ankle").range
-    assert low <= ankle <= high
+    assert low <= position(posed, "ankle") <= high
     still = [*range(7), *(model.joint(n).qposadr[0] for n in ("hip_roll", "toe"))]
     assert np.array_equal(posed.data.qpos[still], model.qpos0[still])
     assert any(re.search(r"rod by \S+ deg, ankle by", note) for note in posed.notes)
@@ -106,10 +106,8 @@ def test_a_stated_joint_stays_and_the_loop_closes_around_it():
 def test_a_rest_pose_outside_the_ranges_is_closed_inside_them():
     text = FOOT.replace('range="-70 60"', 'range="15 60"')
     posed = pose(text)
-    model = posed.model
-    crank = posed.data.qpos[model.joint("crank").qposadr[0]]
-    assert math.radians(15.0) - 1e-9 <= crank <= math.radians(60.0)
-    assert gap(model, posed.data.qpos) < 1e-9
+    assert math.radians(15.0) - 1e-9 <= position(posed, "crank") <= math.radians(60.0)
+    assert gap(posed.model, posed.data.qpos) < 1e-9
     assert posed.notes[0] == "outside their ranges before closing: crank"
     stated = pose(text, crank="14 deg")
     assert stated.notes[0] == "outside their ranges before closing: crank"
@@ -117,24 +115,18 @@ def test_a_rest_pose_outside_the_ranges_is_closed_inside_them():
 
 @pytest.mark.slow
 def test_closing_does_not_leave_the_range_of_a_joint():
-    free = pose(FOOT, crank="20deg")
-    address = free.model.joint("ankle").qposadr[0]
-    turned = math.degrees(free.data.qpos[address])
-    end = 0.5 * turned
-    bounds = f"{min(end, -50.0)} {max(end, 0.0)}" if turned > 0 else f"{end} 40"
-    text = FOOT.replace('range="-50 40"', f'range="{bounds}"')
-    posed = pose(text, crank="20deg")
-    assert math.degrees(posed.data.qpos[address]) == approx(end)
-    assert any(
-        "cannot close all loops within the joints' ranges" in note
-        for note in posed.notes
-    )
+    end = 0.5 * math.degrees(position(pose(FOOT, crank="20deg"), "ankle"))
+    assert 0.0 < end < 20.0
+    posed = pose(FOOT.replace('range="-50 40"', f'range="-50 {end}"'), crank="20deg")
+    assert math.degrees(position(posed, "ankle")) == approx(end)
+    said = "cannot close all loops within the joints' ranges"
+    assert any(said in note for note in posed.notes)
 
 
 def test_a_keyframe_is_a_pose():
     posed = pose(FOOT, "crouch")
     assert posed.data.qpos[2] == 0.82
-    assert posed.data.qpos[posed.model.joint("knee").qposadr[0]] == 1.0
+    assert position(posed, "knee") == 1.0
     same = pose(FOOT, "0")
     assert np.array_equal(same.data.qpos, posed.data.qpos)
     with raises(InputError, match="no such keyframe; the file has: crouch"):
@@ -212,8 +204,7 @@ def test_a_stated_joint_with_ranges_beside_it_is_the_reason_too():
 
 
 def test_zero_needs_no_unit():
-    posed = pose(FOOT, crank="0")
-    assert posed.data.qpos[posed.model.joint("crank").qposadr[0]] == 0.0
+    assert position(pose(FOOT, crank="0"), "crank") == 0.0
 
 
 def test_a_floating_body_that_is_tied_to_the_ground_moves_there():
