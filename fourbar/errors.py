@@ -33,7 +33,7 @@ ELSEWHERE = (
 )
 """Address for people with another mechanism."""
 _OF_OTHER_MECHANISM = re.compile(
-    r"crank|slider|(connecting_?)?rod|piston|rail|cam|gear|offset|dyad"
+    r"slider|(connecting_?)?rod|piston|rail|cam|gear|offset|dyad"
     r"|precision_points|bell_?crank|(fif|six|seven|eigh)th"
     r"|(bell_?crank|link|bar|rod|arm|crank|rocker|coupler|input|output|slider)_?[0-9]+"
     r"|(v_|a_)?(theta|omega|alpha|G)_?([5-9]|1[0-9])|F([5-9][1-9]|[1-9][5-9])"
@@ -103,13 +103,16 @@ def abbreviate(text: str, longest: int) -> str:
 def list_allowed(wrong: str, names: Iterable[str]) -> str:
     """Say what names are allowed in place of a wrong one, those like it first.
 
-    Names are whole; those beyond LONGEST_LIST characters are counted.
+    Names are whole; those beyond LONGEST_LIST characters are counted. For a name of
+    another mechanism the address is returned.
 
     >>> list_allowed("forc", ["position", "velocity", "force"])
     'must be among force, position, velocity'
     """
     from difflib import get_close_matches
 
+    if any(map(names_other_mechanism, wrong.split("."))):
+        return ELSEWHERE
     names = list(names)
     like = [name for name in names if wrong.casefold() in name.casefold()]
     like += get_close_matches(wrong, names)
@@ -167,14 +170,19 @@ class InputError(FourBarError):
         numpy = sys.modules.get("numpy")
         if numpy is not None and isinstance(value, numpy.generic):
             value = value.item()
-        shown = " ".join(repr(value).split())  # arrays take several lines
+        try:
+            shown = " ".join(repr(value).split())  # arrays take several lines
+        except ValueError:
+            shown = "a huge whole number"
         if unit is not None:
             numbers = value if isinstance(value, tuple) else (value,)
             shown = write_in_units(unit, *map(float, numbers))
         shown = abbreviate(shown, LONGEST_VALUE)  # of a long path the end says which
         prefix = f"{file}: " if file else ""
+        # the words of a file must neither control a terminal nor fill it
+        name = abbreviate(clean_line(key), LONGEST_VALUE)
         super().__init__(
-            f"{prefix}{key}{'' if value is None else f' = {shown}'}: {allowed}"
+            f"{prefix}{name}{'' if value is None else f' = {shown}'}: {allowed}"
         )
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:

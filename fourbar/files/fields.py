@@ -4,7 +4,6 @@ Every error names the file, the key, the value and what is allowed. Loads, point
 drives, springs and effects follow the declarations of their fields.
 """
 
-import difflib
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,15 +21,12 @@ from fourbar.effects.place import (
     states_place,
 )
 from fourbar.errors import (
-    ELSEWHERE,
     InputError,
+    list_allowed,
     name_unit,
-    names_other_mechanism,
-    write_count,
 )
 from fourbar.linkage import (
     ANY_NUMBER,
-    BAR_NAMES,
     PINS,
     REQUIRED_NUMBER,
     Declared,
@@ -49,38 +45,7 @@ from fourbar.quantities.units import (
     to_si,
 )
 from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
-from fourbar.scene.motion import is_length
 
-BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
-LONGEST_FIELD = 60
-_FURTHER_PIN = re.compile(r"[C-F]|O_?[5-9]")
-"""Pins of more than four bars, as they are usually named."""
-_MEANT = {
-    "weight": "mass",
-    "torque": "moment",
-    "couple": "moment",
-    "rate": "stiffness",
-    "k": "stiffness",
-    "material": "density",
-    "crank": "input",
-    "rocker": "output",
-    "follower": "output",
-    "frame": "ground",
-    "x": "from_pin",
-    "y": "from_pin",
-    "at": "from_pin",
-    "pin": "from_pin",
-    **dict.fromkeys(("theta", "angle"), "theta_2"),
-    **dict.fromkeys(("omega", "speed", "rpm"), "omega_2"),
-    "alpha": "alpha_2",
-    **dict.fromkeys(("cg", "cog", "com", "G"), "centre"),
-    "I": "inertia",
-    "link": "bar",
-    "start": "from",
-    "stop": "to",
-    "end": "to",
-}
-"""Words that are no keys, and the keys that may be meant by them."""
 _WAYS = {
     **dict.fromkeys(
         ("radius_of_gyration", "gyration", "k_G"),
@@ -166,8 +131,7 @@ class Entry:
     def refuse(self, allowed: str) -> InputError:
         """Make the error for the entry, or a missing one."""
         missing = "is missing; " if self.value is None else ""
-        value = _shorten_for_error(self.value)
-        return InputError(self.key, value, missing + allowed, self.file.name)
+        return InputError(self.key, self.value, missing + allowed, self.file.name)
 
     def table(self, allowed: Iterable[str]) -> dict[str, Any]:
         """Read a table that holds no keys but those allowed."""
@@ -176,16 +140,8 @@ class Entry:
             raise self.refuse(f"must be a table with the keys {', '.join(names)}")
         for name in self.value:
             if name not in names:
-                known = f"{_suggest_word(name, names)}allowed: {', '.join(names)}"
-                known = _WAYS.get(name, known)
-                if _is_elsewhere(self.key, self.value, names):
-                    known = ELSEWHERE
-                unknown = self[name]
-                if not BARE_KEY.fullmatch(name):  # quoted, it stays on one line
-                    end = "..." if len(name) > LONGEST_FIELD else ""
-                    quoted = repr(name[:LONGEST_FIELD] + end)
-                    unknown.key = f"{self.key}.{quoted}".removeprefix(".")
-                raise unknown.refuse(f"unknown key; {known}")
+                known = _WAYS.get(name) or list_allowed(name, names)
+                raise self[name].refuse(f"unknown key; {known}")
         return self.value
 
     def text(self) -> str:
@@ -496,57 +452,3 @@ def _write_place(place: Place) -> dict[str, Any]:
         elif value is not None:
             stated[name] = value
     return stated
-
-
-def _is_elsewhere(key: str, table: dict[str, Any], names: list[str]) -> bool:
-    """Return True if a table has a key of another mechanism, or too many bars or pins.
-
-    A key that may mean one of those allowed is none.
-    """
-    if key == "pins" and len(table) > len(names):
-        return True
-    has_lengths = key == "lengths" and table.keys() >= set(BAR_NAMES.values())
-    for name in table.keys() - {*names}:
-        if has_lengths and is_length(table[name]) and not _suggest_word(name, names):
-            return True
-        if names == [*PINS] and _FURTHER_PIN.fullmatch(name):
-            return True
-        if names_other_mechanism(name) and _MEANT.get(name) not in names:
-            return True
-    return False
-
-
-def _suggest_word(word: object, names: list[str]) -> str:
-    """Suggest the valid word that is nearest to one that is not, or means the same."""
-    if not isinstance(word, str):
-        return ""
-    close = difflib.get_close_matches(word[:LONGEST_FIELD], names, 1)
-    if _MEANT.get(word) in names:
-        close = [_MEANT[word]]
-    return f'did you mean "{close[0]}"? ' if close else ""
-
-
-def _shorten_for_error(value: object) -> object:
-    """Shorten a value to what an error line shows: never long or deep."""
-    if isinstance(value, str):
-        return value[: 2 * LONGEST_FIELD]
-    if isinstance(value, dict):
-        return _Words(f"a table of {write_count(len(value), 'entry')}")
-    if isinstance(value, list):
-        if len(value) <= 3 and all(
-            isinstance(entry, (str, float, bool)) for entry in value
-        ):
-            return [*map(_shorten_for_error, value)]
-        return _Words(f"a list of {write_count(len(value), 'entry')}")
-    if isinstance(value, int) and value.bit_length() > 64:
-        return _Words("a huge whole number")
-    return value
-
-
-class _Words(str):
-    """A description that is shown without quotes."""
-
-    __slots__ = ()
-
-    def __repr__(self) -> str:
-        return str(self)

@@ -32,7 +32,6 @@ from fourbar.files.drawn_pins import (
     read_ground,
 )
 from fourbar.files.fields import (
-    BARE_KEY,
     PLACES_OF_ENDS,
     Entry,
     SceneFile,
@@ -294,13 +293,7 @@ def _read_points(points: Entry) -> tuple[Point, ...]:
         raise points.refuse(
             f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}"
         )
-    read = []
-    for name, value in points.value.items():
-        entry = points.holding(value)
-        if BARE_KEY.fullmatch(name):
-            entry = points[name]
-        read.append(entry.described(Point, name=name))
-    return tuple(read)
+    return tuple(points[name].described(Point, name=name) for name in points.value)
 
 
 def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]:

@@ -7,11 +7,9 @@ import numpy as np
 
 from fourbar.effects.place import At, Place
 from fourbar.errors import (
-    ELSEWHERE,
     InputError,
     expect,
     list_allowed,
-    names_other_mechanism,
     write_in_units,
 )
 from fourbar.formulas.arithmetic import (
@@ -201,8 +199,7 @@ def command_key(scene: Scene) -> str:
 def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary; keys like it come first."""
     expect("key", key, str)
-    is_elsewhere = any(map(names_other_mechanism, key.split(".")))
-    allowed = ELSEWHERE if is_elsewhere else list_allowed(key, keys)
+    allowed = list_allowed(key, keys)
     return InputError(key, value, f"is no number of this scene; {allowed}")
 
 
