@@ -11,7 +11,7 @@ from tests.support.texts import EVERY_PLACE, HELD, LINE_DRIVEN
 FILES = {"places": EVERY_PLACE, "line": LINE_DRIVEN, "point": HELD}
 REFUSED = read_rows(r"""
 places | arm = | at = | unknown key; must be among bar, force, from_pin
-places | from_pin = { x | at = { x | points.Q.at = {'x': 
+places | from_pin = { x | at = { x | points.Q.at = {'x':
 places | point = "P"\n | point = "R"\n | loads[0].point = 'R'
 places | point = "P"\n | point = "P"\nbar = 4\n | P is on bar 3
 places | arm = | from_pin = ["1 mm", "0 deg"]\narm = | from_pin states the place already
