@@ -67,39 +67,23 @@ BARE = ("--lengths", "300 mm", "10 cm", "0.25", "0.22", "--omega", "60 rpm")
 MADE = mjcf.make_scene(0.3, 0.1, 0.25, 0.22, omega=tau)
 
 
-@pytest.fixture
-def run(capsys, tmp_path, monkeypatch):
-    """Runs a command in this process: exit status, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        code = cli.status([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return call
-
-
-def strict(ended):
+def strict(text):
     """JSON without the NaN and Infinity that Python would let pass."""
-    code, out, err = ended
-    assert (code, err, out.count("\n")) == (HOLDS, "", 1)
-    assert not re.search("NaN|Infinity", out)
-    return json.loads(out)
+    assert text.count("\n") == 1
+    assert not re.search("NaN|Infinity", text)
+    return json.loads(text)
 
 
-def read_csv(ended):
-    code, out, err = ended
-    assert (code, err) == (HOLDS, "")
-    return list(csv.DictReader(io.StringIO(out)))
+def read_csv(text):
+    return list(csv.DictReader(io.StringIO(text)))
 
 
 @pytest.mark.parametrize("name", slow_but({"drag_link"}, ["thesis", "drag_link"]))
-def test_json_and_csv_have_every_key_and_every_digit(name, run):
+def test_json_and_csv_have_every_key_and_every_digit(name, show):
     file = MODELS / f"{name}.toml"
-    document = strict(run("analyze", file, "--json"))
+    document = strict(show("analyze", file, "--json"))
     solution = solve(load(file))
-    rows = read_csv(run("analyze", file, "--csv", "--units", "SI"))
+    rows = read_csv(show("analyze", file, "--csv", "--units", "SI"))
     assert set(CONTRACT) <= set(document)
     for quantity in solution.evaluated():
         array = solution[quantity]
@@ -117,21 +101,21 @@ def test_json_and_csv_have_every_key_and_every_digit(name, run):
     assert "time" not in document
 
 
-def test_one_position_is_an_array_and_has_no_forces_without_a_speed(run):
+def test_one_position_is_an_array_and_has_no_forces_without_a_speed(show):
     save(crank_rocker(motion=Motion(1.0)), "scene.toml")
-    document = strict(run("analyze", "scene.toml", "--json"))
+    document = strict(show("analyze", "scene.toml", "--json"))
     assert set(CONTRACT) <= set(document) and np.shape(document["theta_3"]) == (1,)
     assert document["torque"] is document["F12"] is document["omega_2"] is None
-    assert "N m" not in run("analyze", "scene.toml")[1]
-    (row,) = read_csv(run("analyze", "scene.toml", "--csv"))
+    assert "N m" not in show("analyze", "scene.toml")
+    (row,) = read_csv(show("analyze", "scene.toml", "--csv"))
     assert row["torque [N m]"] == "" and row["theta_2 [rad]"] == "1.0"
 
 
 @pytest.mark.slow
-def test_a_free_motion_has_time_and_no_drive(run):
+def test_a_free_motion_has_time_and_no_drive(show):
     released = Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
     save(crank_rocker(motion=released), "scene.toml")
-    document = strict(run("analyze", "scene.toml", "--json"))
+    document = strict(show("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
 
 
@@ -139,16 +123,15 @@ def test_a_free_motion_has_time_and_no_drive(run):
     "command, write", [("sdf", assembly.write_sdf), ("usd", assembly.write_usd)]
 )
 def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
-    command, write, run
+    command, write, show, run
 ):
     target = Path(f"bars.{command}")
-    code, out, err = run(command, *BARE, "-o", target)
-    assert (code, err) == (HOLDS, "") and "1 kg/m" in out
+    assert "1 kg/m" in show(command, *BARE, "-o", target)
     assert target.read_text(encoding="utf-8") == write(MADE)
     code, _, err = run(command, CRANK_ROCKER, "-o", "a")
     assert code == BAD_INPUT and "loads (here on bar 3, bar 4)" in err
     assert "--without-loads" in err
-    assert run(command, CRANK_ROCKER, "--without-loads", "-o", "a")[0] == HOLDS
+    show(command, CRANK_ROCKER, "--without-loads", "-o", "a")
 
 
 @pytest.mark.parametrize(
@@ -160,29 +143,29 @@ def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     ],
     ids=["scene", "lengths", "motor"],
 )
-def test_mjcf_of_a_scene_and_of_bare_lengths(asked, printed, text, run):
-    code, out, err = run("mjcf", *asked, "-o", "a.xml")
-    assert (code, out.splitlines(), err) == (HOLDS, printed, "")
+def test_mjcf_of_a_scene_and_of_bare_lengths(asked, printed, text, show):
+    assert show("mjcf", *asked, "-o", "a.xml").splitlines() == printed
     assert Path("a.xml").read_text() == text
 
 
-def test_what_rests_at_every_angle_is_no_range_of_one(run):
+def test_what_rests_at_every_angle_is_no_range_of_one(show):
     save(replace(balance(0.0), effects=()), "balanced.toml")
-    code, out, _ = run("equilibrium", "balanced.toml")
-    assert code == 0
+    out = show("equilibrium", "balanced.toml")
     assert "indifferent (Q = 0 throughout): everywhere on its circuit" in out
 
 
 @pytest.mark.slow
-def test_degrees_are_of_angles_alone_and_named(run):
-    plain = strict(run("analyze", CRANK_ROCKER, "--json"))
-    turned = strict(run("analyze", CRANK_ROCKER, "--json", "--degrees"))
+def test_degrees_are_of_angles_alone_and_named(show):
+    plain = strict(show("analyze", CRANK_ROCKER, "--json"))
+    turned = strict(show("analyze", CRANK_ROCKER, "--json", "--degrees"))
     assert turned["angle_unit"] == "deg"
     for key in CONTRACT[1:]:
         in_degrees = key in ("theta_2", "theta_3", "theta_4")
         expected = np.degrees(plain[key]) if in_degrees else plain[key]
         assert np.all(np.asarray(turned[key]) == expected), key
-    rows = read_csv(run("analyze", CRANK_ROCKER, "--csv", "--units", "SI", "--degrees"))
+    rows = read_csv(
+        show("analyze", CRANK_ROCKER, "--csv", "--units", "SI", "--degrees")
+    )
     assert float(rows[90]["theta_2 [deg]"]) == approx(90.0, rel=1e-15)
     assert "theta_2" not in rows[0]
     for heading in rows[0]:
@@ -194,16 +177,16 @@ ROW = re.compile(r" *\d+\.\d{4} ")
 
 
 @pytest.mark.slow
-def test_the_table_of_positions_says_in_what_units_and_may_be_thinned(run):
-    lines = run("analyze", THESIS, "--table")[1].split("\n")
+def test_the_table_of_positions_says_in_what_units_and_may_be_thinned(show):
+    lines = show("analyze", THESIS, "--table").split("\n")
     assert lines[0] == "Thesis model mechanism" and len(lines) > 361
     heading = next(n for n, line in enumerate(lines) if "theta_2 " in line)
     assert "T4" in lines[heading]
     assert lines[heading + 1].split()[:3] == ["deg", "N", "m"]
-    radians = run("analyze", THESIS, "--table", "--radians")[1].split("\n")
+    radians = show("analyze", THESIS, "--table", "--radians").split("\n")
     assert radians[heading + 1].split()[0] == "rad"
-    assert run("analyze", THESIS, "--all")[1].split("\n") == lines
-    thinned = run("analyze", CRANK_ROCKER, "--every", 100)[1].splitlines()
+    assert show("analyze", THESIS, "--all").split("\n") == lines
+    thinned = show("analyze", CRANK_ROCKER, "--every", 100).splitlines()
     rows = [line.split()[0] for line in thinned if ROW.match(line)]
     assert rows == ["0.0000", "100.0000", "200.0000", "300.0000", "360.0000"]
 
@@ -244,24 +227,23 @@ def test_the_digits_of_the_torque():
         assert digits == tables.MOST_DIGITS or relative > 10.0 ** -(digits + 1)
 
 
-def test_no_command_is_a_question_for_help(run, capsys):
+def test_no_command_is_a_question_for_help(show, capsys):
     """The line of each command stands there whole, in 80 columns."""
-    code, out, err = run()
-    assert (code, err) == (HOLDS, "") and out == run("-h")[1]
+    out = show()
+    assert out == show("-h")
     described = " ".join(out.split())
     for command in cli.group.commands.values():
         line = f"{command.name} {command.get_short_help_str(limit=1000)}"
         assert " ".join(line.split()) in described
     assert max(map(len, out.splitlines())) <= 80
-    assert run("-V")[1] == f"fourbar, version {fourbar.__version__}\n"
+    assert show("-V") == f"fourbar, version {fourbar.__version__}\n"
     harness = import_module("fourbar_validation.cli").status([])
     assert harness == HOLDS and "advise" in capsys.readouterr().out
 
 
-def test_the_shell_completes(run, monkeypatch):
+def test_the_shell_completes(show, monkeypatch):
     monkeypatch.setenv("_FOURBAR_COMPLETE", "zsh_source")
-    code, out, _ = run()
-    assert code == HOLDS and "compdef" in out
+    assert "compdef" in show()
 
 
 CLASSIFIED = read_rows("""
@@ -280,24 +262,24 @@ CLASSIFIED = read_rows("""
 
 
 @pytest.mark.parametrize("lengths, line", CLASSIFIED)
-def test_classify(lengths, line, run):
-    code, out, err = run("classify", *lengths.split())
-    assert (code, err) == (HOLDS, "") and line in out
+def test_classify(lengths, line, show):
+    assert line in show("classify", *lengths.split())
 
 
-def test_a_stroke_that_is_not_commanded_is_found_where_the_column_has_it(run, tmp_path):
+def test_a_stroke_that_is_not_commanded_is_found_where_the_column_has_it(
+    show, tmp_path
+):
     """Of a cylinder from the ground to the coupler."""
     drive = LinearDrive(Place(1, (0.29, -1.0)), Place(3, (0.1, -0.26)))
     scene = crank_rocker(motion=Motion(Sweep(0.3, 1.2, 9), 1.0), drive=drive)
     stroke = solve(scene).stroke[4]
     save(scene, tmp_path / "cylinder.toml")
     at = f"stroke={stroke:.17g} m"
-    code, out, _ = run("analyze", tmp_path / "cylinder.toml", "--at", at)
-    assert code == HOLDS
+    out = show("analyze", tmp_path / "cylinder.toml", "--at", at)
     assert f"at theta_2 = {degrees(0.7):.6g} deg" in out
 
 
-def test_classify_says_what_turns_and_how_far(run):
+def test_classify_says_what_turns_and_how_far(show):
     """By the law of cosines where two bars are collinear."""
 
     def angle(opposite, first, second):
@@ -305,7 +287,7 @@ def test_classify_says_what_turns_and_how_far(run):
         return degrees(acos(cosine))
 
     d, a, b, c = map(float, LENGTHS)
-    text = run("classify", *LENGTHS)[1]
+    text = show("classify", *LENGTHS)
     stretched, folded = angle(c, d, b + a), 180.0 + angle(c, d, b - a)
     for name, cells in (
         ("stretched", [stretched, stretched, 180.0 - angle(a + b, d, c)]),
@@ -323,10 +305,10 @@ def test_classify_says_what_turns_and_how_far(run):
         f"output {angle(a + b, d, c) - angle(b - a, d, c):.4f} deg",
     ):
         assert words in text
-    every = run("classify", *LENGTHS, "--all")[1].splitlines()
+    every = show("classify", *LENGTHS, "--all").splitlines()
     of_coupler = {line for line in every if line.startswith("  coupler:")}
     assert len(of_coupler) == 4 and {*every} - of_coupler >= {*text.splitlines()}
-    assert len(run("classify", 3, 1, 1, 1)[1].splitlines()) == 3  # a structure
+    assert len(show("classify", 3, 1, 1, 1).splitlines()) == 3  # a structure
 
 
 NEW = read_rows("""
@@ -340,9 +322,10 @@ NEW = read_rows("""
 
 
 @pytest.mark.parametrize("texts, metres", NEW)
-def test_new_writes_a_file_and_names_the_command_that_reads_it(texts, metres, run):
-    code, out, _ = run("new", "my wiper.toml", "--lengths", *shlex.split(texts))
-    assert code == HOLDS
+def test_new_writes_a_file_and_names_the_command_that_reads_it(
+    texts, metres, show, run
+):
+    out = show("new", "my wiper.toml", "--lengths", *shlex.split(texts))
     assert shlex.split(out.strip())[-3:] == ["fourbar", "analyze", "my wiper.toml"]
     again = "--unit", "m", "--lengths", *LENGTHS
     refuses(run("new", "my wiper.toml", *again), "file exists")
@@ -358,12 +341,12 @@ def test_new_writes_a_file_and_names_the_command_that_reads_it(texts, metres, ru
     ],
     ids=lambda bars: bars[0],
 )
-def test_who_asks_for_positions_only_is_told_no_force(bars, run):
+def test_who_asks_for_positions_only_is_told_no_force(bars, show):
     path = Path("positions.toml")
-    assert run("new", path, *bars, "--positions-only")[0] == HOLDS
+    show("new", path, *bars, "--positions-only")
     assert load(path).motion.speed is None and load(path).effects == ()
-    code, out, _ = run("analyze", path)
-    assert code == HOLDS and "transmission angle: at least" in out
+    out = show("analyze", path)
+    assert "transmission angle: at least" in out
     assert not re.search("motor|torque|drive|mass|force", out + path.read_text())
 
 
@@ -379,13 +362,13 @@ animate @gallery/pump_jack.toml --seconds 0.12 -o a.gif | : 3 frames | GIF89a
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line, said, holds", DRAWINGS)
-def test_plot_and_animate_write_what_their_ending_says(line, said, holds, run):
+def test_plot_and_animate_write_what_their_ending_says(line, said, holds, show):
     """Without an option they show the units of the scene: those of the pump-jack are
     inches and pounds.
     """
     arguments = shlex.split(line.replace("@", f"{MODELS}/"))
     file = Path(arguments[-1])
-    assert run(*arguments) == (HOLDS, f"wrote {file}{said}\n", "")
+    assert show(*arguments) == f"wrote {file}{said}\n"
     assert holds.encode() in file.read_bytes()
 
 
@@ -428,35 +411,35 @@ def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
 
-def test_the_name_of_a_file_asks_for_its_form(run):
+def test_the_name_of_a_file_asks_for_its_form(show):
     for ending, *option in (("csv", "--csv"), ("json", "--json"), ("txt", "--every=9")):
-        printed = run("analyze", CRANK_ROCKER, *option)[1]
+        expected = show("analyze", CRANK_ROCKER, *option)
         file = Path(f"a.{ending}")
         every = option if ending == "txt" else ()
-        assert run("analyze", CRANK_ROCKER, *every, "-o", file) == (HOLDS, "", "")
-        assert file.read_text() == printed
+        assert show("analyze", CRANK_ROCKER, *every, "-o", file) == ""
+        assert file.read_text() == expected
 
 
 @pytest.mark.posix
-def test_a_device_is_written_to_and_stays_one(run):
+def test_a_device_is_written_to_and_stays_one(show):
     pipe = Path("pipe")
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
     try:
-        assert run("mjcf", "--lengths", *LENGTHS, "-o", pipe)[0] == HOLDS
+        show("mjcf", "--lengths", *LENGTHS, "-o", pipe)
         assert b"</mujoco>" in os.read(reader, 60_000)
         assert stat.S_ISFIFO(pipe.stat().st_mode)
     finally:
         os.close(reader)
 
 
-def test_a_title_does_not_steer_the_terminal(run):
+def test_a_title_does_not_steer_the_terminal(show):
     title = "\x1b[2J\x1b]0;x\x07\r\n[bold]name"
     save(crank_rocker(title=title), "scene.toml")
-    out = run("analyze", "scene.toml")[1]
+    out = show("analyze", "scene.toml")
     assert "\x1b" not in out and "\x07" not in out
     assert out.startswith('Crank-rocker "[2J ]0;x [bold]name", open')
-    assert strict(run("analyze", "scene.toml", "--json"))["title"] == title
+    assert strict(show("analyze", "scene.toml", "--json"))["title"] == title
 
 
 @pytest.mark.slow
@@ -663,42 +646,40 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": text}
 
 
-def test_an_angle_of_more_than_half_a_turn_is_that_of_the_sweep(run):
+def test_an_angle_of_more_than_half_a_turn_is_that_of_the_sweep(show):
     """The output of a drag-link turns with its input, by 233.8 deg at 300 deg."""
     asked = "--json", "--degrees", "--at", "300 deg"
-    shown = strict(run("analyze", MODELS / "drag_link.toml", *asked))
+    shown = strict(show("analyze", MODELS / "drag_link.toml", *asked))
     assert shown["theta_4"] == approx([233.8003], abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["law_sine", "released"])
-def test_an_angle_of_a_motion_over_time_is_that_of_each_instant(run, name):
+def test_an_angle_of_a_motion_over_time_is_that_of_each_instant(show, name):
     """A released motion begins at its angle, and passes it again."""
     file = MODELS / "capabilities" / f"{name}.toml"
     angles = solve(load(file), "position").theta_2
     angle = float(angles[0] if name == "released" else angles.mean())
-    _, out, _ = run("analyze", file, "--at", f"{angle!r} rad")
-    first, *lines = out.splitlines()
+    first, *lines = show("analyze", file, "--at", f"{angle!r} rad").splitlines()
     assert first.endswith(f" at {len(lines)} positions:") and len(lines) > 1
     assert all('--at "time=' in line for line in lines)
 
 
-def test_the_greatest_output_angle_and_a_printed_time_are_positions(run):
+def test_the_greatest_output_angle_and_a_printed_time_are_positions(show):
     """The limit is that of the sides 5, 4.5 and 6; 0.1 s at 10 rad/s are 1 rad."""
     lengths = '{ ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }'
     motion = '{ theta_2 = "60 deg", omega_2 = "60 rpm" }'
     Path("scene.toml").write_text(f"lengths = {lengths}\nmotion = {motion}")
     limit = 180.0 - degrees(acos((5**2 + 4.5**2 - 2**2) / (2 * 5 * 4.5)))
-    _, out, _ = run("analyze", "scene.toml", "--at", "theta_4=max")
+    out = show("analyze", "scene.toml", "--at", "theta_4=max")
     assert re.search(rf"bar 4 +{limit:.4f} ", out)
-    _, out, _ = run("analyze", CRANK_ROCKER, "--at", "t=0.1 s")
+    out = show("analyze", CRANK_ROCKER, "--at", "t=0.1 s")
     assert f"at theta_2 = {degrees(1.0):.6g} deg" in out
 
 
-def test_a_value_that_no_position_has_leaves_the_others(run):
+def test_a_value_that_no_position_has_leaves_the_others(show, run):
     """In a circle of 0.1 m about O2 A_x is at most 0.1 m, and 0.05 m at 60 deg."""
     wanted = ("--at", "A_x=0.2 m", "--at", "A_x=max", "--at", "60 deg")
-    code, out, err = run("analyze", CRANK_ROCKER, *wanted)
-    assert (code, err) == (0, "")
+    out = show("analyze", CRANK_ROCKER, *wanted)
     assert re.findall(r"^at theta_2 = (.*)", out, re.MULTILINE) == ["0 deg", "60 deg"]
     left_out = "left out: --at A_x = 0.2 m: no position has it"
     assert out.splitlines()[-1].startswith(left_out)
@@ -708,7 +689,7 @@ def test_a_value_that_no_position_has_leaves_the_others(run):
     refuses(run("analyze", CRANK_ROCKER, *wanted[:2]), "error: --at A_x = 0.2 m: no")
 
 
-def test_points_in_the_table_have_the_coordinates_of_the_drawing(run):
+def test_points_in_the_table_have_the_coordinates_of_the_drawing(show):
     """O2 is not the origin of the drawing; `--at` and CSV have its coordinates too."""
     Path("drawn.toml").write_text(
         '[pins]\nO2 = ["100 mm", "20 mm"]\nA = ["100 mm", "120 mm"]\n'
@@ -716,20 +697,20 @@ def test_points_in_the_table_have_the_coordinates_of_the_drawing(run):
         '[points]\nP = { bar = 2, drawn = ["150 mm", "80 mm"] }\n'
         '[motion]\ntheta_2 = "drawn"\nomega_2 = "0 rad/s"\n'
     )
-    code, out, _ = run("analyze", "drawn.toml", "--table")
+    out = show("analyze", "drawn.toml", "--table")
     lines = [line.split() for line in out.splitlines()]
     (heading,) = (line for line in lines if "P_x" in line)
     shown = dict(zip(heading, lines[-1], strict=False))
-    assert code == 0 and (shown["P_x"], shown["P_y"]) == ("150", "80")
+    assert (shown["P_x"], shown["P_y"]) == ("150", "80")
 
 
-def test_a_linkage_moves_as_the_bar_of_another_does(run):
+def test_a_linkage_moves_as_the_bar_of_another_does(show):
     """By two commands the torque is that of the motion stated as three arrays."""
     second = MODELS / "drag_link.toml"
     moved = solve(load(CRANK_ROCKER))
     motion = Motion(moved.theta_4 - 0.7, moved.omega_4, moved.alpha_4)
     expected = solve(replace(load(second), motion=motion))
     positions = f"{CRANK_ROCKER}:theta_4-0.7 rad"
-    document = strict(run("analyze", second, "--positions", positions, "--json"))
+    document = strict(show("analyze", second, "--positions", positions, "--json"))
     assert document["torque"] == expected.torque.tolist()
     assert document["alpha_4"] == expected.alpha_4.tolist()

@@ -7,7 +7,6 @@ import pytest
 
 import fourbar
 from fourbar import solve
-from fourbar.show.block import write_block
 from fourbar.show.shown_units import COMMON
 
 pytest.importorskip(
@@ -16,6 +15,7 @@ pytest.importorskip(
 )
 from fourbar.edit.exports import evaluate_scene
 from fourbar_validation.places import MODELS
+from tests.support.block import read_block
 from tests.support.shares import slow_but
 
 BOUNDED = (
@@ -41,7 +41,7 @@ def load_coarse(name):
 )
 def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
-    block = " ".join(write_block(solve(scene), COMMON))
+    block = read_block(solve(scene), COMMON)
     headline = evaluate_scene(scene, COMMON, settled=True)["headline"]
     drive, pins, _ = headline.split("; ")
     peak = re.sub(r"^peak (torque|drive force) ", "", drive)

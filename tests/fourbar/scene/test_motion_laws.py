@@ -13,6 +13,7 @@ from fourbar import Gravity, InputError, Scene, solve, uniform
 from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import COMMAND_NAMES, Law, Motion, Rise, Sine
+from tests.support.block import read_block
 from tests.support.rows import read_rows
 
 EXACT = 1e-13
@@ -74,13 +75,7 @@ def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     text = dump(scene)
     assert loads(text).motion == scene.motion
     assert (f"omega_{bar} = [" in text) == (rates > 0)
-
-
-def test_a_cubic_between_two_points_has_their_speeds():
-    law = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 2.0))
-    _, omega, _ = law.at(np.array([0.0, 1.0]))
-    assert_allclose(omega, [0.0, 2.0], atol=EXACT)
-    assert "alpha" not in dump(Scene(uniform(0.2, 0.3, 0.25, 0.28), Motion(law=law)))
+    assert ("alpha" in text) == (rates > 1)
 
 
 POINTS = (0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, tau)
@@ -198,7 +193,7 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     at_ends = np.array([*np.linspace(0.0, 0.2, 2001), *np.linspace(0.7, 1.0, 2001)])
     bare = uniform(0.3, 0.1, 0.25, 0.22)
     scene = Scene(bare, Motion(law=law), effects=(Gravity(),))
-    printed = write_note(scene)
+    printed = read_block(solve(scene, "error"))
     assert f'ends = "{ends}"' in printed and f'"{other}" changes' in printed
     rates = (one.at(at_ends) for one in (law, changed))
     changes = [np.abs(a - b).max() for a, b in zip(*rates, strict=True)]
@@ -212,10 +207,4 @@ def test_a_table_that_leaves_no_choice_says_nothing_of_its_ends():
     rates = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 0.0))
     for law in (Law(times, angles, ends="periodic"), rates):
         scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law))
-        assert "ends" not in write_note(scene)
-
-
-def write_note(scene):
-    from fourbar.show.block import write_block
-
-    return " ".join(" ".join(write_block(solve(scene, "error"))).split())
+        assert "ends" not in read_block(solve(scene))

@@ -18,11 +18,10 @@ from fourbar import (
     Torsion,
     solve,
 )
-from fourbar.cli import status
 from fourbar.files import loads
 from fourbar.show.acting import list_drawn_notes, list_spring_notes
-from fourbar.show.block import write_block
 from fourbar.solution import DEGREES
+from tests.support.block import read_block
 from tests.support.rows import read_rows
 from tests.support.scenes import bare
 
@@ -175,29 +174,23 @@ TOLD = [
 
 @pytest.mark.parametrize("text, said", TOLD)
 def test_where_springs_are_beyond_their_stroke_and_places_are_taken_is_told(text, said):
-    scene = loads(text)
-    told = " ".join(" ".join(write_block(solve(scene))).split())
+    told = read_block(solve(loads(text)))
     assert (said.removeprefix("!") in told) == (said[0] != "!"), told
 
 
 @pytest.mark.slow
-def test_every_form_of_what_is_printed_tells_it(tmp_path, capsys):
+def test_every_form_of_what_is_printed_tells_it(tmp_path, show):
     """Of an equilibrium the place is that of the input."""
     file = tmp_path / "hatch.toml"
-
-    def show(command, *options):
-        assert status([command, str(file), *options]) == 0
-        return " ".join(capsys.readouterr().out.split())
-
     file.write_text(hatch(motion=BY_BAR_4), encoding="utf-8")
     said = f"{TOO_LONG} from theta_2 = {reach(0.4)} on"
-    assert said in show("equilibrium")
+    assert said in " ".join(show("equilibrium", file).split())
     for command in ("analyze", "equilibrium"):
-        (note,) = json.loads(show(command, "--json"))["notes"]
+        (note,) = json.loads(show(command, file, "--json"))["notes"]
         assert "has no stops" in note
     file.write_text(load(f"bar = 4\n{FORCE}\n{ARM}"), encoding="utf-8")
     for option in ("--columns=theta_2,torque", "--table", "--json"):
-        assert "arm counts from G of bar 4" in show("analyze", option)
+        assert "arm counts from G of bar 4" in show("analyze", file, option)
 
 
 DRAWN = """

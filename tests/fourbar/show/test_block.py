@@ -39,12 +39,12 @@ from fourbar import (
 from fourbar.files.scene_file import read_tables
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.block import write_block
-from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.studies import write_equilibria
 from fourbar.show.summary import Facts
 from fourbar.show.tables import write_cells
 from fourbar.solving import find_last_stage
+from tests.support.block import read_block
 from tests.support.scenes import CYLINDER, balanced_lamp, bare, crank_rocker, thesis
 from tests.support.shares import slow_but
 
@@ -54,10 +54,7 @@ WEIGHT = (Gravity(),)
 
 
 def block(scene, **options):
-    """Return the block of a scene in one line, whose breaks depend on the width."""
-    lines = write_block(solve(scene, find_last_stage(scene)), **options)
-    assert max(map(len, lines)) <= BLOCK_WIDTH, lines
-    return " ".join(" ".join(lines).split())
+    return read_block(solve(scene, find_last_stage(scene)), **options)
 
 
 def move(lengths, effects=(), **motion):
@@ -662,17 +659,8 @@ def test_a_cell_that_is_rounding_of_its_column_is_zero_without_a_sign():
 
 @pytest.mark.parametrize("name, branch", (("open", 1), ("crossed", -1)))
 def test_equilibria_are_named_as_a_scene_states_their_assembly(name, branch):
-    """Each, put into a scene with its branch, needs no torque.
-
-    Angles are printed with four decimals of a degree.
-    """
+    """On either side of a change point, where the sine of mu has another sign."""
     scene = move(PARALLELOGRAM, WEIGHT, branch=branch)
     rows = write_equilibria("", equilibrium(scene)).splitlines()
-    rests = [row.split() for row in rows if re.search(r"\b(un)?stable\b", row)]
-    rests = [row for row in rests if len(row) > 5 and row[2] in ("open", "crossed")]
-    assert len(rests) > 1
-    for theta_2, _, named, _, _, slope, *_ in rests:
-        assert named == name
-        at = Motion(radians(float(theta_2)), 0.0, branch=branch)
-        (torque,) = solve(replace(scene, motion=at)).torque
-        assert abs(torque) <= radians(1e-4) * abs(float(slope))
+    named = [row.split()[2] for row in rows if re.search(r" (un)?stable ", row)]
+    assert len(named) > 1 and {*named} == {name}

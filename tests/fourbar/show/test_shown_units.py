@@ -10,8 +10,7 @@ import pytest
 from pytest import approx, raises
 
 from fourbar import load, solve
-from fourbar.cli import status
-from fourbar.errors import HOLDS, InputError
+from fourbar.errors import InputError
 from fourbar.show.shown_units import units, units_of_scene, write_digits
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
@@ -45,14 +44,9 @@ SIZES = {
 """Size of each unit that a result of the model has in imperial units, by definition."""
 
 
-def show(capsys, *options):
-    assert status(["analyze", str(MODEL), *options]) == HOLDS
-    return capsys.readouterr().out
-
-
-def test_every_number_is_in_the_unit_that_is_named(capsys):
+def test_every_number_is_in_the_unit_that_is_named(show):
     solution = solve(load(MODEL), "error")
-    document = json.loads(show(capsys, "--json", "--units", "imperial"))
+    document = json.loads(show("analyze", MODEL, "--json", "--units", "imperial"))
     assert document["angle_unit"] == "deg"
     named = document["units"]
     for name, unit in named.items():
@@ -63,14 +57,15 @@ def test_every_number_is_in_the_unit_that_is_named(capsys):
         else:
             assert np.allclose(values, expected, rtol=2e-15, atol=0.0), name
     assert {*named.values()} >= {"in", "lbf", "lbf in", "deg", "rpm", "in/s^2", "hp"}
-    table = csv.DictReader(io.StringIO(show(capsys, "--csv", "--units", "imperial")))
+    text = show("analyze", MODEL, "--csv", "--units", "imperial")
+    table = csv.DictReader(io.StringIO(text))
     forces = [float(row["F12_y [lbf]"]) * POUND for row in table]
     assert forces == approx(solution.F12[:, 1], rel=1e-14)
 
 
-def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys):
+def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(show):
     scene = load(MODEL)
-    text = show(capsys, "--csv-comma", "--units", "mm kW")
+    text = show("analyze", MODEL, "--csv-comma", "--units", "mm kW")
     header, *rows = csv.reader(io.StringIO(text), delimiter=";")
     assert not any("." in cell for row in rows for cell in row)
     assert all(" [" in name for name in header[3:] if name not in PURE)
@@ -97,11 +92,11 @@ mm lbs deg | write lbf for pounds-force
 
 
 @pytest.mark.parametrize("text, words", REFUSED)
-def test_what_is_no_list_of_units_is_refused(text, words, capsys):
+def test_what_is_no_list_of_units_is_refused(text, words, run):
     with raises(InputError, match=words):
         units(text)
-    assert status(["analyze", str(MODEL), "--units", text]) == 2
-    assert "units" in capsys.readouterr().err
+    code, _, err = run("analyze", MODEL, "--units", text)
+    assert code == 2 and "units" in err
 
 
 def test_units_are_read_as_people_write_them():

@@ -27,10 +27,11 @@ from fourbar import (
 from fourbar.files import loads
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import command_at
-from fourbar.show import block, motion_curves, summary
+from fourbar.show import motion_curves, summary
 from fourbar.show.duty import list_duty
 from fourbar_validation.places import MODELS
 from tests.fourbar.show.test_summary import list_sizes
+from tests.support.block import read_block
 from tests.support.scenes import CYLINDER, crank_rocker
 from tests.support.shares import slow_but
 
@@ -59,11 +60,6 @@ def sweep(lengths, start, stop, bar=2, **parts):
 
 def find_facts(scene):
     return summary.Facts(solve(scene))
-
-
-def write(facts, **options):
-    lines = block.write_block(facts.solution, **options)
-    return " ".join(" ".join(lines).split())
 
 
 def find_angle(side, first, second):
@@ -165,7 +161,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
     kind = "torque" if drive == "torque" else "force"
     numbers = facts.peak, entry[f"peak_{kind}"], entry[f"rms_{kind}"]
     assert [number is None for number in numbers] == [drive in growing] * 3
-    text = write(facts, pressure=1e6)
+    text = read_block(facts.solution, pressure=1e6)
     head = f"{kind} grows without bound at {scene.motion.commanded} = "
     assert (head in text) == (drive in growing)
     if drive in growing:
@@ -196,7 +192,7 @@ def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
         assert getattr(duty, name) == approx(getattr(right, name), rel=LOCATED), name
     facts = find_facts(POLES["cylinder in line with the crank"][0])
     assert facts.duty.peak_speed == approx(10.0 * LEVER[0], rel=PEAK)
-    assert "speed peak 0.9 m/s power" in write(facts)
+    assert "speed peak 0.9 m/s power" in read_block(facts.solution)
 
 
 @pytest.mark.parametrize("speed", (10.0, np.array([10.0, 5.0])))
@@ -208,7 +204,7 @@ def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed
     facts = find_facts(scene)
     assert facts.peak is facts.motion.find_peak("F12") is None
     assert facts.motion.find_peak("F43") is not None
-    text = write(facts, pressure=1e6)
+    text = read_block(facts.solution, pressure=1e6)
     assert f"grows without bound at theta_2 = {degrees(IN_LINE):.4g} deg" in text
     assert "bore none is enough" in text and "peak unbounded" in text
 
@@ -247,7 +243,7 @@ def test_a_gap_within_a_step_is_no_full_turn():
     """
     facts = find_facts(sweep((0.3, 0.1, 0.25, 0.15 - 1e-6), 0.1, 0.1 + tau))
     assert facts.solution.assembled.all()
-    text = write(facts)
+    text = read_block(facts.solution)
     assert "assembles up to theta_2 = " in text
     assert "input turns fully" not in text and "per turn" not in text
 

@@ -35,7 +35,6 @@ from fourbar import (
     solve,
     uniform,
 )
-from fourbar.cli import status
 from fourbar.files import load, loads
 from fourbar.formulas.mobility import find_intervals
 from fourbar.show.lines import BLOCK_WIDTH
@@ -55,18 +54,6 @@ DOWN = Gravity()
 
 CLOSE = 1e-12
 """Relative and rad; a dozen operations in doubles, and angles of a few turns."""
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Runs `fourbar equilibrium`, which must hold, and returns what it prints."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        assert status(["equilibrium", *arguments]) == 0
-        return capsys.readouterr().out
-
-    return call
 
 
 def crank_as_pendulum(*effects, loads=(), **motion):
@@ -436,12 +423,12 @@ def test_a_coarse_sweep_reaches_what_it_passes_in_its_circuit_and_no_more():
         assert_array_equal(curve.reached(curve.tau(points)), passed & (branch == 1))
 
 
-def test_equilibria_are_printed_in_the_units_of_the_file(run):
+def test_equilibria_are_printed_in_the_units_of_the_file(show):
     text, pound, inch = dump(crank_as_pendulum(DOWN)), 0.45359237, 0.0254
     assert 'ground = "0.3 m"' in text
     stated = text.replace('ground = "0.3 m"', f'ground = "{0.3 / inch!r} in"')
     Path("inches.toml").write_text(stated)
-    printed = run("inches.toml")
+    printed = show("equilibrium", "inches.toml")
     slope = FALLS / (pound * 9.80665 * inch)
     for words in (
         "(lbf in/rad)",
@@ -469,21 +456,24 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
 
 
 @pytest.mark.slow
-def test_the_command_prints_what_python_finds(run):
+def test_the_command_prints_what_python_finds(show):
     file = MODELS / "problems/gz_physics_987.toml"
-    printed = run(str(file))
+    printed = show("equilibrium", file)
     for words in (" 0.759439\n", "found between 3600 positions", "stable"):
         assert words in printed
-    kept, equilibria = json.loads(run(str(file), "--json")), equilibrium(load(file))
+    kept = json.loads(show("equilibrium", file, "--json"))
+    equilibria = equilibrium(load(file))
     places = [rest.place.theta_2 for rest in equilibria.found]
     assert [rest["place"]["theta_2"] for rest in kept["equilibria"]] == places
     assert kept["samples"] == equilibria.samples
     assert kept["positions"]["theta_2"] == equilibria.positions.theta_2.tolist()
     counterexamples = MODELS.parent / "tests/counterexamples"
-    printed = run(str(counterexamples / "dry_friction_on_a_crank_at_rest.toml"))
+    stuck = counterexamples / "dry_friction_on_a_crank_at_rest.toml"
+    printed = show("equilibrium", stuck)
     assert max(map(len, printed.splitlines())) <= BLOCK_WIDTH
     assert "friction alone holds" in printed and "largest without friction: " in printed
-    kite = json.loads(run(str(counterexamples / "kite_with_A_on_O4.toml"), "--json"))
+    folded = counterexamples / "kite_with_A_on_O4.toml"
+    kite = json.loads(show("equilibrium", folded, "--json"))
     assert kite["not_decided"][0]["theta_4"] is None  # which it has not there
 
 

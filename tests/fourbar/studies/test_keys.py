@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 from pytest import raises
 
 from fourbar import InputError, Tolerance, save, solve, tolerances, uniform, vary
-from fourbar.cli import status
 from fourbar.files import dump, loads
 from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
@@ -149,18 +148,16 @@ def test_a_tolerance_of_such_a_key_gets_that_line(text, stated, words):
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_tolerances_of_pins_are_written_and_shown(capsys, tmp_path):
+def test_tolerances_of_pins_are_written_and_shown(show):
     scene = replace(DRAWN, tolerances=(Tolerance("pins.O2.0", "0.05 mm"),))
     assert loads(dump(scene)) == scene
     redrawn = replace(scene, linkage=uniform(0.3, 0.1, 0.25, 0.22))
     with raises(InputError, match="no number of the scene has this key"):
         dump(redrawn)  # its file states lengths
-    path = str(tmp_path / "drawn.toml")
-    save(scene, path)
-    assert status(["tolerance", path, "--samples", "64"]) == 0
-    assert "torque: 100 % pins.O2.0" in capsys.readouterr().out
-    assert status(["analyze", path, "--sensitivity"]) == 0
-    shown = capsys.readouterr().out
+    save(scene, "drawn.toml")
+    shown = show("tolerance", "drawn.toml", "--samples", 64)
+    assert "torque: 100 % pins.O2.0" in shown
+    shown = show("analyze", "drawn.toml", "--sensitivity")
     assert "of a\n    drawn coordinate by 1 % of the longest bar" in shown
     assert "\npins.A.0" in shown  # the coordinate 0 of A has an influence too
 
@@ -200,17 +197,14 @@ def test_the_tolerance_of_a_drawn_point_is_that_of_its_coordinate():
     assert loads(dump(scene)) == scene
 
 
-def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(
-    capsys, tmp_path
-):
+def test_the_table_of_tolerances_fits_a_terminal_and_shows_no_rounding(show, tmp_path):
     """At the drawn position the patch is at y = 0, within the rounding of doubles."""
     path = tmp_path / "wishbone.toml"
     text = WISHBONE.replace(
         'theta_2 = "drawn"', 'theta_2 = { from = "drawn", to = "-8 deg", steps = 4 }'
     )
     path.write_text(text.replace("drawn.0", "drawn.1"), encoding="utf-8")
-    assert status(["tolerance", str(path), "--samples", "64"]) == 0
-    shown = capsys.readouterr().out.splitlines()
+    shown = show("tolerance", path, "--samples", 64).splitlines()
     assert max(map(len, shown)) <= 80
     (row,) = (line.split() for line in shown if line.startswith("patch_y  "))
     assert row[3] == "0"

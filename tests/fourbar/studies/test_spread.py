@@ -25,7 +25,6 @@ from fourbar import (
     tolerances,
     uniform,
 )
-from fourbar.cli import status
 from fourbar.files import loads
 from fourbar.formulas.mobility import choose_range, limit_positions
 from fourbar.show.lines import BLOCK_WIDTH
@@ -173,34 +172,30 @@ def test_what_the_study_refuses(stated, options, words):
         spread(*stated, **{"samples": 64, **options})
 
 
-def test_the_command_prints_draws_and_writes(tmp_path, capsys):
+def test_the_command_prints_draws_and_writes(tmp_path, show, run):
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")
     # a place, though v_ begins a velocity
     point = '\n[points]\nv = { bar = 3, from_pin = ["5 cm", "20 deg"] }\n'
     scene.write_text(text + TABLE)
-
-    def show(*options, code=0):
-        command = ["tolerance", str(scene), "--samples", "64", *options]
-        assert status(command) == code
-        return capsys.readouterr()
-
-    printed = show("-o", str(plot)).out
+    command = "tolerance", scene, "--samples", 64
+    printed = show(*command, "-o", plot)
     assert "64 samples (seed 0), 13 positions" in printed and "lengths.input" in printed
     assert plot.read_bytes().startswith(b"\x89PNG")
     for part, unit in (("torque", "N m"), ("theta_4", "deg")):
         assert re.search(rf"^{part} +{unit} ", printed, re.M)
-    in_N_mm = show("--units", "N.mm rad").out
+    in_N_mm = show(*command, "--units", "N.mm rad")
     assert re.search(r"^torque +N mm ", in_N_mm, re.M)
     assert re.search(r"unit +rad +nominal", in_N_mm)
-    document = json.loads(show("--json").out)
+    document = json.loads(show(*command, "--json"))
     assert len(document["quantities"]["torque"]["deviation"]) == 13
     assert document["tolerances"]["lengths.coupler"]["distribution"] == "normal"
-    show("-o", "t.bmp", code=2)
+    assert run(*command, "-o", "t.bmp")[0] == 2
     scene.write_text(text + TABLE + point)
-    assert re.search(r"^v_x +mm ", show().out, re.M)
+    assert re.search(r"^v_x +mm ", show(*command), re.M)
     scene.write_text(text)
-    assert "tolerances: the scene states none" in show(code=2).err
+    code, _, err = run(*command)
+    assert code == 2 and "tolerances: the scene states none" in err
 
 
 DRAWN = """\
@@ -219,11 +214,10 @@ theta_2 = "drawn"
 """
 
 
-def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, capsys):
+def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, show):
     """The nominal place is as drawn, and the samples lie about it."""
     (tmp_path / "drawn.toml").write_text(DRAWN)
-    assert status(["tolerance", str(tmp_path / "drawn.toml"), "--samples", "64"]) == 0
-    printed = capsys.readouterr().out
+    printed = show("tolerance", "drawn.toml", "--samples", 64)
     for name, drawn in (("P_x", 45.0), ("P_y", 11.0)):
         row = re.search(rf"^{name} +in +(.*)$", printed, re.M)
         assert row is not None, printed
