@@ -568,6 +568,7 @@ def _find_order(runs: list[BenchmarkRun]) -> float | None:
 @click.option(
     "--engines",
     type=click.Path(path_type=Path),
+    default=BENCHMARKED_ENGINES,
     help="A file like engines.toml, whose engines alone are asked.",
 )
 @click.option(
@@ -591,7 +592,7 @@ def _find_order(runs: list[BenchmarkRun]) -> float | None:
     help="Seconds for each question.",
 )
 def benchmark_command(
-    engines: Path | None,
+    engines: Path,
     problems: tuple[str, ...],
     out: Path,
     time_limit: float,
@@ -608,11 +609,11 @@ def benchmark_command(
         if name not in known:
             allowed = f"must be one of {', '.join(known)}"
             raise InputError("--problem", name, allowed)
-    entries = read_engines_of(engines or BENCHMARKED_ENGINES)
+    entries = read_engines_of(engines)
     out.mkdir(parents=True, exist_ok=True)
     benchmark = Benchmark(
         entries.values(),
-        read_reasons(engines or BENCHMARKED_ENGINES),
+        read_reasons(engines),
         problems or known,
         out,
     )

@@ -120,7 +120,6 @@ def _draw_near_change_point(rng: Generator) -> DrawnLinkage:
         straight = math.pi
     elif kind == 2:  # kite a = d, b = c
         lengths = (x, x, y, y)
-        straight = 0.0
     else:
         # multiples of 2^-20 so that d + a = b + c, or d - a = b - c, holds exactly
         d, a, b = (
@@ -128,9 +127,10 @@ def _draw_near_change_point(rng: Generator) -> DrawnLinkage:
             for v in sorted(rng.uniform(0.1, 1.0, 3), reverse=True)
         )
         b = float(min(b, d + a - 0.01))
-        lengths, straight = (d, a, d - a + b, b), 0.0
+        lengths = (d, a, d - a + b, b)
         if rng.random() < 0.5:
-            lengths, straight = (d, a, b, d + a - b), math.pi
+            lengths = (d, a, b, d + a - b)
+            straight = math.pi
     distance = _draw_signed(rng, -8.0, 0.0)
     changed = [*lengths]
     if rng.random() < 0.3:

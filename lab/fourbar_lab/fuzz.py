@@ -46,9 +46,7 @@ NUMBER_BEFORE_A_UNIT = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
 _NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
 EXACT_ENGINES = tuple(
-    hold_fully(w)
-    for w in ENGINES
-    if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body")
+    hold_fully(engine) for engine in ENGINES if not engine.through_time
 )
 """The exact engines, held to full accuracy. Or they are held to what was predicted for
 the position.

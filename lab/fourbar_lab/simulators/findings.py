@@ -15,7 +15,7 @@ import click
 
 from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines.environments import make_environment, read_engines
-from fourbar_validation.engines.programs import Ended, run_to_end
+from fourbar_validation.engines.programs import run_to_end
 from fourbar_validation.places import CHECKOUT
 
 FINDINGS = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
@@ -49,17 +49,16 @@ class Reproduction:
         return name, module.strip("()")
 
     def run(self, python: str | Path, seconds: float) -> str:
-        """Run the script: "holds", "fixed" or why it could not run."""
-        return _read_outcome(run_to_end([python, self.script], seconds=seconds))
+        """Run the script: "holds", "fixed" or why it could not run.
 
-
-def _read_outcome(done: Ended) -> str:
-    """Return what a script's end says; a traceback is no "fixed"."""
-    if not done.failed:
-        return "holds"
-    if done.last == FIXED:
-        return FIXED
-    return f"not run: {done.last}"
+        A traceback is no "fixed".
+        """
+        done = run_to_end([python, self.script], seconds=seconds)
+        if not done.failed:
+            return "holds"
+        if done.last == FIXED:
+            return FIXED
+        return f"not run: {done.last}"
 
 
 def read_docstring(script: Path) -> Reproduction:

@@ -363,11 +363,9 @@ def start(scene: Scene) -> Start:
 
 def gravity_field(scene: Scene) -> tuple[float, float, float]:
     """Return the field of gravity, m/s^2."""
-    fields = [
-        find_field(effect) for effect in scene.effects if isinstance(effect, Gravity)
-    ]
-    if fields:
-        return (*fields[0], 0.0)
+    for effect in scene.effects:
+        if isinstance(effect, Gravity):
+            return (*find_field(effect), 0.0)
     return (0.0, 0.0, 0.0)
 
 

@@ -217,13 +217,6 @@ def _resolve_force(size: float, direction: float) -> Any:
 
     One that the direction as a double cannot tell from zero is zero.
     """
-    from mpmath import mp, mpc, mpf
+    from mpmath import mp, mpf
 
-    least = mpf(2) ** -53
-    x = mp.cos(direction)
-    y = mp.sin(direction)
-    if abs(x) <= least:
-        x = 0
-    if abs(y) <= least:
-        y = 0
-    return mpf(size) * mpc(x, y)
+    return size * mp.chop(mp.expj(direction), mpf(2) ** -53)

@@ -22,25 +22,23 @@ class MujocoSlider:
         of_crank, of_rod, of_slider = map(_write_inertial, linkage.bars)
         hinge = '<joint type="hinge" axis="0 0 1"/>'
         gravity_x, gravity_y = linkage.gravity.tolist()
-        lines = [
-            "<mujoco>",
-            f'<option gravity="{gravity_x!r} {gravity_y!r} 0">',
-            '<flag constraint="disable"/>',
-            "</option>",
-            "<worldbody>",
-            f'<body name="crank">{hinge}{of_crank}',
-            f'<body name="rod" pos="{linkage.crank!r} 0 0">{hinge}{of_rod}',
-            f'<site name="end" pos="{linkage.rod!r} 0 0"/>',
-            "</body>",
-            "</body>",
-            f'<body name="slider" pos="0 {linkage.offset!r} 0">',
-            f'<joint type="slide" axis="1 0 0"/>{of_slider}',
-            '<site name="slider"/>',
-            "</body>",
-            "</worldbody>",
-            "</mujoco>",
-        ]
-        self.model = mujoco.MjModel.from_xml_string("\n".join(lines))
+        self.model = mujoco.MjModel.from_xml_string(f"""
+        <mujoco>
+          <option gravity="{gravity_x!r} {gravity_y!r} 0">
+            <flag constraint="disable"/>
+          </option>
+          <worldbody>
+            <body name="crank">{hinge}{of_crank}
+              <body name="rod" pos="{linkage.crank!r} 0 0">{hinge}{of_rod}
+                <site name="end" pos="{linkage.rod!r} 0 0"/>
+              </body>
+            </body>
+            <body name="slider" pos="0 {linkage.offset!r} 0">
+              <joint type="slide" axis="1 0 0"/>{of_slider}
+              <site name="slider"/>
+            </body>
+          </worldbody>
+        </mujoco>""")
         self.data = mujoco.MjData(self.model)
         self.bodies = [self.model.body(name).id for name in ("crank", "rod", "slider")]
         self.sites = [self.model.site(name).id for name in ("end", "slider")]
