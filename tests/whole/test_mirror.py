@@ -73,7 +73,7 @@ validation/engines/mujoco/robots/test_closures.py | ancestry loop_facts
 validation/engines/mujoco/robots/test_measure.py | planes
 validation/robots/test_files.py | validation/engines/mujoco/robots: compiled
 validation/robots/test_loops.py | options
-validation/published/test_published.py | comparison printed_figures textbook thesis
+validation/published/test_published.py | comparison printed_figures thesis
 validation/regression/test_regression.py | accept engines history record render rules
 validation/regression/test_regression.py | scenes
 validation/report/test_report.py | machine overview run_summary

@@ -17,6 +17,10 @@ from fourbar.quantities import UNKNOWNS
 from fourbar_validation.places import MODELS
 from fourbar_validation.published import comparison as command
 from fourbar_validation.published.comparison import (
+    MISPRINT,
+    REPRODUCED,
+    TEXTBOOK_FOLDER,
+    UNEXPLAINED,
     explain_difference,
     list_figures,
     list_ladder_rows,
@@ -28,11 +32,6 @@ from fourbar_validation.published.printed_figures import (
     PublishedFigure,
     compare_figure,
     read_printed,
-)
-from fourbar_validation.published.textbook import (
-    TEXTBOOK_FOLDER,
-    compare_textbooks,
-    list_answers,
 )
 from fourbar_validation.published.thesis import (
     BAR_LENGTHS,
@@ -75,7 +74,7 @@ def test_the_published_torque_error_by_error():
     assert len(LADDER) + 1 == len(LISTED_UNKNOWNS["T4"].split())
     for name, listed in LISTED_UNKNOWNS.items():
         for step, figure in enumerate(listed.split()):
-            number = compute_model(LADDER[:step])[name]
+            number = compute_model(LADDER[:step])[name.removesuffix("x")].real
             assert abs(number - float(figure)) <= LISTED + ROUND_OFF
 
 
@@ -120,7 +119,7 @@ def test_every_figure_is_compared():
         "manual, kinematics": 26,
         "5.7 inertias": 3,
         "5.7 constants": 28,
-        "5.7 matrix": 26,
+        "5.7 matrix": 21,
         "manual, unknowns": 13,
         "5.7 unknowns": 13,
         "Maple": 5,
@@ -130,7 +129,7 @@ def test_every_figure_is_compared():
     assert len(names) == len(list_all())
     of_thesis = [one for one in list_all() if one.table != "public test cases"]
     verdicts = Counter(figure.verdict() for figure in of_thesis)
-    assert verdicts == {"rounded": 1233, "truncated": 28, "differs": 60}
+    assert verdicts == {"rounded": 1228, "truncated": 28, "differs": 60}
 
 
 @pytest.mark.slow
@@ -140,11 +139,12 @@ def test_every_difference_is_what_its_errata_make_of_ours():
     An agreement needs no misprint to explain it.
     """
     differ = [figure for figure in list_all() if figure.verdict() == "differs"]
-    assert all(figure.explained() for figure in differ)
-    misprints = {one.name: one.errata for one in differ if not one.reproduced()}
+    kinds = [(figure, explain_difference(figure)[0]) for figure in differ]
+    assert {kind for _, kind in kinds} == {REPRODUCED, MISPRINT}
+    misprints = {one.name: one.errata for one, kind in kinds if kind == MISPRINT}
     twelve = dict.fromkeys(("k3_2_in_eq_5_6", "k4_1"), ("12b",))
     assert misprints == twelve | {"tetaDos_deg": ("17",)}
-    assert {name for name, one in ERRATA.items() if not one.reproduced} == {"12b", "17"}
+    assert {key for key, one in ERRATA.items() if "reproduced" in one} == {"12b", "17"}
     # as data/README.md says
     assert sum("unknowns" in figure.table for figure in differ) == 26
     assert sum(set(figure.errata) <= {"1", "2", "3"} for figure in differ) == 10
@@ -158,8 +158,8 @@ def test_every_difference_is_what_its_errata_make_of_ours():
 def test_errata_are_complete():
     assert {str(n) for n in range(1, 41)} <= set(ERRATA)
     for entry in ERRATA.values():
-        said = (entry.where, entry.title, entry.printed, entry.right)
-        assert all((*said, entry.derivation, entry.effect))
+        said = ("where", "title", "printed", "right", "derivation", "effect")
+        assert all(map(entry.get, said))
 
 
 def solve_as_printed(sides, arms):
@@ -209,7 +209,7 @@ def test_torques_that_the_errata_state():
         (9, f"{program(3, 1, 2, 4, 5) + 100 * 15 - 15:.3f}"),
         (13, f"{hand(matrix):.6f}"),
     ):
-        assert words in ERRATA[str(erratum)].effect
+        assert words in ERRATA[str(erratum)]["effect"]
     last = float(LISTED_UNKNOWNS["T4"].split()[-1])
     assert f"{hand(k, 'k3_5', 'k4x'):.4f}" == f"{last:.4f}"
 
@@ -231,10 +231,10 @@ def test_open_loops_that_the_errata_state():
         return np.abs(crank + b * unit[third] + c * unit[fourth])
 
     first, second = gaps(1, 4), gaps(2, 3)
-    assert f"{first.max():.3f} cm" in ERRATA["6"].derivation
+    assert f"{first.max():.3f} cm" in ERRATA["6"]["derivation"]
     assert np.sort(first)[-2] < PRINTED_GAP and second.max() < PRINTED_GAP
     wrong = np.append(np.delete(gaps(1, 3), first.argmax()), gaps(2, 4))
-    assert f"{wrong.min():.1f} to {wrong.max():.1f} cm" in ERRATA["22"].derivation
+    assert f"{wrong.min():.1f} to {wrong.max():.1f} cm" in ERRATA["22"]["derivation"]
 
 
 def test_limits_that_the_errata_state():
@@ -244,15 +244,16 @@ def test_limits_that_the_errata_state():
             f"{np.degrees(limit.theta_2) % 360.0:.4f}"
             for limit in fourbar.limit_positions(linkage, bar)
         }
-        stated = ERRATA["16"].right.split(title)[1].split(" deg")[0]
+        stated = ERRATA["16"]["right"].split(title)[1].split(" deg")[0]
         assert angles == {part.strip() for part in stated.split(" and ")}
 
 
 def test_public_test_cases_agree_to_the_last_digit():
-    assert {figure.verdict() for figure in compare_textbooks()} == {"rounded"}
+    answers = [figure for figure in list_all() if figure.scene]
+    assert {answer.verdict() for answer in answers} == {"rounded"}
     scenes = {path.stem for path in TEXTBOOK_FOLDER.glob("*.toml")}
-    assert {answer.scene for answer in list_answers()} == scenes
-    assert len({answer.where.split(",")[0] for answer in list_answers()}) >= 3
+    assert {answer.scene for answer in answers} == scenes
+    assert len({answer.where.split(",")[0] for answer in answers}) >= 3
 
 
 def test_answers_that_sympy_leaves_to_be_solved():
@@ -267,7 +268,7 @@ def test_answers_that_sympy_leaves_to_be_solved():
     forcing = [-0.031211821321648, -0.00066022608181, 0.001813559741243]
     relative = [
         answer.printed
-        for answer in list_answers()
+        for answer in read_printed()
         if answer.note.startswith("the printed mass matrix")
     ]
     assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == relative
@@ -306,8 +307,8 @@ def test_a_difference_without_an_erratum_fails(monkeypatch):
     )
     for changes in ({}, {"errata": ()}):
         figure = wrong._replace(**changes)
-        assert figure.verdict() == "differs" and explain_difference(figure)
-        assert not figure.explained()
+        assert figure.verdict() == "differs"
+        assert explain_difference(figure)[0] == UNEXPLAINED
         monkeypatch.setattr(command, "list_figures", lambda one=figure: iter([one]))
         process = CliRunner().invoke(published, standalone_mode=False)
         assert process.return_value == 1

@@ -3,33 +3,57 @@
 Ours stand beside them, and differences are explained.
 """
 
+import re
 from collections import Counter
-from collections.abc import Iterator
-from importlib import import_module
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import click
+import numpy as np
 
-from fourbar.errors import FAILED, HOLDS, needing
+import fourbar
+from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas.mobility import TURN
 from fourbar.show.lines import wrap_line
 from fourbar.writing import write_text
-from fourbar_validation.places import HARNESS_PROGRAM
+from fourbar_validation.places import HARNESS_PROGRAM, MODELS
 from fourbar_validation.published.printed_figures import (
     ERRATA,
     FIGURE_VERDICTS,
     PublishedFigure,
+    compare_figure,
     read_printed,
 )
-from fourbar_validation.published.textbook import compare_textbooks
 from fourbar_validation.published.thesis import (
     LADDER,
     compute_model,
-    compute_numbers,
+    compute_results,
 )
 from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.report.templating import render
 
+_TERM = re.compile(r"([-+]?) ?(\w+?)(?:_(x|y|mod|deg|turn|rad))?(?: |$)")
+"""Term of a quantity: its sign, the name of a result, and what is taken of a vector."""
+_TAKEN: dict[str, Callable[[Any], Any]] = {
+    "": np.real,
+    "x": np.real,
+    "y": np.imag,
+    "mod": np.abs,
+    "deg": partial(np.angle, deg=True),
+    "turn": lambda vector: np.angle(vector, deg=True) % 360.0,
+    "rad": lambda vector: np.angle(vector) % TURN,
+}
+"""Component, size and direction: from -180 to 180 deg, and within one turn."""
+TEXTBOOK_FOLDER = MODELS / "textbook"
 PAGE_WIDTH = 78
+_ERRATUM = (
+    "#{id} {where}: printed {printed}. Right: {right}. Why: {derivation}. Effect:"
+    " {effect}."
+)
+REPRODUCED, MISPRINT, UNEXPLAINED = "reproduced", "misprint", "unexplained"
+"""Differences that their errata give, that no computation can give, and others."""
 
 
 def list_figures() -> Iterator[PublishedFigure]:
@@ -38,29 +62,45 @@ def list_figures() -> Iterator[PublishedFigure]:
     The sources are the thesis, the Maple worksheet, and public test cases.
     """
     for figure in read_printed():
-        ours, made = (
-            compute_numbers(errata)[figure.name] for errata in ((), figure.errata)
-        )
+        ours, made = (_compute(figure, errata) for errata in ((), figure.errata))
         yield figure._replace(ours=ours, made=made)
-    yield from compare_textbooks()
 
 
-def explain_difference(figure: PublishedFigure) -> str:
-    """Explain in a phrase why a figure differs."""
+@cache
+def _solve_scene(name: str) -> Any:
+    return fourbar.solve(fourbar.load(TEXTBOOK_FOLDER / f"{name}.toml"))
+
+
+def _compute(figure: PublishedFigure, errata: tuple[str, ...]) -> float:
+    """Compute a figure, a result of ours or the sum of several, with errata made."""
+    results = compute_results(errata)
+    if figure.scene:
+        results = _solve_scene(figure.scene)
+    total = 0.0
+    for sign, name, part in _TERM.findall(figure.quantity):
+        value = np.atleast_1d(results[name])[figure.position]
+        vector = complex(*np.ravel(value))
+        term = _TAKEN[part](vector)
+        total += -term if sign == "-" else term
+    return float(total)
+
+
+def explain_difference(figure: PublishedFigure) -> tuple[str, str]:
+    """Tell what a difference is, and explain in a phrase why a figure differs."""
     if not figure.errata:
-        return "no erratum explains this"
-    text = "; ".join(f"#{name} {ERRATA[name].title}" for name in figure.errata)
+        return UNEXPLAINED, "no erratum explains this"
+    text = "; ".join(f"#{name} {ERRATA[name]['title']}" for name in figure.errata)
     if len(figure.errata) > 3 and set(figure.errata) <= set(LADDER):
         text = "#" + " #".join(figure.errata) + ", the steps of the table above"
-    if figure.reproduced():
+    if compare_figure(figure.printed, figure.made, figure.noise) != "differs":
         decimals = len(figure.printed.partition(".")[2])
-        return f"{text}: gives {figure.made:.{min(decimals + 1, 12)}f}"
-    if figure.explained():
-        return f"{text} (no computation gives these digits)"
-    return f"{text}: does not give this"
+        return REPRODUCED, f"{text}: gives {figure.made:.{min(decimals + 1, 12)}f}"
+    if all(ERRATA[name].get("reproduced", True) for name in figure.errata):
+        return UNEXPLAINED, f"{text}: does not give this"
+    return MISPRINT, f"{text} (no computation gives these digits)"
 
 
-def compare_figures(show_all: bool) -> int:
+def compare_figures(figures: list[PublishedFigure], show_all: bool) -> int:
     """Compare the figures of the sources with ours.
 
     Return 1 on a difference that no erratum explains.
@@ -71,47 +111,41 @@ def compare_figures(show_all: bool) -> int:
     page = min(PAGE_WIDTH, console.width)
     which = "" if show_all else " that differ from ours, and why"
     console.print(f"Printed figures{which}:")
-    counts: dict[str, Counter[str]] = {}
-    differing = []
-    for figure in list_figures():
-        verdict = figure.verdict()
-        counts.setdefault(figure.table, Counter())[verdict] += 1
-        differs = verdict == "differs"
+    differing = [figure for figure in figures if figure.verdict() == "differs"]
+    kinds: Counter[str] = Counter()
+    for figure in figures if show_all else differing:
         line = f"{figure.table}: {figure.name}  printed {figure.printed}"
-        line += f"  ours {figure.ours:.10g}" + f", {verdict}" * (not differs)
-        if show_all or differs:
-            click.echo("\n".join(wrap_line(line, console.width)))
-        if differs:
-            differing.append(figure)
-            why = explain_difference(figure)
+        line += f"  ours {figure.ours:.10g}"
+        if figure not in differing:
+            line += f", {figure.verdict()}"
+        click.echo("\n".join(wrap_line(line, console.width)))
+        if figure in differing:
+            kind, why = explain_difference(figure)
+            kinds[kind] += 1
             click.echo(click.wrap_text(why, page, "    ", "    "))
-    counts["every table"] = sum(counts.values(), Counter())
-    rows = (
-        (table, *(str(row[verdict]) for verdict in FIGURE_VERDICTS))
-        for table, row in counts.items()
-    )
+    verdicts = [(figure.table, figure.verdict()) for figure in figures]
+    every = [("every table", verdict) for _, verdict in verdicts]
+    counts = Counter(verdicts + every)
+    rows = [
+        (table, *(str(counts[table, verdict]) for verdict in FIGURE_VERDICTS))
+        for table in dict(verdicts + every)
+    ]
     console.print(make_words_table(("table", *FIGURE_VERDICTS), rows))
-    explained = [figure for figure in differing if figure.explained()]
-    reproduced = sum(figure.reproduced() for figure in explained)
     summary = (
         "A figure is rounded or truncated if ours, rounded or cut to its digits,"
         f" equals it. {len(differing)} figures differ: the errata named reproduce"
-        f" {reproduced} of them digit for digit, and {len(explained) - reproduced} are"
+        f" {kinds[REPRODUCED]} of them digit for digit, and {kinds[MISPRINT]} are"
         " misprints."
     )
     click.echo(click.wrap_text(summary, page) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
     met = {name for figure in differing for name in figure.errata}
     for name in filter(met.__contains__, ERRATA):
-        erratum = ERRATA[name]
-        text = (
-            f"#{name} {erratum.where}: printed {erratum.printed}. Right:"
-            f" {erratum.right}. Why: {erratum.derivation}. Effect: {erratum.effect}."
-        )
+        text = _ERRATUM.format_map(ERRATA[name])
         click.echo(click.wrap_text(text, page, "", "    "))
-    if unexplained := len(differing) - len(explained):
-        console.print(f"No erratum explains {unexplained} of the differences.")
-    elif not counts["every table"]:
+    if kinds[UNEXPLAINED]:
+        console.print(f"No erratum explains {kinds[UNEXPLAINED]} of the differences.")
+    elif not figures:
         console.print("Nothing was compared: there is no figure.")
     else:
         return HOLDS
@@ -135,11 +169,13 @@ def list_ladder_rows() -> Iterator[tuple[str, ...]]:
     """
     first = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12"
     steps = [(first, "the answer of this project")]
-    steps += [(f"#{name} {ERRATA[name].title}", ERRATA[name].right) for name in LADDER]
+    steps += [
+        (f"#{name} {ERRATA[name]['title']}", ERRATA[name]["right"]) for name in LADDER
+    ]
     for count, did in enumerate(steps):
         model = compute_model(LADDER[:count])
-        forces = (f"{model[name]:.3f}" for name in ("F12x", "F12y"))
-        yield (*did, f"{model['T4']:.9f}", *forces)
+        force = model["F12"]
+        yield (*did, f"{model['T4']:.9f}", f"{force.real:.3f}", f"{force.imag:.3f}")
 
 
 @click.command()
@@ -158,8 +194,7 @@ def published(show_all: bool, out: Path | None) -> int:
     from rich.console import Console
 
     # a missing library of the last source is noticed before the first is printed
-    with needing("a free motion among the sources needs SciPy", "validation"):
-        import_module("scipy.integrate")
+    figures = [*list_figures()]
     rows = [*list_ladder_rows()]
     title = "The published torque, error by error"
     table = make_words_table(ERRATA_HEADINGS, rows, 2, title=title, show_lines=True)
@@ -167,4 +202,4 @@ def published(show_all: bool, out: Path | None) -> int:
     if out is not None:
         head = {"head": ERRATA_HEADINGS, "rows": rows, "program": HARNESS_PROGRAM}
         write_text(out, render("fourbar_validation.published", "ladder.md.j2", **head))
-    return compare_figures(show_all)
+    return compare_figures(figures, show_all)

@@ -6,30 +6,18 @@ import tomllib
 from collections.abc import Iterator
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 FOLDER = Path(__file__).parent
 FIGURE_VERDICTS = ("rounded", "truncated", "differs")
 
 
-class Erratum(NamedTuple):
-    """One error of a source."""
-
-    id: str
-    where: str
-    title: str
-    printed: str
-    right: str
-    derivation: str
-    effect: str
-    reproduced: bool = True
-    """True if making the error gives the printed digits."""
-    transcription: bool = False
-    """True if it may be a slip of the transcription that was read."""
+def _read(name: str) -> str:
+    return (FOLDER / name).read_text(encoding="utf-8")
 
 
-_FILE = tomllib.loads((FOLDER / "errata.toml").read_text(encoding="utf-8"))
-ERRATA = {entry["id"]: Erratum(**entry) for entry in _FILE["erratum"]}
+_ENTRIES = tomllib.loads(_read("errata.toml"))["erratum"]
+ERRATA: dict[str, dict[str, Any]] = {entry["id"]: entry for entry in _ENTRIES}
 """The errata of the sources, as data: `errata.toml` says what each field is."""
 
 
@@ -48,56 +36,54 @@ class PublishedFigure(NamedTuple):
     """Ours after those of these errata that can be computed."""
     noise: float = 0.0
     """Round-off of whoever printed 15 digits or more, in the unit printed."""
+    quantity: str = ""
+    """What is printed: a result of ours, or the sum of several."""
+    scene: str = ""
+    """Scene of `models/textbook` that has the result; empty for the thesis."""
+    position: int = 0
+    where: str = ""
+    """Address of a public test case."""
+    note: str = ""
 
     def verdict(self) -> str:
         """Return "rounded", "truncated" or "differs": ours against the printed."""
         return compare_figure(self.printed, self.ours, self.noise)
 
-    def reproduced(self) -> bool:
-        """Tell whether the errata give the published digits, rounded or truncated."""
-        return compare_figure(self.printed, self.made, self.noise) != "differs"
-
-    def explained(self) -> bool:
-        """Tell whether the errata account for a difference.
-
-        A misprint that no erratum can give is accounted for too.
-        """
-        known = all(ERRATA[name].reproduced for name in self.errata)
-        return bool(self.errata) and (self.reproduced() or not known)
-
 
 def read_printed() -> Iterator[PublishedFigure]:
-    """Read the figures of the thesis and of a Maple worksheet, without ours."""
+    """Read the figures of the thesis, a Maple worksheet and public test cases."""
     for row in _read_rows("positions.csv"):
         for name in ("theta3_1", "theta4_2", "theta3_2", "theta4_1"):
             place = f"{row['theta2_deg']} {name}"
             errata = ("6",) if place == "136 theta3_1" else ()
-            printed = row[f"{name}_deg"]
-            yield PublishedFigure("2.4 positions", place, printed, errata=errata)
+            yield PublishedFigure(
+                "2.4 positions",
+                place,
+                row[f"{name}_deg"],
+                errata=errata,
+                quantity=f"{name}_deg",
+                position=int(row["theta2_deg"]),
+            )
     for row in _read_rows("figures.csv"):
-        yield PublishedFigure(
-            row["table"],
-            row["name"],
-            row["printed"],
-            errata=tuple(row["errata"].split()),
-            noise=float(row["noise"] or 0.0),
-        )
+        errata = tuple(row["errata"].split())
+        numbers = {"noise": float(row["noise"]), "position": int(row["position"])}
+        yield PublishedFigure(**row | numbers | {"errata": errata})
+    for answer in tomllib.loads(_read("textbook.toml"))["answer"]:
+        name = f"{answer['scene']} {answer['quantity']}"
+        yield PublishedFigure("public test cases", name, **answer)
 
 
-def _read_rows(name: str) -> Iterator[dict[str, str]]:
-    text = (FOLDER / "data" / name).read_text(encoding="utf-8")
-    yield from csv.DictReader(text.splitlines())
+def _read_rows(name: str) -> Iterator[dict[str, Any]]:
+    yield from csv.DictReader(_read(f"data/{name}").splitlines())
 
 
 def compare_figure(printed: str, value: float, noise: float) -> str:
     """Return "rounded", "truncated" or "differs", at the printed decimals."""
     theirs = Decimal(printed)
     ours = Decimal(value)
-    unit = Decimal(1).scaleb(int(theirs.as_tuple().exponent))
-    if ours.quantize(unit, ROUND_HALF_EVEN) == theirs:
-        return "rounded"
     if abs(ours - theirs) <= Decimal(noise):
         return "rounded"
-    if ours.quantize(unit, ROUND_DOWN) == theirs:
-        return "truncated"
+    for verdict, mode in (("rounded", ROUND_HALF_EVEN), ("truncated", ROUND_DOWN)):
+        if ours.quantize(theirs, mode) == theirs:
+            return verdict
     return "differs"
