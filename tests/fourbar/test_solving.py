@@ -39,7 +39,12 @@ from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from fourbar.show.plot import draw
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    bare,
+    crank_rocker,
+    recommand,
+)
 
 EXAMPLES = settings(
     max_examples=120,
@@ -182,7 +187,7 @@ def test_where_the_loop_does_not_close_only_what_is_commanded_has_a_value(kind):
 
 PARALLELOGRAM = uniform(1.0, 0.5, 1.0, 0.5)
 KITE = uniform(1.0, 0.5, 0.5, 1.0)
-CRANK_ROCKER = uniform(0.3, 0.1, 0.25, 0.22)
+CRANK_ROCKER = uniform(*CRANK_ROCKER_LENGTHS)
 
 
 @pytest.mark.parametrize(
@@ -279,7 +284,7 @@ def test_the_blocks_of_a_sweep_are_solved_like_its_positions():
     for stage in ("force", "error"):
         n = POSITIONS_OF_A_BLOCK // {"force": 1, "error": 4}[stage]
         rows = np.resize(np.arange(7), n + 5)
-        many = replace(few, motion=few.motion.replace(angle=few.motion.angle[rows]))
+        many = recommand(few, angle=few.motion.angle[rows])
         ends = np.array([0, n - 1, n, n + 4])
         blocks, alone = solve(many, stage), solve(few, stage)
         for name in alone.evaluated():

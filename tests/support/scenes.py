@@ -23,6 +23,8 @@ from fourbar import (
 )
 from tests.support.checkout import ROOT
 
+CRANK_ROCKER_LENGTHS = (0.3, 0.1, 0.25, 0.22)
+PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 """A cylinder from the ground to the coupler."""
 CYLINDER = LinearDrive(Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17)))
@@ -46,6 +48,11 @@ def crank_rocker(**changes):
         "title": "crank-rocker",
     }
     return Scene(**{**parts, **changes})
+
+
+def find_angle(side, first, second):
+    """Return the angle between two sides of a triangle, opposite to the third."""
+    return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 def bare(d, a, b, c, theta_1=0.0):
@@ -91,6 +98,11 @@ TURN = crank_rocker(
     points=(Point("P", 3, (0.1, 0.7)), Point("J", 4, (0.05, 0.2))),
 )
 """A turn of the crank-rocker with points on coupler and output."""
+
+
+def recommand(scene, **changes):
+    """Return a scene with the fields of its motion changed."""
+    return replace(scene, motion=scene.motion.replace(**changes))
 
 
 def low_parallelogram(steps=8, **changes):

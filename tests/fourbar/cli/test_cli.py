@@ -11,7 +11,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from importlib import import_module
-from math import acos, degrees, tau
+from math import degrees, tau
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,7 @@ from fourbar.mjcf.document import write_mjcf_for
 from fourbar.show import tables
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import balance, crank_rocker
+from tests.support.scenes import balance, crank_rocker, find_angle
 from tests.support.shares import slow_but
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
@@ -282,9 +282,8 @@ def test_a_stroke_that_is_not_commanded_is_found_where_the_column_has_it(
 def test_classify_says_what_turns_and_how_far(show):
     """By the law of cosines where two bars are collinear."""
 
-    def angle(opposite, first, second):
-        cosine = (first**2 + second**2 - opposite**2) / (2.0 * first * second)
-        return degrees(acos(cosine))
+    def angle(*sides):
+        return degrees(find_angle(*sides))
 
     d, a, b, c = map(float, LENGTHS)
     text = show("classify", *LENGTHS)
@@ -669,7 +668,7 @@ def test_the_greatest_output_angle_and_a_printed_time_are_positions(show):
     lengths = '{ ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }'
     motion = '{ theta_2 = "60 deg", omega_2 = "60 rpm" }'
     Path("scene.toml").write_text(f"lengths = {lengths}\nmotion = {motion}")
-    limit = 180.0 - degrees(acos((5**2 + 4.5**2 - 2**2) / (2 * 5 * 4.5)))
+    limit = 180.0 - degrees(find_angle(2.0, 5.0, 4.5))
     out = show("analyze", "scene.toml", "--at", "theta_4=max")
     assert re.search(rf"bar 4 +{limit:.4f} ", out)
     out = show("analyze", CRANK_ROCKER, "--at", "t=0.1 s")

@@ -5,7 +5,7 @@ From an empty scene to a saved file, numbers equal to `analyze`'s.
 
 import json
 import time
-from math import acos, cos, degrees, hypot, remainder, sin
+from math import cos, degrees, hypot, remainder, sin
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from selenium.webdriver.support.ui import Select
 from fourbar.files import loads
 from fourbar_validation.places import MODELS
 from tests.fourbar.edit.test_server import start
+from tests.support.scenes import find_angle
 
 pytestmark = pytest.mark.slow
 
@@ -552,7 +553,7 @@ def test_a_path_stays_as_a_target_with_the_dead_centres_of_both(page, path):
         d, a, b, c = page.value("data.lengths")
         middles = []
         for reach, along in ((b + a, a + 0.5 * b), (b - a, 0.5 * b - a)):
-            angle = acos((d * d + reach * reach - c * c) / (2.0 * d * reach))
+            angle = find_angle(c, d, reach)
             middles.append((along * cos(angle), along * sin(angle)))
         return sorted(middles)
 

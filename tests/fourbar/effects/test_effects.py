@@ -1,7 +1,7 @@
 """The effects' formulas against potentials, exact arithmetic and limiting cases."""
 
 import json
-from math import acos, pi, tau
+from math import pi, tau
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.scene import Command, Scene
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, crank_rocker, find_angle
 
 LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
@@ -123,14 +123,13 @@ def test_breaks_change_their_sign_where_forces_jump_or_bend():
     stated = Table((0.4, 1.0, 1.5), (1.0, 3.0, 2.0))
     load = Load(2, moment=1.0, table=stated)
     places = {f"theta_2 = {corner!r}": [corner] for corner in stated.theta_2}
-    lengths = 0.3, 0.1, 0.25, 0.22
-    d, a, b, c = lengths
+    d, a, b, c = CRANK_ROCKER_LENGTHS
     places["O4"] = [
-        turned + acos((r * r + d * d - c * c) / (2.0 * r * d))
-        for r, turned in ((b + a, 0.0), (b - a, pi))
+        find_angle(c, d, b + a),
+        find_angle(c, d, b - a) + pi,
     ]
     friction = Friction.at(O4=0.1)
-    scene = Scene(uniform(*lengths), loads=(load,), effects=(friction,))
+    scene = Scene(uniform(*CRANK_ROCKER_LENGTHS), loads=(load,), effects=(friction,))
     angles = np.linspace(0.0, 2.0 * tau, 1009)
     branch = np.ones(len(angles), dtype=np.int8)
     for speed in (3.0, -3.0):

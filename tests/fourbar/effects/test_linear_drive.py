@@ -31,7 +31,7 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, PARALLELOGRAM, crank_rocker
 from tests.support.texts import LINE_DRIVEN
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
@@ -39,7 +39,6 @@ BARS = 10.0
 """Of an error bar, 0.64 standard deviations wide: 2 in ten billion normal errors are
 beyond.
 """
-WIDE = (0.3, 0.1, 0.25, 0.22)
 
 
 def ends(start_bar, end_bar):
@@ -80,16 +79,16 @@ PARALLEL = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
 @pytest.mark.parametrize(
     "lengths, drive, branch, status",
     [
-        (WIDE, CROSSES_O2, 1, ["no_lever", "ok", "no_lever"]),
-        (WIDE, MEETS, 1, ["ok", "no_direction", "ok"]),
-        ((0.3, 0.1, 0.3, 0.1), PARALLEL, 1, ["no_lever"] * 3),
-        ((0.3, 0.1, 0.3, 0.1), PARALLEL, -1, ["ok"] * 3),
+        (CRANK_ROCKER_LENGTHS, CROSSES_O2, 1, ["no_lever", "ok", "no_lever"]),
+        (CRANK_ROCKER_LENGTHS, MEETS, 1, ["ok", "no_direction", "ok"]),
+        (PARALLELOGRAM, PARALLEL, 1, ["no_lever"] * 3),
+        (PARALLELOGRAM, PARALLEL, -1, ["ok"] * 3),
     ],
 )
 def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
     lengths, drive, branch, status
 ):
-    angles = [0.0, 0.5, math.pi] if lengths == WIDE else [0.4, 0.5, 1.0]
+    angles = [0.0, 0.5, math.pi] if lengths == CRANK_ROCKER_LENGTHS else [0.4, 0.5, 1.0]
     scene = Scene(uniform(*lengths), Motion(angles, 1.0, branch=branch), drive=drive)
     s = solve(scene, "error")
     assert s.status == status
@@ -123,7 +122,7 @@ def test_ends_that_keep_their_distance_are_refused_in_one_line(ends):
         InputError,
         match=r"^drive\.to = .*does no work",
     ):
-        Scene(uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
+        Scene(uniform(*CRANK_ROCKER_LENGTHS), drive=drive)
 
 
 def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():

@@ -3,7 +3,7 @@
 import pickle
 import re
 from dataclasses import replace
-from math import acos, pi, radians
+from math import pi, radians
 
 import numpy as np
 import pytest
@@ -36,7 +36,13 @@ from fourbar.evaluation.free_motion import release_at
 from fourbar.formulas.mobility import TURN
 from fourbar.scene import Command
 from fourbar_validation.engines.free_body import FreeBody
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    PARALLELOGRAM,
+    bare,
+    crank_rocker,
+    find_angle,
+)
 
 HANGING = replace(crank_rocker().linkage, ground_angle=0.0)
 DOWN = Gravity()
@@ -103,7 +109,7 @@ def test_what_has_no_inertia_at_a_dead_centre_is_named_with_its_place():
     Bars 2 and 3 are in line, and B is at 0.25 m - 0.1 m from O2.
     """
     linkage = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22, 2.0))
-    dead = pi + acos((0.3**2 + 0.15**2 - 0.22**2) / (2.0 * 0.3 * 0.15))
+    dead = pi + find_angle(0.22, 0.3, 0.15)
     falling = let_go(radians(100.0), 0.0, 0.5, 100, DOWN, linkage=linkage)
     with raises(FourBarError, match="give each bar its mass") as stopped:
         release(falling)
@@ -193,7 +199,7 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_dry_friction_slows_a_flywheel_evenly_until_it_stands(sense):
     """Bars without mass: J alpha = -f, and rest after 0.5 s."""
-    linkage, times = bare(0.3, 0.1, 0.25, 0.22), np.linspace(0.0, 1.0, 11)
+    linkage, times = bare(*CRANK_ROCKER_LENGTHS), np.linspace(0.0, 1.0, 11)
     effects = [Flywheel(0.5), Friction.at(O2=0.4)]
     m = integrate(linkage, effects, 0.3, 0.4 * sense, times)
     left = np.maximum(0.4 - 0.8 * m.time, 0.0)
@@ -217,7 +223,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
 
     All bars are in line at each half turn of the input.
     """
-    linkage = bare(0.3, 0.1, 0.3, 0.1, 0.2)
+    linkage = bare(*PARALLELOGRAM, 0.2)
     for speed in (10.0, -10.0):
         scene = let_go(0.5, speed, 1.5, 6, Flywheel(0.3), linkage=linkage)
         released = release(scene)

@@ -9,7 +9,7 @@ from math import pi, tau
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pytest import approx, raises
 
@@ -29,7 +29,7 @@ from fourbar import (
 )
 from fourbar.files import dump, load, loads, save, scene_text
 from fourbar_validation.places import MODELS
-from tests.fourbar.test_solving import scenes
+from tests.fourbar.test_solving import EXAMPLES, scenes
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -43,9 +43,7 @@ def facts(scene):
     repr tells -0.0 from 0.0.
     """
     motion = scene.motion
-    angles = motion.theta_2
-    if isinstance(angles, np.ndarray):
-        angles = angles.tolist()
+    angles = np.asarray(motion.theta_2).tolist()
     rest = (motion.omega_2, motion.alpha_2, motion.branch, motion.free)
     parts = (scene.linkage, angles, rest, scene.drive_bar, scene.loads, scene.effects)
     return repr(parts), scene.title, scene.source
@@ -90,12 +88,7 @@ TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 
 @pytest.mark.slow
-@settings(
-    max_examples=150,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=list(HealthCheck),
-)
+@EXAMPLES
 @given(scenes(), st.none() | SWEPT | RELEASED, TEXT, TEXT)
 def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
     """Beside listed angles: none at all, a sweep, a limit, and a release."""

@@ -15,7 +15,12 @@ from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import half_angle, loop
 from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, draw_linkage
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    PARALLELOGRAM,
+    bare,
+    draw_linkage,
+)
 
 QUADRUPLES = int(os.environ.get("DRAWINGS", "300"))
 """Linkages near change points that are compared with exact sums; more at night."""
@@ -116,9 +121,9 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths(stated, touches):
 
 
 LINKAGES = [
-    (0.3, 0.1, 0.25, 0.22),
+    CRANK_ROCKER_LENGTHS,
     (0.25, 0.22, 0.3, 0.1),
-    (0.3, 0.1, 0.3, 0.1),  # a parallelogram
+    PARALLELOGRAM,  # a parallelogram
     (0.1, 0.3, 0.3, 0.1),  # kites; with the second A lies on O4 at theta_2 = theta_1
     (0.3, 0.3, 0.2, 0.2),
     (0.2, 0.2, 0.2, 0.2),
@@ -190,7 +195,7 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
 @pytest.mark.parametrize("bar", MOVING_BARS)
 @pytest.mark.parametrize("offset", [None, "1e-3"])
 def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
-    bars, theta = bare(0.3, 0.1, 0.25, 0.22, 0.4), np.linspace(0.1, 6.0, 7)
+    bars, theta = bare(*CRANK_ROCKER_LENGTHS, 0.4), np.linspace(0.1, 6.0, 7)
     path = prepare_path(bars.lengths, 0.4, bar)
     half = path.half_angle(theta)
     remainder = None if offset is None else mp.mpf(offset)

@@ -12,7 +12,7 @@ from pytest import approx
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
-from tests.support.scenes import bare
+from tests.support.scenes import PARALLELOGRAM, bare
 
 EPS = 2.0**-52
 
@@ -31,7 +31,7 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
 
     An antiparallelogram has h4 = -(d - a)/(d + a) and its inverse there.
     """
-    link, theta_2 = bare(0.3, 0.1, 0.3, 0.1), np.array([0.0, 1.0, pi])
+    link, theta_2 = bare(*PARALLELOGRAM), np.array([0.0, 1.0, pi])
     parallel = compute_state(link, theta_2, 1, 2.0, 5.0)
     assert find_singular(parallel.position).tolist() == [True, False, True]
     assert np.array_equal(parallel.omega(4), [2.0, 2.0, 2.0])
@@ -71,7 +71,7 @@ def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit():
 
     So does the angle between them.
     """
-    link = bare(0.3, 0.1, 0.3, 0.1)
+    link = bare(*PARALLELOGRAM)
     position = compute_state(link, np.linspace(0.01, 3.1, 200), 1).position
     assert np.array_equal(position.sin_mu, position.u2.imag)
     assert np.array_equal(dot(position.u3, position.u4), position.u2.real)

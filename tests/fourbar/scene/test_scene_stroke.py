@@ -24,7 +24,7 @@ from fourbar import (
 from fourbar.mjcf import write_mjcf
 from fourbar_lab.stability import compute_reference
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import crank_rocker, recommand
 
 BARS = 10.0
 """Of an error bar, as `stability` allows."""
@@ -83,9 +83,7 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
     s = solve(vary(by_stroke, {"lengths.ground_angle": angles}), "error")
     assert (s.status_code == 0).all()
     for place, stroke in enumerate(strokes):
-        reference = compute_reference(
-            replace(by_stroke, motion=by_stroke.motion.replace(angle=stroke)), 1, stroke
-        )
+        reference = compute_reference(recommand(by_stroke, angle=stroke), 1, stroke)
         exact = reference[0]["drive_force"]
         error = np.array(
             [

@@ -23,7 +23,7 @@ from fourbar.show.acting import list_drawn_notes, list_spring_notes
 from fourbar.solution import DEGREES
 from tests.support.block import read_block
 from tests.support.rows import read_rows
-from tests.support.scenes import bare
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare
 
 HATCH = """
 [lengths]
@@ -226,15 +226,16 @@ def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told
     assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
 
+MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
+ENDS = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
+
+
 @pytest.mark.parametrize("start, stop", [(2.0, 2.0 + tau), (8.0, 2.0)])
 def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
-    ends = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
     length = sqrt(0.1 - 0.06 * cos(pi - 0.2))
-    springs = Springs((Spring(*ends, 1.0, length),))
-    motion = Motion(Sweep(start, stop, 1), 1.0)
-    linkage = bare(0.3, 0.1, 0.25, 0.22)
-    scene = Scene(linkage, motion, effects=(springs,))
+    springs = Springs((Spring(*ENDS, 1.0, length),))
+    scene = Scene(MASSLESS, Motion(Sweep(start, stop, 1), 1.0), effects=(springs,))
     (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     places = [f"theta_2 = {degrees(pi + x):.4g} deg" for x in (-0.2, 0.2)]
     if stop < start:
@@ -245,16 +246,14 @@ def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
 @pytest.mark.slow
 def test_a_spring_pulls_in_a_release_from_between_its_instants():
     """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
-    linkage = bare(0.3, 0.1, 0.25, 0.22)
-    ends = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
     length = sqrt(0.1 - 0.06 * cos(1.1))  # at 1.1 rad
     effects = (
         Flywheel(0.01, 2),
         Torsion((("O2", 1.0, 1.0, 0.0),)),
-        Springs((Spring(*ends, 1e-12, length),)),
+        Springs((Spring(*ENDS, 1e-12, length),)),
     )
     motion = Motion(0.5, 0.0, free=Free(0.3, 3))
-    scene = Scene(linkage, motion, effects=effects)
+    scene = Scene(MASSLESS, motion, effects=effects)
     time = 1e3 * acos(-0.2) / 10.0
     (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     assert f"pulls from t = {time:.4g} ms on" in note

@@ -38,7 +38,7 @@ from fourbar.show.plot import film as films
 from fourbar.show.plot import style, view
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, crank_rocker, thesis
+from tests.support.scenes import PARALLELOGRAM, bare, crank_rocker, thesis
 
 HOSTILE = (
     "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data}"
@@ -94,7 +94,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
 def test_a_single_position_has_the_angles_of_its_solution():
     """The table begins at 0 deg, from where the output of a parallelogram goes on."""
     motion = Motion(radians(200.0), 3.0)
-    scene = crank_rocker(linkage=bare(0.3, 0.1, 0.3, 0.1), motion=motion)
+    scene = crank_rocker(linkage=bare(*PARALLELOGRAM), motion=motion)
     data = animate.collect_page_data(scene, {})
     assert data["branches"]["1"]["theta_4"][data["start"]] == approx(radians(-160.0))
 

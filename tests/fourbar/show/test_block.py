@@ -3,7 +3,7 @@
 import re
 import tomllib
 from dataclasses import replace
-from math import acos, degrees, floor, log10, pi, radians, sqrt, tau
+from math import degrees, floor, log10, pi, radians, sqrt, tau
 
 import numpy as np
 import pytest
@@ -45,10 +45,19 @@ from fourbar.show.summary import Facts
 from fourbar.show.tables import write_cells
 from fourbar.solving import find_last_stage
 from tests.support.block import read_block
-from tests.support.scenes import CYLINDER, balanced_lamp, bare, crank_rocker, thesis
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    CYLINDER,
+    PARALLELOGRAM,
+    balanced_lamp,
+    bare,
+    crank_rocker,
+    find_angle,
+    thesis,
+)
 from tests.support.shares import slow_but
 
-MASSLESS = bare(0.3, 0.1, 0.25, 0.22)
+MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
 
 WEIGHT = (Gravity(),)
 
@@ -69,13 +78,8 @@ def write(angle):
     return f"{degrees(angle):.4g} deg"
 
 
-def opposite(side, first, second):
-    return acos((first**2 + second**2 - side**2) / (2.0 * first * second))
-
-
-PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 LIMITED = (0.3, 0.4, 0.2, 0.25)
-LIMIT = opposite(0.45, 0.3, 0.4)
+LIMIT = find_angle(0.45, 0.3, 0.4)
 OF_THESIS = limit_positions(thesis().linkage)
 FIRST, SECOND = (write(x) for x in sorted(x.theta_2 % tau for x in OF_THESIS))
 FILES = tomllib.loads("""
@@ -607,9 +611,7 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     """The ends lie as far from O2, or the ground's end is on the path of the other,
     which passes it at theta_2 = 40 deg.
     """
-    scene = move(
-        (0.3, 0.1, 0.25, 0.22), WEIGHT, theta_2=Sweep(1.0, 2.0, 10), omega_2=0.0
-    )
+    scene = move(CRANK_ROCKER_LENGTHS, WEIGHT, theta_2=Sweep(1.0, 2.0, 10), omega_2=0.0)
     ground = Place(1, (0.1, -1.5))
     if bar == 3:
         met = solve(replace(scene, motion=Motion(radians(40.0))))
@@ -625,9 +627,9 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
 @pytest.mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))
 def test_digits_left_are_those_that_the_error_bar_leaves(away):
     """A torque on bar 4 beside its dead centre, where bars 2 and 3 are in line."""
-    stretched = opposite(0.22, 0.3, 0.35)
+    stretched = find_angle(0.22, 0.3, 0.35)
     motion = {"theta_2": stretched + away, "omega_2": 3.0}
-    scene = replace(move((0.3, 0.1, 0.25, 0.22), WEIGHT, **motion), drive_bar=4)
+    scene = replace(move(CRANK_ROCKER_LENGTHS, WEIGHT, **motion), drive_bar=4)
     s = solve(scene, "error")
     digits = floor(log10(abs(s.torque[0]) / s.torque_error[0]))
     assert (digits < 8) == (away < 1e-8)

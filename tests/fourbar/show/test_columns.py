@@ -28,7 +28,7 @@ from fourbar.show.tables import print_positions
 from fourbar.solution import DEGREES
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import TURN
+from tests.support.scenes import TURN, recommand
 
 
 def columns(scene, names):
@@ -78,7 +78,7 @@ def test_an_unknown_column_is_refused_with_those_there_are(name, says):
 
 
 def test_a_column_that_needs_a_speed_says_so():
-    still = replace(TURN, motion=TURN.motion.replace(speed=None))
+    still = recommand(TURN, speed=None)
     for name in ("shaking_moment", "torque", "omega_4", "a_P_y", "F12/F14"):
         with raises(InputError, match='"0 rad/s" gives the static torque'):
             columns(still, name)
@@ -101,7 +101,7 @@ def test_a_steady_command_of_another_bar_or_a_stroke_has_a_time():
     with raises(InputError, match="no one speed"):
         columns(replace(TURN, motion=growing), "time")
     cylinder = load(MODELS / "capabilities/stroke_input.toml")
-    steady = replace(cylinder, motion=cylinder.motion.replace(acceleration=0.0))
+    steady = recommand(cylinder, acceleration=0.0)
     with raises(InputError, match="no one speed"):
         columns(cylinder, "time")
     time = columns(steady, "time")["time"]
@@ -136,7 +136,7 @@ ROUND_OFF = 1e-13
 @pytest.mark.parametrize("speed", [TURN.motion.speed, None])
 def test_ratios_and_centres_are_those_of_the_formulas(speed):
     """From the pins and from the half-angle formulas."""
-    scene = replace(TURN, motion=TURN.motion.replace(speed=speed))
+    scene = recommand(TURN, speed=speed)
     s = solve(scene)
     state = compute_state(scene.linkage, s.theta_2, s.branch)
     for name, values in {

@@ -29,7 +29,7 @@ from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
 from fourbar.studies.passing import join_commands
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import bare, crank_rocker, find_angle
 
 LOCATED = 1e-11
 """rad or s: a place is located to round-off, times the slope of what is asked for."""
@@ -300,7 +300,7 @@ def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
         'output = "25 mm"\n[motion]\ntheta_2 = '
     )
     scene = loads(lengths + '{ from = "30 deg", to = "170 deg", steps = 20 }')
-    limit = acos((50**2 + 20**2 - 65**2) / (2 * 50 * 20))
+    limit = find_angle(65, 50, 20)
     place = limit - radians(0.001)
     at = solve(loads(f'{lengths}"{place!r} rad"'))
     found = locate(scene, "transmission", f"{float(asin(at.sin_mu[0]))!r} rad")

@@ -30,7 +30,7 @@ from fourbar.show.located import locate
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import COMMON, units
 from fourbar.studies import course
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, crank_rocker
 from tests.support.shares import slow_but
 from tests.support.texts import PLIERS
 
@@ -182,7 +182,7 @@ def test_a_motion_that_begins_or_stands_still_has_no_limit(motion):
 
 def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     """At the limit of bar 4 its speed is zero; a whole turn later the angle is 2 pi."""
-    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(None, 10.0))
+    scene = Scene(uniform(*CRANK_ROCKER_LENGTHS), Motion(None, 10.0))
     at_limit = locate(scene, "theta_4", "max")
     rows = PositionSheet(solve(scene, at=at_limit), units("N m")).write_bars()
     assert abs(solve(scene, at=at_limit).omega_4[0]) > 0.0

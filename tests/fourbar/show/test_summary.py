@@ -33,7 +33,7 @@ from fourbar.show.motion_curves import acts
 from fourbar.show.summary import Facts
 from fourbar.studies.internal_forces import largest_bending
 from fourbar_validation.places import MODELS
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare, crank_rocker
 from tests.support.shares import slow_but
 
 NODES, WEIGHTS = leggauss(600)
@@ -221,7 +221,7 @@ def check_loads(facts, sizes, weights):
 def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones():
     """Nothing acts but one force, so that everything is in proportion to it."""
     linkage, motion = (
-        bare(0.3, 0.1, 0.25, 0.22),
+        bare(*CRANK_ROCKER_LENGTHS),
         Motion(Sweep(0.1, 0.1 + tau, 12), 10.0),
     )
     small, huge = (

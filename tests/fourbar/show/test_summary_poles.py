@@ -3,7 +3,7 @@ of the sweep.
 """
 
 from dataclasses import replace
-from math import acos, atan2, degrees, hypot, pi, radians, sin, tau
+from math import atan2, degrees, hypot, pi, radians, sin, tau
 
 import numpy as np
 import pytest
@@ -32,7 +32,13 @@ from fourbar.show.duty import list_duty
 from fourbar_validation.places import MODELS
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.block import read_block
-from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    CYLINDER,
+    PARALLELOGRAM,
+    crank_rocker,
+    find_angle,
+)
 from tests.support.shares import slow_but
 
 LOCATED = 1e-6
@@ -45,12 +51,6 @@ PEAK = 1e-9
 """Relative, of a largest value: a panel settles to that."""
 
 
-CRANK_ROCKER = (0.3, 0.1, 0.25, 0.22)
-
-
-PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
-
-
 def sweep(lengths, start, stop, bar=2, **parts):
     """Make a scene of bars of 1 kg/m under gravity, between two angles of a bar."""
     rates = {f"theta_{bar}": Sweep(start, stop, 20), f"omega_{bar}": 10.0}
@@ -60,11 +60,6 @@ def sweep(lengths, start, stop, bar=2, **parts):
 
 def find_facts(scene):
     return summary.Facts(solve(scene))
-
-
-def find_angle(side, first, second):
-    """Return the angle between two sides of a triangle, opposite to the third."""
-    return acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 CLAMP = loads("""
@@ -109,10 +104,12 @@ RUBBING = PinFriction.at(O4=(0.12, 0.006)), Gravity()
 
 POLES = {
     "cylinder in line with the crank": (
-        crank_rocker(motion=sweep(CRANK_ROCKER, 0.1, 0.1 + tau).motion, drive=CYLINDER),
+        crank_rocker(
+            motion=sweep(CRANK_ROCKER_LENGTHS, 0.1, 0.1 + tau).motion, drive=CYLINDER
+        ),
         [IN_LINE + pi, IN_LINE + tau],
     ),
-    "torque on the output": (sweep(CRANK_ROCKER, 0.0, tau, drive_bar=4), DEAD),
+    "torque on the output": (sweep(CRANK_ROCKER_LENGTHS, 0.0, tau, drive_bar=4), DEAD),
     "change points": (sweep(PARALLELOGRAM, 5.0, 5.0 + tau), [tau, 3 * pi]),
     "change points, backwards": (sweep(PARALLELOGRAM, 6.3, 0.5), [tau, pi]),
     "change point of the output": (
@@ -126,7 +123,7 @@ POLES = {
         [0.0],
     ),
     "cylinder where friction reverses": (DIGGER, [brentq(find_stroke_speed, 0.8, 1.0)]),
-    "limits of the output": (sweep(CRANK_ROCKER, 1.5, 3.5, 4), LIMITS),
+    "limits of the output": (sweep(CRANK_ROCKER_LENGTHS, 1.5, 3.5, 4), LIMITS),
     "toggle clamp that stops before": (CLAMP, []),
     "toggle clamp that goes beyond": (replace(CLAMP, motion=BEYOND), [CLAMPED]),
 }

@@ -29,6 +29,7 @@ from fourbar.show.studies import write_sensitivity
 from fourbar.studies.keys import list_entries, read_place
 from fourbar_validation.places import MODELS
 from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
+from tests.support.scenes import PARALLELOGRAM, find_angle
 
 EXACT = 1e-10
 """Of the derivative, or of what the quantity would change by if it were proportional to
@@ -55,7 +56,7 @@ def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
 
 def test_where_there_is_no_derivative_a_status_says_why():
     d, a, b, c = LINK.lengths
-    in_line = np.arccos(((a + b) ** 2 + d * d - c * c) / (2.0 * d * (a + b)))
+    in_line = find_angle(c, d, a + b)
     stops = sensitivity(
         scene((Friction.at(O4=0.05),), theta_2=LINK.ground_angle + in_line)
     )
@@ -117,9 +118,6 @@ def differ_by_a_study(nominal, key, name="theta_3"):
     beside = {key: np.array([number - step, number + step])}
     below, above = solve(vary(nominal, beside))[name]
     return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
-
-
-PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 
 
 KITE = (0.3, 0.1, 0.1, 0.3)

@@ -41,7 +41,12 @@ from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar_validation.places import MODELS
-from tests.support.scenes import balanced_lamp, bare
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    balanced_lamp,
+    bare,
+    recommand,
+)
 from tests.support.shares import slow_but
 
 TURN = 2.0 * pi
@@ -92,9 +97,7 @@ TOP = pi / 2 + 0.1
 SPRING = Springs((Spring(Place(1, (0.3, 1.0)), Place(2, (0.1, 0.0)), 100.0),))
 
 
-WITHOUT_MASS = replace(
-    crank_as_pendulum(SPRING), linkage=bare(0.3, 0.1, 0.25, 0.22, 0.0)
-)
+WITHOUT_MASS = replace(crank_as_pendulum(SPRING), linkage=bare(*CRANK_ROCKER_LENGTHS))
 
 
 HANGS = ("stable", AT_REST, -FALLS, J)
@@ -295,7 +298,7 @@ def test_what_is_balanced_is_indifferent_over_all_that_it_reaches():
     hanging = crank_as_pendulum(DOWN)
     centred = replace(hanging.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0)))
     square = load(MODELS / "textbook/gtdynamics_square.toml")
-    crossed = replace(square, motion=square.motion.replace(branch=-1))
+    crossed = recommand(square, branch=-1)
     assert not equilibrium(square).indifferent
     lamp = equilibrium(balanced_lamp())
     assert not re.search(r"\de-|largest", write_equilibria("lamp", lamp))

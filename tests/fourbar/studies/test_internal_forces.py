@@ -24,7 +24,7 @@ from fourbar import (
     solve,
 )
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare, crank_rocker
 
 ROUNDED = 1e-12
 """Relative to the sum of the terms: some tens of roundings and a division by sin mu,
@@ -32,7 +32,7 @@ which is above 0.6 here.
 """
 
 
-BARE = bare(0.3, 0.1, 0.25, 0.22)
+BARE = bare(*CRANK_ROCKER_LENGTHS)
 
 
 AT = Motion(1.0, 0.0)

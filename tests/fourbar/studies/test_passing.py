@@ -5,7 +5,7 @@ Solved back, of every kind of motion.
 
 import re
 from dataclasses import replace
-from math import acos, cos, pi, radians, sqrt
+from math import cos, pi, radians, sqrt
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ from fourbar.studies.passing import (
 )
 from fourbar_validation.places import MODELS
 from tests.support.block import read_block
-from tests.support.scenes import bare, crank_rocker, thesis
+from tests.support.scenes import bare, crank_rocker, find_angle, recommand, thesis
 
 LOCATED = 1e-12
 """rad, m or s: a place is found to its last digits, and solved back with a few
@@ -82,8 +82,8 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
     d, a, b, c = scene.linkage.lengths
     theta_1 = scene.linkage.ground_angle
     reach = b + side * a
-    at_O2 = acos((d**2 + reach**2 - c**2) / (2.0 * d * reach))
-    at_O4 = acos((d**2 + c**2 - reach**2) / (2.0 * d * c))
+    at_O2 = find_angle(c, d, reach)
+    at_O4 = find_angle(reach, d, c)
     found = find_positions(scene, "theta_4", theta_1 + pi - at_O4 + beside)
     theta_2 = theta_1 + at_O2 + (0.0 if side > 0.0 else pi)
     assert found.angle == approx([theta_2], abs=AT_LIMIT)
@@ -154,7 +154,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     From the line of the cylinder's ground pin bar 2 turns clockwise to the one limit
     and anticlockwise, by the rest of a turn, to the other.
     """
-    limit = acos((7.0**2 + 2.0**2 - 8.5**2) / 28.0)
+    limit = find_angle(8.5, 7.0, 2.0)
     from_line = radians(60.0)
     first, last = (
         sqrt(3.0**2 + 1.0 - 6.0 * cos(limit + away)) for away in (-from_line, from_line)
@@ -170,7 +170,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
         with raises(NotAssembledError) as raised:
             equilibrium(scene)
         assert str(raised.value) == said
-    other = replace(scene, motion=scene.motion.replace(side="left"))
+    other = recommand(scene, side="left")
     assert say_range(other) == "this cylinder can have 0.0508 to 0.1016 m"
     narrow = ROCKER_WITH_RAM.replace('"7 in"', '"10.3 in"').replace("-60 deg", "90 deg")
     none = loads(narrow.replace('"right"', '"left"'))

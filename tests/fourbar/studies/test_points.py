@@ -1,12 +1,10 @@
 """Instant centres and coupler curves of scenes and solutions."""
 
-from dataclasses import replace
-
 import numpy as np
 from pytest import raises
 
 from fourbar import InputError, coupler_curve, instant_centres, solve
-from tests.support.scenes import TURN
+from tests.support.scenes import TURN, recommand
 
 
 def test_centres_of_a_scene_and_of_its_solution_are_those_of_its_linkage():
@@ -23,7 +21,7 @@ def test_a_coupler_curve_of_a_scene_passes_through_its_point():
     path = solve(TURN).points["P"]
     away = np.hypot(curve.x[:, None] - path[:, 0], curve.y[:, None] - path[:, 1])
     assert away.min(axis=0).max() < 1e-4
-    crossed = replace(TURN, motion=TURN.motion.replace(branch=-1))
+    crossed = recommand(TURN, branch=-1)
     other = coupler_curve(solve(crossed), "P", steps=400)
     assert set(other.branch) == {-1} and set(curve.branch) == {1}
     with raises(InputError, match="must be a point of the coupler: P"):

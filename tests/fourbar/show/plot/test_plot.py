@@ -44,7 +44,13 @@ from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import CYLINDER, crank_rocker, thesis
+from tests.support.scenes import (
+    CYLINDER,
+    PARALLELOGRAM,
+    crank_rocker,
+    recommand,
+    thesis,
+)
 from tests.support.shares import slow_but
 from tests.support.texts import EVERYTHING
 
@@ -366,7 +372,7 @@ def test_free_bodies_balance(drive):
 )
 def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, position):
     """Bar 4 hangs between two pins at 60 deg: its moment is m g cos 60 deg c/8."""
-    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    linkage = fourbar.uniform(*PARALLELOGRAM)
     scene = fourbar.Scene(linkage, Motion(angle, 0.0), effects=(Gravity(),))
     figure = composed(scene, "bars", position=position)
     words = " ".join(figure.subfigs[0].get_supxlabel().split())
@@ -435,7 +441,7 @@ def test_a_pole_is_dotted_where_it_is_and_what_grows_has_no_ring(
 def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     scene = crank_rocker()
     if turned:  # speed changes sign, and so does the angle at which friction acts
-        scene = replace(scene, motion=scene.motion.replace(speed=-10.0))
+        scene = recommand(scene, speed=-10.0)
     torque = 1e3 * solved(scene).torque
     peak = torque[np.abs(torque).argmax()]
     figure = composed(scene, "torque")
